@@ -14,6 +14,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from errand_spot.server.calls import service_calls
+from errand_spot.server.server import LISTED, MOTIONS, SERVICES
 from executive.app.scenarios import ScenarioFile
 from executive.mission.json_schema import mission_json_schema
 from executive.testing.skill_test import SkillTestFile
@@ -21,8 +23,6 @@ from executive.tree.port_values import describe_type, field_types
 from executive.tree.registry import built_in_skills
 from executive.words.knowledge import Knowledge
 from executive.words.mission import Mission
-from plant.spot_api.server.calls import service_calls
-from plant.spot_api.server.server import LISTED, MOTIONS, SERVICES
 from plant.worlds.world import SeedRules
 from skills.api import Skill
 from skills.durations import DURATION_PATTERN

@@ -22,7 +22,7 @@ from executive.cli.number_options import quantity_option
 from executive.mission.request import Request, parse_start
 from executive.words.forms import Option
 from executive.words.forms import OptionGroup as Group
-from skills.quantities import Margin, Port, Wait, quantity_of
+from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
 
 _START, _FOXGLOVE = "--start", "--foxglove"
@@ -55,31 +55,11 @@ VIEW_PORT = Annotated[int, quantity_option(Port, help="Port of the page; 0 takes
 
 ROBOT = Annotated[
     str | None,
-    grouped(Group.SPOT, "--robot", metavar="spot://HOST[:PORT]", help="Drive this robot, in the map of --world."),
-]
-USER = Annotated[str | None, grouped(Group.SPOT, "--user", help="User; by default $BOSDYN_CLIENT_USERNAME.")]
-CERTIFICATE = Annotated[
-    Path | None, grouped(Group.SPOT, "--certificate", help="Certificate of a server; by default the SDK's own.")
-]
-POWER_ON = Annotated[bool, grouped(Group.SPOT, "--power-on", help="Switch the motors on, and off at the end.")]
-TAKE = Annotated[bool, grouped(Group.SPOT, "--take", help="Take the lease from its holder, after a typed yes.")]
-
-
-class EstopHolder(enum.StrEnum):
-    """Holder of the E-stop during a run: a person's device, or this program."""
-
-    TABLET = "tablet"
-    OWN = "own"
-
-
-ESTOP = Annotated[
-    EstopHolder,
-    grouped(Group.SPOT, "--estop", help="Who holds the E-stop; own replaces the tablet's, after a typed yes."),
-]
-PADDING = Annotated[
-    float | None,
-    quantity_option(
-        Margin, "--padding", help="Distance, m, that the robot keeps from obstacles by itself.", group=Group.SPOT
+    grouped(
+        Group.ROBOTS,
+        "--robot",
+        metavar="ADDRESS[?OPTION=VALUE&...]",
+        help="Drive a real robot in the map of --world, such as spot://HOST?power_on=yes; needs its plug-in.",
     ),
 ]
 FOXGLOVE = Annotated[

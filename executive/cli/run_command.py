@@ -14,20 +14,13 @@ import typer
 from executive.cli.options import (
     ANYWAY,
     AS_JSON,
-    CERTIFICATE,
-    ESTOP,
     FOXGLOVE,
-    PADDING,
-    POWER_ON,
     QUIET,
     ROBOT,
     STORE,
-    TAKE,
-    USER,
     VIEW,
     VIEW_FOR,
     VIEW_PORT,
-    EstopHolder,
     grouped,
     takes_request,
 )
@@ -64,21 +57,15 @@ def run(
     view_port: VIEW_PORT = 0,
     foxglove: FOXGLOVE = None,
     robot: ROBOT = None,
-    user: USER = None,
-    certificate: CERTIFICATE = None,
-    power_on: POWER_ON = False,
-    take: TAKE = False,
-    estop: ESTOP = EstopHolder.TABLET,
-    padding: PADDING = None,
 ) -> None:
-    """Runs a sentence or a mission file in the simulated world, or with a real Spot."""
+    """Runs a sentence or a mission file in the simulated world, or with a real robot."""
     refuse_unaddressed(request)
     from executive.app.checker import prepare_checked
     from executive.app.page_view import PageView, queue_function
+    from executive.app.real_robot import real_runner
     from executive.app.runs import MissionRuns
     from executive.cli.listen_command import hear_request
     from executive.cli.screen import ConsoleScreen, voice_for
-    from executive.cli.spot_command import connected_spot
     from executive.record.work import Profile
     from executive.store.missions import MissionStore, store_in
     from executive.view.foxglove import serve_live
@@ -97,9 +84,8 @@ def run(
         prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
         page = page_of if view or view_for is not None else None
         screen = ConsoleScreen(console, quiet, whole_tree, voice, page, live, timing)
-        given = robot and (robot, user, certificate, power_on, take, estop, padding)
-        spot = connected_spot(prepared, *given) if given else nullcontext()
-        with MissionStore(kept_in) as missions, missions.claim(), spot as runner:
+        connection = real_runner(prepared, robot) if robot else nullcontext()
+        with MissionStore(kept_in) as missions, missions.claim(), connection as runner:
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
             ended = MissionRuns(missions, screen, run=runner).run(mission, prepared)
     _tell(console, timing, ended.report if as_json else None)

@@ -79,7 +79,6 @@ class OptionGroup(enum.StrEnum):
     REQUEST = "Request"
     WORLD = "World"
     ROBOTS = "Robots"
-    SPOT = "A real Spot"
     DISTURBANCES = "Faults and variations"
     OUTPUT = "Output"
     PAGE = "Live page"

@@ -27,14 +27,14 @@ from bosdyn.client.frame_helpers import get_a_tform_b
 from bosdyn.client.math_helpers import SE2Pose, SE3Pose
 from pydrake.math import RigidTransform
 
+from errand_spot.messages import frame_tree, seconds, transform
+from errand_spot.server.commands import RobotCommandService
+from errand_spot.server.identity import credentials
+from errand_spot.server.server import Options, SpotServer
 from executive.app.placed_robots import only_robot
 from executive.app.simulated import compile_first, simulate
 from executive.app.worlds import open_world
 from plant.simulation import Simulation
-from plant.spot_api.messages import frame_tree, seconds, transform
-from plant.spot_api.server.commands import RobotCommandService
-from plant.spot_api.server.identity import credentials
-from plant.spot_api.server.server import Options, SpotServer
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Pose2D
 from tests.benchmarks.harness import command, show
@@ -239,7 +239,7 @@ def run(program, *, seed=1):
     with judged(seed) as judge:
         server = judge.server
         user = {"BOSDYN_CLIENT_USERNAME": "user", "BOSDYN_CLIENT_PASSWORD": "simulated"}
-        launch = [sys.executable, "-m", "plant.spot_api.launch", str(server.certificate), str(server.port), "real"]
+        launch = [sys.executable, "-m", "errand_spot.launch", str(server.certificate), str(server.port), "real"]
 
         def execute():
             line, environment = [*launch, script, *arguments, "127.0.0.1"], {**os.environ, **user}

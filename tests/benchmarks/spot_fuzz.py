@@ -23,11 +23,11 @@ from bosdyn.api.spot.robot_command_pb2 import MobilityParams
 from google.protobuf import descriptor_pool
 from google.protobuf.message_factory import GetMessageClass
 
-from plant.spot_api.adapter.connection import Address, Connection
-from plant.spot_api.server.calls import service_calls
-from plant.spot_api.server.computer import Motors
-from plant.spot_api.server.identity import credentials
-from plant.spot_api.server.server import SERVICES
+from errand_spot.adapter.connection import Address, Connection
+from errand_spot.server.calls import service_calls
+from errand_spot.server.computer import Motors
+from errand_spot.server.identity import credentials
+from errand_spot.server.server import SERVICES
 from tests.benchmarks.harness import command
 from tests.benchmarks.spot_kills import PASSWORD, USER, server_of
 

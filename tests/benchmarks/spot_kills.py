@@ -23,7 +23,7 @@ import numpy as np
 
 from tests.benchmarks.harness import command, tell, totals
 
-PRELOADED = ["bosdyn.client.keepalive", "bosdyn.client.util", "plant.spot_api.adapter.robot", "skills.testing.robot"]
+PRELOADED = ["bosdyn.client.keepalive", "bosdyn.client.util", "errand_spot.adapter.robot", "skills.testing.robot"]
 USER, PASSWORD = "user", "right"
 STILL_S, FREE_S, OFF_AFTER_S, WAIT_S = 0.3, 6.0, 2.0, 10.0
 DRIVE_S, STILL_M, DRIVES_M = 0.6, 0.02, 0.005
@@ -70,9 +70,9 @@ def sdk_client(port, certificate, number, end_s):
 
 def adapter_client(port, certificate, number, end_s):
     """Drives and moves the arm with the adapter; `end_s` gets the end of each drive (robot's time) first."""
+    from errand_spot.adapter.connection import Address, Connection, WallClock
+    from errand_spot.adapter.robot import ApiRobot
     from plant.robots.spot.kind import spot_capabilities
-    from plant.spot_api.adapter.connection import Address, Connection, WallClock
-    from plant.spot_api.adapter.robot import ApiRobot
     from skills.robot import ArmTrajectory, CommandState
 
     connection = Connection(Address("127.0.0.1", port, Path(certificate)), USER, PASSWORD)
@@ -111,7 +111,7 @@ class Trials:
 
     def run(self, number):
         """Runs a trial; `off` says whether the motors went off by policy, None without one."""
-        from tests.plant.spot_api.proxy import Proxy
+        from proxy import Proxy
 
         client, ending = (sdk_client, adapter_client)[number % 2], ENDINGS[number % 3]
         computer, proxy, end_s = self._server.computer, Proxy(self._server.port), self._context.Value("d", 0.0)
@@ -165,8 +165,8 @@ def _waited(true, most_s=WAIT_S):
 
 
 def server_of(scripted, credentials):
+    from errand_spot.server.server import Options, SpotServer
     from plant.robots.spot.kind import spot_capabilities
-    from plant.spot_api.server.server import Options, SpotServer
     from skills.manipulation.arm.kinematics import arm_model
 
     if scripted:
@@ -201,7 +201,7 @@ def summary(trials):
 
 
 def measure(trials: int = 50, seed: int = 1, scripted: bool = False):
-    from plant.spot_api.server.identity import credentials
+    from errand_spot.server.identity import credentials
 
     with tempfile.TemporaryDirectory() as folder:
         held = credentials(Path(folder))

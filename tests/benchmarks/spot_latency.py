@@ -47,7 +47,7 @@ class Times:
 
 def serve(scripted, folder, port, stopping, results):
     """Serves a robot, and sends the times of its commands and steps at the end."""
-    from plant.spot_api.server.identity import credentials
+    from errand_spot.server.identity import credentials
 
     server = server_of(scripted, credentials(Path(folder)))
     times = Times(server)
@@ -61,7 +61,7 @@ class Client:
     def __init__(self, port, certificate):
         from bosdyn.api import image_pb2, point_cloud_pb2
 
-        from plant.spot_api.adapter.connection import Address, Connection
+        from errand_spot.adapter.connection import Address, Connection
 
         self.connection = Connection(Address("127.0.0.1", port, certificate), USER, PASSWORD)
         self.connection.synchronise()
@@ -149,7 +149,7 @@ def pace(steps, since_s, until_s):
 
 
 def measure(seconds: float = 120.0, scripted: bool = False):
-    from plant.spot_api.server.identity import credentials
+    from errand_spot.server.identity import credentials
 
     context = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory() as folder:

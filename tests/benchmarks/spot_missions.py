@@ -12,18 +12,20 @@ from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
+from lock_step import LockStep
+
+from errand_spot.perception import SpotPerception
+from errand_spot.server.identity import credentials
 from executive.app.goal_conditions import verdict_of
 from executive.app.mission_run import run_request
 from executive.app.placed_robots import robot_stack
 from executive.app.prepare import prepare
-from executive.app.real_spot import ApiBackend
-from executive.app.served_spot import SpotPerception
+from executive.app.real_robot import RealBackend
 from executive.app.simulated import simulate
 from executive.mission.request import Request
-from plant.spot_api.server.identity import credentials
+from skills.robot import ConnectedRobot
 from tests.benchmarks.errand_process import ROOT
 from tests.benchmarks.harness import benchmark
-from tests.plant.spot_api.lock_step import LockStep
 
 MISSIONS = ROOT / "missions"
 SHIPPED = tuple(sorted(file.stem for file in MISSIONS.glob("*.yaml") if file.stem != "two_robots"))
@@ -31,16 +33,16 @@ TIME_OF_DAY = "08:29"
 """Missions that wait for a time begin shortly before it."""
 
 
-class Judged(ApiBackend):
-    """Backend of a real Spot, with the referee of the plant behind the server."""
+class Judged(RealBackend):
+    """Backend of a real robot, with the referee of the plant behind the server."""
 
     def __init__(self, step, simulation, prepared):
         stack = robot_stack(prepared.robots[step.robot.name])
-        super().__init__(step.robot, step, prepared.world, stack, prepared.world.start)
-        self._simulation = simulation
+        super().__init__(ConnectedRobot(step.robot, step), prepared.world, stack, prepared.world.start)
+        self.referee = simulation.referee
 
     def judge(self, tree, result, *, before=(), since_s=0.0):
-        return verdict_of(tree, result, self._simulation.referee.judge, before=before, since_s=since_s)
+        return verdict_of(tree, result, self.referee.judge, before=before, since_s=since_s)
 
 
 def through_api(request, folder, options=lambda _: {}):

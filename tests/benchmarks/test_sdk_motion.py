@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
+pytest.importorskip("bosdyn.client", reason="not installed: pip install errand-spot")
 
 from tests.benchmarks.sdk_motion import EXAMPLES, OWN, PROGRAMS, run
 

@@ -22,7 +22,7 @@ GOLDEN: dict[str, Any] = yaml_beside(__file__, "request_options.yaml")
 NOT_OF_THE_REQUEST = {
     *("--listen", "--json", "--quiet", "--tree", "--profile", "--store", "--anyway", "--voice"),
     *("--view", "--view-for", "--view-port", "--foxglove", "--help"),
-    *("--robot", "--user", "--certificate", "--power-on", "--take", "--estop", "--padding"),
+    "--robot",
 }
 
 

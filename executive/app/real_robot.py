@@ -1,0 +1,149 @@
+"""Runs missions with a real robot, which the backend of a plug-in connects. It has no referee."""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from threading import Event
+from typing import Final
+from urllib.parse import parse_qsl
+
+from yaml import YAMLError
+
+from executive.app.artifacts import Artifacts
+from executive.app.backend import Durable
+from executive.app.goal_conditions import Share
+from executive.app.mission_run import FinishedRun, run_request
+from executive.app.placed_robots import robot_stack
+from executive.app.prepared import Prepared
+from executive.app.signals import ended_by_signals
+from executive.app.simulated import compile_first, run_entry
+from executive.record.work import Profile
+from executive.run.control import Control
+from executive.run.outcome import RobotResult
+from executive.run.visitor import RunEntry, RunVisitor
+from executive.run.worker import ThreadWorker
+from executive.tree.compiler import CompiledTree
+from executive.words.goal import RefereeReport
+from plant.worlds.world import World
+from skills.files.errors import InputError
+from skills.files.yaml_source import scalar_of
+from skills.robot import Clock, ConnectedRobot, Pose2D
+from skills.stack import RobotStack, StackError, robot_backend
+
+_ADDRESS: Final = re.compile(r"(?P<scheme>[a-z][a-z0-9+.-]*)://(?P<place>[^?\s]+)(\?(?P<options>\S*))?")
+
+
+@dataclass
+class RealBackend:
+    """Backend with one connected robot in the map of a world.
+
+    `start` is where the robot stands by what the user says; without it it localises on the whole map.
+    """
+
+    connected: ConnectedRobot
+    world: World
+    stack: RobotStack
+    start: Pose2D | None
+
+    @property
+    def clock(self) -> Clock:
+        """The robot's clock."""
+        return self.connected.clock
+
+    def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
+        """Returns the robot with its estimators, ready; the steps are stored, the world is not.
+
+        Raises InputError for a robot of another name, and for a mission that was interrupted.
+        """
+        robot = self.connected.robot
+        if tree.robot_name != robot.name:
+            raise InputError(f"there is no robot '{tree.robot_name}'", hint=f"known: {robot.name}")
+        if durable is not None and durable.take_up:
+            raise InputError("a mission of a real robot is not resumed", hint="run it again with errand run")
+        entry = run_entry(robot, self.world, tree, self.stack, start=self.start, surely=False)
+        self.connected.make_ready()
+        return replace(entry, real=True)
+
+    def happened(self) -> Sequence[tuple[float, str]]:
+        """Returns nothing: nobody knows what happens around a real robot."""
+        return ()
+
+    def visitors(self, control: Control) -> Sequence[RunVisitor]:
+        """Returns no visitors: people talk to the robot by themselves."""
+        return ()
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Sentences on the robot's sensors."""
+        return self.connected.notes
+
+    def work(self) -> Mapping[str, int]:
+        """Returns no counters."""
+        return {}
+
+    def attach(self, profile: Profile) -> None:
+        """Times nothing."""
+
+    def show_live(self) -> None:
+        """Returns None: there is no scene."""
+
+    def judge(
+        self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
+    ) -> RefereeReport | None:
+        """Returns None: there is no referee."""
+        return None
+
+    def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
+        """Returns None: there is no recording."""
+        return None
+
+
+@contextmanager
+def real_runner(prepared: Prepared, address: str) -> Iterator[Callable[..., FinishedRun]]:
+    """Connects to the robot at an address, and yields a function that runs a mission with it, as `run_request` does.
+
+    The robot localises around the request's start, or without one on the whole map. A signal before the robot is ready
+    raises KeyboardInterrupt. Raises InputError if the address names no robot, or the robot is not ready.
+    """
+    if prepared.several:
+        raise InputError("a real robot runs alone", hint="leave --robots out")
+    found = _ADDRESS.fullmatch(address)
+    if found is None:
+        raise InputError(f"--robot {address[:60]}: is no address", hint="write spot://192.168.80.3, for example")
+    try:
+        given = {key: scalar_of(value) if value else True for key, value in parse_qsl(found["options"] or "", True)}
+        driver = robot_backend(found["scheme"], given)
+    except StackError as error:
+        raise InputError(f"--robot {address[:60]}: {_what(error)}", hint=error.hint) from error
+    except (YAMLError, ValueError) as error:
+        raise InputError(f"--robot {address[:60]}: an option is no value", hint="write ?option=value&option") from error
+    compile_first()
+    logging.getLogger("drake").setLevel(logging.WARNING)
+    start, ready = prepared.request.start, Event()
+
+    def interrupt(_reason: str) -> None:
+        if not ready.is_set():
+            raise KeyboardInterrupt
+
+    with ended_by_signals(interrupt), driver.connect(found["place"], prepared.tree.robot_name) as connected:
+        stack = robot_stack(prepared.robots[connected.robot.name])
+        where = start if isinstance(start, Pose2D) else None
+
+        def make_ready() -> None:
+            connected.make_ready()
+            ready.set()
+
+        made = replace(connected, make_ready=make_ready)
+        backend = RealBackend(made, prepared.world, stack, where)
+        yield partial(run_request, backend=backend, worker=ThreadWorker())
+
+
+def _what(error: StackError) -> str:
+    """Returns what is wrong with an option of an address, with its name."""
+    return f"{error.path[0]}: {error.message}" if error.path else error.message

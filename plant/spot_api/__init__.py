@@ -1,1 +1,0 @@
-"""Boston Dynamics' API of Spot. Needs the extra `spot`; nothing else imports the SDK."""

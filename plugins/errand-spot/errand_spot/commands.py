@@ -1,0 +1,184 @@
+"""`errand serve` serves Spot's API for a simulated robot; `errand sdk` runs a program of the SDK against it."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from threading import Event, Thread
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from executive.cli.number_options import quantity_option
+from executive.cli.output import console_for, writing
+from skills.files.errors import InputError
+from skills.quantities import Port, Seed
+
+if TYPE_CHECKING:
+    from errand_spot.server.server import SpotServer
+    from plant.worlds.world import World
+
+USER: Final = "user"
+PASSWORD: Final = "simulated"  # of a simulator that only this machine reaches
+_FOLDER: Final = "spot-api"
+_SPOT: Final = re.compile(r"spot://(?P<host>[A-Za-z0-9.-]+)(:(?P<port>\d{1,5}))?")
+WORLD = Annotated[str, typer.Option("--world", help="A world by name or folder.")]
+SEED = Annotated[int, quantity_option(Seed, help="Seed of the objects and of all noise.")]
+NO_TABLET = Annotated[
+    bool, typer.Option("--no-tablet", help="No operator's tablet holds a released E-stop: the program brings its own.")
+]
+
+
+class PaceOption(StrEnum):
+    """Driver of the robot's clock."""
+
+    REAL = "real"
+    CLIENT = "client"
+
+
+PACE = Annotated[
+    PaceOption, typer.Option("--pace", help="Wall time, or the client's calls step the robot, which is repeatable.")
+]
+
+GRAPH = Annotated[
+    Path | None, typer.Option("--graph", metavar="FOLDER", help="Writes a GraphNav map of the world there first.")
+]
+
+
+def serve(
+    world: WORLD = "flat",
+    seed: SEED = 1,
+    port: Annotated[int, quantity_option(Port, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
+    no_tablet: NO_TABLET = False,
+    pace: PACE = PaceOption.REAL,
+    graph: GRAPH = None,
+) -> None:
+    """Serves Spot's API for a simulated Spot, until Ctrl-C."""
+    with _server(world, seed, port, pace, tablet=not no_tablet, graph=graph) as server:
+        console = console_for(False)
+        console.print(f"Spot's API: 127.0.0.1:{server.port} (Ctrl-C ends it)\n", markup=False)
+        for name, value in _environment(server).items():
+            console.print(f"export {name}={value}", markup=False)
+        if pace is PaceOption.CLIENT:
+            console.print("\nIt is stepped by calls of errand.Clock/Advance, google.protobuf.Duration -> Timestamp.")
+        try:
+            _drive_clock(server, Event())
+        except KeyboardInterrupt:
+            return
+
+
+sdk = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+@sdk.command(context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False})
+def run_program(
+    script: Annotated[Path, typer.Argument(metavar="SCRIPT", help="A Python program that uses the SDK.")],
+    arguments: Annotated[
+        list[str] | None, typer.Argument(metavar="ARGUMENTS", help="Its arguments; the robot's address is 127.0.0.1.")
+    ] = None,
+    world: WORLD = "flat",
+    seed: SEED = 1,
+    no_tablet: NO_TABLET = False,
+    pace: PACE = PaceOption.REAL,
+    graph: GRAPH = None,
+) -> None:
+    """Runs a program of Spot's SDK, unchanged, with a simulated Spot; exits as the program does."""
+    if not script.is_file():
+        raise InputError(f"{script}: there is no such program", hint="name a Python file, after the options of Errand")
+    with _server(world, seed, 0, pace, tablet=not no_tablet, graph=graph) as server:
+        ended, code = Event(), list[int]()
+
+        def run() -> None:
+            code.append(_run(script, arguments or [], server, pace))
+            ended.set()
+
+        program = Thread(target=run, name="sdk-program", daemon=True)
+        program.start()
+        _drive_clock(server, ended)
+        program.join()
+    raise typer.Exit(code[0])
+
+
+def _drive_clock(server: SpotServer, ended: Event) -> None:
+    """Steps the robot in wall time, or does what clients ask for, until something has ended."""
+    from errand_spot.server.computer import Pace
+
+    (server.computer.run if server.computer.pace is Pace.REAL else server.computer.serve)(ended)
+
+
+def _run(script: Path, arguments: list[str], server: SpotServer, pace: PaceOption) -> int:
+    """Runs a program in a process of its own; returns its exit code."""
+    certificate = _environment(server)["SPOT_CERTIFICATE"]
+    launch = [sys.executable, "-m", "errand_spot.launch", certificate, str(server.port), pace.value]
+    return subprocess.run([*launch, str(script), *arguments], env={**os.environ, **_environment(server)}).returncode
+
+
+def _environment(server: SpotServer) -> dict[str, str]:
+    """Environment variables with which programs and drivers find the server, and log in."""
+    return {
+        "SPOT_IP": "127.0.0.1",
+        "SPOT_PORT": str(server.port),
+        "SPOT_CERTIFICATE": str(server.certificate),
+        "BOSDYN_CLIENT_USERNAME": USER,
+        "BOSDYN_CLIENT_PASSWORD": PASSWORD,
+    }
+
+
+def _write_graph(world: World, folder: Path) -> None:
+    """Writes a GraphNav map of a world. Raises InputError."""
+    from errand_spot.perception import world_map
+    from errand_spot.server.graph_map import write_map
+    from executive.app.placed_robots import DEFAULT_KIND
+
+    with writing(folder, "name another --graph"):
+        write_map(world_map(world, DEFAULT_KIND), folder)
+
+
+@contextmanager
+def _server(
+    world: str, seed: int, port: int, pace: PaceOption, *, tablet: bool, graph: Path | None
+) -> Iterator[SpotServer]:
+    """Builds the simulation with Alice, and serves her. Raises InputError without the SDK or a free port."""
+    from errand_spot.perception import SpotPerception
+    from errand_spot.picking import PointPicker
+    from errand_spot.server.computer import Pace
+    from errand_spot.server.estop import Tablet
+    from errand_spot.server.identity import credentials
+    from errand_spot.server.server import Options, SpotServer
+    from executive.app.placed_robots import only_robot
+    from executive.app.simulated import compile_first, simulate
+    from executive.app.worlds import knowledge_of, open_world
+    from plant.models.catalogue import user_cache
+    from skills.geometry import compose, inverse
+    from skills.manipulation.arm.kinematics import arm_model
+
+    opened = open_world(world)
+    if graph is not None:
+        _write_graph(opened, graph)
+    placed = only_robot("Alice", opened, seed=seed)
+    compile_first()
+    simulation = simulate(opened, {"Alice": placed}, seed=seed, record=False)
+    robot = simulation.robots["Alice"]
+    robot.image(robot.capabilities().cameras[0].source)  # the first picture takes long: the renderer begins
+    options = Options(
+        {USER: PASSWORD},
+        port,
+        pace=Pace(pace.value),
+        tablet=Tablet.TABLET if tablet else Tablet.NONE,
+        picker=PointPicker(robot, simulation.clock),
+        dock_O=None if placed.dock is None else compose(inverse(placed.start), placed.dock),
+        perception=SpotPerception({tag.id: tag.size_m for tag in knowledge_of(opened).known_tags()}),
+    )
+    try:
+        held = credentials(user_cache() / _FOLDER)
+        server = SpotServer(robot, simulation.clock, arm_model(robot.capabilities()), held, options)
+    except OSError as error:
+        raise InputError(str(error), hint="name another --port, or 0 for a free one") from error
+    with server.running():
+        yield server

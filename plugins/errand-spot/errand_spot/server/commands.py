@@ -1,0 +1,358 @@
+"""Power and motion commands of clients: who may, when, and how far each has come."""
+
+from __future__ import annotations
+
+import logging
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass
+from itertools import count
+from threading import Lock
+from typing import Any, Final
+
+from bosdyn.api import (
+    basic_command_pb2,
+    estop_pb2,
+    full_body_command_pb2,
+    lease_pb2,
+    power_pb2,
+    robot_command_pb2,
+)
+
+from errand_spot.messages import InvalidRequestError, seconds, timestamp
+from errand_spot.server import arm, gripper, hand, mobility
+from errand_spot.server.calls import Call, Service
+from errand_spot.server.computer import Computer, Motion, Motors, Snapshot
+from errand_spot.server.identity import DOMAIN, TimeSyncService
+from errand_spot.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
+
+Status = robot_command_pb2.RobotCommandResponse
+Progress = basic_command_pb2.RobotCommandFeedbackStatus
+_LOG: Final = logging.getLogger(__name__)
+_ALL: Final = (MOBILITY, ARM, GRIPPER)
+_REMEMBERED: Final = 1000
+
+
+class PowerService(Service):
+    """Switches the motors on and off."""
+
+    name, type, authority = "power", "bosdyn.api.PowerService", f"power.{DOMAIN}"
+
+    def __init__(self, computer: Computer, leases: LeaseService) -> None:
+        self._computer, self._leases, self._ids = computer, leases, count(1)
+        self._wanted, self._fan_ends_s = dict[int, Motors](), dict[int, float]()
+
+    def PowerCommand(self, request: Any, _call: Call) -> Any:
+        """Takes a command for the motors; the power of the computer, ports and radio cannot be switched."""
+        Response, Request = power_pb2.PowerCommandResponse, power_pb2.PowerCommandRequest
+        used = self._leases.use(request.lease, _ALL)
+        if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
+            return Response(lease_use_result=used, status=power_pb2.STATUS_UNKNOWN)
+        if request.request == Request.REQUEST_ON_MOTORS:
+            if self._computer.estop.level() != estop_pb2.ESTOP_LEVEL_NONE:
+                return Response(lease_use_result=used, status=power_pb2.STATUS_ESTOPPED)
+            if self._computer.snapshot.faults:
+                return Response(lease_use_result=used, status=power_pb2.STATUS_FAULTED)
+            wanted, work = Motors.ON, self._computer.switch_on
+        elif request.request == Request.REQUEST_OFF_MOTORS:
+            wanted, work = Motors.OFF, self._computer.switch_off
+        else:
+            raise InvalidRequestError("request: only the motors can be switched on and off")
+        number = next(self._ids)
+        self._wanted[number] = wanted
+        self._computer.do(work)
+        return Response(lease_use_result=used, status=power_pb2.STATUS_IN_PROGRESS, power_command_id=number)
+
+    def PowerCommandFeedback(self, request: Any, _call: Call) -> Any:
+        """Tells whether a command is done."""
+        Response = power_pb2.PowerCommandFeedbackResponse
+        wanted = self._wanted.get(request.power_command_id)
+        if wanted is None:
+            raise InvalidRequestError(f"power_command_id: there is no command {request.power_command_id}")
+        if self._computer.snapshot.motors is wanted:
+            return Response(status=power_pb2.STATUS_SUCCESS)
+        if wanted is Motors.ON and self._computer.estop.level() != estop_pb2.ESTOP_LEVEL_NONE:
+            return Response(status=power_pb2.STATUS_ESTOPPED)
+        return Response(status=power_pb2.STATUS_IN_PROGRESS)
+
+    def FanPowerCommand(self, request: Any, _call: Call) -> Any:
+        """Takes a command for the fans, of which the simulated robot has none that turn."""
+        Response = power_pb2.FanPowerCommandResponse
+        used = self._leases.use(request.lease, _ALL)
+        if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
+            return Response(lease_use_result=used, status=Response.STATUS_UNKNOWN)
+        lasts_s = seconds(request.duration)
+        if not 0 <= request.percent_power <= 100 or not 0.0 < lasts_s <= mobility.LONGEST_S:
+            raise InvalidRequestError(
+                f"percent_power must be 0 to 100, and duration at most {mobility.LONGEST_S:.0f} s"
+            )
+        number, end_s = next(self._ids), self._computer.now_s() + lasts_s
+        self._fan_ends_s[number] = end_s
+        return Response(
+            lease_use_result=used, status=Response.STATUS_OK, desired_end_time=timestamp(end_s), command_id=number
+        )
+
+    def FanPowerCommandFeedback(self, request: Any, _call: Call) -> Any:
+        """Tells whether the time of a command is over, or a later one has taken its place."""
+        Response, end_s = power_pb2.FanPowerCommandFeedbackResponse, self._fan_ends_s.get(request.command_id)
+        if end_s is None:
+            raise InvalidRequestError(f"command_id: there is no command {request.command_id}")
+        status = Response.STATUS_COMPLETE if self._computer.now_s() >= end_s else Response.STATUS_RUNNING
+        if status == Response.STATUS_RUNNING and request.command_id != max(self._fan_ends_s):
+            status = Response.STATUS_OVERRIDDEN_BY_COMMAND
+        return Response(status=status, desired_end_time=timestamp(end_s))
+
+
+@dataclass(frozen=True)
+class _Commanded:
+    """Motions of a command by part, or the whole-body motion."""
+
+    parts: Mapping[str, Any]
+    whole: Any = None
+
+    def feedback(self) -> Any:
+        """The message of how far the command has come."""
+        made = robot_command_pb2.RobotCommandFeedback()
+        if self.whole is not None:
+            made.full_body_feedback.CopyFrom(self.whole.feedback)
+            return made
+        made.synchronized_feedback.SetInParent()
+        for part, field in (
+            (MOBILITY, "mobility_command_feedback"),
+            (ARM, "arm_command_feedback"),
+            (GRIPPER, "gripper_command_feedback"),
+        ):
+            if part in self.parts:
+                getattr(made.synchronized_feedback, field).CopyFrom(self.parts[part].feedback)
+        return made
+
+
+class RobotCommandService(Service):
+    """Takes commands for the whole robot or its parts, and tells how far they have come."""
+
+    name, type, authority = "robot-command", "bosdyn.api.RobotCommandService", f"command.{DOMAIN}"
+
+    def __init__(self, computer: Computer, leases: LeaseService, clocks: TimeSyncService) -> None:
+        self._computer, self._leases, self._clocks = computer, leases, clocks
+        self._ids, self._lock = count(1), Lock()
+        self._commands: OrderedDict[int, _Commanded] = OrderedDict()
+
+    def RobotCommand(self, request: Any, _call: Call) -> Any:
+        """Starts a command; commands for other parts go on."""
+        parts = _parts_of(request.command)
+        used = self._leases.use(request.lease, parts)
+        if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
+            return Status(lease_use_result=used, status=Status.STATUS_UNKNOWN)
+        status, message, number = Status.STATUS_OK, "", 0
+        try:
+            number = self._start(request)
+        except mobility.RefusedError as refused:
+            status, message = refused.status, str(refused)
+        except InvalidRequestError as invalid:
+            status, message = Status.STATUS_INVALID_REQUEST, str(invalid)
+        return Status(lease_use_result=used, status=status, message=message, robot_command_id=number)
+
+    def RobotCommandFeedback(self, request: Any, _call: Call) -> Any:
+        """Tells how far a command has come."""
+        with self._lock:
+            commanded = self._commands.get(request.robot_command_id)
+        if commanded is None:
+            raise InvalidRequestError(f"robot_command_id: there is no command {request.robot_command_id}")
+        return robot_command_pb2.RobotCommandFeedbackResponse(feedback=commanded.feedback())
+
+    def ClearBehaviorFault(self, request: Any, _call: Call) -> Any:
+        """Answers that there is no such fault: the simulated robot has none."""
+        Response = robot_command_pb2.ClearBehaviorFaultResponse
+        used = self._leases.use(request.lease, _ALL)
+        return Response(lease_use_result=used, status=Response.STATUS_NOT_CLEARED)
+
+    def _start(self, request: Any) -> int:
+        """Starts a command and returns its number. Raises RefusedError or InvalidRequestError."""
+        command, computer = request.command, self._computer
+        snapshot = computer.snapshot
+        whole = _whole_motion(command.full_body_command) if command.HasField("full_body_command") else None
+        if snapshot.motors is not Motors.ON and not isinstance(whole, _PowerOff | _StopAll):
+            raise mobility.RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off")
+        if whole is None and computer.docked() and _leaves_dock(command.synchronized_command):
+            raise mobility.RefusedError(Status.STATUS_DOCKED, "the robot is docked: undock it first")
+        parts: Mapping[str, Any] = {}
+        if whole is None:
+            if _has_end_time(command) and not self._clocks.knows(request.clock_identifier):
+                raise mobility.RefusedError(Status.STATUS_NO_TIMESYNC, "the client has not synchronised its clock")
+            parts = self._motions(command.synchronized_command, snapshot)
+        commanded = _Commanded(parts, whole)
+        with self._lock:
+            number = next(self._ids)
+            self._commands[number] = commanded
+            while len(self._commands) > _REMEMBERED:
+                self._commands.popitem(last=False)
+        begun = computer.do(lambda: computer.move(parts) if whole is None else whole.begin_alone(computer))
+        begun.add_done_callback(_log_failure)
+        return number
+
+    def _motions(self, command: Any, snapshot: Snapshot) -> Mapping[str, Motion]:
+        """Motions of a synchronised command by part."""
+        made: dict[str, Motion] = {}
+        now_s = self._computer.now_s()
+        if command.HasField("mobility_command"):
+            made[MOBILITY] = _base_motion(command.mobility_command, self._computer, snapshot, now_s)
+        if command.HasField("arm_command"):
+            if self._computer.solver is None:
+                raise mobility.unsupported("arm_command of a robot without an arm")
+            made[ARM] = _arm_motion(command.arm_command, self._computer, snapshot, now_s)
+        if command.HasField("gripper_command"):
+            can = self._computer.capabilities.gripper
+            if can is None:
+                raise mobility.unsupported("gripper_command of a robot without a gripper")
+            request = command.gripper_command.claw_gripper_command
+            made[GRIPPER] = gripper.Claw(request, can.widest, can.max_force_n)
+        if not made:
+            raise InvalidRequestError("command: it names no part of the robot")
+        return made
+
+
+def _log_failure(begun: Future[None]) -> None:
+    """Logs the error of a command that could not begin, which no client waits for."""
+    if (error := begun.exception()) is not None:
+        _LOG.error("a command could not begin", exc_info=error)
+
+
+def _parts_of(command: Any) -> tuple[str, ...]:
+    """The smallest parts that a command moves."""
+    if command.HasField("full_body_command"):
+        return _ALL
+    named = command.synchronized_command
+    fields = {MOBILITY: "mobility_command", ARM: "arm_command", GRIPPER: "gripper_command"}
+    return tuple(part for part, field in fields.items() if named.HasField(field)) or _ALL
+
+
+def _has_end_time(command: Any) -> bool:
+    """Returns whether a command says a time on the robot's clock."""
+    named = command.synchronized_command
+    base = named.mobility_command
+    which = base.WhichOneof("command")
+    ends = ("se2_velocity_request", "se2_trajectory_request", "stance_request")
+    return which in ends or named.arm_command.HasField("arm_velocity_command")
+
+
+def _leaves_dock(command: Any) -> bool:
+    """Returns whether a command would move a robot that is docked."""
+    stays = (None, "sit_request", "stop_request", "freeze_request")
+    return command.HasField("arm_command") or command.mobility_command.WhichOneof("command") not in stays
+
+
+def _base_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: float) -> mobility.BaseMotion:
+    """Motion of the base."""
+    params, which = mobility.mobility_params(request), request.WhichOneof("command")
+
+    def velocity() -> mobility.BaseMotion:
+        given = request.se2_velocity_request
+        return mobility.Velocity(given, params, mobility.end_of(given, now_s, "se2_velocity_request"))
+
+    def trajectory() -> mobility.BaseMotion:
+        given = request.se2_trajectory_request
+        end_s = mobility.end_of(given, now_s, "se2_trajectory_request")
+        return mobility.Trajectory(given, params, end_s, snapshot)
+
+    def stance() -> mobility.BaseMotion:
+        mobility.end_of(request.stance_request, now_s, "stance_request")
+        return mobility.Halt("stance_feedback")
+
+    made: dict[str, Callable[[], mobility.BaseMotion]] = {
+        "stand_request": lambda: mobility.Stand(*mobility.posture(params, computer)),
+        "sit_request": mobility.Sit,
+        "se2_velocity_request": velocity,
+        "se2_trajectory_request": trajectory,
+        "stance_request": stance,
+        "follow_arm_request": lambda: hand.FollowArm(request.follow_arm_request),
+        "stop_request": lambda: mobility.Halt("stop_feedback"),
+        "freeze_request": lambda: mobility.Halt("freeze_feedback"),
+    }
+    if which not in made:
+        raise mobility.unsupported(f"mobility_command: {which or 'no command'}")
+    return made[which]()
+
+
+def _arm_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: float) -> arm.ArmMotion:
+    """Motion of the arm."""
+    which = request.WhichOneof("command")
+
+    def velocity() -> arm.ArmMotion:
+        given = request.arm_velocity_command
+        return hand.Moving(given, snapshot, mobility.end_of(given, now_s, "arm_velocity_command"))
+
+    made: dict[str, Callable[[], arm.ArmMotion]] = {
+        "arm_joint_move_command": lambda: arm.JointMove(
+            request.arm_joint_move_command, computer.arm_rad(snapshot.joints), now_s
+        ),
+        "named_arm_position_command": lambda: arm.Named(request.named_arm_position_command),
+        "arm_cartesian_command": lambda: hand.Cartesian(request.arm_cartesian_command, snapshot, now_s),
+        "arm_gaze_command": lambda: hand.Gaze(request.arm_gaze_command, snapshot),
+        "arm_velocity_command": velocity,
+        "arm_stop_command": arm.ArmHalt,
+    }
+    if which not in made:
+        raise mobility.unsupported(f"arm_command: {which or 'no command'}")
+    return made[which]()
+
+
+class _Whole:
+    """Command of the whole body."""
+
+    def __init__(self, feedback: Any) -> None:
+        self.feedback = feedback
+        feedback.status = Progress.STATUS_PROCESSING
+
+    def begin_alone(self, computer: Computer) -> None:
+        """Starts it in place of all motions."""
+        computer.stop_parts(_ALL)
+
+
+class _StopAll(_Whole):
+    """Stops, freezes, or rights itself."""
+
+
+class _PowerOff(_Whole):
+    """Sits down and switches the motors off."""
+
+    def begin_alone(self, computer: Computer) -> None:
+        """Starts to settle."""
+        computer.stop_parts(_ALL)
+        computer.settle()
+        computer.move({MOBILITY: self})
+
+    def begin(self, computer: Computer) -> None:
+        """Does nothing more."""
+
+    def tick(self, computer: Computer) -> None:
+        """Reports whether the motors are off."""
+        self._report(off=computer.motors is Motors.OFF)
+
+    def end(self, _status: int) -> None:
+        """Ends with the motors: they end all motions when they are switched off."""
+        self._report(off=True)
+
+    def _report(self, *, off: bool) -> None:
+        made, part = full_body_command_pb2.FullBodyCommand.Feedback(), basic_command_pb2.SafePowerOffCommand.Feedback
+        made.status = Progress.STATUS_PROCESSING
+        made.safe_power_off_feedback.status = part.STATUS_POWERED_OFF if off else part.STATUS_IN_PROGRESS
+        self.feedback = made
+
+
+def _whole_motion(request: Any) -> _Whole:
+    """Motion of the whole body. Raises RefusedError."""
+    made, which = full_body_command_pb2.FullBodyCommand.Feedback(), request.WhichOneof("command")
+    if which == "stop_request":
+        made.stop_feedback.SetInParent()
+        return _StopAll(made)
+    if which == "freeze_request":
+        made.freeze_feedback.SetInParent()
+        return _StopAll(made)
+    if which == "selfright_request":
+        made.selfright_feedback.status = basic_command_pb2.SelfRightCommand.Feedback.STATUS_COMPLETED
+        return _StopAll(made)
+    if which == "safe_power_off_request":
+        made.safe_power_off_feedback.status = basic_command_pb2.SafePowerOffCommand.Feedback.STATUS_IN_PROGRESS
+        return _PowerOff(made)
+    raise mobility.unsupported(f"full_body_command: {which or 'no command'}")

@@ -1,0 +1,320 @@
+"""Motions of the hand in space: straight from pose to pose, gaze at a point, velocities."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from bosdyn.api import arm_command_pb2
+from pydrake.common.eigen_geometry import AngleAxis
+from pydrake.math import RigidTransform, RotationMatrix
+from scipy.spatial.transform import Rotation
+
+from errand_spot.messages import finite, points_of, seconds, transform, vector
+from errand_spot.server.arm import USUAL_RAD_S, ArmMotion, Status
+from errand_spot.server.computer import HAND_X_M, Computer, Snapshot, Solver
+from errand_spot.server.leases import ARM
+from errand_spot.server.mobility import BaseMotion, Trajectory, soon, unknown_frame, unsupported, way_to
+from skills.robot import ArmTrajectory, FloatArray, Pose2D
+
+_USUAL_M_S, _SLOWEST_M_S = 0.4, 0.02
+_TRACK_S: Final = 0.1
+_MOVED_M, _MOVED_RAD = 0.02, 0.04
+_BEHIND_M: Final = 0.75
+_FOLLOWING_S: Final = 60.0
+_PER_SEGMENT: Final = 6
+_FARTHEST_M: Final = 2.0
+X_HAND: Final = RigidTransform([HAND_X_M, 0.0, 0.0])
+"""Pose of the API's frame `hand` in `link_wr1`, the default tool."""
+
+_Passed = tuple[float, RigidTransform]
+"""Time (s, the robot's clock) at which the wrist passes a pose in `odom`."""
+
+
+class Cartesian(ArmMotion):
+    """Moves a tool of the wrist through poses in a frame; a goal out of reach ends it as stalled."""
+
+    field = "arm_cartesian_feedback"
+    complete = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
+    going = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_IN_PROGRESS
+    stalled = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_STALLED
+
+    def __init__(self, request: Any, snapshot: Snapshot, now_s: float) -> None:
+        frame = _known(request.root_frame_name, snapshot)
+        X_WT = (
+            transform(request.wrist_tform_tool, "wrist_tform_tool") if request.HasField("wrist_tform_tool") else X_HAND
+        )
+        X_RT = transform(request.root_tform_task, "root_tform_task")
+        axes = ("x_axis", "y_axis", "z_axis", "rx_axis", "ry_axis", "rz_axis")
+        if any(getattr(request, axis) != request.AXIS_MODE_POSITION for axis in axes):
+            raise unsupported("arm_cartesian_command with an axis in force mode")
+        given_m_s = request.max_linear_velocity.value if request.HasField("max_linear_velocity") else _USUAL_M_S
+        self._fastest_m_s = max(finite(given_m_s, "max_linear_velocity"), _SLOWEST_M_S)
+        self._out_of_reach = self._tracks = False
+        self._tracked_s, self._stays = 0.0, frame in ("odom", "vision")
+        given, field = request.pose_trajectory_in_task, "arm_cartesian_command.pose_trajectory_in_task"
+        points = points_of(given, field)
+        offset_s = seconds(given.reference_time) - now_s if given.HasField("reference_time") else 0.0
+        self._times_s = [soon(offset_s + seconds(point.time_since_reference), field) for point in points]
+        X_OR = snapshot.X_AB("odom", frame)
+        self._X_OW = [X_OR @ X_RT @ transform(point.pose, "pose") @ X_WT.inverse() for point in points]
+        self._X_WT = X_WT
+        super().__init__()
+
+    @property
+    def goal_O(self) -> FloatArray:
+        """Last position (3,) of the tool in `odom`."""
+        return np.asarray((self._X_OW[-1] @ self._X_WT).translation())
+
+    def begin(self, computer: Computer) -> None:
+        """Starts to move straight from pose to pose; poses in `odom` and `vision` stay there while the body moves."""
+        X_OW, end_s, self._path = computer.snapshot.X_AB("odom", "link_wr1"), computer.clock.now(), list[_Passed]()
+        begun_s = end_s
+        self._path.append((begun_s, X_OW))
+        for goal_s, X_OGoal in zip(self._times_s, self._X_OW, strict=True):
+            far_m = float(np.linalg.norm(X_OGoal.translation() - X_OW.translation()))
+            end_s, X_OW = max(begun_s + goal_s, end_s + 1.5 * far_m / self._fastest_m_s), X_OGoal
+            self._path.append((end_s, X_OW))
+        self._plan(computer)
+
+    def _plan(self, computer: Computer) -> None:
+        """Plans what is left of the path from where hand and body are; stalled unless all of it is in reach."""
+        self._tracks, self._X_OB, before = False, computer.snapshot.X_AB("odom", "body"), computer.arm_rad()
+        X_BO, X_OW, now_s = self._X_OB.inverse(), computer.snapshot.X_AB("odom", "link_wr1"), computer.clock.now()
+        times, postures, time_s = list[float](), list[FloatArray](), 0.0
+        for end_s, X_OGoal in [each for each in self._path[1:] if each[0] > now_s] or self._path[-1:]:
+            far_m = float(np.linalg.norm(X_OGoal.translation() - X_OW.translation()))
+            goal_s = max(end_s - now_s, time_s + 1.5 * far_m / self._fastest_m_s)
+            for share in np.linspace(0.0, 1.0, _PER_SEGMENT + 1)[1:]:
+                posture = _posture_at(computer, X_BO @ _between(X_OW, X_OGoal, float(share)), before)
+                if posture is not None:
+                    times.append(time_s + share * (goal_s - time_s))
+                    postures.append(posture)
+                    before = posture
+            if posture is None:
+                self._out_of_reach = True
+                return
+            X_OW, time_s = X_OGoal, goal_s
+        self._out_of_reach = False
+        self._follow(computer, times, postures)
+
+    def _track(self, computer: Computer) -> None:
+        """Moves the hand along its path while the body moves below it, as far as the arm reaches."""
+        now_s = computer.clock.now()
+        if now_s < self._tracked_s + _TRACK_S:
+            return
+        self._tracks, self._tracked_s, q = True, now_s, computer.arm_rad()
+        ahead_s = now_s + 2.0 * _TRACK_S
+        later = next((k for k, (end_s, _) in enumerate(self._path) if end_s > ahead_s), None)
+        X_OW = self._path[-1][1]
+        if later:
+            (a_s, X_OA), (b_s, X_OB) = self._path[later - 1 : later + 1]
+            X_OW = _between(X_OA, X_OB, (ahead_s - a_s) / (b_s - a_s))
+        posture = _posture_at(computer, computer.snapshot.X_AB("body", "odom") @ X_OW, q)
+        if posture is not None:
+            most = 2.0 * _TRACK_S * USUAL_RAD_S
+            trajectory = ArmTrajectory(
+                np.array([0.0, 2.0 * _TRACK_S]), np.array([q, q + np.clip(posture - q, -most, most)])
+            )
+            computer.robot.move_arm(trajectory, until_s=now_s + 1.0, lease=computer.lease)
+
+    def tick(self, computer: Computer) -> None:
+        """Goes on along the path, and reports how far the hand is from its goal."""
+        done = self.feedback.arm_cartesian_feedback.status == self.complete
+        live = self._stays and not done and self.status == Status.STATUS_PROCESSING
+        off = self._X_OB.InvertAndCompose(computer.snapshot.X_AB("odom", "body"))
+        moved = float(np.linalg.norm(off.translation())) > _MOVED_M or off.rotation().ToAngleAxis().angle() > _MOVED_RAD
+        moves = computer.base_moves(shifted=moved)
+        if live and moves:
+            self._track(computer)
+        elif live and (moved or self._tracks):
+            self._plan(computer)
+        if live and (moves or moved):
+            self.feedback = self._made(self.going)
+        elif not done and self._out_of_reach:
+            self.feedback = self._made(self.stalled)
+        else:
+            super().tick(computer)
+        X_WG = computer.snapshot.X_AB("link_wr1", "odom") @ self._X_OW[-1]
+        made = arm_command_pb2.ArmCommand.Feedback()
+        made.CopyFrom(self.feedback)
+        made.arm_cartesian_feedback.measured_pos_distance_to_goal = float(np.linalg.norm(X_WG.translation()))
+        made.arm_cartesian_feedback.measured_rot_distance_to_goal = X_WG.rotation().ToAngleAxis().angle()
+        self.feedback = made
+
+
+class FollowArm(BaseMotion):
+    """Walks until the Cartesian goal of the hand lies ahead of the body; beside other motions of the arm it stays."""
+
+    field = "follow_arm_feedback"
+
+    def __init__(self, request: Any) -> None:
+        offset = vector(request.body_offset_from_hand, "body_offset_from_hand")
+        self._ahead = np.array(offset if any(offset) else (_BEHIND_M, 0.0, 0.0))
+        self._walks, self._way = not request.disable_walking, None
+        super().__init__()
+
+    _way: Trajectory | None
+
+    def begin(self, computer: Computer) -> None:
+        """Starts to walk, with the heading that the body has."""
+        arm = computer.motion(ARM)
+        if self._walks and isinstance(arm, Cartesian):
+            pose = computer.snapshot.odometry.pose
+            goal_O = arm.goal_O - pose.transform().rotation() @ self._ahead
+            goal = Pose2D(float(goal_O[0]), float(goal_O[1]), pose.yaw_rad)
+            self._way = way_to(goal, computer.now_s() + _FOLLOWING_S, computer.snapshot)
+            self._way.begin(computer)
+
+    def tick(self, computer: Computer) -> None:
+        """Walks on."""
+        if self._way is not None:
+            self._way.tick(computer)
+
+    def end(self, status: int) -> None:
+        """Ends it with a status."""
+        if self._way is not None:
+            self._way.end(status)
+        super().end(status)
+
+    @property
+    def moving(self) -> bool:
+        """Returns whether the body is on its way."""
+        return self._way is not None and self._way.moving
+
+
+class Gaze(ArmMotion):
+    """Turns the hand's camera to a point, where the hand is or at a pose of its tool."""
+
+    field = "arm_gaze_feedback"
+    complete = arm_command_pb2.GazeCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
+    going = arm_command_pb2.GazeCommand.Feedback.STATUS_IN_PROGRESS
+    stalled = arm_command_pb2.GazeCommand.Feedback.STATUS_TOOL_TRAJECTORY_STALLED
+
+    def __init__(self, request: Any, snapshot: Snapshot) -> None:
+        frame = _known(request.frame1_name, snapshot)
+        points = points_of(request.target_trajectory_in_frame1, "arm_gaze_command.target_trajectory_in_frame1")
+        target = vector(points[-1].point, "target")
+        self._target_O = snapshot.X_AB("odom", frame) @ np.array(target)
+        self._at_O: FloatArray | None = None
+        if request.tool_trajectory_in_frame2.points:
+            X_OF = snapshot.X_AB("odom", _known(request.frame2_name, snapshot))
+            X_OT = X_OF @ transform(request.tool_trajectory_in_frame2.points[-1].pose, "tool")
+            self._at_O = np.asarray(X_OT.translation())
+        super().__init__()
+
+    def begin(self, computer: Computer) -> None:
+        """Starts to turn; nearer or lower where the hand cannot look from there."""
+        X_BO, now = computer.snapshot.X_AB("body", "odom"), computer.arm_rad()
+        target_B = np.asarray(X_BO @ self._target_O)
+        hand_B = np.asarray(computer.snapshot.X_AB("body", "hand").translation())
+        ready_B = np.array([0.75, 0.0, 0.25])
+        for at_B in ([] if self._at_O is None else [np.asarray(X_BO @ self._at_O)]) + [hand_B, ready_B]:
+            away = target_B - at_B
+            if np.linalg.norm(away) < 0.05:
+                continue
+            X_BW = RigidTransform(_looking(away), at_B) @ X_HAND.inverse()
+            if (posture := _posture_at(computer, X_BW, now)) is not None:
+                self._follow(computer, [1.5 * float(np.abs(posture - now).max()) / USUAL_RAD_S], [posture])
+                return
+        self.feedback = self._made(self.stalled)
+
+    def _made(self, progress: int) -> Any:
+        made, done = super()._made(progress), progress == self.complete
+        part = made.arm_gaze_feedback
+        part.gazing_at_target = part.hand_position_at_goal = part.hand_roll_at_goal = done
+        return made
+
+
+def _between(X_AB: RigidTransform, X_AC: RigidTransform, share: float) -> RigidTransform:
+    """Pose at a share of the straight way from B to C; the rotation turns about one axis."""
+    turn = X_AB.rotation().InvertAndCompose(X_AC.rotation()).ToAngleAxis()
+    moved = (1.0 - share) * X_AB.translation() + share * X_AC.translation()
+    return RigidTransform(X_AB.rotation() @ RotationMatrix(AngleAxis(share * turn.angle(), turn.axis())), moved)
+
+
+def _looking(away: FloatArray) -> RotationMatrix:
+    """Rotation whose x axis points along a vector, with z as far up as possible."""
+    x = away / np.linalg.norm(away)
+    side = np.cross([0.0, 0.0, 1.0], x)
+    y = side / np.linalg.norm(side) if np.linalg.norm(side) > 1e-6 else np.array([0.0, 1.0, 0.0])
+    return RotationMatrix(np.column_stack([x, y, np.cross(x, y)]))
+
+
+class Moving(ArmMotion):
+    """Moves the hand at a velocity until its end."""
+
+    field, going = "arm_velocity_feedback", 0
+
+    def __init__(self, request: Any, snapshot: Snapshot, end_s: float) -> None:
+        self._end_s, self._frame = end_s, "odom"
+        self._angular = vector(request.angular_velocity_of_hand_rt_odom_in_hand, "angular_velocity")
+        self._cylindrical = request.HasField("cylindrical_velocity")
+        if self._cylindrical:
+            v = request.cylindrical_velocity.linear_velocity
+            self._linear = tuple(finite(getattr(v, name), name) * 0.5 for name in ("r", "theta", "z"))
+        else:
+            self._frame = _known(request.cartesian_velocity.frame_name, snapshot)
+            self._linear = vector(request.cartesian_velocity.velocity_in_frame_name, "velocity_in_frame_name")
+        super().__init__()
+
+    def begin(self, computer: Computer) -> None:
+        """Starts to move."""
+        self._q = computer.arm_rad()
+
+    def tick(self, computer: Computer) -> None:
+        """Moves the hand on by one step."""
+        if self.status != Status.STATUS_PROCESSING:
+            return
+        if computer.left_s(self._end_s) <= 0.0:
+            self.end(Status.STATUS_COMMAND_TIMED_OUT)
+            return
+        step_s, X_BW = 0.1, computer.solver.X_BH(self._q) if computer.solver else RigidTransform()
+        X_BHand = X_BW @ X_HAND
+        moved = RigidTransform(
+            X_BHand.rotation() @ RotationMatrix(Rotation.from_rotvec(np.array(self._angular) * step_s).as_matrix()),
+            X_BHand.translation() + step_s * self._velocity_B(computer, X_BHand),
+        )
+        posture = _posture_at(computer, moved @ X_HAND.inverse(), self._q)
+        if posture is None or np.abs(posture - self._q).max() > 0.4:
+            return
+        share = 0.25
+        begun, self._q = self._q, self._q + share * (posture - self._q)
+        trajectory = ArmTrajectory(np.array([0.0, 2 * share * step_s]), np.array([begun, self._q]))
+        computer.robot.move_arm(trajectory, until_s=computer.until_s(self._end_s), lease=computer.lease)
+
+    def _velocity_B(self, computer: Computer, X_BHand: RigidTransform) -> FloatArray:
+        if not self._cylindrical:
+            R_BF = computer.snapshot.X_AB("body", self._frame).rotation()
+            return np.asarray(R_BF @ np.array(self._linear))
+        r, theta, z = self._linear
+        shoulder_B = np.array([0.292, 0.0, 0.188])
+        x, y, _ = X_BHand.translation() - shoulder_B
+        heading, radius = math.atan2(y, x), math.hypot(x, y)
+        out, aside = np.array([math.cos(heading), math.sin(heading)]), np.array([-math.sin(heading), math.cos(heading)])
+        return np.array([*(r * out + theta * radius * aside), z])
+
+    def _made(self, _progress: int) -> Any:
+        made = arm_command_pb2.ArmCommand.Feedback(status=self.status)
+        made.arm_velocity_feedback.SetInParent()
+        return made
+
+
+def _known(frame: str, snapshot: Snapshot) -> str:
+    """Returns a frame of the tree. Raises RefusedError."""
+    if frame not in snapshot.frames:
+        raise unknown_frame(frame)
+    return frame
+
+
+def solutions(solver: Solver, X_BW: RigidTransform) -> list[FloatArray]:
+    """Joint angles that put the wrist at a pose; none for one that is far away."""
+    near = float(np.abs(X_BW.translation()).max()) < _FARTHEST_M
+    return list(solver.inverse(X_BW)) if near else []
+
+
+def _posture_at(computer: Computer, X_BW: RigidTransform, near_rad: FloatArray) -> FloatArray | None:
+    """Joint angles that put the wrist at a pose, the nearest to a posture; None out of reach."""
+    found = [] if computer.solver is None else solutions(computer.solver, X_BW)
+    return min(found, key=lambda q: float(np.abs(q - near_rad).max()), default=None)

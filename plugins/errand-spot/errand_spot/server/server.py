@@ -1,0 +1,209 @@
+"""The server: all services of one robot on one port with TLS, and the thread that steps it."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Final
+
+import grpc
+
+from errand_spot.server import docking, identity, manipulation, pictures, rays, state
+from errand_spot.server.calls import Service, handlers
+from errand_spot.server.commands import PowerService, RobotCommandService
+from errand_spot.server.computer import Computer, Pace, Perception, Solver
+from errand_spot.server.estop import EstopService, Tablet
+from errand_spot.server.faults import Switchboard
+from errand_spot.server.graph_nav import GraphNavService, Live
+from errand_spot.server.identity import DOMAIN, Credentials
+from errand_spot.server.keepalive import KeepaliveService
+from errand_spot.server.leases import LeaseService
+from errand_spot.server.pace import Pacer
+from skills.robot import Clock, Pose2D, Robot
+
+_MOST_BYTES: Final = 64 * 1024**2
+_THREADS: Final = 24
+LISTED: Final[Mapping[str, str]] = {
+    "arm-surface-contact": "bosdyn.api.ArmSurfaceContactService",
+    "auto-return": "bosdyn.api.auto_return.AutoReturnService",
+    "autowalk-service": "bosdyn.api.autowalk.AutowalkService",
+    "choreography": "bosdyn.api.spot.ChoreographyService",
+    "data": "bosdyn.api.DataService",
+    "data-acquisition": "bosdyn.api.DataAcquisitionService",
+    "data-acquisition-store": "bosdyn.api.DataAcquisitionStoreService",
+    "door": "bosdyn.api.spot.DoorService",
+    "map-processing-service": "bosdyn.api.graph_nav.MapProcessingService",
+    "payload-registration": "bosdyn.api.PayloadRegistrationService",
+    "recording-service": "bosdyn.api.graph_nav.GraphNavRecordingService",
+    "robot-command-streaming": "bosdyn.api.RobotCommandStreamingService",
+    "robot-mission": "bosdyn.api.mission.MissionService",
+    "robot-state-streaming": "bosdyn.api.RobotStateStreamingService",
+    "spot-check": "bosdyn.api.spot.SpotCheckService",
+}
+"""Services of a real Spot that are in the directory, and whose calls answer UNIMPLEMENTED."""
+SERVICES: Final[tuple[type[Service], ...]] = (
+    identity.AuthService,
+    identity.RobotIdService,
+    identity.DirectoryService,
+    identity.DirectoryRegistrationService,
+    identity.LicenseService,
+    identity.TimeSyncService,
+    EstopService,
+    LeaseService,
+    KeepaliveService,
+    PowerService,
+    RobotCommandService,
+    state.RobotStateService,
+    pictures.ImageService,
+    pictures.GripperCameraParamService,
+    pictures.PointCloudService,
+    pictures.LocalGridService,
+    rays.RayCastService,
+    manipulation.ManipulationService,
+    docking.DockingService,
+    state.InverseKinematicsService,
+    state.WorldObjectService,
+    state.FaultService,
+    state.PayloadService,
+    state.DataBufferService,
+    state.LogStatusService,
+    GraphNavService,
+)
+"""Services that are served."""
+MOTIONS: Final = (
+    "stand with height and pitch, sit, velocity, trajectory of poses, follow arm, stance, stop, freeze, safe power "
+    "off, self-right; the arm's joint moves, named positions, Cartesian moves, gaze, velocity and stop; the gripper. "
+    "Others are refused as unsupported."
+)
+"""The motions of `RobotCommand`, in words."""
+_DESCRIBED_IN: Final = (
+    *("auth", "data_buffer", "directory_registration", "directory", "estop", "fault", "image", "lease", "license"),
+    *("gripper_camera_param", "local_grid"),
+    *("payload", "point_cloud", "power", "robot_command", "robot_id", "robot_state", "time_sync", "world_object"),
+    *("docking.docking", "manipulation_api", "ray_cast", "log_status.log_status", "spot.inverse_kinematics"),
+    "keepalive.keepalive",
+    "graph_nav.graph_nav",
+)
+"""Files of the SDK that describe the services; importing them registers their descriptions."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of a server: users with their passwords, port (0 takes a free one), pace, and the operator's tablet.
+
+    `picker` picks up objects for the manipulation service; without it picks are refused. `dock_O` is the robot's pose
+    on its dock, in `odom`. Without `perception` odometry alone localises the robot, and no tags are seen.
+    """
+
+    passwords: Mapping[str, str]
+    port: int = 0
+    pace: Pace = Pace.REAL
+    tablet: Tablet = Tablet.TABLET
+    picker: manipulation.Picker | None = None
+    dock_O: Pose2D | None = None
+    perception: Perception | None = None
+
+
+class SpotServer:
+    """Server of the API for one robot. Nothing steps it before `run`."""
+
+    def __init__(
+        self, robot: Robot, clock: Clock, solver: Solver | None, credentials: Credentials, options: Options
+    ) -> None:
+        """Opens the port on 127.0.0.1. Raises OSError when it is in use."""
+        for name in _DESCRIBED_IN:
+            importlib.import_module(f"bosdyn.api.{name}_service_pb2")
+        estop = EstopService(options.tablet)
+        leases = LeaseService(lambda: self.computer.now_s(), lambda parts: self.computer.lost(parts))
+        self.computer = Computer(
+            robot, clock, leases=leases, estop=estop, solver=solver, pace=options.pace, dock_O=options.dock_O
+        )
+        self.certificate = credentials.certificate
+        auth = identity.AuthService(options.passwords, credentials.token_key.read_bytes())
+        self.services = self._services(leases, estop, auth, robot.name, options)
+        self.faults = Switchboard()
+        self._grpc = grpc.server(
+            ThreadPoolExecutor(_THREADS, thread_name_prefix="spot-api"),
+            interceptors=[self.faults],
+            options=[
+                ("grpc.max_receive_message_length", _MOST_BYTES),
+                ("grpc.max_send_message_length", _MOST_BYTES),
+                ("grpc.so_reuseport", 0),
+            ],
+        )
+        if options.pace is Pace.CLIENT:
+            self._grpc.add_generic_rpc_handlers([Pacer(self.computer)])
+        self._grpc.add_generic_rpc_handlers(handlers(self.services, auth.user_of, self.computer.now_s))
+        key, certificate = credentials.private_key.read_bytes(), credentials.certificate.read_bytes()
+        try:
+            self.port = self._grpc.add_secure_port(
+                f"127.0.0.1:{options.port}", grpc.ssl_server_credentials([(key, certificate)])
+            )
+        except RuntimeError as error:
+            raise OSError(f"port {options.port} of 127.0.0.1 cannot be opened") from error
+
+    def _services(
+        self,
+        leases: LeaseService,
+        estop: EstopService,
+        auth: identity.AuthService,
+        robot_name: str,
+        options: Options,
+    ) -> Sequence[Service]:
+        """All services that are served; the directory lists them and the others."""
+        computer, clocks = self.computer, identity.TimeSyncService()
+        others = [(name, type_name, f"api.{DOMAIN}") for name, type_name in LISTED.items()]
+        known = [(each.name, each.type, each.authority) for each in SERVICES]
+        lacking = {state.InverseKinematicsService.name} if computer.solver is None else set()
+        if computer.capabilities.lidar_height_m is None:
+            lacking |= {pictures.PointCloudService.name, pictures.LocalGridService.name}
+        entries = [entry for entry in (*known, *others) if entry[0] not in lacking]
+        directory = identity.DirectoryService(entries, computer.now_s)
+        faults = state.FaultService(computer.now_s, directory.silent)
+        live = Live(
+            state.RobotStateService(computer, faults.faults),
+            pictures.PointCloudService(computer),
+            pictures.LocalGridService(computer),
+            state.WorldObjectService(computer, options.perception),
+        )
+        made: list[Service] = [
+            auth,
+            identity.RobotIdService(robot_name),
+            directory,
+            identity.DirectoryRegistrationService(directory),
+            identity.LicenseService(),
+            clocks,
+            estop,
+            leases,
+            KeepaliveService(computer),
+            PowerService(computer, leases),
+            RobotCommandService(computer, leases, clocks),
+            pictures.ImageService(computer),
+            pictures.GripperCameraParamService(),
+            rays.RayCastService(computer),
+            manipulation.ManipulationService(computer, leases, options.picker),
+            docking.DockingService(computer, leases, clocks),
+            state.InverseKinematicsService(computer),
+            *vars(live).values(),
+            faults,
+            state.PayloadService(),
+            state.DataBufferService(),
+            state.LogStatusService(),
+            GraphNavService(computer, leases, clocks, options.perception, live),
+        ]
+        return [service for service in made if service.name not in lacking]
+
+    @contextmanager
+    def running(self) -> Iterator[SpotServer]:
+        """Answers calls. The caller steps the robot: with `computer.run`, or with `computer.step`.
+
+        The thread that built a simulation must step it, because its renderer belongs to that thread.
+        """
+        self._grpc.start()
+        try:
+            yield self
+        finally:
+            self._grpc.stop(0.5).wait()

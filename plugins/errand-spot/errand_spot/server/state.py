@@ -1,0 +1,401 @@
+"""State and hardware of the robot, objects, reach, and services that only take or list something."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from itertools import count
+from threading import Lock
+from typing import Any, Final
+
+import numpy as np
+from bosdyn.api import (
+    data_buffer_pb2,
+    estop_pb2,
+    payload_pb2,
+    robot_state_pb2,
+    service_fault_pb2,
+    world_object_pb2,
+)
+from bosdyn.api.log_status import log_status_pb2
+from bosdyn.api.spot import inverse_kinematics_pb2
+
+from errand_spot.messages import (
+    InvalidRequestError,
+    api_joint,
+    duration,
+    frame_tree,
+    seconds,
+    timestamp,
+    transform,
+    vec3,
+    velocity,
+)
+from errand_spot.server.arm import JOINTS, READY_RAD
+from errand_spot.server.calls import Call, Service
+from errand_spot.server.computer import Computer, Motors, Perception, SeenTag, Snapshot
+from errand_spot.server.hand import X_HAND, solutions
+from errand_spot.server.identity import DOMAIN
+from skills.robot import Mount, NoImageError
+
+RUNTIME_S: Final = 5400.0
+_LOOK_S, _PICTURES_S = 0.5, 5.0
+_FIRST_TAG: Final = 1_000_000
+"""Id of the object of tag 0; those of clients' objects are smaller."""
+_Kinds = world_object_pb2.WorldObjectType
+_FIELDS: Final[Mapping[int, str]] = {
+    _Kinds.WORLD_OBJECT_DRAWABLE: "drawable_properties",
+    _Kinds.WORLD_OBJECT_APRILTAG: "apriltag_properties",
+    _Kinds.WORLD_OBJECT_IMAGE_COORDINATES: "image_properties",
+    _Kinds.WORLD_OBJECT_DOCK: "dock_properties",
+    _Kinds.WORLD_OBJECT_USER_NOGO: "nogo_region_properties",
+}
+"""Field of an object of each type; others are never listed."""
+_FEET: Final = ("fl", "fr", "hl", "hr")
+
+
+class RobotStateService(Service):
+    """Tells the robot's state and its hardware."""
+
+    name, type, authority = "robot-state", "bosdyn.api.RobotStateService", f"state.{DOMAIN}"
+
+    def __init__(self, computer: Computer, service_faults: Callable[[], Iterable[Any]]) -> None:
+        """`service_faults` gives the faults of services."""
+        self._computer, self._service_faults = computer, service_faults
+
+    def GetRobotState(self, _request: Any, _call: Call) -> Any:
+        """Returns the state after the last step."""
+        made, snapshot = robot_state_pb2.RobotStateResponse(), self._computer.snapshot
+        state, stamp = made.robot_state, timestamp(snapshot.time_s)
+        self._power(state, snapshot)
+        state.kinematic_state.CopyFrom(kinematic_state(snapshot))
+        state.system_fault_state.SetInParent()
+        for number, fault in enumerate(snapshot.faults):
+            state.system_fault_state.faults.add(name=fault, uid=number, error_message=fault).onset_timestamp.CopyFrom(
+                stamp
+            )
+        state.behavior_fault_state.SetInParent()
+        state.service_fault_state.SetInParent()
+        state.service_fault_state.faults.extend(self._service_faults())
+        state.terrain_state.SetInParent()
+        self._estop(state, stamp)
+        self._feet(state, snapshot)
+        if self._computer.capabilities.gripper is not None:
+            self._manipulator(state, snapshot)
+        return made
+
+    def GetRobotMetrics(self, _request: Any, _call: Call) -> Any:
+        """Returns the time that the robot has been on."""
+        made = robot_state_pb2.RobotMetricsResponse()
+        made.robot_metrics.timestamp.CopyFrom(timestamp(self._computer.now_s()))
+        made.robot_metrics.metrics.add(label="operation_time", units="s", float_value=self._computer.clock.now())
+        return made
+
+    def GetRobotHardwareConfiguration(self, _request: Any, _call: Call) -> Any:
+        """Returns the links and the description (URDF) of the robot."""
+        made = robot_state_pb2.RobotHardwareConfigurationResponse()
+        made.hardware_configuration.skeleton.urdf = self._computer.capabilities.description
+        names = ["body", *(f"{foot}.{part}" for foot in _FEET for part in ("hip", "uleg", "lleg"))]
+        arm = self._computer.capabilities.arm
+        names += [f"arm0.link_{joint}" for joint in (*JOINTS, "fngr")] if arm is not None else []
+        for name in names:
+            made.hardware_configuration.skeleton.links.add(name=name)
+        return made
+
+    def GetRobotLinkModel(self, request: Any, _call: Call) -> Any:
+        """Returns an empty mesh: the looks of the maker's robot are not ours to give."""
+        made = robot_state_pb2.RobotLinkModelResponse()
+        made.link_model.file_name, made.link_model.file_contents = f"{request.link_name}.obj", "# no mesh\n"
+        return made
+
+    def _power(self, state: Any, snapshot: Snapshot) -> None:
+        charge, stamp = 100.0 * snapshot.battery.charge, timestamp(snapshot.time_s)
+        power, State = state.power_state, robot_state_pb2.PowerState
+        power.timestamp.CopyFrom(stamp)
+        power.motor_power_state = {
+            Motors.OFF: State.MOTOR_POWER_STATE_OFF,
+            Motors.STARTING: State.MOTOR_POWER_STATE_POWERING_ON,
+            Motors.ON: State.MOTOR_POWER_STATE_ON,
+        }[snapshot.motors]
+        docked = self._computer.docked()
+        power.shore_power_state = State.SHORE_POWER_STATE_ON if docked else State.SHORE_POWER_STATE_OFF
+        power.robot_power_state = State.ROBOT_POWER_STATE_ON
+        power.payload_ports_power_state = State.PAYLOAD_PORTS_POWER_STATE_ON
+        power.wifi_radio_power_state = State.WIFI_RADIO_POWER_STATE_ON
+        power.locomotion_charge_percentage.value = charge
+        power.locomotion_estimated_runtime.CopyFrom(duration(RUNTIME_S * snapshot.battery.charge))
+        battery = state.battery_states.add(identifier="simulated")
+        battery.timestamp.CopyFrom(stamp)
+        battery.charge_percentage.value = charge
+        battery.estimated_runtime.CopyFrom(duration(RUNTIME_S * snapshot.battery.charge))
+        battery.voltage.value, battery.current.value = 52.0, 6.0 if docked else -6.0
+        battery.temperatures.append(30.0)
+        Battery = robot_state_pb2.BatteryState
+        battery.status = Battery.STATUS_CHARGING if docked else Battery.STATUS_DISCHARGING
+
+    def _estop(self, state: Any, stamp: Any) -> None:
+        State = robot_state_pb2.EStopState
+        stopped = self._computer.estop.level() != estop_pb2.ESTOP_LEVEL_NONE
+        for name, kind, stops in (
+            ("hardware_estop", State.TYPE_HARDWARE, False),
+            ("software_estop", State.TYPE_SOFTWARE, stopped),
+        ):
+            made = state.estop_states.add(name=name, type=kind)
+            made.state = State.STATE_ESTOPPED if stops else State.STATE_NOT_ESTOPPED
+            made.timestamp.CopyFrom(stamp)
+
+    def _feet(self, state: Any, snapshot: Snapshot) -> None:
+        height_m = float(snapshot.odometry.X_OB.translation()[2])
+        for foot in _FEET:
+            x = 0.32 if foot.startswith("f") else -0.32
+            y = 0.17 if foot.endswith("l") else -0.17
+            made = state.foot_state.add(contact=robot_state_pb2.FootState.CONTACT_MADE)
+            made.foot_position_rt_body.CopyFrom(vec3((x, y, -height_m)))
+            made.terrain.frame_name = "odom"
+            made.terrain.ground_mu_est = 0.8
+
+    def _manipulator(self, state: Any, snapshot: Snapshot) -> None:
+        can, State = self._computer.capabilities, robot_state_pb2.ManipulatorState
+        assert can.gripper is not None and can.arm is not None
+        made = state.manipulator_state
+        made.gripper_open_percentage = 100.0 * snapshot.gripper.opening / can.gripper.widest
+        made.is_gripper_holding_item = self._computer.grip.holds(snapshot.gripper)
+        made.estimated_end_effector_force_in_hand.CopyFrom(vec3((0.0, 0.0, 0.0)))
+        stowed = np.abs(self._computer.arm_rad(snapshot.joints) - np.array(can.arm.stowed_rad)).max() < 0.1
+        made.stow_state = State.STOWSTATE_STOWED if stowed else State.STOWSTATE_DEPLOYED
+        made.carry_state = self._computer.grip.carry_state(snapshot.gripper)
+        made.velocity_of_hand_in_odom.SetInParent()
+        made.velocity_of_hand_in_vision.SetInParent()
+
+
+def kinematic_state(snapshot: Snapshot) -> Any:
+    """The message of joints, frames and velocities."""
+    made = robot_state_pb2.KinematicState(transforms_snapshot=frame_tree(snapshot.frames))
+    joints = snapshot.joints
+    for name, position in joints.position_rad.items():
+        joint = made.joint_states.add(name=api_joint(name))
+        joint.position.value, joint.velocity.value = position, joints.velocity_rad_s[name]
+        joint.acceleration.value, joint.load.value = 0.0, joints.effort_nm[name]
+    vx, vy, wz = snapshot.odometry.velocity
+    linear_O = snapshot.odometry.X_OB.rotation().matrix() @ np.array([vx, vy, 0.0])
+    moving = velocity(linear_O, (0.0, 0.0, wz))
+    made.velocity_of_body_in_odom.CopyFrom(moving)
+    made.velocity_of_body_in_vision.CopyFrom(moving)
+    made.acquisition_timestamp.CopyFrom(timestamp(snapshot.time_s))
+    return made
+
+
+class WorldObjectService(Service):
+    """Lists the objects that clients have added, and the known AprilTags that the body's cameras see."""
+
+    name, type, authority = "world-objects", "bosdyn.api.WorldObjectService", f"api.{DOMAIN}"
+
+    def __init__(self, computer: Computer, perception: Perception | None) -> None:
+        """No tags are seen without `perception`."""
+        self._computer, self._perception = computer, perception
+        self._lock, self._ids, self._objects = Lock(), count(1), dict[int, Any]()
+        self._looking, self._looked_s, self._seen = Lock(), -math.inf, dict[int, SeenTag]()
+
+    def ListWorldObjects(self, request: Any, _call: Call) -> Any:
+        """Lists the objects of the types that are asked for, and not older than asked for."""
+        fields = [_FIELDS[kind] for kind in request.object_type if kind in _FIELDS]
+        since_s, made = seconds(request.timestamp_filter), world_object_pb2.ListWorldObjectResponse()
+        for each in self.objects(look=not fields or "apriltag_properties" in fields):
+            has = not request.object_type or any(field.name in fields for field, _ in each.ListFields())
+            if has and not 0.0 < seconds(each.acquisition_time) < since_s:
+                made.world_objects.append(each)
+        return made
+
+    def objects(self, *, look: bool = True) -> list[Any]:
+        """All objects; `look` takes pictures first."""
+        seen = [self._described(tag) for tag in self.tags()] if look else []
+        with self._lock:
+            return [*self._objects.values(), *seen]
+
+    def tags(self) -> Sequence[SeenTag]:
+        """The tags that the body's cameras see now, or saw a moment ago."""
+        computer, perception = self._computer, self._perception
+        if perception is None:
+            return ()
+        with self._looking:
+            if computer.now_s() - self._looked_s > _LOOK_S:
+                cameras = [each.source for each in computer.capabilities.cameras if each.mount is Mount.BODY]
+                taken = computer.do(lambda: [computer.robot.image(source) for source in cameras])
+                with suppress(NoImageError, TimeoutError):
+                    found = [tag for image in taken.result(_PICTURES_S) for tag in perception.tags(image)]
+                    self._seen = {tag.number: tag for tag in found}
+                self._looked_s = computer.now_s()
+            return list(self._seen.values())
+
+    def _described(self, tag: SeenTag) -> Any:
+        """The message of a tag; the frame `filtered_fiducial` is the same one."""
+        made = world_object_pb2.WorldObject(id=_FIRST_TAG + tag.number, name=f"world_obj_apriltag_{tag.number}")
+        made.acquisition_time.CopyFrom(timestamp(self._looked_s))
+        frames, described = dict(self._computer.snapshot.frames), made.apriltag_properties
+        described.tag_id, described.dimensions.x, described.dimensions.y = tag.number, tag.size_m, tag.size_m
+        described.frame_name_fiducial = f"fiducial_{tag.number}"
+        described.frame_name_fiducial_filtered = f"filtered_fiducial_{tag.number}"
+        for name in (described.frame_name_fiducial, described.frame_name_fiducial_filtered):
+            frames[name] = ("odom", tag.X_OT)
+        described.fiducial_pose_status = described.fiducial_filtered_pose_status = described.STATUS_OK
+        made.transforms_snapshot.CopyFrom(frame_tree(frames))
+        return made
+
+    def MutateWorldObjects(self, request: Any, _call: Call) -> Any:
+        """Adds, changes or deletes an object of a client."""
+        Response, Mutation = world_object_pb2.MutateWorldObjectResponse, world_object_pb2.MutateWorldObjectRequest
+        action, given = request.mutation.action, request.mutation.object
+        with self._lock:
+            if action == Mutation.ACTION_ADD:
+                number = next(self._ids)
+            elif given.id in self._objects:
+                number = given.id
+            else:
+                return Response(status=Response.STATUS_INVALID_MUTATION_ID)
+            if action == Mutation.ACTION_DELETE:
+                del self._objects[number]
+            else:
+                stored = world_object_pb2.WorldObject()
+                stored.CopyFrom(given)
+                stored.id = number
+                self._objects[number] = stored
+        return Response(status=Response.STATUS_OK, mutated_object_id=number)
+
+
+class InverseKinematicsService(Service):
+    """Answers whether the arm reaches a pose with the body where it stands."""
+
+    name, type, authority = "inverse-kinematics", "bosdyn.api.spot.InverseKinematicsService", f"api.{DOMAIN}"
+
+    def __init__(self, computer: Computer) -> None:
+        self._computer = computer
+
+    def InverseKinematics(self, request: Any, _call: Call) -> Any:
+        """Returns joint angles for a pose of the tool."""
+        Response = inverse_kinematics_pb2.InverseKinematicsResponse
+        snapshot, solver = self._computer.snapshot, self._computer.solver
+        if not request.HasField("tool_pose_task") or solver is None:
+            raise InvalidRequestError("task_specification: only a tool_pose_task is served")
+        if request.root_frame_name not in snapshot.frames:
+            raise InvalidRequestError(f"root_frame_name: {request.root_frame_name!r} is unknown")
+        X_WT = X_HAND
+        if request.HasField("wrist_mounted_tool"):
+            X_WT = transform(request.wrist_mounted_tool.wrist_tform_tool, "wrist_tform_tool")
+        X_RT = transform(request.root_tform_scene, "root_tform_scene") @ transform(
+            request.scene_tform_task, "scene_tform_task"
+        )
+        X_RTool = X_RT @ transform(request.tool_pose_task.task_tform_desired_tool, "task_tform_desired_tool")
+        X_BW = snapshot.X_AB("body", request.root_frame_name) @ X_RTool @ X_WT.inverse()
+        found = solutions(solver, X_BW)
+        if not found:
+            return Response(status=Response.STATUS_NO_SOLUTION_FOUND)
+        best = min(found, key=lambda q: float(np.abs(q - np.array(READY_RAD)).max()))
+        made = Response(status=Response.STATUS_OK, robot_configuration=kinematic_state(snapshot))
+        wanted = {f"arm0.{name}": float(value) for name, value in zip(JOINTS, best, strict=True)}
+        for joint in made.robot_configuration.joint_states:
+            joint.position.value = wanted.get(joint.name, joint.position.value)
+        return made
+
+
+class FaultService(Service):
+    """Takes the faults of clients' services."""
+
+    name, type, authority = "fault", "bosdyn.api.FaultService", f"fault.{DOMAIN}"
+
+    def __init__(self, now: Callable[[], float], silent: Callable[[], Iterable[str]]) -> None:
+        """`now` gives the robot's time, `silent` the registered services that have fallen silent."""
+        self._now, self._silent = now, silent
+        self._lock, self._active = Lock(), dict[tuple[str, str], Any]()
+
+    def faults(self) -> list[Any]:
+        """All faults, with those of services that have fallen silent."""
+        with self._lock:
+            made = list(self._active.values())
+        for service in self._silent():
+            fault = service_fault_pb2.ServiceFault(severity=service_fault_pb2.ServiceFault.SEVERITY_CRITICAL)
+            fault.fault_id.fault_name, fault.fault_id.service_name = "liveness", service
+            fault.error_message = f"{service} has not updated its entry in the directory in time"
+            made.append(fault)
+        return made
+
+    def TriggerServiceFault(self, request: Any, _call: Call) -> Any:
+        """Stores a fault."""
+        Response, key = service_fault_pb2.TriggerServiceFaultResponse, _fault_key(request.fault.fault_id)
+        stored = service_fault_pb2.ServiceFault()
+        stored.CopyFrom(request.fault)
+        stored.onset_timestamp.CopyFrom(timestamp(self._now()))
+        with self._lock:
+            known = key in self._active
+            self._active.setdefault(key, stored)
+        return Response(status=Response.STATUS_FAULT_ALREADY_ACTIVE if known else Response.STATUS_OK)
+
+    def ClearServiceFault(self, request: Any, _call: Call) -> Any:
+        """Removes a fault."""
+        Response, key = service_fault_pb2.ClearServiceFaultResponse, _fault_key(request.fault_id)
+        with self._lock:
+            known = self._active.pop(key, None) is not None
+        return Response(status=Response.STATUS_OK if known else Response.STATUS_FAULT_NOT_ACTIVE)
+
+
+def _fault_key(fault_id: Any) -> tuple[str, str]:
+    return fault_id.service_name, fault_id.fault_name
+
+
+class PayloadService(Service):
+    """Lists the payloads: none but the LiDAR, which the robot knows already."""
+
+    name, type, authority = "payload", "bosdyn.api.PayloadService", f"payload.{DOMAIN}"
+
+    def ListPayloads(self, _request: Any, _call: Call) -> Any:
+        """Lists no payloads."""
+        return payload_pb2.ListPayloadsResponse()
+
+
+class DataBufferService(Service):
+    """Takes what clients log, and keeps none of it."""
+
+    name, type, authority = "data-buffer", "bosdyn.api.DataBufferService", f"buffer.{DOMAIN}"
+
+    def __init__(self) -> None:
+        self._ids = count(1)
+
+    def RecordTextMessages(self, _request: Any, _call: Call) -> Any:
+        """Takes text messages."""
+        return data_buffer_pb2.RecordTextMessagesResponse()
+
+    def RecordOperatorComments(self, _request: Any, _call: Call) -> Any:
+        """Takes comments of the operator."""
+        return data_buffer_pb2.RecordOperatorCommentsResponse()
+
+    def RecordDataBlobs(self, _request: Any, _call: Call) -> Any:
+        """Takes data."""
+        return data_buffer_pb2.RecordDataBlobsResponse()
+
+    def RecordEvents(self, _request: Any, _call: Call) -> Any:
+        """Takes events."""
+        return data_buffer_pb2.RecordEventsResponse()
+
+    def RecordSignalTicks(self, _request: Any, _call: Call) -> Any:
+        """Takes values of signals."""
+        return data_buffer_pb2.RecordSignalTicksResponse()
+
+    def RegisterSignalSchema(self, _request: Any, _call: Call) -> Any:
+        """Gives a schema its number."""
+        return data_buffer_pb2.RegisterSignalSchemaResponse(schema_id=next(self._ids))
+
+
+class LogStatusService(Service):
+    """Tells that no logs are written: the simulated robot keeps none, and starts none."""
+
+    name, type, authority = "log-status", "bosdyn.api.log_status.LogStatusService", f"log.{DOMAIN}"
+
+    def GetActiveLogStatuses(self, _request: Any, _call: Call) -> Any:
+        """Lists no logs."""
+        Response = log_status_pb2.GetActiveLogStatusesResponse
+        return Response(status=Response.STATUS_OK)
+
+    def GetLogStatus(self, _request: Any, _call: Call) -> Any:
+        """Answers that there is no such log."""
+        Response = log_status_pb2.GetLogStatusResponse
+        return Response(status=Response.STATUS_ID_NOT_FOUND)

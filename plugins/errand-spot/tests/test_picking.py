@@ -1,0 +1,90 @@
+"""What stands at a point is picked up, where a grasp is allowed."""
+
+import numpy as np
+import pytest
+
+from errand_spot.picking import PointPicker, observe
+from plant.robots.spot.kind import spot_capabilities
+from skills.api import Cause
+from skills.manipulation.grasp.skill import Grasp
+from skills.robot import Pose2D
+from skills.routine import SkillFailure
+from skills.testing.blocks import ROOM, TABLE_CAN
+from skills.testing.clock import VirtualClock
+from skills.testing.robot import ScriptedRobot, Start
+
+TOP_M = 0.75
+"""Height of the room's table."""
+
+
+def table_points(x0=1.2, y0=-0.6, x1=1.8, y1=0.6, z=TOP_M, apart=0.02):
+    x, y = np.meshgrid(np.arange(x0, x1, apart), np.arange(y0, y1, apart))
+    return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, z)])
+
+
+def can_points(x=1.38, y=0.0, base=TOP_M, height=0.115):
+    across, up = np.meshgrid(np.linspace(-0.033, 0.033, 7), np.linspace(0.0, height, 12))
+    return np.column_stack([np.full(up.size, x - 0.033), y + across.ravel(), base + up.ravel()])
+
+
+def test_an_object_stands_on_the_surface_below_the_point():
+    floor = table_points(0.6, -0.6, 1.2, 0.6, 0.0)
+    points = np.concatenate([floor, table_points(), can_points()])
+    seen = observe(np.array([1.347, 0.0, 0.80]), points, 3.0)
+    assert seen.position_W[2] - 0.5 * seen.size_m[2] == pytest.approx(TOP_M, abs=0.01)
+    assert seen.size_m[2] == pytest.approx(0.115, abs=0.02)
+    assert seen.position_W[:2] == pytest.approx((1.36, 0.0), abs=0.03)
+    assert seen.surface is None
+
+
+def test_an_object_without_a_surface_stands_on_the_floor():
+    seen = observe(np.array([1.0, 0.0, 0.05]), can_points(1.033, 0.0, 0.0), 0.0)
+    assert seen.surface == "floor"
+
+
+@pytest.fixture
+def before_the_table():
+    """A robot before a table with a can, and how to pick up what stands at a point; returns the picker and the end."""
+    clock = VirtualClock()
+    start = Start(Pose2D(0.45, 0.0, 0.0))
+    robot = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=[*ROOM, TABLE_CAN], start=start)
+    lease = robot.take_lease("test")
+
+    def pick(point_O, allows=lambda R_OH: True, most_s=90.0):
+        picker = PointPicker(robot, clock)
+        cloud_O = np.concatenate([table_points(), can_points()]) - [0.45, 0.0, 0.0]
+        picker.begin(lease, np.array(point_O), cloud_O, allows)
+        while (held := picker.step()) is None and clock.now() < most_s:
+            clock.advance(0.05)
+        picker.end()
+        return picker, held
+
+    return robot, pick
+
+
+def is_stuck(*_):
+    raise SkillFailure(Cause.PLANNING, "no free path was found for the arm")
+    yield
+
+
+ANY, NONE = (lambda R_OH: True), (lambda R_OH: False)
+# Whether the can is there and can be carried; the point, and how the hand may turn -> is it held, had it a plan?
+PICKS = [
+    (True, True, (0.90, 0.0, 0.80), ANY, True, True),
+    (True, True, (0.90, 0.0, 0.80), NONE, False, False),
+    (False, True, (0.90, 0.3, 0.76), ANY, False, True),
+    (True, False, (0.90, 0.0, 0.80), ANY, True, True),
+]
+
+
+@pytest.mark.parametrize(("there", "carried", "point_O", "allows", "holds", "planned"), PICKS)
+def test_an_object_at_a_point_is_picked_up_where_that_is_allowed(
+    before_the_table, monkeypatch, there, carried, point_O, allows, holds, planned
+):
+    robot, pick = before_the_table
+    if not there:
+        robot.blocks.remove(TABLE_CAN)
+    if not carried:
+        monkeypatch.setattr(Grasp, "_carry", is_stuck)
+    picker, held = pick(point_O, allows)
+    assert (held, not picker.no_plan, robot.held) == (holds, planned, TABLE_CAN if holds else None)

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from executive.app.scenarios import ScenarioFile
+from executive.app.prepare.scenarios import ScenarioFile
 from executive.mission.json_schema import mission_json_schema
 from executive.testing.skill_test import SkillTestFile
 from executive.tree.port_values import describe_type, field_types

@@ -34,6 +34,8 @@ HOMES = (
     ("executive.cli",),
 )
 """The homes of executive, the lowest first."""
+APP = ("prepare", "report", "runs", "fleet", "evaluate")
+"""The folders of executive.app, the lowest first; modules beside them stand above all."""
 BUILDERS = ("plant.models.builder", "plant.worlds.builder")
 """What makes models and worlds; at run time only the commands import it that make them."""
 USES_BUILDERS = (*BUILDERS, "executive.cli.new_command", "executive.cli.object_command", "executive.cli.world_command")
@@ -81,6 +83,19 @@ def upward(path: str, source: str) -> list[str]:
     return [name for name in names if own is None or (above := rank(name)) is None or above > own]
 
 
+def app_rank(name: str) -> int:
+    """How high a module of executive.app stands."""
+    folder = name.split(".")[2]
+    return APP.index(folder) if folder in APP else len(APP)
+
+
+def upward_in_app(path: str, source: str) -> list[str]:
+    """The modules of executive.app that a module of a folder imports although they stand above that folder."""
+    own = dotted(path)
+    names = [name for name in ours(source) if within(own, "executive.app") and within(name, "executive.app")]
+    return [name for name in names if app_rank(name) > app_rank(own)]
+
+
 def builder_imports(path: str, source: str) -> list[str]:
     """What a module that is needed at run time imports of the builders."""
     own = within(dotted(path), *USES_BUILDERS)
@@ -110,6 +125,11 @@ def test_no_module_breaks_the_import_rule(package: str) -> None:
 
 def test_the_homes_of_executive_import_each_other_one_way() -> None:
     assert set(found(upward, "executive")) <= {"executive/__init__.py"}
+
+
+def test_the_folders_of_the_application_import_each_other_one_way() -> None:
+    assert {path.split("/")[2] for path in modules("executive/app") if path.count("/") == 3} == set(APP)
+    assert found(upward_in_app, *(f"executive/app/{folder}" for folder in APP)) == {}
 
 
 def test_the_root_of_executive_holds_no_modules() -> None:
@@ -146,13 +166,16 @@ CALL = "def f():\n    "
         (breaches, "executive/run/runner.py", f"{CALL}import plant.simulation", ["plant.simulation"]),
         (breaches, "executive/run/runner.py", "from executive.cli.entry import app", ["executive.cli.entry.app"]),
         (breaches, "executive/run/runner.py", "from skills.api import Cause", []),
-        (breaches, "executive/app/simulated.py", "from plant.simulation import Simulation", []),
-        (breaches, "executive/app/simulated.py", "from executive.cli.output import c", ["executive.cli.output.c"]),
+        (breaches, "executive/app/runs/simulated.py", "from plant.simulation import Simulation", []),
+        (breaches, "executive/app/runs/simulated.py", "from executive.cli.output import c", ["executive.cli.output.c"]),
         (upward, "executive/words/command.py", "from executive.language import u", ["executive.language.u"]),
         (upward, "executive/mission/resolve.py", "from executive.language import u", []),
         (upward, "executive/tree/estimate.py", f"{CALL}import executive.run.runner", ["executive.run.runner"]),
         (upward, "executive/tree/estimate.py", "from executive.attic import old", ["executive.attic.old"]),
         (upward, "executive/view/formats.py", "from executive.tree.node_view import NodeView", []),
+        (upward_in_app, "executive/app/runs/a.py", "import executive.app.fleet.chain", ["executive.app.fleet.chain"]),
+        (upward_in_app, "executive/app/runs/a.py", "from executive.app.kernels import k", ["executive.app.kernels.k"]),
+        (upward_in_app, "executive/app/runs/a.py", "from executive.app.report.run_report import RunReport", []),
         (builder_imports, "executive/cli/map.py", "import plant.models.builder.mesh", ["plant.models.builder.mesh"]),
         (builder_imports, "executive/cli/object_command.py", f"{CALL}import plant.models.builder.importing", []),
         (builder_imports, "plant/worlds/builder/own.py", "from plant.models.builder import mesh", []),

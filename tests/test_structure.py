@@ -22,12 +22,12 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1594,
     "executive/testing": 849,
-    "executive/app": 8332,
+    "executive/app": 8324,
     "executive/cli": 4997,
-    "skills": 30311,
+    "skills": 30294,
     "plant": 22156,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 517, 95, 14
+MODULES, ONE_IMPORTER, SAME_NAME = 517, 93, 13
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from executive.app.worlds import knowledge_of
+from executive.app.prepare.worlds import knowledge_of
 from executive.words.slug import slug
 from plant.robots.robot_kind import robot_kind
 from plant.spot_api.server.computer import SeenTag

@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from executive.app.checker import Checked, Checker
+from executive.app.prepare.checker import Checked, Checker
 from executive.cli.defaults import yielding
 from executive.cli.options import takes_request
 from executive.cli.output import BAD_INPUT, console_for, finish, progress_bar

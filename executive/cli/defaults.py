@@ -81,7 +81,7 @@ def typed_options(context: Any) -> frozenset[str]:
 
 def yielding(request: Request, context: Any) -> Request:
     """Drops the defaults of the file that the command line or the mission file decides otherwise. Raises InputError."""
-    from executive.app.mission_files import mission_file
+    from executive.app.prepare.mission_files import mission_file
     from executive.mission.request import Request
     from skills.files.yaml_source import read_yaml
 

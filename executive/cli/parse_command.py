@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 import executive
-from executive.app.worlds import knowledge_of, open_world
+from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, print_json, writing
 from executive.language.explain import arcs_svg, explain, explanation_lines
 from executive.language.understand import Status, Understanding

@@ -41,8 +41,8 @@ from skills.files.yaml_source import read_yaml
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from executive.app.prepared import Prepared
-    from executive.app.report import RunReport
+    from executive.app.prepare.prepared import Prepared
+    from executive.app.report.run_report import RunReport
     from executive.record.work import Profile
 
 
@@ -73,9 +73,9 @@ def run(
 ) -> None:
     """Runs a sentence or a mission file in the simulated world, or with a real Spot."""
     refuse_unaddressed(request)
-    from executive.app.checker import prepare_checked
-    from executive.app.page_view import PageView, queue_function
-    from executive.app.runs import MissionRuns
+    from executive.app.prepare.checker import prepare_checked
+    from executive.app.runs.page_view import PageView, queue_function
+    from executive.app.runs.queue import MissionRuns
     from executive.cli.listen_command import hear_request
     from executive.cli.screen import ConsoleScreen, voice_for
     from executive.cli.spot_command import connected_spot

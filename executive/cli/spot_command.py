@@ -23,9 +23,9 @@ from skills.files.errors import InputError
 from skills.quantities import Port, Seed
 
 if TYPE_CHECKING:
-    from executive.app.mission_run import FinishedRun
-    from executive.app.prepared import Prepared
+    from executive.app.prepare.prepared import Prepared
     from executive.app.real_spot import Access
+    from executive.app.runs.one_run import FinishedRun
     from plant.spot_api.server.server import SpotServer
     from plant.worlds.world import World
 
@@ -137,7 +137,7 @@ def _environment(server: SpotServer) -> dict[str, str]:
 
 def _write_graph(world: World, folder: Path) -> None:
     """Writes a GraphNav map of a world. Raises InputError."""
-    from executive.app.placed_robots import DEFAULT_KIND
+    from executive.app.prepare.placed_robots import DEFAULT_KIND
     from executive.app.served_spot import world_map
     from plant.spot_api.server.graph_map import write_map
 
@@ -152,10 +152,10 @@ def _server(
     """Builds the simulation with Alice, and serves her. Raises InputError without the SDK or a free port."""
     _need_sdk()
     from executive.app.picking import PointPicker
-    from executive.app.placed_robots import only_robot
+    from executive.app.prepare.placed_robots import only_robot
+    from executive.app.prepare.worlds import knowledge_of, open_world
+    from executive.app.runs.simulated import compile_first, simulate
     from executive.app.served_spot import SpotPerception
-    from executive.app.simulated import compile_first, simulate
-    from executive.app.worlds import knowledge_of, open_world
     from plant.models.catalogue import user_cache
     from plant.spot_api.server.computer import Pace
     from plant.spot_api.server.estop import Tablet

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skills.detection import Detector, DetectorWrapper
 from skills.files.errors import InputError
 from skills.robot import FloatArray
 
@@ -88,3 +91,21 @@ def read_model(folder: Path) -> ObjectModel:
     if wrong or len(points) * len(rests) == 0:
         raise InputError("it is damaged", hint=_AGAIN, file=file)
     return model
+
+
+class ModelDetector(DetectorWrapper):
+    """Networks that judge pictures, and `models`, with which the skills compare segments (`model_matching.py`)."""
+
+    def __init__(self, networks: Detector, models: Iterable[ObjectModel]) -> None:
+        super().__init__(networks)
+        self.models: Mapping[str, ObjectModel] = MappingProxyType({model.name: model for model in models})
+
+
+@runtime_checkable
+class _HasModels(Protocol):
+    models: Mapping[str, ObjectModel]
+
+
+def models_of(detector: Any) -> Mapping[str, ObjectModel]:
+    """Models of own objects that a detector has, by name."""
+    return detector.models if isinstance(detector, _HasModels) else MappingProxyType({})

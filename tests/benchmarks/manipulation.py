@@ -32,9 +32,9 @@ import numpy as np
 
 from errand_train.commands.worst_sheet import Shown, contact_sheet
 from errand_train.detector.scoring import Judged
-from executive.app.placed_robots import only_robot
-from executive.app.simulated import run_entry, simulate
-from executive.app.worlds import knowledge_of
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.prepare.worlds import knowledge_of
+from executive.app.runs.simulated import run_entry, simulate
 from executive.run.outcome import Outcome
 from executive.run.runner import run
 from executive.run.visitor import RunSettings, RunVisitor

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from executive.app.evaluate.evaluation_file import load_evaluation
-from executive.app.scenarios import read_scenario
+from executive.app.prepare.scenarios import read_scenario
 from executive.language.parser import load_parser
 from executive.mission.load import knowledge_of_mission, load_mission, load_stack, mission_of_robot
 from executive.mission.resolve import mission_from_file

@@ -22,7 +22,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from executive.app.goal_conditions import verdict_of
+from executive.app.runs.goal_conditions import verdict_of
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.outcome import Outcome

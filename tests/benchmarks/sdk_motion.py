@@ -27,9 +27,9 @@ from bosdyn.client.frame_helpers import get_a_tform_b
 from bosdyn.client.math_helpers import SE2Pose, SE3Pose
 from pydrake.math import RigidTransform
 
-from executive.app.placed_robots import only_robot
-from executive.app.simulated import compile_first, simulate
-from executive.app.worlds import open_world
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.prepare.worlds import open_world
+from executive.app.runs.simulated import compile_first, simulate
 from plant.simulation import Simulation
 from plant.spot_api.messages import frame_tree, seconds, transform
 from plant.spot_api.server.commands import RobotCommandService

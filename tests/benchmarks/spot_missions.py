@@ -12,13 +12,13 @@ from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
-from executive.app.goal_conditions import verdict_of
-from executive.app.mission_run import run_request
-from executive.app.placed_robots import robot_stack
-from executive.app.prepare import prepare
+from executive.app.prepare.from_request import prepare
+from executive.app.prepare.placed_robots import robot_stack
 from executive.app.real_spot import ApiBackend
+from executive.app.runs.goal_conditions import verdict_of
+from executive.app.runs.one_run import run_request
+from executive.app.runs.simulated import simulate
 from executive.app.served_spot import SpotPerception
-from executive.app.simulated import simulate
 from executive.mission.request import Request
 from plant.spot_api.server.identity import credentials
 from tests.benchmarks.errand_process import ROOT

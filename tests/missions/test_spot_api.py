@@ -12,10 +12,10 @@ from bosdyn.api.graph_nav import graph_nav_pb2, nav_pb2
 from bosdyn.client.graph_nav import GraphNavClient
 from bosdyn.client.lease import LeaseClient
 
-from executive.app.placed_robots import only_robot
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.prepare.worlds import open_world
+from executive.app.runs.simulated import simulate
 from executive.app.served_spot import SpotPerception, world_map
-from executive.app.simulated import simulate
-from executive.app.worlds import open_world
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.control_state import Mode

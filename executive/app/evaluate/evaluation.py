@@ -19,11 +19,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.app.checker import prepare_checked
 from executive.app.evaluate.results import Case, Evaluation, Evidence, Results, ResultsFile, RunSpec, Standing
 from executive.app.evaluate.workers import Pool, installed_code
-from executive.app.mission_run import return_memory, run_request
-from executive.app.report import RunReport
+from executive.app.prepare.checker import prepare_checked
+from executive.app.report.run_report import RunReport
+from executive.app.runs.one_run import return_memory, run_request
 from executive.mission.request import Request
 from executive.record.history import Event, read_events, timeline
 from executive.record.schemas import TRANSITIONS, TREE

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.app.evaluate.results import Evaluation, RunSpec
-from executive.app.mission_files import mission_file
+from executive.app.prepare.mission_files import mission_file
 from executive.mission.load import stack_file
 from executive.mission.request import Request
 from executive.mission.scenario import NO_SCENARIO, RandomFaults, Scenario

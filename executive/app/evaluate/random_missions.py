@@ -9,8 +9,8 @@ from typing import Any, Final
 
 from executive.app.evaluate.evaluation_file import MOST_RUNS, seed_range
 from executive.app.evaluate.results import Evaluation, RunSpec
-from executive.app.feasibility import abilities_in
-from executive.app.worlds import knowledge_of, open_world
+from executive.app.prepare.feasibility import abilities_in
+from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.mission.request import Request
 from executive.words.knowledge import Knowledge
 from skills.detect.descriptions import plural

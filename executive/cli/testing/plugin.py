@@ -87,7 +87,7 @@ class SmallPlant:
 
 def _small_plant(folder: Path, *, can: bool = True) -> SmallPlant:
     """Writes the world into `folder` and places the robot at (-0.5, 0), 1.7 m before the table."""
-    from executive.app.placed_robots import shared_detector
+    from executive.app.prepare.placed_robots import shared_detector
     from executive.testing.bench import SkillBench, write_small_room
     from plant.robots.robot_kind import PlacedRobot
     from plant.simulation import Simulation

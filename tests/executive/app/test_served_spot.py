@@ -5,8 +5,8 @@ import pytest
 
 pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
 
+from executive.app.prepare.worlds import open_world
 from executive.app.served_spot import SpotPerception, world_map
-from executive.app.worlds import open_world
 from plant.spot_api.server.graph_map import write_map
 from skills.robot import Pose2D
 from skills.testing.blocks import Block

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.app import fleet_run
+from executive.app.fleet import fleet_run
 from executive.cli.fleet_command import _faults, _to_do
 from executive.mission.request import Request
 from executive.store.missions import GivenMissions, MissionState, MissionStore

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.app.mission_files import mission_file, shipped_missions
+from executive.app.prepare.mission_files import mission_file, shipped_missions
 from skills.files.errors import InputError
 from tests.executive.cli.calls import done, errand
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.app.checker import Checker
+from executive.app.prepare.checker import Checker
 from skills.files.errors import InputError
 from tests.executive.mission import mutations
 

@@ -19,7 +19,7 @@ from errand_train.commands.worst_sheet import Shown, contact_sheet
 from errand_train.detector.scoring import BODY, BODY_CLASSES, by_camera, judge_picture, picture_errors, score
 from errand_train.detector.scoring_labels import LabelledPicture, pictures_of_coco
 from errand_train.libraries import check_libraries
-from executive.app.picture_files import open_detector, read_picture, write_picture
+from executive.app.report.pictures import open_detector, read_picture, write_picture
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json
 from skills.detection import Detection

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from executive.app.evaluate.results import Case, Evaluation, Evidence, ResultsFile, RunSpec
-from executive.app.report import RunReport
+from executive.app.report.run_report import RunReport
 from executive.mission.request import Request
 from skills.files.errors import InputError
 

@@ -14,7 +14,7 @@ from skills.check_door.skill import CheckDoor
 from skills.clear_costmap.skill import ClearCostmap
 from skills.files.errors import InputError
 from skills.navigate.skill import Navigate
-from skills.open_door.http_door import HttpDoor
+from skills.open_door.openers import HttpDoor
 from skills.open_door.skill import OpenDoor
 from skills.perception.doorway import DoorState, Doorway
 from skills.robot import Pose2D

@@ -10,9 +10,9 @@ from bosdyn.api import lease_pb2, manipulation_api_pb2, robot_command_pb2
 from bosdyn.client.robot_command import RobotCommandBuilder as Build
 
 from executive.app.picking import PointPicker
-from executive.app.placed_robots import only_robot
-from executive.app.simulated import simulate
-from executive.app.worlds import open_world
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.prepare.worlds import open_world
+from executive.app.runs.simulated import simulate
 from plant.spot_api.messages import vec3
 from plant.spot_api.server.calls import Call
 from plant.spot_api.server.computer import Motors, Pace

@@ -30,7 +30,7 @@ from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter.connection import Address, Connection, LostError, WallClock
 from plant.spot_api.adapter.robot import PRESSED, ApiRobot
 from plant.worlds.world import World
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Clock, CommandId, CommandState, LeaseError, Pose2D, Robot, RobotStoppedError
 from skills.stack import RobotStack
 

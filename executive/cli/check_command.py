@@ -21,7 +21,7 @@ from executive.mission.request import Request
 from executive.tree.estimate import Estimate
 from executive.tree.node_view import node_view
 from executive.view.text import readable, to_rich
-from skills.files.errors import InputError, count_text, one_line
+from skills.inputs.errors import InputError, count_text, one_line
 
 SHOWN_NODES: Final = 40
 

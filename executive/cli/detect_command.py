@@ -15,7 +15,7 @@ from executive.app.report.pictures import draw_detections, open_detector, read_p
 from executive.cli.number_options import quantity_option
 from executive.cli.output import BAD_INPUT, console_for, finish, progress_bar, show_table
 from skills.detection import Detection, Detector
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.perception.detector.onnx_detector import DetectorOptions
 from skills.quantities import Share
 from skills.robot import Picture

@@ -17,7 +17,7 @@ from executive.cli.number_options import quantity_option
 from executive.cli.options import ANYWAY, AS_JSON, REQUEST_OPTIONS, request_arguments, takes_request
 from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer, writing
 from executive.mission.request import Request
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.quantities import Count
 
 if TYPE_CHECKING:

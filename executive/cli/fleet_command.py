@@ -15,8 +15,8 @@ from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines,
 from executive.mission.request import Request
 from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission, store_in
 from executive.words.robot_config import find_robot
-from skills.files.errors import InputError
-from skills.files.outside import is_folder
+from skills.inputs.errors import InputError
+from skills.inputs.outside import is_folder
 
 fleet = typer.Typer(
     name="fleet",

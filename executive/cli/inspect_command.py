@@ -25,8 +25,8 @@ from executive.tree.node_view import NodeView, node_view, to_json
 from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.styles import style_of
 from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, printable, readable, to_text
-from skills.files.errors import InputError
-from skills.files.outside import is_file
+from skills.inputs.errors import InputError
+from skills.inputs.outside import is_file
 from skills.quantities import Count, Delay, Port, Tries, Wait
 
 RECORDING: Final = "recording.html"

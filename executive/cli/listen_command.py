@@ -28,7 +28,7 @@ from executive.speech.whisper import load_whisper
 from executive.words.knowledge import Knowledge
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.robot_config import RobotConfig, display_name
-from skills.files.errors import InputError, listing
+from skills.inputs.errors import InputError, listing
 
 _METER_WIDTH = 24
 _QUIETEST_DB = -60.0

@@ -20,9 +20,9 @@ from executive.cli.number_options import quantity_option
 from executive.cli.options import AS_JSON
 from executive.cli.output import console_for, finish, writing
 from executive.run.control import Control
-from skills.files.errors import InputError
-from skills.files.outside import read_text
-from skills.files.yaml_source import read_yaml
+from skills.inputs.errors import InputError
+from skills.inputs.outside import read_text
+from skills.inputs.yaml_source import read_yaml
 from skills.quantities import LongDuration, Seed
 from skills.robot import Picture, Pose2D
 

@@ -17,8 +17,8 @@ from executive.language.explain import arcs_svg, explain, explanation_lines
 from executive.language.understand import Status, Understanding
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.steps import steps_to_yaml
-from skills.files.errors import InputError
-from skills.files.outside import read_text
+from skills.inputs.errors import InputError
+from skills.inputs.outside import read_text
 
 
 class ParseFormat(StrEnum):

@@ -23,7 +23,7 @@ from executive.store.standing_missions import StandingMission, StandingMissions
 from executive.store.trigger_source import refuse_missing_source
 from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, local, schedule_of
 from executive.store.wakeup import WakeupPipe, wake_server
-from skills.files.errors import InputError, listing
+from skills.inputs.errors import InputError, listing
 from skills.quantities import Count, Port, Wait
 
 if TYPE_CHECKING:

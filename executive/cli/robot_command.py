@@ -31,7 +31,7 @@ from executive.view.server import PageContent, serve
 from plant.worlds.world import World
 from skills.api import SkillContext
 from skills.estimate.grid_map import load_grid_map
-from skills.files.errors import InputError, count_text
+from skills.inputs.errors import InputError, count_text
 from skills.quantities import Delay, Port, Seed
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack

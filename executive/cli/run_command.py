@@ -34,9 +34,9 @@ from executive.cli.options import (
 from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, terminal_answerer
 from executive.mission.request import Request
 from executive.words.forms import OptionGroup as Group
-from skills.files.errors import InputError
-from skills.files.outside import is_file
-from skills.files.yaml_source import read_yaml
+from skills.inputs.errors import InputError
+from skills.inputs.outside import is_file
+from skills.inputs.yaml_source import read_yaml
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -31,7 +31,7 @@ from executive.tree.node_view import logged_view
 from executive.view.map_picture import map_picture
 from executive.words.goal import RefereeReport
 from executive.words.variation import NO_VARIATION
-from skills.files.errors import InputError, Problems
+from skills.inputs.errors import InputError, Problems
 
 Progress = Callable[[int], AbstractContextManager[Callable[[], None]]]
 """Shows progress over a number of runs; the yielded function is called after each run."""

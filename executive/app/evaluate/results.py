@@ -14,7 +14,7 @@ from typing import Final
 from executive.app.report.run_report import RunReport
 from executive.mission.request import Request
 from executive.store.database import Database, FileKind, form
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 FALSE_CLAIM: Final = "FALSE CLAIM"
 _ID_LETTERS: Final = 16

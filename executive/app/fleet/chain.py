@@ -9,7 +9,7 @@ from executive.app.fleet.fleet_mission import FleetMission, is_plain, with_comma
 from executive.app.prepare.prepared import Prepared
 from executive.words.command import Command, Task
 from executive.words.knowledge import SurfaceFacts
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ from executive.tree.board import Sign
 from executive.tree.node_view import node_view
 from executive.words.knowledge import BatteryFacts
 from plant.robots.robot_kind import PlacedRobot
-from skills.files.errors import listing
+from skills.inputs.errors import listing
 from skills.robot import Pose2D
 
 LEFT_M: Final = 1.5

@@ -34,8 +34,8 @@ from executive.words.step import Step
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
 from skills.api import Surface, Zone
-from skills.files.errors import InputError
 from skills.geometry import wrap
+from skills.inputs.errors import InputError
 from skills.manipulation.place.free_spots import spots
 from skills.robot import Pose2D
 

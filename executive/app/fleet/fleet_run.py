@@ -37,7 +37,7 @@ from executive.store.missions import GivenMissions, MissionState, MissionStore, 
 from executive.view.foxglove import LiveServer
 from executive.words.robot_config import RobotConfig
 from plant.worlds.world import World
-from skills.files.errors import InputError, Problems
+from skills.inputs.errors import InputError, Problems
 
 TIME_LIMIT_S: Final = 1200.0
 """Time limit for each mission of the queue, on the robots' clock."""

@@ -18,7 +18,7 @@ from executive.tree.estimate import Estimate, RoutePlanner
 from executive.tree.node_view import node_view
 from executive.view.formats import to_svg
 from executive.view.text import DRAWN_NODES, readable
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 MOST_LETTERS: Final = 300
 

@@ -19,7 +19,7 @@ from plant.models.catalogue import load_catalogue
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
 from skills.api import Zone
-from skills.files.errors import Problems
+from skills.inputs.errors import Problems
 from skills.manipulation.arm.kinematics import arm_model
 from skills.perception.class_forms import class_forms, known_attributes, shipped_forms
 from skills.robot import Capabilities, Pose2D

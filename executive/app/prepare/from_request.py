@@ -32,9 +32,9 @@ from executive.words.robot_config import RobotConfig, find_robot, robots_of_file
 from executive.words.steps import steps_from_lines
 from plant.robots.robot_kind import PlacedRobot
 from plant.worlds.world import ObjectRule, World, WorldError
-from skills.files.errors import InputError, Problems, listing, suggestion
-from skills.files.outside import LONGEST_ANSWER, plain_text
-from skills.files.yaml_source import KeyPath, read_yaml
+from skills.inputs.errors import InputError, Problems, listing, suggestion
+from skills.inputs.outside import LONGEST_ANSWER, plain_text
+from skills.inputs.yaml_source import KeyPath, read_yaml
 from skills.robot import Pose2D
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from skills.files.errors import InputError, nearest_name
-from skills.files.outside import is_there
-from skills.files.yaml_source import yaml_of
+from skills.inputs.errors import InputError, nearest_name
+from skills.inputs.outside import is_there
+from skills.inputs.yaml_source import yaml_of
 
 if TYPE_CHECKING:
     from typing import Unpack

@@ -16,7 +16,7 @@ from executive.words.knowledge import DOCK, Knowledge, Pose, RobotFacts
 from executive.words.robot_config import RobotConfig
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.navigate.footprint import Footprint
 from skills.robot import FloatArray, Pose2D
 from skills.stack import DetectorComponent, RobotStack, default_stack

@@ -22,9 +22,9 @@ from plant.worlds.seeding import add_answers, add_crowd
 from plant.worlds.world import DoorRule, MoveRule, World, WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.faults.faulty_robot import parse_fault, random_faults
-from skills.files.errors import InputError, Problems, suggestion, with_article
-from skills.files.schema import Name, Text, validate
-from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
+from skills.inputs.errors import InputError, Problems, suggestion, with_article
+from skills.inputs.schema import Name, Text, validate
+from skills.inputs.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import Coordinate, Delay, Height, Quantity
 from skills.robot import FloatArray
 

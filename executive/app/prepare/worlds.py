@@ -6,7 +6,7 @@ from pathlib import Path
 
 from executive.words.knowledge import Knowledge, load_knowledge
 from plant.worlds.world import WORLDS_FOLDER, World, WorldError, known_worlds, load_world
-from skills.files.errors import InputError, known_names, suggestion
+from skills.inputs.errors import InputError, known_names, suggestion
 
 
 def open_world(name: str) -> World:

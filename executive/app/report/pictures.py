@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from skills.detection import Detection
-from skills.files.errors import InputError
-from skills.files.picture_files import read_pixels
+from skills.inputs.errors import InputError
+from skills.inputs.picture_files import read_pixels
 from skills.perception.detector.model_files import MODEL_FILE, ModelFileError
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector, load_detector
 from skills.robot import Picture

@@ -27,7 +27,7 @@ from executive.view.text import DRAWN_NODES, executed_tree, readable
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import inside
 from skills.api import ObjectObservation
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 REPORT: Final = "report.html"
 TREE: Final = "tree"

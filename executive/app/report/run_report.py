@@ -17,7 +17,7 @@ from rich.markup import escape
 
 from executive.run.outcome import Said
 from executive.words.goal import RefereeReport
-from skills.files.errors import count_text
+from skills.inputs.errors import count_text
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter

@@ -10,7 +10,7 @@ from executive.tree.board import FromBoard
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.words.expression import Expression, Template
 from executive.words.goal import GoalCondition, GoalKind, RefereeReport, When
-from skills.files.errors import listing
+from skills.inputs.errors import listing
 
 SHOWN_CHARS = 60
 _MOVING = frozenset({GoalKind.GRASPED, GoalKind.PLACED, GoalKind.HANDED_OVER, GoalKind.CLEARED})

@@ -41,7 +41,7 @@ from plant.worlds.world import World
 from skills.api import PlanningError, Publish, Worker
 from skills.estimate.grid_map import load_grid_map
 from skills.faults.faulty_robot import FaultyRobot, inject_faults, parse_fault
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path
 from skills.robot import Pose2D, Robot

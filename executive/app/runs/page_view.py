@@ -28,7 +28,7 @@ from executive.view.page_control import (
     robot_of,
     text_of,
 )
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 if TYPE_CHECKING:
     from executive.view.server import PageServer

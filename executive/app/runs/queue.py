@@ -27,7 +27,7 @@ from executive.store.recollection import Recollection
 from executive.store.resuming import ended_tree, resumed_tree
 from executive.view.foxglove import LiveServer
 from executive.words.slug import slug
-from skills.files.errors import InputError, disk_is_full
+from skills.inputs.errors import InputError, disk_is_full
 
 _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCELLED, MissionState.ERROR)
 

@@ -28,8 +28,8 @@ from executive.store.trigger_source import TriggerSource, trigger_source
 from executive.store.triggers import OnCall, OnTopic, Trigger
 from executive.store.wakeup import wake_server
 from executive.view.serving import CallError, CallServer
-from skills.files.errors import InputError
-from skills.files.plugins import PluginDefect, run_in_thread
+from skills.inputs.errors import InputError
+from skills.inputs.plugins import PluginDefect, run_in_thread
 
 LIMIT_S: Final = 10.0
 """Time limit of a plug-in to start, and to stop."""

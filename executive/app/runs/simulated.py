@@ -31,10 +31,10 @@ from plant.snapshot_file import SnapshotError
 from plant.worlds.world import World, WorldError
 from skills.detection import Detector
 from skills.estimate.grid_map import load_grid_map
-from skills.files.errors import InputError
-from skills.files.object_model import ModelDetector, models_of, read_model
+from skills.inputs.errors import InputError
 from skills.manipulation.arm.solid_cells import wall_columns
 from skills.navigate.lattice import search
+from skills.perception.object_model import ModelDetector, models_of, read_model
 from skills.robot import Clock, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 

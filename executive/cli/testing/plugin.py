@@ -63,7 +63,7 @@ def _settings(config: pytest.Config) -> SkillTestSettings:
         from executive.testing.skill_suite import SkillTestSettings
         from executive.testing.skill_test import scripted_maker
         from executive.tree.registry import installed_skills
-        from skills.files.errors import InputError
+        from skills.inputs.errors import InputError
 
         capabilities = _spot()
         makers = {"scripted": scripted_maker(capabilities), "plant": _plant_bench}

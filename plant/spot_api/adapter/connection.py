@@ -18,7 +18,7 @@ from bosdyn.api.spot import door_pb2
 
 from plant.spot_api.adapter.statuses import call_trouble, response_trouble, trouble
 from plant.spot_api.messages import seconds
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import CommandCause
 
 CLIENT: Final = "errand"

@@ -27,7 +27,7 @@ from plant.spot_api.adapter.connection import Address, Connection
 from plant.spot_api.server import computer, identity, keepalive
 from plant.spot_api.server.computer import Motors
 from plant.spot_api.server.estop import Tablet
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D, RobotStoppedError
 from tests.plant.spot_api.lock_step import PASSWORD, USER, scripted_spot
 

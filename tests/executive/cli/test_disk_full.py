@@ -13,7 +13,7 @@ from executive.record.event_log import EventLog
 from executive.record.history import read_events
 from executive.run.outcome import Outcome
 from executive.store.missions import MissionState, MissionStore
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.executive.app.runs.scripted_backend import ScriptedBackend
 
 FULL_AT_S = 3.0

@@ -25,7 +25,7 @@ from executive.words.command import Command
 from executive.words.goal import RefereeReport
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 from tests.executive.cli import calls
 from tests.executive.distribution import write_distribution

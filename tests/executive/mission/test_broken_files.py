@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from executive.app.prepare.checker import Checker
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.executive.mission import mutations
 
 COUNT, SEED = 300, 7

@@ -23,8 +23,8 @@ from executive.app.report.pictures import open_detector, read_picture, write_pic
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json
 from skills.detection import Detection
-from skills.files.errors import InputError
-from skills.files.outside import read_text
+from skills.inputs.errors import InputError
+from skills.inputs.outside import read_text
 from skills.perception.detector.augmentation import AugmentedDetector
 from skills.perception.detector.camera_images import rotate_180, rotate_boxes_180
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector

@@ -29,7 +29,7 @@ from executive.words.mission import Mission
 from executive.words.steps import lines_of_steps
 from plant.robots.robot_kind import PlacedRobot
 from skills.api import Cause, Failed, Running, Skill, Succeeded
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 from tests.benchmarks.fleet import begun_again
 from tests.executive.conftest import COKE, default_end

@@ -11,7 +11,7 @@ from executive.cli.output import ask_at_terminal
 from executive.language.questions import ClarifyingQuestion, Slot
 from executive.mission.request import Request
 from executive.words.mission import QuestionPolicy
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 TABLE = "put the cube on the table"
 QUESTION = ClarifyingQuestion("Which table?", Slot.PLACE, ("kitchen table", "coffee table"), "kitchen table", "table")

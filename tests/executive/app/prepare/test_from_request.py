@@ -13,7 +13,7 @@ from executive.mission.request import Request
 from executive.words.robot_config import RobotConfig
 from executive.words.variation import Variation
 from plant.worlds.seeding import place_people
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 from tests.tables import yaml_beside
 

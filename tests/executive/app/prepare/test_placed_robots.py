@@ -9,7 +9,7 @@ from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.words.robot_config import RobotConfig
 from plant.robots.robot_kind import PlacedRobot
 from plant.worlds.seeding import place_people
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 
 WORLD = open_world("flat")

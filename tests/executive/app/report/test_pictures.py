@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.app.report.pictures import read_picture, write_picture
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 def noise(*shape, dtype=np.uint8):

@@ -17,7 +17,7 @@ from executive.record.event_log import EventLog
 from executive.run.control_state import Mode
 from executive.store.missions import MissionState, MissionStore
 from executive.view.page_control import RefusedError
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.node_view import node_view
 from executive.words.goal import RefereeReport
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 GO = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
 

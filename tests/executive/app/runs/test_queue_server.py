@@ -25,7 +25,7 @@ from executive.store.missions import MissionState, MissionStore
 from executive.store.standing_missions import MOST_WAITING, StandingMissions
 from executive.store.triggers import Missed, OnCall, OnTopic, trigger_of
 from executive.view.serving import CallError
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import yaml_beside
 
 TOKEN = "a-token-of-the-test"

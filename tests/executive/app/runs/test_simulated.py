@@ -16,7 +16,7 @@ from plant.worlds.seeding import place_people
 from plant.worlds.world import load_world
 from skills.api import Question
 from skills.estimate.grid_map import load_grid_map
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.perception.cascade import Cascade
 from skills.robot import Pose2D
 from skills.stack import default_stack

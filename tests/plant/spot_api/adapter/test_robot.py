@@ -18,7 +18,7 @@ from plant.spot_api.adapter.connection import Address, Connection
 from plant.spot_api.adapter.readings import picture
 from plant.spot_api.adapter.robot import ApiRobot
 from plant.spot_api.server.faults import Fault
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import ArmTrajectory, CommandCause, CommandState, FrameTree, LeaseError, NoImageError
 from skills.testing.blocks import Block
 from tests.plant.spot_api.lock_step import FailedCall, LockStep, scripted

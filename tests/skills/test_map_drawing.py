@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from skills.files.map_drawing import Names, drawable, text_size, with_legend
+from skills.map_drawing import Names, drawable, text_size, with_legend
 
 
 def blank(width=400, height=300):

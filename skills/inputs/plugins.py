@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 __all__ = [
     "CLASSES",
@@ -66,7 +66,7 @@ def _all_installed() -> SelectableGroups:
 
 def class_tables(name: str) -> Iterator[tuple[Path, Any]]:
     """Yields path and data of a YAML file from each package with classes that has it. Raises InputError."""
-    from skills.files.yaml_source import read_yaml
+    from skills.inputs.yaml_source import read_yaml
 
     for entry in sorted(installed_plugins(CLASSES), key=lambda entry: entry.name):
         try:
@@ -85,7 +85,7 @@ def class_entries(name: str, kind: type[ResultT]) -> Iterator[tuple[Path, dict[s
     """Yields the file and its entries by class of each package with classes that has it. Raises InputError."""
     from pydantic import TypeAdapter, ValidationError
 
-    from skills.files.schema import first_error
+    from skills.inputs.schema import first_error
 
     for file, data in class_tables(name):
         try:

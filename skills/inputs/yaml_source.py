@@ -14,8 +14,8 @@ from typing import Any, Final
 
 import yaml
 
-from skills.files.errors import InputError, with_article
-from skills.files.outside import read_text
+from skills.inputs.errors import InputError, with_article
+from skills.inputs.outside import read_text
 
 __all__ = ["KeyPath", "YamlSource", "parse_yaml", "quoted_key", "read_yaml", "scalar_of", "yaml_of"]
 

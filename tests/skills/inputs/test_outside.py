@@ -5,8 +5,8 @@ import os
 
 import pytest
 
-from skills.files.errors import InputError
-from skills.files.outside import (
+from skills.inputs.errors import InputError
+from skills.inputs.outside import (
     LONGEST_TEXT,
     file_beside,
     is_file,

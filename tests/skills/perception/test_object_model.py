@@ -5,8 +5,8 @@ import pytest
 from own_models import can_model, photographed_can
 
 from executive.record.work import CountedDetector, Work
-from skills.files.errors import InputError
-from skills.files.object_model import RECOGNITION_FILE, ModelDetector, models_of, read_model
+from skills.inputs.errors import InputError
+from skills.perception.object_model import RECOGNITION_FILE, ModelDetector, models_of, read_model
 from skills.testing.estimators import PlainColours
 
 MODEL = can_model("tin", 0.04, 0.12, (190, 15, 20))

@@ -10,8 +10,8 @@ from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import ErrorDetails
 from typing_extensions import TypeAliasType
 
-from skills.files.errors import MOST_LISTED, InputError, listing, nearest_name, short_list, suggestion
-from skills.files.yaml_source import KeyPath, YamlSource, quoted_key
+from skills.inputs.errors import MOST_LISTED, InputError, listing, nearest_name, short_list, suggestion
+from skills.inputs.yaml_source import KeyPath, YamlSource, quoted_key
 from skills.quantities import QuantityError, base_type, display_text
 
 __all__ = ["Name", "Text", "first_error", "validate"]

@@ -1,6 +1,6 @@
 import pytest
 
-from skills.files.errors import MOST_LETTERS, InputError, definite, known_names, with_article
+from skills.inputs.errors import MOST_LETTERS, InputError, definite, known_names, with_article
 
 
 def test_a_message_that_repeats_an_endless_name_is_cut_off():

@@ -8,7 +8,7 @@ import unicodedata
 from pathlib import Path
 from typing import Any, Final
 
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 __all__ = ["file_beside", "is_file", "is_folder", "is_there", "plain_file", "read_bytes", "read_text"]
 

@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.files.errors import InputError
-from skills.files.outside import read_bytes
+from skills.inputs.errors import InputError
+from skills.inputs.outside import read_bytes
 
 __all__ = ["MOST_PIXELS", "Brightness", "check_picture", "read_brightness", "read_pixels"]
 

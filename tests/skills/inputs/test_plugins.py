@@ -8,12 +8,12 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from skills.files.plugins import PluginDefect, run_in_thread, run_plugin
+from skills.inputs.plugins import PluginDefect, run_in_thread, run_plugin
 
 ENTRY = EntryPoint("wave", "wavers:Wave", "errand.skills")
 HANGS = """
 from importlib.metadata import EntryPoint
-from skills.files.plugins import run_plugin
+from skills.inputs.plugins import run_plugin
 import time
 run_plugin(EntryPoint("wave", "wavers:Wave", "errand.skills"), lambda: time.sleep(60), limit_s=0.2)
 """

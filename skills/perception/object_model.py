@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.detection import Detector, DetectorWrapper
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import FloatArray
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from pydantic import BaseModel, ConfigDict
 from executive.mission.load import load_mission, load_stack
 from executive.words.knowledge import load_knowledge
 from executive.words.mission import Mission
-from skills.files.errors import InputError
-from skills.files.outside import TEXT_BYTES
-from skills.files.schema import Name, validate
-from skills.files.yaml_source import parse_yaml, read_yaml, scalar_of, yaml_of
+from skills.inputs.errors import InputError
+from skills.inputs.outside import TEXT_BYTES
+from skills.inputs.schema import Name, validate
+from skills.inputs.yaml_source import parse_yaml, read_yaml, scalar_of, yaml_of
 from skills.quantities import Count, Share
 from tests.hostile_values import FILES
 from tests.tables import table

@@ -1,9 +1,9 @@
 import pytest
 from pydantic import BaseModel, ConfigDict
 
-from skills.files.errors import InputError
-from skills.files.schema import validate
-from skills.files.yaml_source import read_yaml
+from skills.inputs.errors import InputError
+from skills.inputs.schema import validate
+from skills.inputs.yaml_source import read_yaml
 
 
 class Event(BaseModel):

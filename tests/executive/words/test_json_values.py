@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from executive.words.json_values import from_text, to_text
 from skills.api import ObjectKind, ObjectObservation, Surface
-from skills.files.json_values import from_text, to_text
 from skills.robot import CommandState, Pose2D
 from tests.tables import table
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NewType, Protocol
 
@@ -384,6 +384,20 @@ class Robot(Protocol):
 
     def return_lease(self, lease: Lease) -> None:
         """Returns the lease; the robot stops. Ignores a lease that was taken away."""
+
+
+@dataclass(frozen=True)
+class ConnectedRobot:
+    """Robot that a backend has connected, its clock, and what the report says about its sensors.
+
+    `make_ready` lets it stand. It is called just before a run, because a robot that is ready must hear something all
+    the time, and planning and loading take long.
+    """
+
+    robot: Robot
+    clock: Clock
+    make_ready: Callable[[], None] = lambda: None
+    notes: tuple[str, ...] = ()
 
 
 class NoImageError(RuntimeError):

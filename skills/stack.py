@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import EntryPoint
@@ -22,7 +23,7 @@ from skills.inputs.errors import suggestion
 from skills.inputs.plugins import OURS, PluginDefect, distribution_of, installed_plugins, run_plugin
 from skills.inputs.schema import first_error
 from skills.quantities import display_text
-from skills.robot import FloatArray, GripperCapabilities, Pose2D
+from skills.robot import ConnectedRobot, FloatArray, GripperCapabilities, Pose2D
 
 if TYPE_CHECKING:
     from skills.detection import Detector
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from skills.world_model import Costmap, FreeSpace, Localiser, WorkCounter
 
 __all__ = [
+    "BACKENDS",
     "DEFAULT_FILE",
     "DOORS",
     "SLOTS",
@@ -47,6 +49,7 @@ __all__ = [
     "default_component",
     "default_stack",
     "door_opener",
+    "robot_backend",
     "stack_data",
     "stack_of",
     "stack_schema",
@@ -68,6 +71,8 @@ SKILL_GROUP: Final = "errand.skills"
 USE: Final = "use"
 DOORS: Final = "errand.doors"
 """Entry-point group of the plug-ins that open doors (`skills.perception.doorway.DoorOpener`)."""
+BACKENDS: Final = "errand.backends"
+"""Entry-point group of the backends that drive robots; a name is the scheme of addresses, as in `spot://HOST`."""
 PLUGIN: Final = "plugin"
 DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")
 
@@ -169,6 +174,17 @@ class DetectorComponent(Hashable, Protocol):
         """Loads the detector. Raises ValueError when its model cannot be used."""
 
 
+class RobotBackend(Protocol):
+    """Connects to robots of one make. Its fields are the options of an address: `spot://HOST?power_on=yes`."""
+
+    def connect(self, address: str, name: str) -> AbstractContextManager[ConnectedRobot]:
+        """Connects to the robot at an address without scheme and options; missions call it by the name.
+
+        At the end, or when the block raises, the robot is left as it was. Raises InputError when the robot cannot be
+        reached or is not ready.
+        """
+
+
 @dataclass(frozen=True)
 class RobotStack:
     """Components of one robot, their `names`, and the options of its skills by the skill's name."""
@@ -255,6 +271,16 @@ def door_opener(given: Mapping[str, Any]) -> Any:
         raise StackError((PLUGIN,), f"no plug-in {display_text(name)} opens doors", suggestion(str(name), known))
     options = {key: value for key, value in given.items() if key != PLUGIN}
     return _typed((), _loaded(PLUGIN, str(name), DOORS), options)
+
+
+def robot_backend(scheme: str, given: Mapping[str, Any]) -> RobotBackend:
+    """Returns the backend of a scheme, with its options. Raises StackError."""
+    known = sorted({entry.name for entry in installed_plugins(BACKENDS)})
+    if scheme not in known:
+        hint = suggestion(scheme, known) if known else "install one: pip install errand-spot, for example"
+        raise StackError((), f"no plug-in drives robots of '{scheme[:60]}://'", hint)
+    backend: RobotBackend = _typed((), _loaded(scheme, scheme, BACKENDS), given)
+    return backend
 
 
 def _names(slot: str) -> list[str]:

@@ -22,9 +22,9 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1594,
     "executive/testing": 849,
-    "executive/app": 8324,
-    "executive/cli": 4997,
-    "skills": 30150,
+    "executive/app": 8343,
+    "executive/cli": 5031,
+    "skills": 30194,
     "plant": 22156,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 517, 93, 13

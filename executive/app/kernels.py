@@ -1,7 +1,9 @@
 """Compiles the numeric code of driving, scans, arms and maps into numba's cache by short runs of each."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -18,6 +20,8 @@ from executive.mission.request import Request
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.robot_config import RobotConfig
 from skills.estimate.compiled import CompiledFunction
+from skills.inputs.errors import InputError
+from skills.inputs.plugins import KERNELS, PluginDefect, distribution_of, installed_plugins, run_plugin
 
 _MISSION: Final = """
 name: warm up
@@ -31,15 +35,17 @@ _DRIVES: Final = (
     ("fetch", None),
 )
 """Kinds of robots, and the components in place of their default ones."""
-STEPS: Final = len(_DRIVES) + 4
 TICK_S: Final = 0.05
 _DRIVEN_S: Final = 2.5
 _SURVEYED_S: Final = 4.0
+_LIMIT_S: Final = 300.0
+"""Time that a plug-in may take to compile its code."""
 
 
 def newly_compiled() -> int:
     """Number of functions that this process has compiled because numba's cache lacked them."""
-    modules = [module for name, module in sys.modules.items() if name.startswith(("skills.", "plant."))]
+    packages = {"skills", "plant", *(entry.value.partition(".")[0] for entry in installed_plugins(KERNELS))}
+    modules = [module for name, module in sys.modules.items() if name.partition(".")[0] in packages]
     values = [value for module in modules for value in vars(module).values()]
     compiled: list[Any] = [
         each.machine_code for each in values if isinstance(each, CompiledFunction) and each.is_compiled
@@ -49,23 +55,36 @@ def newly_compiled() -> int:
     return sum(sum(code.stats.cache_misses.values()) for code in codes.values())
 
 
-def compile_kernels(advance: Callable[[], None] = lambda: None) -> None:
-    """Drives with each kind of robot and component, moves an arm, and surveys, each for a short time.
+def kernel_steps() -> Sequence[Callable[[], None]]:
+    """Functions that each run some numeric code for a short time: drives, an arm, a survey, and those of plug-ins.
 
-    Takes some seconds if the cache holds all code already. Calls `advance` after each of STEPS.
+    All together take some seconds if the cache holds their code already. A step of a plug-in raises InputError if it
+    fails.
     """
+    drives = (partial(_drive, kind, stack) for kind, stack in _DRIVES)
+    return (*drives, _solve_arm, _map_cells, _survey, _see_blocks, *map(_step_of, installed_plugins(KERNELS)))
+
+
+def _step_of(entry: EntryPoint) -> Callable[[], None]:
+    """Returns the step that a plug-in registers, loaded when it is called."""
+
+    def step() -> None:
+        try:
+            run_plugin(entry, lambda: entry.load()(), limit_s=_LIMIT_S)
+        except PluginDefect as defect:
+            what = f"cannot compile '{entry.name}' ({entry.value}) of {distribution_of(entry)}: {defect}"
+            raise InputError(what, hint="repair or uninstall that distribution") from defect
+
+    return step
+
+
+def _drive(kind: str, components: str | None) -> None:
+    """Runs a mission that drives for some seconds, in a folder that is removed."""
     with TemporaryDirectory() as folder:
-        for number, (kind, stack) in enumerate(_DRIVES):
-            _drive(kind, stack, Path(folder) / str(number))
-            advance()
-    for step in (_solve_arm, _map_cells, _survey, _see_blocks):
-        step()
-        advance()
+        _drive_in(Path(folder), kind, components)
 
 
-def _drive(kind: str, components: str | None, folder: Path) -> None:
-    """Runs a mission that drives for some seconds."""
-    folder.mkdir()
+def _drive_in(folder: Path, kind: str, components: str | None) -> None:
     mission, stack = folder / "warm_up.yaml", None
     mission.write_text(_MISSION, encoding="utf-8")
     if components is not None:

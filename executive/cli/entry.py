@@ -10,7 +10,7 @@ import gc
 import os
 import sys
 import threading
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
@@ -29,23 +29,9 @@ _COLLECTED_AFTER: Final = (30_000, 20, 50)
 
 
 COMMANDS_GROUP: Final = "errand.commands"
-"""The entry-point group of plug-ins: name = the word after `errand`, value = a `typer.Typer` or a function with typer's
-options."""
+"""The entry-point group of plug-ins: name = the word after `errand`, or GROUP.NAME below a group of Errand; value = a
+`typer.Typer` or a function with typer's options."""
 EXIT_CODES: Final = "Exit codes: 0 success; 1 the mission was not achieved; 2 bad input, named in one line."
-_KNOWN: Final[Mapping[str, str]] = {"dataset": "errand-train"}
-"""Commands of the project's other distribution."""
-
-
-RENAMED: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
-    "tree": {"--output": ("--out",)},
-    "parse": {"--svg": ("--format", "svg", "--out")},
-    "log": {"--map": ("--format", "map", "--out"), "--ros2": ("--format", "ros2", "--out")},
-    "replay": {"--html": ("--out",)},
-    "report": {"--html": ("--out",)},
-    "detect": {"--draw": ("--out",)},
-    "object": {"--picture": ("--out",)},
-}
-"""Former options of commands, which are accepted with a warning, and what stands for them now."""
 
 
 @dataclass(frozen=True)
@@ -81,20 +67,42 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     ),
     "report": _Command("evaluate_command", "report", "Report the results of an evaluation: rates, causes, failures."),
     "teleop": _Command("robot_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
-    "serve": _Command("spot_command", "serve", "Serve Spot's API for a simulated Spot, for programs of its SDK."),
-    "sdk": _Command("spot_command", "sdk", "Run a program of Spot's SDK, unchanged, with a simulated Spot."),
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "stack": _Command("plugins_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
     "map": _Command("map_command", "map_group", "Maps that the robot builds itself, by exploring or along a route."),
-    "world": _Command("world_command", "world", "Worlds from any map, and drawings of worlds."),
-    "object": _Command("object_command", "object_group", "Objects of your own: import any mesh as a model."),
-    "plugins": _Command("plugins_command", "plugins", "List the plug-ins of other distributions, and errors in them."),
+    "plugins": _Command(
+        "plugins_command", "plugins", "List the installed plug-ins, what each registers, and errors in them."
+    ),
     "warm-up": _Command(
         "robot_command", "warm_up", "Compile the numeric code for this machine, so that runs begin at once."
     ),
-    "new": _Command("new_command", "new", "Write an installable package with a skill, or with a robot from a URDF."),
+    "new": _Command("new_command", "new", "Write an installable package with a skill, or with a robot."),
 }
 """Commands of Errand by name, in the order of the help; commands of plug-ins follow them."""
+
+
+@dataclass(frozen=True)
+class _PluginCommand:
+    """Command of a plug-in of this project: the plug-in's distribution, and the command's help."""
+
+    distribution: str
+    help: str
+
+    @property
+    def missing(self) -> str:
+        """Dimmed line of the help where the plug-in is not installed."""
+        return typer.style(f"Not installed: pip install {self.distribution}", dim=True)
+
+
+PLUGIN_COMMANDS: Final[Mapping[str, _PluginCommand]] = {
+    "serve": _PluginCommand("errand-spot", "Serve Spot's API for a simulated Spot, for programs of its SDK."),
+    "sdk": _PluginCommand("errand-spot", "Run a program of Spot's SDK, unchanged, with a simulated Spot."),
+    "world": _PluginCommand("errand-make", "Worlds from any map, and drawings of worlds."),
+    "object": _PluginCommand("errand-make", "Objects of your own: import any mesh as a model."),
+    "new.robot": _PluginCommand("errand-make", "Write a package with a robot from a URDF."),
+    "dataset": _PluginCommand("errand-train", "Labelled pictures for the detector; training and scores."),
+}
+"""Commands of this project's plug-ins by name, listed by the help also where they are not installed."""
 
 
 def shipped_command(name: str) -> Any:
@@ -125,31 +133,20 @@ def _with_epilog(command: Any) -> Any:
     return command
 
 
-def current(command: str, words: Sequence[str]) -> list[str]:
-    """Replaces former options of a command by the present ones, and warns of each."""
-    present = list[str]()
-    for word in words:
-        former, equals, value = word.partition("=")
-        if (now := RENAMED.get(command, {}).get(former)) is None:
-            present.append(word)
-            continue
-        typer.echo(f"errand: warning: {former} is now {' '.join(now)}", err=True)
-        present += [*now, *((value,) if equals else ())]
-    return present
+def help_lines() -> dict[str, str]:
+    """Returns the help of the commands of plug-ins by name, without importing them.
 
-
-def help_lines(shipped: Collection[str]) -> dict[str, str]:
-    """Returns the commands of plug-ins by name, with the summary of each distribution, without importing them.
-
-    Reads the metadata files itself, because importing `importlib.metadata` takes longer than the whole help.
+    A command that this project has no help for gets the summary of its distribution. Reads the metadata files itself,
+    because importing `importlib.metadata` takes longer than the whole help.
     """
     lines = dict[str, str]()
     for folder in map(Path, sys.path):
         for info in (*folder.glob("*.dist-info"), *folder.glob("*.egg-info")):
             section = _text(info / "entry_points.txt").partition(f"[{COMMANDS_GROUP}]\n")[2].partition("\n[")[0]
             names = [line.partition("=")[0].strip() for line in section.splitlines() if "=" in line]
-            lines |= {name: _summary(info) for name in names if name not in shipped}
-    return dict(sorted(lines.items()))
+            lines |= {name: _summary(info) for name in names if name not in COMMANDS}
+    others = {name: line for name, line in sorted(lines.items()) if name not in PLUGIN_COMMANDS}
+    return {name: each.help if name in lines else each.missing for name, each in PLUGIN_COMMANDS.items()} | others
 
 
 def _summary(info: Path) -> str:
@@ -167,26 +164,43 @@ def _text(file: Path) -> str:
 def plugin_command(name: str) -> Any | None:
     """Loads the command of a plug-in; returns None if no distribution registers the name.
 
-    Raises InputError if the command cannot be loaded, several distributions register it, or it belongs to errand-train,
-    which is not installed.
+    Raises InputError if the command cannot be loaded, several distributions register it, or it belongs to a plug-in of
+    this project that is not installed.
     """
     from skills.inputs.plugins import PluginDefect, distribution_of, installed_plugins, run_plugin
 
+    words, short = name.replace(".", " "), name.rpartition(".")[2]
     found = [entry for entry in installed_plugins(COMMANDS_GROUP) if entry.name == name]
     if not found:
-        if name in _KNOWN:
-            what = f"'{name}' is a command of {_KNOWN[name]}, which is not installed"
-            raise InputError(what, hint="run `make train` in a clone of Errand")
+        if (ours := PLUGIN_COMMANDS.get(name)) is not None:
+            what = f"'{words}' is a command of {ours.distribution}, which is not installed"
+            raise InputError(what, hint=f"pip install {ours.distribution}")
         return None
     if len(found) > 1:
-        what = f"{listing(sorted(map(distribution_of, found)))} both have a command '{name}'"
+        what = f"{listing(sorted(map(distribution_of, found)))} both have a command '{words}'"
         raise InputError(what, hint="uninstall one of them")
     (entry,) = found
     try:
-        return run_plugin(entry, lambda: as_command(name, entry.load()))
+        return run_plugin(entry, lambda: as_command(short, entry.load()))
     except PluginDefect as defect:
-        what = f"cannot load command '{name}' ({entry.value}) of {distribution_of(entry)}: {defect}"
+        what = f"cannot load command '{words}' ({entry.value}) of {distribution_of(entry)}: {defect}"
         raise InputError(what, hint="repair or uninstall that distribution") from defect
+
+
+def with_plugin_commands(name: str, group: TyperGroup, typed: str) -> None:
+    """Adds the commands of plug-ins to a group of Errand: lists all, and loads the one that is typed.
+
+    Raises InputError as `plugin_command` does.
+    """
+    for each, line in help_lines().items():
+        above, _, short = each.rpartition(".")
+        if above == name and isinstance(group.commands.get(short), _Listed | None):
+            loaded = plugin_command(each) if short == typed else None
+            group.add_command(loaded or _Listed(short, short_help=line), short)
+
+
+class _Listed(TyperCommand):
+    """Command of a plug-in that the help lists, and that is loaded when it is called."""
 
 
 class _LazyGroup(TyperGroup):
@@ -199,18 +213,21 @@ class _LazyGroup(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Lists all names, those of plug-ins last."""
-        for name, line in help_lines(COMMANDS).items():
-            if name not in self.commands:
-                self.add_command(TyperCommand(name, help=line))
+        for name, line in help_lines().items():
+            if name not in self.commands and "." not in name:
+                self.add_command(_Listed(name, short_help=line))
         return super().list_commands(ctx)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Imports and returns the command that the first argument names."""
-        if args and args[0] in COMMANDS:
-            self.add_command(shipped_command(args[0]), args[0])
-            args = [args[0], *current(args[0], args[1:])]
-        elif args and (found := plugin_command(args[0])) is not None:
-            self.add_command(found, args[0])
+        name, typed = [*args, "", ""][:2]
+        if name in COMMANDS:
+            command = shipped_command(name)
+            if isinstance(command, TyperGroup):
+                with_plugin_commands(name, command, typed)
+            self.add_command(command, name)
+        elif name and "." not in name and (found := plugin_command(name)) is not None:
+            self.add_command(found, name)
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:

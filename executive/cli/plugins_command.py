@@ -1,18 +1,18 @@
-"""`errand plugins` lists the plug-ins of other distributions; `errand stack show` prints a stack with its options."""
+"""`errand plugins` lists what distributions register; `errand stack show` prints a stack with its options."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, entry_points, version
 from typing import Annotated, Final
 
 import typer
 
-from executive.cli.entry import COMMANDS, COMMANDS_GROUP, as_command
+from executive.cli.entry import COMMANDS, COMMANDS_GROUP, PLUGIN_COMMANDS, as_command
 from executive.cli.number_options import quantity_option
 from executive.cli.options import takes_request
 from executive.cli.output import console_for, finish, progress_bar, show_table
@@ -23,11 +23,11 @@ from executive.tree import registry
 from plant.models.catalogue import load_catalogue
 from plant.robots import robot_kind as kinds
 from skills.inputs.errors import InputError
-from skills.inputs.plugins import CLASSES, LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
+from skills.inputs.plugins import CLASSES, KERNELS, LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
 from skills.inputs.yaml_source import yaml_of
 from skills.perception.class_forms import class_forms
 from skills.quantities import Duration
-from skills.stack import DOORS, SLOTS, stack_data
+from skills.stack import BACKENDS, DOORS, SLOTS, stack_data
 
 _WORKERS: Final = 4
 _MORE_S: Final = 30.0
@@ -41,6 +41,7 @@ class Plugin:
     group: str
     name: str
     distribution: str
+    version: str
     value: str
     broken: str | None = None
 
@@ -50,7 +51,7 @@ def plugins(
     limit: Annotated[float, quantity_option(Duration, "--limit", help="Time limit to load a plug-in.")] = LIMIT_S,
     load: Annotated[str | None, typer.Option(hidden=True)] = None,
 ) -> None:
-    """Lists the plug-ins of other distributions and errors of loading them, each in a process of its own."""
+    """Lists distributions, what each registers, and errors of loading it, each in a process of its own."""
     if load is not None:
         _load(load, limit)
         return
@@ -60,17 +61,28 @@ def plugins(
         for each in pool.map(lambda entry: _checked(entry, limit), entries):
             found.append(each)
             advance()
-    if not found:
-        console.print(f"No other distribution registers anything in: {', '.join(groups())}.", markup=False)
-    else:
-        rows = [(each.group, each.name, each.distribution, each.value, each.broken or "can be used") for each in found]
-        show_table(console, ("group", "name", "distribution", "value", ""), rows)
+    show_table(console, ("distribution", "version", "group", "name", "value", ""), list(_rows(found)))
     finish({"plugins": [asdict(each) for each in found]}, as_json, good=not any(each.broken for each in found))
+
+
+def _rows(found: Sequence[Plugin]) -> Iterator[tuple[str, ...]]:
+    """Yields the rows of the core, of the plug-ins, and of this project's plug-ins that are not installed."""
+    yield (OURS, version(OURS), "", "", "", "the core")
+    last = ""
+    for each in sorted(found, key=lambda each: each.distribution):
+        named = (each.distribution, each.version) if each.distribution != last else ("", "")
+        yield (*named, each.group, each.name, each.value, each.broken or "can be used")
+        last = each.distribution
+    for name in sorted(
+        {each.distribution for each in PLUGIN_COMMANDS.values()} - {each.distribution for each in found}
+    ):
+        yield (name, "", "", "", "", f"not installed: pip install {name}")
 
 
 def groups() -> Sequence[str]:
     """Returns the entry-point groups that Errand reads."""
-    return (registry.GROUP, *SLOTS.values(), DOORS, kinds.GROUP, trigger_source.GROUP, CLASSES, COMMANDS_GROUP)
+    own = (kinds.GROUP, BACKENDS, trigger_source.GROUP, CLASSES, COMMANDS_GROUP, KERNELS)
+    return (registry.GROUP, *SLOTS.values(), DOORS, *own)
 
 
 def _of_others() -> Sequence[EntryPoint]:
@@ -84,7 +96,9 @@ def _key(entry: EntryPoint) -> str:
 
 def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
     """Loads a plug-in in a process of its own; returns the result."""
-    plugin = Plugin(entry.group, entry.name, distribution_of(entry), entry.value)
+    plugin = Plugin(
+        entry.group, entry.name, distribution_of(entry), entry.dist.version if entry.dist else "", entry.value
+    )
     namesakes = entry_points(group=entry.group, name=entry.name)
     clash = next((each for each in namesakes if _key(each) != _key(entry)), None)
     if clash is not None:

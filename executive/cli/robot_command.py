@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from executive.app.kernels import STEPS, compile_kernels, newly_compiled
+from executive.app.kernels import kernel_steps, newly_compiled
 from executive.app.prepare.mission_files import save_pose
 from executive.app.prepare.placed_robots import only_robot, refuse_blocked
 from executive.app.prepare.worlds import open_world
@@ -181,6 +181,9 @@ def _state(hands: Teleop) -> dict[str, Any]:
 def warm_up() -> None:
     """Compiles the numeric code for this machine, so that the first run begins at once."""
     begun_s = time.monotonic()
-    with progress_bar(console_for(False), "steps", STEPS) as advance:
-        compile_kernels(advance)
+    steps = kernel_steps()
+    with progress_bar(console_for(False), "steps", len(steps)) as advance:
+        for step in steps:
+            step()
+            advance()
     typer.echo(f"{count_text(newly_compiled(), 'function')} compiled in {time.monotonic() - begun_s:.0f} s")

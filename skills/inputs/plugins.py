@@ -16,6 +16,7 @@ from skills.inputs.errors import InputError
 
 __all__ = [
     "CLASSES",
+    "KERNELS",
     "LIMIT_S",
     "OURS",
     "PluginDefect",
@@ -29,6 +30,9 @@ __all__ = [
 
 CLASSES: Final = "errand.classes"
 """Group of the packages with classes of objects; the value names the package, whose code does not run."""
+
+KERNELS: Final = "errand.kernels"
+"""Group of the functions without arguments that run numeric code for a short time, so that it is compiled."""
 
 OURS: Final = "spot-errand"
 """Distribution of this project, whose modules need no time limit."""

@@ -5,11 +5,12 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from executive.cli.entry import COMMANDS, plugin_command, shipped_command
+from executive.cli.entry import COMMANDS, PLUGIN_COMMANDS, plugin_command, shipped_command
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-_COMMANDS = {**{name: shipped_command(name) for name in COMMANDS}, "dataset": plugin_command("dataset")}
+_COMMANDS = {name: shipped_command(name) for name in COMMANDS}
+_COMMANDS |= {name: plugin_command(name) for name in PLUGIN_COMMANDS if "." not in name}
 _BLOCK = re.compile(r"(?:^<!-- (?P<mark>[^>]*) -->\n+)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\]\((?!https?:)([^)#]*)(#[^)]*)?\)")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.cli.entry import COMMANDS, EXIT_CODES, RENAMED, current, shipped_command
+from executive.cli.entry import COMMANDS, EXIT_CODES, shipped_command
 from executive.words.forms import OptionGroup
 from tests.executive.cli.calls import done, errand
 
@@ -143,10 +143,3 @@ def test_the_help_of_run_has_a_heading_for_each_group_of_options():
     headings = [line.removesuffix(":") for line in shown.splitlines() if line.endswith(":") and line[:1].isupper()]
     assert headings == ["Arguments", *OptionGroup, "Options"]
     assert shown.index("Robots:") < shown.index("--stack") < shown.index("Faults and variations:")
-
-
-def test_former_options_stand_for_the_present_ones_and_warn(capsys):
-    assert current("log", ["a.mcap", "--map", "m.png"]) == ["a.mcap", "--format", "map", "--out", "m.png"]
-    assert current("report", ["r", "--html=p.html"]) == ["r", "--out", "p.html"]
-    assert (current("run", ["--map", "m"]), capsys.readouterr().err.count("is now")) == (["--map", "m"], 2)
-    assert {option for former in RENAMED.values() for option in former} >= {"--output", "--svg", "--html", "--draw"}

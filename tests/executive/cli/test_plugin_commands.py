@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from executive.cli.entry import PLUGIN_COMMANDS
 from tests.executive.cli.calls import done, errand
 from tests.executive.distribution import write_distribution
 
@@ -104,13 +105,42 @@ def test_a_command_of_errand_is_not_replaced_by_one_of_its_name(install):
     assert "a command of Errand has this name" in ended.stdout
 
 
-def test_without_errand_train_its_command_says_how_to_install_it(monkeypatch):
+# plug-in of this project   listed by the help                   called
+# installed                 with the command's help               runs
+# not installed             Not installed: pip install PLUG-IN    refused with the same hint
+@pytest.fixture
+def nothing_installed(monkeypatch):
     monkeypatch.setattr("skills.inputs.plugins.installed_plugins", lambda _group: ())
-    ended = errand("dataset", "render")
-    what = "'dataset' is a command of errand-train, which is not installed; run `make train` in a clone of Errand"
+    monkeypatch.setattr("executive.cli.entry._text", lambda _file: "")
+
+
+@pytest.mark.parametrize(
+    ("words", "plug_in"),
+    [
+        ("dataset render", "errand-train"),
+        ("object import", "errand-make"),
+        ("sdk", "errand-spot"),
+    ],
+)
+def test_a_command_of_a_missing_plug_in_says_how_to_install_it(words, plug_in, nothing_installed):
+    ended = errand(*words.split())
+    what = f"'{words.split()[0]}' is a command of {plug_in}, which is not installed; pip install {plug_in}"
     assert (ended.exit_code, ended.stderr) == (2, f"errand: {what}\n")
 
 
-def test_errand_train_registers_the_commands_for_data_sets():
-    ended = errand("--help")
-    assert any(line.split()[:1] == ["dataset"] for line in ended.stdout.splitlines())
+def test_the_help_lists_the_commands_of_missing_plug_ins_dimmed(nothing_installed):
+    line = next(line for line in errand("--help", color=True).stdout.splitlines() if line.split()[:1] == ["world"])
+    assert line.split(maxsplit=1)[1] == "\x1b[2mNot installed: pip install errand-make\x1b[0m"
+
+
+def test_the_help_lists_the_commands_of_installed_plug_ins_with_their_own_help():
+    shown = errand("--help", env={"COLUMNS": "200"}).stdout
+    wanted = {name: each.help for name, each in PLUGIN_COMMANDS.items() if "." not in name}
+    assert {name: f"{name} " in shown and line in shown for name, line in wanted.items()} == dict.fromkeys(wanted, True)
+
+
+def test_a_plug_in_adds_a_command_to_a_group_of_errand(install):
+    install("ships", ["new.ship = ships:count"])
+    assert "ship" in errand("new", "--help").stdout
+    ended = errand("new", "ship", "--ports", "2")
+    assert (ended.stdout, ended.stderr) == ("ports: 2\n", "")

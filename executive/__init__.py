@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Unpack
 
-    from executive.app.checker import Checked
     from executive.app.evaluate.results import Cases
-    from executive.app.report import RunReport
+    from executive.app.prepare.checker import Checked
+    from executive.app.report.run_report import RunReport
     from executive.language.understand import Understanding
     from executive.mission.request import Request, RequestFields
     from executive.run.control import Control
@@ -41,7 +41,7 @@ def __getattr__(name: str) -> Any:
 
 def load_world(name: str = "flat") -> World:
     """Loads a world by the name of a shipped world or by its folder. Raises InputError if there is none."""
-    from executive.app.worlds import open_world
+    from executive.app.prepare.worlds import open_world
 
     return open_world(name)
 
@@ -54,7 +54,7 @@ def parse(
     `knowledge` describes the world, by default `flat`; with `open_words` every name is accepted instead. With
     `require_wake` the sentence must call the robot by its name.
     """
-    from executive.app.worlds import knowledge_of
+    from executive.app.prepare.worlds import knowledge_of
     from executive.language.parser import load_parser
     from executive.language.understand import understand
 
@@ -68,8 +68,8 @@ def check(mission: Request | str | Path, **fields: Unpack[RequestFields]) -> Che
     Raises:
         InputError: a keyword argument cannot be used. Errors of the mission are in the result.
     """
-    from executive.app.checker import Checker
-    from executive.app.mission_files import request_of
+    from executive.app.prepare.checker import Checker
+    from executive.app.prepare.mission_files import request_of
 
     return Checker().check(request_of(mission, **fields))
 
@@ -84,9 +84,9 @@ def run_mission(
     Raises:
         InputError: the mission is not understood, `check` finds an error in it, or a keyword argument cannot be used.
     """
-    from executive.app.checker import prepare_checked
-    from executive.app.mission_files import request_of
-    from executive.app.mission_run import run_request
+    from executive.app.prepare.checker import prepare_checked
+    from executive.app.prepare.mission_files import request_of
+    from executive.app.runs.one_run import run_request
 
     return run_request(prepare_checked(request_of(mission, **fields)), control=control).report
 
@@ -113,7 +113,7 @@ def evaluate(
     from executive.app.evaluate.evaluation_file import evaluation_at_seeds, is_evaluation, load_evaluation, seed_range
     from executive.app.evaluate.results import Cases
     from executive.app.evaluate.workers import Pool
-    from executive.app.mission_files import mission_file, request_of
+    from executive.app.prepare.mission_files import mission_file, request_of
 
     asked, out = request_of(mission, **fields), Path(fields.get("out", "out/evaluate"))
     asked = asked if asked.file is None else replace(asked, file=mission_file(asked.file))

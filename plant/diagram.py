@@ -49,7 +49,7 @@ from plant.robots.robot_kind import PlacedRobot, RobotBody, robot_kind
 from plant.worlds.geometry_files import OWN_PACKAGE
 from plant.worlds.seeding import PointRoute, Receiving
 from plant.worlds.world import DoorRule, add_package
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 _RELATIVE_URI = re.compile(r"<uri>\s*(?![a-z]+://)([^<\s]+)\s*</uri>")
 

@@ -22,7 +22,7 @@ from pydrake.systems.framework import Context
 from plant.saved_state import Stateful
 from plant.worlds.seeding import ATTEMPTS, Placement, candidates, outline_W, polygon_distance
 from plant.worlds.world import DoorRule, MoveRule, Point, SurfaceTop, World
-from skills.files.errors import definite
+from skills.inputs.errors import definite
 from skills.robot import FloatArray
 
 HEIGHT_M, THICKNESS_M, ABOVE_FLOOR_M = 2.0, 0.04, 0.02

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any, ClassVar
 
-from skills.files.json_values import pack, unpack
+from executive.words.json_values import pack, unpack
 
 State = dict[str, Any]
 

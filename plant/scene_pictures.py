@@ -27,7 +27,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from plant.rendering import lights
 from plant.sensors.camera_spec import FAR_M, NEAR_M, colour_render_camera, depth_render_camera
 from plant.worlds.world import Point, World
-from skills.files.map_drawing import (
+from skills.map_drawing import (
     INK,
     PLATE,
     ZONE_COLOURS,

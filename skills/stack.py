@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, get_type_hints
 
 import numpy as np
 
-from skills.files.errors import suggestion
-from skills.files.plugins import OURS, PluginDefect, distribution_of, installed_plugins, run_plugin
-from skills.files.schema import first_error
+from skills.inputs.errors import suggestion
+from skills.inputs.plugins import OURS, PluginDefect, distribution_of, installed_plugins, run_plugin
+from skills.inputs.schema import first_error
 from skills.quantities import display_text
 from skills.robot import ConnectedRobot, FloatArray, GripperCapabilities, Pose2D
 
@@ -217,7 +217,7 @@ def default_stack() -> RobotStack:
 
 @cache
 def _default_data() -> dict[str, Any]:
-    from skills.files.yaml_source import read_yaml
+    from skills.inputs.yaml_source import read_yaml
 
     data: dict[str, Any] = read_yaml(DEFAULT_FILE).data
     return data

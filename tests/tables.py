@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from skills.files.yaml_source import read_yaml
+from skills.inputs.yaml_source import read_yaml
 
 
 def yaml_beside(test_file, name):

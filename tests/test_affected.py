@@ -13,7 +13,7 @@ TRAIN = "plugins/errand-train"
         ("tests/executive/words/test_command.py", "tests/executive/words/test_command.py", True),
         ("tests/executive/words/test_command.py", "executive/words/command.py", True),
         ("tests/executive/words/test_zone.py", "executive/words/command.py", True),  # its folder mirrors the module's
-        ("tests/missions/test_faults.py", "executive/app/simulated.py", True),  # by tests/missions/flat_mission.py
+        ("tests/missions/test_faults.py", "executive/app/runs/simulated.py", True),  # by tests/missions/flat_mission.py
         ("tests/plant/worlds/test_shipped_worlds.py", "plant/worlds/flat/objects.yaml", True),
         ("tests/executive/words/test_command.py", "plant/worlds/flat/objects.yaml", False),
         ("tests/executive/words/test_command.py", "skills/navigate/mppi.py", False),

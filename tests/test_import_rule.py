@@ -1,4 +1,4 @@
-"""The import rule: executive -> skills; plant -> executive.words, skills.robot, skills.files; skills imports neither.
+"""The import rule: executive -> skills; plant -> executive.words, skills.robot, skills.inputs; skills imports neither.
 
 Only executive.app and executive.cli import all three. Nothing of the core imports executive.cli, nor a plug-in.
 The homes of executive import each other one way, from the last of `HOMES` to the first, the words nothing but a few
@@ -14,10 +14,12 @@ from tests.sources import PLUGINS, PRODUCT, dotted, graph_of, import_graph, modu
 Check = Callable[[str, str], list[str]]
 Graph = Mapping[str, frozenset[str]]
 WORDS_MAY = (
-    *("executive.words", "skills.api", "skills.files", "skills.quantities", "skills.durations", "skills.robot"),
+    *("executive.words", "skills.api", "skills.inputs", "skills.quantities", "skills.durations", "skills.robot"),
     "skills.perception.class_forms",
 )
 """All that the words import: what things are, how files are read, and which numbers a quantity may have."""
+PLANT_MAY = ("executive.words", "skills.robot", "skills.robot_wrapper", "skills.inputs", "skills.map_drawing")
+"""All that the plant imports of others; the builders also the models of objects that they write."""
 HOMES = (
     ("executive.words", "executive.record.schemas", "executive.record.work"),
     ("executive.language",),
@@ -34,6 +36,8 @@ HOMES = (
     ("executive.cli",),
 )
 """The homes of executive, the lowest first."""
+APP = ("prepare", "report", "runs", "fleet", "evaluate")
+"""The folders of executive.app, the lowest first; modules beside them stand above all."""
 BUILDERS = ("plant.models.builder", "plant.worlds.builder")
 """What makes models and worlds; at run time only the commands import it that make them."""
 USES_BUILDERS = (*BUILDERS, "executive.cli.new_command", "executive.cli.object_command", "executive.cli.world_command")
@@ -50,13 +54,15 @@ def breaches(path: str, source: str) -> list[str]:
     own, names = dotted(path), ours(source)
     allowed = {
         "skills": ("skills",),
-        "plant": ("plant", "executive.words", "skills.robot", "skills.robot_wrapper", "skills.files"),
+        "plant": ("plant", *PLANT_MAY),
         "executive": ("executive", "skills"),
     }[own.partition(".")[0]]
     if within(own, "executive.cli"):
         return []
     if within(own, "executive.words"):
         return [name for name in names if not within(name, *WORDS_MAY)]
+    if within(own, *BUILDERS):
+        names = [name for name in names if not within(name, "skills.perception.object_model")]
     sees_all = own == "executive" or within(own, "executive.app")
     outside = [name for name in names if not within(name, *allowed) and not sees_all]
     return outside + [name for name in names if within(name, "executive.cli")]
@@ -79,6 +85,19 @@ def upward(path: str, source: str) -> list[str]:
     own = rank(dotted(path))
     names = [name for name in ours(source) if within(name, "executive")]
     return [name for name in names if own is None or (above := rank(name)) is None or above > own]
+
+
+def app_rank(name: str) -> int:
+    """How high a module of executive.app stands."""
+    folder = name.split(".")[2]
+    return APP.index(folder) if folder in APP else len(APP)
+
+
+def upward_in_app(path: str, source: str) -> list[str]:
+    """The modules of executive.app that a module of a folder imports although they stand above that folder."""
+    own = dotted(path)
+    names = [name for name in ours(source) if within(own, "executive.app") and within(name, "executive.app")]
+    return [name for name in names if app_rank(name) > app_rank(own)]
 
 
 def builder_imports(path: str, source: str) -> list[str]:
@@ -112,6 +131,11 @@ def test_the_homes_of_executive_import_each_other_one_way() -> None:
     assert set(found(upward, "executive")) <= {"executive/__init__.py"}
 
 
+def test_the_folders_of_the_application_import_each_other_one_way() -> None:
+    assert {path.split("/")[2] for path in modules("executive/app") if path.count("/") == 3} == set(APP)
+    assert found(upward_in_app, *(f"executive/app/{folder}" for folder in APP)) == {}
+
+
 def test_the_root_of_executive_holds_no_modules() -> None:
     assert [path for path in modules("executive") if path.count("/") == 1] == ["executive/__init__.py"]
 
@@ -138,7 +162,7 @@ CALL = "def f():\n    "
         (breaches, "skills/grasp/skill.py", "import executive.run.runner", ["executive.run.runner"]),
         (breaches, "plant/robots/robot.py", "from skills.api import Surface", ["skills.api.Surface"]),
         (breaches, "plant/robots/robot.py", "from skills.robot import Robot", []),
-        (breaches, "plant/worlds/world.py", "from skills.files.yaml_source import read_yaml", []),
+        (breaches, "plant/worlds/world.py", "from skills.inputs.yaml_source import read_yaml", []),
         (breaches, "plant/referee/judge.py", "from executive.words.goal import GoalCondition", []),
         (breaches, "plant/referee/judge.py", "from executive.tree import goals", ["executive.tree.goals"]),
         (breaches, "executive/words/goal.py", "from executive.language import u", ["executive.language.u"]),
@@ -146,13 +170,16 @@ CALL = "def f():\n    "
         (breaches, "executive/run/runner.py", f"{CALL}import plant.simulation", ["plant.simulation"]),
         (breaches, "executive/run/runner.py", "from executive.cli.entry import app", ["executive.cli.entry.app"]),
         (breaches, "executive/run/runner.py", "from skills.api import Cause", []),
-        (breaches, "executive/app/simulated.py", "from plant.simulation import Simulation", []),
-        (breaches, "executive/app/simulated.py", "from executive.cli.output import c", ["executive.cli.output.c"]),
+        (breaches, "executive/app/runs/simulated.py", "from plant.simulation import Simulation", []),
+        (breaches, "executive/app/runs/simulated.py", "from executive.cli.output import c", ["executive.cli.output.c"]),
         (upward, "executive/words/command.py", "from executive.language import u", ["executive.language.u"]),
         (upward, "executive/mission/resolve.py", "from executive.language import u", []),
         (upward, "executive/tree/estimate.py", f"{CALL}import executive.run.runner", ["executive.run.runner"]),
         (upward, "executive/tree/estimate.py", "from executive.attic import old", ["executive.attic.old"]),
         (upward, "executive/view/formats.py", "from executive.tree.node_view import NodeView", []),
+        (upward_in_app, "executive/app/runs/a.py", "import executive.app.fleet.chain", ["executive.app.fleet.chain"]),
+        (upward_in_app, "executive/app/runs/a.py", "from executive.app.kernels import k", ["executive.app.kernels.k"]),
+        (upward_in_app, "executive/app/runs/a.py", "from executive.app.report.run_report import RunReport", []),
         (builder_imports, "executive/cli/map.py", "import plant.models.builder.mesh", ["plant.models.builder.mesh"]),
         (builder_imports, "executive/cli/object_command.py", f"{CALL}import plant.models.builder.importing", []),
         (builder_imports, "plant/worlds/builder/own.py", "from plant.models.builder import mesh", []),

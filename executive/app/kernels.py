@@ -11,17 +11,17 @@ from typing import Any, Final
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
-from executive.app.mission_run import run_request
-from executive.app.placed_robots import only_robot
-from executive.app.prepare import prepare
-from executive.app.simulated import SimulatedBackend
-from executive.app.worlds import open_world
+from executive.app.prepare.from_request import prepare
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.prepare.worlds import open_world
+from executive.app.runs.one_run import run_request
+from executive.app.runs.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.robot_config import RobotConfig
 from skills.estimate.compiled import CompiledFunction
-from skills.files.errors import InputError
-from skills.files.plugins import KERNELS, PluginDefect, distribution_of, installed_plugins, run_plugin
+from skills.inputs.errors import InputError
+from skills.inputs.plugins import KERNELS, PluginDefect, distribution_of, installed_plugins, run_plugin
 
 _MISSION: Final = """
 name: warm up
@@ -128,7 +128,7 @@ def _map_cells() -> None:
 
 def _survey() -> None:
     """Begins a map, and localises in it and, by scan matching, in the map of a world."""
-    from executive.app.simulated import simulate
+    from executive.app.runs.simulated import simulate
     from skills.estimate.grid_map import load_grid_map
     from skills.estimate.matching import score_poses
     from skills.mapping.mapper import Mapper

@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from executive.app.checker import Checked, Checker
+from executive.app.prepare.checker import Checked, Checker
 from executive.cli.defaults import yielding
 from executive.cli.options import takes_request
 from executive.cli.output import BAD_INPUT, console_for, finish, progress_bar
@@ -21,7 +21,7 @@ from executive.mission.request import Request
 from executive.tree.estimate import Estimate
 from executive.tree.node_view import node_view
 from executive.view.text import readable, to_rich
-from skills.files.errors import InputError, count_text, one_line
+from skills.inputs.errors import InputError, count_text, one_line
 
 SHOWN_NODES: Final = 40
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from skills.files.errors import InputError, suggestion
-from skills.files.outside import read_text
+from skills.inputs.errors import InputError, suggestion
+from skills.inputs.outside import read_text
 
 if TYPE_CHECKING:
     from executive.mission.request import Request
@@ -81,9 +81,9 @@ def typed_options(context: Any) -> frozenset[str]:
 
 def yielding(request: Request, context: Any) -> Request:
     """Drops the defaults of the file that the command line or the mission file decides otherwise. Raises InputError."""
-    from executive.app.mission_files import mission_file
+    from executive.app.prepare.mission_files import mission_file
     from executive.mission.request import Request
-    from skills.files.yaml_source import read_yaml
+    from skills.inputs.yaml_source import read_yaml
 
     usual = {name for name in context.params if context.get_parameter_source(name).name == "DEFAULT_MAP"}
     dropped = set[str]()

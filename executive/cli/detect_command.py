@@ -11,11 +11,11 @@ from typing import Annotated, Any, Final
 import typer
 from rich.console import Console
 
-from executive.app.picture_files import draw_detections, open_detector, read_picture, write_picture
+from executive.app.report.pictures import draw_detections, open_detector, read_picture, write_picture
 from executive.cli.number_options import quantity_option
 from executive.cli.output import BAD_INPUT, console_for, finish, progress_bar, show_table
 from skills.detection import Detection, Detector
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.perception.detector.onnx_detector import DetectorOptions
 from skills.quantities import Share
 from skills.robot import Picture

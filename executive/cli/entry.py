@@ -22,7 +22,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-from skills.files.errors import MOST_LETTERS, InputError, listing, one_line
+from skills.inputs.errors import MOST_LETTERS, InputError, listing, one_line
 
 _COLLECTED_AFTER: Final = (30_000, 20, 50)
 """Thresholds of the three generations of garbage collection; imports create many objects that all stay."""
@@ -167,7 +167,7 @@ def plugin_command(name: str) -> Any | None:
     Raises InputError if the command cannot be loaded, several distributions register it, or it belongs to a plug-in of
     this project that is not installed.
     """
-    from skills.files.plugins import PluginDefect, distribution_of, installed_plugins, run_plugin
+    from skills.inputs.plugins import PluginDefect, distribution_of, installed_plugins, run_plugin
 
     words, short = name.replace(".", " "), name.rpartition(".")[2]
     found = [entry for entry in installed_plugins(COMMANDS_GROUP) if entry.name == name]

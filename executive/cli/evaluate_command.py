@@ -17,7 +17,7 @@ from executive.cli.number_options import quantity_option
 from executive.cli.options import ANYWAY, AS_JSON, REQUEST_OPTIONS, request_arguments, takes_request
 from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer, writing
 from executive.mission.request import Request
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.quantities import Count
 
 if TYPE_CHECKING:
@@ -122,8 +122,8 @@ def _own_results(out: Path, evaluation: Evaluation) -> Path:
 
 def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> Evaluation:
     """Builds the runs of a request at many seeds; asks its questions once. Raises InputError."""
-    from executive.app.checker import prepare_checked
     from executive.app.evaluate.evaluation_file import evaluation_at_seeds, seed_range
+    from executive.app.prepare.checker import prepare_checked
 
     chosen = seed_range(seeds)
     prepared = prepare_checked(asked, ask=terminal_answerer(), anyway=anyway)
@@ -158,7 +158,7 @@ def _show_seeds(cases: Sequence[Case], console: Console) -> dict[str, Any]:
 
 
 def _seed_row(case: Case) -> tuple[str, ...]:
-    from executive.app.report import VERDICTS
+    from executive.app.report.run_report import VERDICTS
 
     report, seen = case.report, case.report.seen
     return (

@@ -9,14 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
-from executive.app.report import VERDICTS
+from executive.app.report.run_report import VERDICTS
 from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, VIEW, VIEW_FOR, VIEW_PORT, StartCommand, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, progress_bar, show_table
 from executive.mission.request import Request
 from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission, store_in
 from executive.words.robot_config import find_robot
-from skills.files.errors import InputError
-from skills.files.outside import is_folder
+from skills.inputs.errors import InputError
+from skills.inputs.outside import is_folder
 
 fleet = typer.Typer(
     name="fleet",
@@ -50,10 +50,10 @@ def run(
     console = console_for(as_json)
     store, tell = _store(queue), plain_lines(console)
     with MissionStore(store, create=False) as missions, missions.claim():
-        from executive.app.dispatch import silence
-        from executive.app.fleet import missions_json
-        from executive.app.fleet_run import run_fleet, simulated_fleet
-        from executive.app.page_view import PageView
+        from executive.app.fleet.dispatch import silence
+        from executive.app.fleet.fleet_mission import missions_json
+        from executive.app.fleet.fleet_run import run_fleet, simulated_fleet
+        from executive.app.runs.page_view import PageView
         from executive.view.foxglove import serve_live
 
         if not request.robots:
@@ -95,7 +95,7 @@ def run(
 def status(queue: Queue, as_json: AS_JSON = False) -> None:
     """Shows the robot and the state of each mission, also during a run."""
     with MissionStore(_store(queue), create=False) as missions:
-        from executive.app.fleet import missions_json
+        from executive.app.fleet.fleet_mission import missions_json
 
         results = missions_json(missions, [each.id for each in missions.missions() if each.queued])
         names = {each.id: each.request.name for each in missions.missions()}
@@ -120,7 +120,7 @@ def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
         if each.id in wholes:
             continue
         if each.id not in known:
-            from executive.app.runs import interrupted_error
+            from executive.app.runs.queue import interrupted_error
 
             raise interrupted_error(missions, each)
         if known[each.id].blocked is not None:

@@ -25,8 +25,8 @@ from executive.tree.node_view import NodeView, node_view, to_json
 from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.styles import style_of
 from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, printable, readable, to_text
-from skills.files.errors import InputError
-from skills.files.outside import is_file
+from skills.inputs.errors import InputError
+from skills.inputs.outside import is_file
 from skills.quantities import Count, Delay, Port, Tries, Wait
 
 RECORDING: Final = "recording.html"
@@ -217,7 +217,7 @@ def _view(text: str | None, request: Request, at_s: float | None, robot: str | N
     if at_s is not None or robot is not None:
         option = "--at" if robot is None else "--robot"
         raise InputError(f"{option} is for logs", hint="name a log.mcap that a run has written")
-    from executive.app.prepare import prepare
+    from executive.app.prepare.from_request import prepare
 
     prepared = prepare(_request(text, request), ask=terminal_answerer())
     for each in prepared.all:
@@ -229,7 +229,7 @@ def _view(text: str | None, request: Request, at_s: float | None, robot: str | N
 
 def _request(text: str | None, request: Request) -> Request:
     """Returns the request whose tree is shown. Raises InputError if none or two are given."""
-    from executive.app.mission_files import shipped_missions
+    from executive.app.prepare.mission_files import shipped_missions
 
     if text is None and request.sentence is None:
         raise InputError("a mission file, a sentence or a log is needed", hint='try: errand tree "go to the kitchen"')

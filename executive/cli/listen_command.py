@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from executive.app.signals import interrupted_by_hang_up
-from executive.app.worlds import knowledge_of, open_world
+from executive.app.prepare.worlds import knowledge_of, open_world
+from executive.app.runs.signals import interrupted_by_hang_up
 from executive.cli.options import takes_request
 from executive.cli.output import BAD_INPUT, console_for, print_json
 from executive.language.parser import load_parser
@@ -28,7 +28,7 @@ from executive.speech.whisper import load_whisper
 from executive.words.knowledge import Knowledge
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.robot_config import RobotConfig, display_name
-from skills.files.errors import InputError, listing
+from skills.inputs.errors import InputError, listing
 
 _METER_WIDTH = 24
 _QUIETEST_DB = -60.0

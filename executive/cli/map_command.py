@@ -14,15 +14,15 @@ import numpy as np
 import typer
 from shapely import Polygon
 
-from executive.app.signals import ended_by_signals
-from executive.app.worlds import open_world
+from executive.app.prepare.worlds import open_world
+from executive.app.runs.signals import ended_by_signals
 from executive.cli.number_options import quantity_option
 from executive.cli.options import AS_JSON
 from executive.cli.output import console_for, finish, writing
 from executive.run.control import Control
-from skills.files.errors import InputError
-from skills.files.outside import read_text
-from skills.files.yaml_source import read_yaml
+from skills.inputs.errors import InputError
+from skills.inputs.outside import read_text
+from skills.inputs.yaml_source import read_yaml
 from skills.quantities import LongDuration, Seed
 from skills.robot import Picture, Pose2D
 
@@ -74,7 +74,7 @@ def build(
     opened = open_world(world) if people else open_world(world).without_people()
     points = None if route is None else _route_points(route)
     mapper = _mapper(opened, out)
-    from executive.app.simulated import compile_first
+    from executive.app.runs.simulated import compile_first
 
     compile_first()
     drive = _Drive(opened, seed, mapper, points, out, console)
@@ -99,8 +99,8 @@ class _Drive:
         out: Path,
         console: Console,
     ) -> None:
-        from executive.app.placed_robots import only_robot
-        from executive.app.simulated import simulate
+        from executive.app.prepare.placed_robots import only_robot
+        from executive.app.runs.simulated import simulate
         from skills.geometry import compose
         from skills.mapping.survey import Survey
         from skills.robot import Pose2D
@@ -199,7 +199,7 @@ class _Drive:
         return f"; {share:.0%} of the rooms seen, about {max(1, round(left_s / 60.0))} min left" if share > 0.05 else ""
 
     def _draw(self) -> None:
-        from executive.app.picture_files import write_picture
+        from executive.app.report.pictures import write_picture
 
         if not self._mapper.keyframes:
             return

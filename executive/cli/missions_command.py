@@ -8,7 +8,7 @@ from typing import Annotated, Final
 
 import typer
 
-from executive.app.mission_files import FOLDER, shipped_missions
+from executive.app.prepare.mission_files import FOLDER, shipped_missions
 from executive.cli.output import console_for, show_table, writing
 
 _FOR_EDITORS: Final = "# yaml-language-server"

@@ -12,7 +12,7 @@ from typing import Annotated, Final
 import typer
 
 from executive.cli.output import console_for, new_folder, progress_bar, writing
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 _TEMPLATES: Final = Path(__file__).parent / "new"
 _SUFFIX: Final = ".template"

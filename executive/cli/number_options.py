@@ -7,7 +7,7 @@ from typing import IO, Any
 
 import typer
 
-from skills.files.errors import one_line
+from skills.inputs.errors import one_line
 from skills.quantities import QuantityError, number_in, range_text
 
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import typer
 
-from skills.files.errors import InputError
-from skills.files.outside import LONGEST_ANSWER, LONGEST_TEXT, plain_text
+from skills.inputs.errors import InputError
+from skills.inputs.outside import LONGEST_ANSWER, LONGEST_TEXT, plain_text
 
 if TYPE_CHECKING:
     from rich.console import Console

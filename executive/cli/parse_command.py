@@ -11,14 +11,14 @@ from typing import Annotated
 import typer
 
 import executive
-from executive.app.worlds import knowledge_of, open_world
+from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, print_json, writing
 from executive.language.explain import arcs_svg, explain, explanation_lines
 from executive.language.understand import Status, Understanding
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.steps import steps_to_yaml
-from skills.files.errors import InputError
-from skills.files.outside import read_text
+from skills.inputs.errors import InputError
+from skills.inputs.outside import read_text
 
 
 class ParseFormat(StrEnum):

@@ -22,9 +22,9 @@ from executive.store import trigger_source
 from executive.tree import registry
 from plant.models.catalogue import load_catalogue
 from plant.robots import robot_kind as kinds
-from skills.files.errors import InputError
-from skills.files.plugins import CLASSES, KERNELS, LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
-from skills.files.yaml_source import yaml_of
+from skills.inputs.errors import InputError
+from skills.inputs.plugins import CLASSES, KERNELS, LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
+from skills.inputs.yaml_source import yaml_of
 from skills.perception.class_forms import class_forms
 from skills.quantities import Duration
 from skills.stack import BACKENDS, DOORS, SLOTS, stack_data

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from executive.app.signals import ended_by_signals
+from executive.app.runs.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, STORE, StartCommand, takes_request
 from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer
@@ -23,13 +23,13 @@ from executive.store.standing_missions import StandingMission, StandingMissions
 from executive.store.trigger_source import refuse_missing_source
 from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, local, schedule_of
 from executive.store.wakeup import WakeupPipe, wake_server
-from skills.files.errors import InputError, listing
+from skills.inputs.errors import InputError, listing
 from skills.quantities import Count, Port, Wait
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from executive.app.runs import MissionResult, MissionRuns
+    from executive.app.runs.queue import MissionResult, MissionRuns
 
 queue = typer.Typer(
     name="queue",
@@ -75,7 +75,7 @@ def add(
     as_json: AS_JSON = False,
 ) -> None:
     """Checks and queues a sentence or a mission file; with a trigger, `errand queue serve` queues it each time."""
-    from executive.app.checker import prepare_checked
+    from executive.app.prepare.checker import prepare_checked
 
     trigger = _trigger(at, every, on, missed)
     refuse_unaddressed(request)
@@ -125,7 +125,7 @@ def run(
     as_json: AS_JSON = False,
 ) -> None:
     """Runs all queued missions, each in the world that the mission before it left."""
-    from executive.app.runs import resumable_line
+    from executive.app.runs.queue import resumable_line
 
     console = console_for(as_json)
     with _runs(store or store_in(out), console, quiet, foxglove) as (missions, runs):
@@ -146,7 +146,7 @@ def _runs(
 ) -> Iterator[tuple[MissionStore, MissionRuns]]:
     """Claims a store for the block, and yields it with the runner of its missions."""
     with MissionStore(store, create=False) as missions, missions.claim():
-        from executive.app.runs import MissionRuns
+        from executive.app.runs.queue import MissionRuns
         from executive.cli.screen import ConsoleScreen
         from executive.view.foxglove import serve_live
 
@@ -162,7 +162,7 @@ def _in_turn(
 
     Runs the mission `first` before them; alone, if it is none of a queue. Stops after a cancelled mission.
     """
-    from executive.app.runs import queued_missions, run_in_turn
+    from executive.app.runs.queue import queued_missions, run_in_turn
 
     coming, total = iter(() if first is None else (first,)), int(first is not None)
     if first is None or first.queued:
@@ -241,8 +241,8 @@ def serve(
     as_json: AS_JSON = False,
 ) -> None:
     """Queues missions at times, on a full battery, calls and messages, and runs them, until Ctrl-C."""
-    from executive.app.queue_server import CallAddress, Listeners, QueueServer
-    from executive.app.runs import resumable_line
+    from executive.app.runs.queue import resumable_line
+    from executive.app.runs.queue_server import CallAddress, Listeners, QueueServer
 
     console = console_for(as_json)
     tell = plain_lines(console)

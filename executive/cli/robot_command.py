@@ -12,13 +12,13 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from executive.app.backend import Scene
 from executive.app.kernels import kernel_steps, newly_compiled
-from executive.app.mission_files import save_pose
-from executive.app.page_view import scene_actions
-from executive.app.placed_robots import only_robot, refuse_blocked
-from executive.app.simulated import simulate
-from executive.app.worlds import open_world
+from executive.app.prepare.mission_files import save_pose
+from executive.app.prepare.placed_robots import only_robot, refuse_blocked
+from executive.app.prepare.worlds import open_world
+from executive.app.runs.backend import Scene
+from executive.app.runs.page_view import scene_actions
+from executive.app.runs.simulated import simulate
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START
 from executive.cli.output import console_for, progress_bar
@@ -31,7 +31,7 @@ from executive.view.server import PageContent, serve
 from plant.worlds.world import World
 from skills.api import SkillContext
 from skills.estimate.grid_map import load_grid_map
-from skills.files.errors import InputError, count_text
+from skills.inputs.errors import InputError, count_text
 from skills.quantities import Delay, Port, Seed
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack
@@ -65,7 +65,7 @@ def teleop(
         placed = only_robot(robot, opened, seed=seed, start=None if start is None else parse_start(start))
         if start is not None:
             refuse_blocked(opened, placed.start)
-        from executive.app.simulated import compile_first
+        from executive.app.runs.simulated import compile_first
 
         compile_first()
         simulation = simulate(opened, {robot: placed}, seed=seed, record=False)

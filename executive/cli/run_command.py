@@ -27,15 +27,15 @@ from executive.cli.options import (
 from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, terminal_answerer
 from executive.mission.request import Request
 from executive.words.forms import OptionGroup as Group
-from skills.files.errors import InputError
-from skills.files.outside import is_file
-from skills.files.yaml_source import read_yaml
+from skills.inputs.errors import InputError
+from skills.inputs.outside import is_file
+from skills.inputs.yaml_source import read_yaml
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from executive.app.prepared import Prepared
-    from executive.app.report import RunReport
+    from executive.app.prepare.prepared import Prepared
+    from executive.app.report.run_report import RunReport
     from executive.record.work import Profile
 
 

@@ -16,7 +16,7 @@ from typing import Final
 
 from executive.run.control import Control
 from executive.run.control_state import ControlState, Mode, OpenQuestion
-from skills.files.outside import LONGEST_ANSWER
+from skills.inputs.outside import LONGEST_ANSWER
 
 HELP: Final = "space pause/go on · s step · x stop button · c cancel"
 SAY_HELP: Final = f"{HELP} · : say something"

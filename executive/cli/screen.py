@@ -15,11 +15,11 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
-from executive.app.conversations import Conversations, load_ahead
-from executive.app.mission_run import FinishedRun
-from executive.app.page_view import PageView
-from executive.app.prepared import Prepared
-from executive.app.runs import RunOptions
+from executive.app.prepare.prepared import Prepared
+from executive.app.runs.conversations import Conversations, load_ahead
+from executive.app.runs.one_run import FinishedRun
+from executive.app.runs.page_view import PageView
+from executive.app.runs.queue import RunOptions
 from executive.cli.run_keys import HELP, Keys, prompt_lines, read_keys
 from executive.language.parser import load_parser
 from executive.record.schemas import SPEECH

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from executive.app.worlds import knowledge_of, open_world
+from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, StartCommand, start_pose
 from executive.cli.output import new_folder, writing
@@ -26,9 +26,9 @@ from executive.words.zone import ZoneFacts
 from plant.worlds.world import World, WorldError
 from skills.api import ZoneKind
 from skills.estimate.grid_map import load_grid_map
-from skills.files.errors import InputError, count_text, listing, suggestion
-from skills.files.outside import read_text
-from skills.files.schema import first_error
+from skills.inputs.errors import InputError, count_text, listing, suggestion
+from skills.inputs.outside import read_text
+from skills.inputs.schema import first_error
 from skills.quantities import Angle, Coordinate, Opening, Quantity, Share, Speed
 from skills.robot import Pose2D
 

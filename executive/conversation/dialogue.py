@@ -44,7 +44,7 @@ from executive.words.leaf_steps import steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Group
 from skills.api import ObjectKind
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 REMEMBERED_S: Final = 60.0
 """Time (robot's clock) for which the last request is remembered, and a question waits for its answer."""

@@ -13,7 +13,7 @@ from executive.language.cleaning import find_address
 from executive.language.lexicon import Patterns, any_of, lexicon, read_table
 from executive.language.questions import RefusalError
 from executive.words.robot_config import display_name, find_robot
-from skills.files.errors import listing
+from skills.inputs.errors import listing
 
 _NUMBERS: Final = {"two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "both": 2}
 _YOU: Final = frozenset({"you", "yourself"})

@@ -21,7 +21,7 @@ from executive.language.tokens import Token
 from executive.words.command import Command, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
 from skills.api import ObjectKind
-from skills.files.errors import known_names, listing
+from skills.inputs.errors import known_names, listing
 
 
 def known_line(knowledge: Knowledge | None) -> str:

@@ -12,7 +12,7 @@ from executive.language.phrases import Phrase
 from executive.language.questions import ABLE, RefusalError, RefusalKind
 from executive.language.roles import HERE, Location
 from executive.words.knowledge import Knowledge
-from skills.files.errors import listing
+from skills.inputs.errors import listing
 
 _STAYS: Final = (VerbKind.GO, VerbKind.FIND, VerbKind.WAIT, VerbKind.CHARGE)
 _BY_HAND: Final = frozenset({"bring", "carry", "take", "deliver", "take over", "bring over", "carry over", "hand"})

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 if TYPE_CHECKING:
     from spacy.language import Language

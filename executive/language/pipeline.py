@@ -22,7 +22,7 @@ from executive.language.tokens import Affirmed, Token, affirmation, name_table, 
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
 from executive.words.step import Step
-from skills.files.errors import listing
+from skills.inputs.errors import listing
 
 _MOST_WORDS: Final = 60
 _MOST_CHARACTERS: Final = 800

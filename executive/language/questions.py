@@ -10,7 +10,7 @@ from enum import Enum
 from typing import Any, Final
 
 from executive.words.mission import QuestionPolicy
-from skills.files.errors import listing
+from skills.inputs.errors import listing
 
 ABLE: Final = "I can fetch, take, put and find objects, go to places, follow and guide people, wait and charge"
 ALIKE_SOUND: Final = 0.2

@@ -19,7 +19,7 @@ from executive.language.understand import Part, Status, Understanding, meaning, 
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
 from executive.words.robot_config import display_name, find_robot
-from skills.files.errors import listing
+from skills.inputs.errors import listing
 
 _IT: Final = r"\b(?:it|them)\b"
 _FROM_THERE: Final = r"\s+from there\b"

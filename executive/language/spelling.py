@@ -27,7 +27,7 @@ from rapidfuzz.distance import OSA
 
 from executive.language.lexicon import read_table
 from executive.words.knowledge import Knowledge
-from skills.files.plugins import class_tables
+from skills.inputs.plugins import class_tables
 
 if TYPE_CHECKING:
     from executive.language.parser import DependencyParser

@@ -14,10 +14,10 @@ from executive.words.knowledge import Knowledge, knowledge_of_source
 from executive.words.mission import Mission, Route, Stop
 from executive.words.outlines import Corner
 from executive.words.step import Place, Step
-from skills.files.errors import Problems, suggestion
-from skills.files.outside import is_file, is_there
-from skills.files.schema import validate
-from skills.files.yaml_source import KeyPath, YamlSource, parse_yaml, read_yaml
+from skills.inputs.errors import Problems, suggestion
+from skills.inputs.outside import is_file, is_there
+from skills.inputs.schema import validate
+from skills.inputs.yaml_source import KeyPath, YamlSource, parse_yaml, read_yaml
 from skills.stack import DEFAULT_FILE, RobotStack, StackError, default_stack, stack_of
 
 _NONE_GIVEN: Final[Given] = MappingProxyType({})

@@ -15,9 +15,9 @@ import yaml
 
 from executive.words.expression import Value
 from executive.words.mission import Parameter
-from skills.files.errors import InputError, listing, nearest_name, suggestion, with_article
-from skills.files.outside import json_object, plain_text
-from skills.files.yaml_source import KeyPath, YamlSource, scalar_of
+from skills.inputs.errors import InputError, listing, nearest_name, suggestion, with_article
+from skills.inputs.outside import json_object, plain_text
+from skills.inputs.yaml_source import KeyPath, YamlSource, scalar_of
 from skills.quantities import LARGEST, Number, QuantityError, display_text, number_of
 
 _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")

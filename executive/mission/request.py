@@ -18,10 +18,10 @@ from executive.words.forms import OptionGroup as Heading  # no name of a caller:
 from executive.words.mission import QuestionPolicy
 from executive.words.robot_config import RobotConfig, parse_pose, parse_robots
 from executive.words.variation import NO_VARIATION, Variation
-from skills.files.errors import InputError
-from skills.files.outside import is_there
-from skills.files.plugins import installed_plugins
-from skills.files.schema import first_error
+from skills.inputs.errors import InputError
+from skills.inputs.outside import is_there
+from skills.inputs.plugins import installed_plugins
+from skills.inputs.schema import first_error
 from skills.quantities import LongDuration, QuantityError, Seed, clock_text
 from skills.robot import Pose2D
 

@@ -27,10 +27,10 @@ from executive.words.policy import Policy
 from executive.words.step import Step
 from executive.words.steps import ForEach, Group, Steps
 from executive.words.zone import ZoneFacts
-from skills.files.errors import InputError, Problems, listing, suggestion
-from skills.files.outside import is_file
-from skills.files.schema import validate
-from skills.files.yaml_source import KeyPath
+from skills.inputs.errors import InputError, Problems, listing, suggestion
+from skills.inputs.outside import is_file
+from skills.inputs.schema import validate
+from skills.inputs.yaml_source import KeyPath
 
 if TYPE_CHECKING:
     from executive.language.parser import DependencyParser

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final
 
 from executive.words.forms import Option
 from executive.words.forms import OptionGroup as Group
-from skills.files.errors import definite
+from skills.inputs.errors import definite
 from skills.quantities import Quantity
 
 RandomFaults = Annotated[int, Quantity(ge=0, le=100)]

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from executive.words.command import PEOPLE_TASKS, SPEAKER, START, TIME_UNITS_S, Command, Task
 from executive.words.knowledge import ANYBODY, Knowledge
 from skills.api import ObjectKind
-from skills.files.errors import suggestion
+from skills.inputs.errors import suggestion
 
 
 def unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from executive.record.schemas import stamp
 from executive.words.slug import slug
-from skills.files.map_drawing import ZONE_COLOURS
+from skills.map_drawing import ZONE_COLOURS
 from skills.robot import Joints, Scan
 
 _UINT8: Final = 1

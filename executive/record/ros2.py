@@ -21,8 +21,8 @@ from mcap_ros2.writer import Writer
 from executive.record.history import Event
 from executive.record.other_tools import body_frame, grey_map, occupancies, origin_pose, ros_name, transform_of
 from executive.record.schemas import DERIVED, JOINTS, MAP, PATH, POSE, SCAN, WALL, stamp
-from skills.files.errors import InputError
-from skills.files.yaml_source import yaml_of
+from skills.inputs.errors import InputError
+from skills.inputs.yaml_source import yaml_of
 
 _RULE: Final = "=" * 80
 _TIME: Final = f"{_RULE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from skills.files.yaml_source import read_yaml
+from skills.inputs.yaml_source import read_yaml
 
 TREE: Final = "tree"
 TRANSITIONS: Final = "transitions"

@@ -36,8 +36,8 @@ from executive.run.control_state import (
 )
 from executive.tree.compiler import CompiledTree
 from skills.api import Asked, Question
-from skills.files.errors import InputError
-from skills.files.outside import LONGEST_ANSWER, plain_text
+from skills.inputs.errors import InputError
+from skills.inputs.outside import LONGEST_ANSWER, plain_text
 from skills.robot import Clock
 
 _REASONS: Final = (Mode.STOPPED, Mode.LEASE_LOST, Mode.PAUSED)

@@ -29,7 +29,7 @@ from executive.run.visitor import (
 from executive.run.watchdog import VerbHung
 from executive.tree.behaviour import StoppableTime
 from skills.api import Cause, Worker
-from skills.files.errors import disk_is_full
+from skills.inputs.errors import disk_is_full
 from skills.robot import Clock
 
 _PATHS_PERIOD_S: Final = 0.5

@@ -20,7 +20,7 @@ from executive.tree.node import NodeState, Snapshot
 from executive.tree.plan import start_key
 from executive.words.slug import slug
 from skills.api import Cause, LocalisationEstimate, ObstacleLayerView, ParticleView
-from skills.files.errors import disk_is_full
+from skills.inputs.errors import disk_is_full
 from skills.navigate.cut_off import DoorWatch
 from skills.perception.doorway import Doorway, SeenDoor
 from skills.robot import Pose2D

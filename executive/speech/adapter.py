@@ -24,7 +24,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 Matrix = npt.NDArray[np.float16]
 

@@ -16,7 +16,7 @@ from executive.speech.interpret import Reading
 from executive.speech.recogniser import Vocabulary
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 _GREETINGS: Final = ("Hey", "Hi", "OK")
 _EVERYBODY: Final = ("everyone", "everybody")

@@ -19,7 +19,7 @@ from executive.speech.interpret import choose_opening, interpret
 from executive.speech.recogniser import Recogniser, Vocabulary
 from executive.speech.sound import RATE_HZ, Loudness, Samples, concatenate, level_db, read_wav
 from executive.words.command import Command
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 NOBODY_SPOKE: Final = "nobody is heard to speak"
 SILENT: Final = "the recording is silent"

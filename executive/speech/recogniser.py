@@ -12,8 +12,8 @@ from typing import Final, Protocol
 
 from executive.speech.sound import Samples
 from executive.words.knowledge import Knowledge
-from skills.files.errors import InputError
-from skills.files.outside import read_text
+from skills.inputs.errors import InputError
+from skills.inputs.outside import read_text
 
 
 @dataclass(frozen=True)

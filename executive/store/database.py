@@ -15,7 +15,7 @@ from typing import Any, Final, Self
 
 from pydantic import TypeAdapter
 
-from skills.files.errors import InputError, disk_is_full
+from skills.inputs.errors import InputError, disk_is_full
 
 BUSY_S: Final = 2.0
 

@@ -16,8 +16,8 @@ from executive.run.visitor import Progress, RunVisitor, TickNote
 from executive.store.database import form, transaction
 from executive.store.recollection import Recollection, StepRecord
 from executive.tree.compiler import CompiledTree
+from executive.words.json_values import to_text
 from executive.words.slug import slug
-from skills.files.json_values import to_text
 from skills.geometry import wrap
 from skills.robot import Pose2D
 

@@ -15,8 +15,8 @@ from executive.store.database import STORE_FILE, Database, form
 from executive.store.journal import StoreJournal, robot_condition, robot_prefix
 from executive.store.recollection import Memory, StepRecord
 from executive.tree.board import LastKnown
-from skills.files.errors import InputError, listing
-from skills.files.json_values import from_text
+from executive.words.json_values import from_text
+from skills.inputs.errors import InputError, listing
 from skills.robot import Pose2D
 
 STORE: Final = Path(".errand") / "missions.sqlite"

@@ -9,7 +9,7 @@ from typing import Final
 from executive.mission.request import Request
 from executive.store.missions import MissionState, MissionStore, StoredMission, insert
 from executive.store.triggers import Every, Missed, OnBatteryFull, Once, Schedule, Timed, Trigger, local, trigger_of
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 LATE: Final = timedelta(seconds=90)
 """An occurrence that is noticed later than this is missed: the clock was set forward, or the machine slept."""

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final, Protocol
 
-from skills.files.errors import InputError, listing
-from skills.files.plugins import PluginDefect, run_plugin
+from skills.inputs.errors import InputError, listing
+from skills.inputs.plugins import PluginDefect, run_plugin
 
 GROUP: Final = "errand.triggers"
 

@@ -19,7 +19,7 @@ from datetime import UTC, date, datetime, time, timedelta, tzinfo
 from typing import Final
 
 from skills.durations import seconds_in
-from skills.files.errors import InputError, listing, suggestion
+from skills.inputs.errors import InputError, listing, suggestion
 
 FULL: Final = 0.95
 NOISE: Final = 0.01

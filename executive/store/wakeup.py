@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from executive.store.missions import MissionStore
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 LONGEST_WAIT: Final = timedelta(minutes=1)
 """Limit of a wait (elapsed time), since the wall clock may be set meanwhile, or the machine may sleep."""

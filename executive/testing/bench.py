@@ -23,7 +23,7 @@ from executive.words.knowledge import Knowledge
 from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.faulty_robot import Fault, inject_faults, parse_fault
-from skills.files.yaml_source import read_yaml
+from skills.inputs.yaml_source import read_yaml
 from skills.perception.doorway import Doorway
 from skills.robot import Capabilities, Clock, Robot
 from skills.testing.blocks import ROOM, TABLE_CAN, Block, grid_of

@@ -34,7 +34,7 @@ from executive.testing.skill_test import (
 from skills.api import Cause, Skill
 from skills.faults.fault_kinds import SENSE_VERBS, STANDARD_FAULTS, Call, Effect, FaultKind, InjectedFault
 from skills.faults.faulty_robot import Fault
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Capabilities
 from skills.robot_wrapper import VERBS
 from skills.testing.robot import ScriptedRobot

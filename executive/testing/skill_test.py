@@ -28,9 +28,9 @@ from executive.tree.registry import missing_skill
 from skills.api import Cause, Skill
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.faulty_robot import parse_fault
-from skills.files.errors import with_article
-from skills.files.schema import validate
-from skills.files.yaml_source import YamlSource, read_yaml
+from skills.inputs.errors import with_article
+from skills.inputs.schema import validate
+from skills.inputs.yaml_source import YamlSource, read_yaml
 from skills.perception.doorway import Doorway
 from skills.quantities import Angle, Coordinate, Delay, Duration, Height, Length, Quantity, Share, Turn
 from skills.robot import Capabilities, Pose2D

@@ -20,7 +20,7 @@ from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
 from executive.words.step import Step
 from executive.words.steps import Group
-from skills.files.errors import InputError, Problems, SourceLine
+from skills.inputs.errors import InputError, Problems, SourceLine
 
 __all__ = ["PYTHON_TYPES", "Assembler", "Flow", "Named", "StepPlan", "StepPlans", "step_name"]
 

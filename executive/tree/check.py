@@ -17,7 +17,7 @@ from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import area_m2
 from skills.api import FreeSpace, PlanningError, Zone, ZoneKind
-from skills.files.errors import InputError, listing, suggestion
+from skills.inputs.errors import InputError, listing, suggestion
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import Path, path_length
 from skills.navigate.zones import zones_sentence

@@ -17,9 +17,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from executive.tree.board import Constant, FromBoard
 from executive.tree.node import NodeSpec
 from skills.api import Zone
-from skills.files.errors import InputError
-from skills.files.schema import validate
-from skills.files.yaml_source import read_yaml
+from skills.inputs.errors import InputError
+from skills.inputs.schema import validate
+from skills.inputs.yaml_source import read_yaml
 from skills.robot import Pose2D
 
 __all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "expected_children", "load_estimates"]

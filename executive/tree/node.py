@@ -15,7 +15,7 @@ from py_trees.common import Status
 
 from executive.tree.behaviour import Explained
 from skills.api import Cause
-from skills.files.errors import SourceLine
+from skills.inputs.errors import SourceLine
 
 __all__ = ["Change", "NodeSpec", "NodeState", "Snapshot", "TreeObserver"]
 

@@ -15,7 +15,7 @@ from executive.tree.board import Constant, FromBoard
 from executive.tree.node import NodeSpec, NodeState
 from executive.tree.port_values import describe_type, field_types
 from skills.api import Cause
-from skills.files.errors import SourceLine
+from skills.inputs.errors import SourceLine
 
 
 @dataclass(frozen=True)

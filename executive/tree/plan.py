@@ -18,7 +18,7 @@ from executive.words.goal import GoalCondition
 from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
 from executive.words.slug import slug
 from skills.api import Cause, ObjectKind, Part, Skill, Surface
-from skills.files.errors import InputError, SourceLine, suggestion
+from skills.inputs.errors import InputError, SourceLine, suggestion
 from skills.perception.class_forms import ANY_OBJECT
 from skills.robot import Pose2D
 

@@ -18,7 +18,7 @@ from typing import Any, Final, Union
 from executive.words.command import parse_object
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectKind, Surface
-from skills.files.errors import listing, suggestion
+from skills.inputs.errors import listing, suggestion
 from skills.quantities import QuantityError, base_type, bounds, in_range, number_of, range_text, unitless_name
 from skills.robot import Pose2D
 

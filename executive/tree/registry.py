@@ -18,8 +18,8 @@ from typing import Any, Final
 
 from executive.tree.port_values import describe_type, field_types
 from skills.api import Cause, Skill
-from skills.files.errors import InputError, suggestion
-from skills.files.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
+from skills.inputs.errors import InputError, suggestion
+from skills.inputs.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
 
 GROUP: Final = "errand.skills"
 

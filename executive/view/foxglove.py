@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from executive.record.event_log import EventLog, LoggedMessage
 from executive.record.schemas import LIBRARY
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 _ADDRESS: Final = re.compile(r"(?P<host>[\w.%-]+|\[[\w.:%-]+\]):(?P<port>\d{1,5})")
 _TIME_EVERY_S: Final = 0.1

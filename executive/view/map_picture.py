@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from executive.record.history import Event
 from executive.record.schemas import DOORS, MAP, NAVIGATION, PATH, POSE, RESERVED_PATH, TREE
 from executive.view.styles import ROBOT_COLOURS, rgb_of
-from skills.files.errors import InputError
-from skills.files.map_drawing import ZONE_COLOURS, Names, draw_zone, with_legend
+from skills.inputs.errors import InputError
+from skills.map_drawing import ZONE_COLOURS, Names, draw_zone, with_legend
 
 WIDTH_PX: Final = 1400
 FOOTPRINT_M: Final = (1.1, 0.5)

@@ -16,8 +16,8 @@ from executive.run.control_state import ControlState, Mode
 from executive.run.visitor import Progress, RunVisitor
 from executive.tree.node import NodeState
 from executive.view.feed import Feed
-from skills.files.errors import InputError
-from skills.files.outside import plain_text
+from skills.inputs.errors import InputError
+from skills.inputs.outside import plain_text
 
 Action = Callable[[Mapping[str, Any]], str]
 

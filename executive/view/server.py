@@ -28,8 +28,8 @@ from executive.view.feed import Feed
 from executive.view.html import PAGE_FOLDER
 from executive.view.page_control import Action, RefusedError
 from executive.view.serving import MAX_BODY, Server, body_of
-from skills.files.errors import InputError
-from skills.files.outside import json_object
+from skills.inputs.errors import InputError
+from skills.inputs.outside import json_object
 
 HOST: Final = "127.0.0.1"
 RECORDING_ADDRESS: Final = "recording.html"

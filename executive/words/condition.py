@@ -13,8 +13,8 @@ from typing_extensions import TypeAliasType
 from executive.words.command import Command, Task, command_of_parts, parts_of_command
 from executive.words.expression import Expression, Kind
 from executive.words.forms import Forms, Strict
-from skills.files.errors import listing
-from skills.files.schema import Name, Text
+from skills.inputs.errors import listing
+from skills.inputs.schema import Name, Text
 from skills.quantities import Delay, Quantity, Share
 
 READINGS: Final[Mapping[str, Kind]] = MappingProxyType(

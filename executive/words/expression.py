@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from skills.durations import seconds_in
-from skills.files.errors import suggestion
+from skills.inputs.errors import suggestion
 from skills.quantities import QuantityError, clock_text
 
 Value = bool | int | float | str

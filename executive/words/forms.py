@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import InitErrorDetails
 
-from skills.files.errors import listing
+from skills.inputs.errors import listing
 
 
 class Strict(BaseModel):

@@ -13,9 +13,9 @@ from executive.words.outlines import Corner, Polygon
 from executive.words.robot_config import RobotsFile
 from executive.words.zone import ZoneFacts, with_files
 from skills.api import Tag, Zone
-from skills.files.errors import InputError, suggestion
-from skills.files.schema import Name, validate
-from skills.files.yaml_source import YamlSource, read_yaml
+from skills.inputs.errors import InputError, suggestion
+from skills.inputs.schema import Name, validate
+from skills.inputs.yaml_source import YamlSource, read_yaml
 from skills.perception.class_forms import ANY_OBJECT, PERSON, class_forms
 from skills.quantities import Angle, Coordinate, Height, Opening, Quantity, TagNumber, TagSize, TopHeight
 

@@ -16,9 +16,9 @@ from executive.words.robot_config import RobotsFile
 from executive.words.step import Given, Placed, Scalar, Step
 from executive.words.steps import Branch, Group, Handler, Steps, While
 from executive.words.zone import ZONES, ZoneFacts, Zones
-from skills.files.errors import SourceLine
-from skills.files.schema import Name, Text
-from skills.files.yaml_source import YamlSource
+from skills.inputs.errors import SourceLine
+from skills.inputs.schema import Name, Text
+from skills.inputs.yaml_source import YamlSource
 from skills.quantities import Delay, Margin, Quantity, Share, Speed
 
 DEFAULT_WORLD: Final = "flat"

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, StrictBool, model_validator
 
 from executive.words.forms import Strict
-from skills.files.schema import Text
+from skills.inputs.schema import Text
 from skills.quantities import Duration, Quantity, Share
 
 Attempts = Annotated[int, Quantity(ge=0, le=100)]

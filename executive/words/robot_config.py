@@ -8,9 +8,9 @@ from typing import Annotated, Final
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from skills.files.errors import InputError, SourceLine, known_names, suggestion
-from skills.files.schema import Name
-from skills.files.yaml_source import YamlSource
+from skills.inputs.errors import InputError, SourceLine, known_names, suggestion
+from skills.inputs.schema import Name
+from skills.inputs.yaml_source import YamlSource
 from skills.quantities import Angle, Coordinate, QuantityError, number_in
 from skills.robot import Pose2D
 

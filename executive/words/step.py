@@ -11,8 +11,8 @@ from pydantic import PrivateAttr, StrictBool
 from executive.words.command import Command
 from executive.words.expression import ExpressionError
 from executive.words.policy import Policy
-from skills.files.errors import InputError, SourceLine
-from skills.files.yaml_source import KeyPath, YamlSource
+from skills.inputs.errors import InputError, SourceLine
+from skills.inputs.yaml_source import KeyPath, YamlSource
 from skills.quantities import Number, Whole
 
 Given = str | StrictBool | Whole | Number

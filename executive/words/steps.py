@@ -33,9 +33,9 @@ from executive.words.leaf_steps import (
 )
 from executive.words.step import Fault, Scalar, Step, unreadable
 from executive.words.zone import ZONES, Zones
-from skills.files.errors import InputError, listing
-from skills.files.schema import Name, Text
-from skills.files.yaml_source import parse_yaml, yaml_of
+from skills.inputs.errors import InputError, listing
+from skills.inputs.schema import Name, Text
+from skills.inputs.yaml_source import parse_yaml, yaml_of
 from skills.quantities import Count, Duration
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 from executive.words.forms import Option
 from executive.words.forms import OptionGroup as Group
-from skills.files.errors import InputError, suggestion
+from skills.inputs.errors import InputError, suggestion
 from skills.quantities import Quantity, QuantityError, number_in, number_of
 
 NORMAL_LIGHT: Final = "normal"

@@ -10,10 +10,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from executive.words.outlines import Polygon
 from skills.api import FilterType, Zone, ZoneKind, ZoneMask
-from skills.files.errors import InputError
-from skills.files.outside import file_beside, is_file
-from skills.files.schema import Name, validate
-from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
+from skills.inputs.errors import InputError
+from skills.inputs.outside import file_beside, is_file
+from skills.inputs.schema import Name, validate
+from skills.inputs.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import Angle, Number, Quantity, Speed
 
 _ROS: Final = "ros__parameters"

@@ -14,10 +14,10 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from skills.files.errors import InputError
-from skills.files.plugins import class_entries
-from skills.files.schema import validate
-from skills.files.yaml_source import read_yaml, yaml_of
+from skills.inputs.errors import InputError
+from skills.inputs.plugins import class_entries
+from skills.inputs.schema import validate
+from skills.inputs.yaml_source import read_yaml, yaml_of
 from skills.robot import quantities
 
 CATALOGUE: Final = "catalogue.yaml"

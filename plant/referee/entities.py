@@ -12,7 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, RigidBody
 
 from plant.saved_state import Stateful
-from skills.files.errors import definite
+from skills.inputs.errors import definite
 
 if TYPE_CHECKING:
     from plant.robots.robot_kind import RobotKind

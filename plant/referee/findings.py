@@ -7,7 +7,7 @@ import numpy as np
 
 from executive.words.goal import GoalCondition, Region, When
 from plant.referee.object_history import Truth
-from skills.files.errors import definite
+from skills.inputs.errors import definite
 from skills.robot import FloatArray
 
 NAMED_REGIONS = 3

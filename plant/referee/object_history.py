@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from plant.saved_state import Stateful
-from skills.files.errors import definite
+from skills.inputs.errors import definite
 from skills.robot import FloatArray, Pose2D
 
 LIFT_M = 0.03

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from skills.files.errors import InputError
-from skills.files.plugins import PluginDefect, distribution_of, installed_plugins, run_plugin
+from skills.inputs.errors import InputError
+from skills.inputs.plugins import PluginDefect, distribution_of, installed_plugins, run_plugin
 from skills.robot import Capabilities, FloatArray, Pose2D, Robot
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from skills.files.yaml_source import YamlSource, read_yaml
+from skills.inputs.yaml_source import YamlSource, read_yaml
 from skills.robot import Intrinsics
 
 if TYPE_CHECKING:

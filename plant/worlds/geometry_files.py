@@ -13,9 +13,9 @@ from types import MappingProxyType
 from typing import Any, Final
 from xml.parsers import expat
 
-from skills.files.errors import InputError
-from skills.files.outside import file_beside, is_there, plain_file, read_text
-from skills.files.yaml_source import read_yaml
+from skills.inputs.errors import InputError
+from skills.inputs.outside import file_beside, is_there, plain_file, read_text
+from skills.inputs.yaml_source import read_yaml
 
 OURS: Final = Path(__file__).resolve().parent.parent
 OWN_PACKAGE: Final = "world"
@@ -90,7 +90,7 @@ class _Walk:
         """Checks a model, mesh or picture; the files of `chain` name each other down to it."""
         kind = file.suffix.lower()
         if kind in _PICTURES:
-            from skills.files.picture_files import check_picture  # brings OpenCV, which most commands do not need
+            from skills.inputs.picture_files import check_picture  # brings OpenCV, which most commands do not need
 
             check_picture(file)
             return

@@ -15,10 +15,10 @@ from executive.words.knowledge import Knowledge, Pose
 from executive.words.mission import Route, Stop
 from plant.models.catalogue import ImportedObject, load_catalogue, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
-from skills.files.errors import InputError, nearest_name, suggestion
-from skills.files.outside import is_file
-from skills.files.schema import validate
-from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
+from skills.inputs.errors import InputError, nearest_name, suggestion
+from skills.inputs.outside import is_file
+from skills.inputs.schema import validate
+from skills.inputs.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.robot import Pose2D, quantities
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from skills.api import ObjectObservation, Surface
-from skills.files.errors import with_article
+from skills.inputs.errors import with_article
 from skills.perception.class_forms import PERSON
 
 SAME_WITHIN_M = 0.12

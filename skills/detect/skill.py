@@ -41,8 +41,8 @@ from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints,
 from skills.perception.class_forms import ANY_OBJECT, known_attributes
 from skills.perception.detection_3d import Detection3D, detections_3d, observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image, is_dark
-from skills.perception.model_detector import models_of
 from skills.perception.model_matching import identified
+from skills.perception.object_model import models_of
 from skills.perception.point_cloud import Coverage, in_plain_view
 from skills.perception.surface_segmentation import Cluster, loose_clusters, segment_3d, segment_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker

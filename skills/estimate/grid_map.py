@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
 from skills.estimate.compiled import distances
-from skills.files.errors import InputError, count_text, nearest_name
-from skills.files.outside import file_beside, is_file
-from skills.files.picture_files import Brightness, read_brightness
-from skills.files.schema import validate
-from skills.files.yaml_source import YamlSource, quoted_key, read_yaml
+from skills.inputs.errors import InputError, count_text, nearest_name
+from skills.inputs.outside import file_beside, is_file
+from skills.inputs.picture_files import Brightness, read_brightness
+from skills.inputs.schema import validate
+from skills.inputs.yaml_source import YamlSource, quoted_key, read_yaml
 from skills.quantities import Angle, Coordinate, Height, Quantity, Share
 from skills.robot import FloatArray
 

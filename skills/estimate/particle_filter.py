@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
 from skills.estimate.grid_map import GridMap
-from skills.files.errors import InputError
 from skills.geometry import wrap
+from skills.inputs.errors import InputError
 from skills.quantities import Count, Factor, Length, Margin, Share, Tries, Turn
 from skills.robot import FloatArray, Pose2D
 

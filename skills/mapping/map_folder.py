@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from skills.files.errors import InputError
-from skills.files.outside import plain_file, read_text
-from skills.files.schema import first_error
+from skills.inputs.errors import InputError
+from skills.inputs.outside import plain_file, read_text
+from skills.inputs.schema import first_error
 from skills.mapping.keyframe import Keyframe
 from skills.mapping.mapper import Mapper, MapperOptions, Submap
 from skills.mapping.occupancy import BANDS_M, LayeredOccupancy

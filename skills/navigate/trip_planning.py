@@ -12,7 +12,7 @@ from skills.navigate.path import Path
 from skills.navigate.planner import LatticePlanner
 from skills.navigate.surroundings import NavigateOptions, Surroundings
 from skills.navigate.zones import zones_sentence
-from skills.open_door.calls import DoorCalls
+from skills.open_door.openers import DoorCalls
 from skills.ports import NavigateInputs
 from skills.robot import Pose2D
 from skills.routine import Patience, SkillFailure

@@ -6,8 +6,7 @@ from typing import ClassVar
 
 from skills.api import Cause, Part, Running, Succeeded
 from skills.check_door.skill import CheckDoorInputs
-from skills.open_door.arm_door import ArmDoor
-from skills.open_door.calls import DoorCalls
+from skills.open_door.openers import ArmDoor, DoorCalls
 from skills.perception.doorway import DoorState, Doorway
 from skills.quantities import Delay
 from skills.routine import Routine, RoutineSkill, SkillFailure

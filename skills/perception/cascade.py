@@ -20,11 +20,10 @@ class Cascade:
 
     def build(self) -> Detector:
         """Loads the detector. Raises ModelFileError or InputError when a file cannot be used."""
-        from skills.files.object_model import read_model
         from skills.perception.detector.augmentation import AugmentedDetector
         from skills.perception.detector.model_files import MODEL_FILE
         from skills.perception.detector.onnx_detector import load_detector
-        from skills.perception.model_detector import ModelDetector
+        from skills.perception.object_model import ModelDetector, read_model
 
         single = load_detector(MODEL_FILE if self.file is None else Path(self.file))
         networks = AugmentedDetector(single) if self.views else single

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
-from skills.files.errors import InputError
-from skills.files.plugins import class_entries
-from skills.files.yaml_source import read_yaml
+from skills.inputs.errors import InputError
+from skills.inputs.plugins import class_entries
+from skills.inputs.yaml_source import read_yaml
 
 FORMS_FILE: Final = "class_forms.yaml"
 PERSON: Final = "person"

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Detection, LocalisationEstimate
-from skills.files.object_model import ObjectModel
 from skills.perception.detection_3d import Detection3D
+from skills.perception.object_model import ObjectModel
 from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, nearest_pixels, project
 from skills.perception.surface_segmentation import Cluster, segment_3d
 from skills.perception.view_matching import lab_of, likeness, seen_view

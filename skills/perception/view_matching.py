@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
-from skills.files.object_model import VIEW_SIDE, view_of
+from skills.perception.object_model import VIEW_SIDE, view_of
 from skills.perception.point_cloud import closed_mask, nearest_pixels, project
 from skills.perception.surface_segmentation import Cluster
 from skills.robot import FloatArray, Image

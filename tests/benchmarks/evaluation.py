@@ -21,7 +21,7 @@ from executive.app.evaluate.evaluation import run_one
 from executive.app.evaluate.results import Case, Evaluation, Evidence, ResultsFile, RunSpec
 from executive.app.evaluate.summary import to_page
 from executive.app.evaluate.workers import local_cluster
-from executive.app.report import RunReport
+from executive.app.report.run_report import RunReport
 from executive.cli.evaluate_command import command_of
 from executive.mission.request import Request
 from executive.words.goal import RefereeReport

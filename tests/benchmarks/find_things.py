@@ -21,8 +21,8 @@ from errand_train.dataset.objects import CLASSES, DISTRACTORS, instance, numbers
 from errand_train.dataset.render import is_validation
 from errand_train.dataset.resting import choose_pose, resting_poses
 from errand_train.dataset.views import View, camera_specs
-from executive.app.placed_robots import shared_detector
-from executive.app.worlds import open_world
+from executive.app.prepare.placed_robots import shared_detector
+from executive.app.prepare.worlds import open_world
 from executive.testing.bench import SkillBench
 from plant.engine import Engine
 from plant.robots.robot_kind import PlacedRobot

@@ -33,7 +33,7 @@ from errand_train.dataset.views import (
     off_centre,
     roll_deg,
 )
-from executive.app.worlds import knowledge_of, open_world
+from executive.app.prepare.worlds import knowledge_of, open_world
 from plant.scene_pictures import look_at
 from plant.sensors.noise import PictureDegrader, PictureNoise
 from skills.estimate.grid_map import load_grid_map

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from executive.app.worlds import knowledge_of, open_world
+from executive.app.prepare.worlds import knowledge_of, open_world
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.rendering import RENDERER, render_parameters
 from plant.sensors.camera_spec import colour_render_camera, depth_render_camera

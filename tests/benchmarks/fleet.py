@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.app.fleet import missions_json
-from executive.app.fleet_run import run_fleet, simulated_fleet
-from executive.app.prepare import prepare
-from executive.app.simulated import SimulatedBackend
+from executive.app.fleet.fleet_mission import missions_json
+from executive.app.fleet.fleet_run import run_fleet, simulated_fleet
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.record.history import read_events
 from executive.run.outcome import Outcome

@@ -16,9 +16,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from executive.app.mission_run import run_request
-from executive.app.prepare import prepare
-from executive.app.runs import new_run
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.one_run import run_request
+from executive.app.runs.queue import new_run
 from executive.mission.request import Request
 from executive.run.visitor import RunVisitor
 from executive.store.missions import STORE, MissionStore

@@ -32,9 +32,9 @@ import numpy as np
 
 from errand_train.commands.worst_sheet import Shown, contact_sheet
 from errand_train.detector.scoring import Judged
-from executive.app.placed_robots import only_robot
-from executive.app.simulated import run_entry, simulate
-from executive.app.worlds import knowledge_of
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.prepare.worlds import knowledge_of
+from executive.app.runs.simulated import run_entry, simulate
 from executive.run.outcome import Outcome
 from executive.run.runner import run
 from executive.run.visitor import RunSettings, RunVisitor
@@ -49,7 +49,7 @@ from plant.scene_pictures import best_view, render_view, save_png
 from plant.simulation import Simulation
 from plant.worlds.seeding import place_objects
 from skills.api import Worker
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.perception.class_forms import ANY_OBJECT
 from tests.benchmarks.harness import benchmark, for_each, quantile, share, tell
 from tests.benchmarks.manipulation_room import CLASSES, LOOK_S, ROBOT, SECOND, SURFACES, TAKEN, TARGET, room

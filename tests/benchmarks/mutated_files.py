@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from executive.app.evaluate.evaluation_file import load_evaluation
-from executive.app.scenarios import read_scenario
+from executive.app.prepare.scenarios import read_scenario
 from executive.language.parser import load_parser
 from executive.mission.load import knowledge_of_mission, load_mission, load_stack, mission_of_robot
 from executive.mission.resolve import mission_from_file
@@ -32,7 +32,7 @@ from plant.models.builder.importing.solid import solid_of
 from plant.models.catalogue import read_imported
 from plant.worlds.world import WORLDS_FOLDER, load_world
 from skills.estimate.grid_map import load_grid_map
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.benchmarks.errand_process import ROOT
 from tests.benchmarks.harness import command
 from tests.executive.mission.mutations import mutated_files, some_bytes

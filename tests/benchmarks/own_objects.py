@@ -48,10 +48,9 @@ from plant.rendering import lights
 from plant.scene_pictures import look_at, render_view
 from skills.detect.skill import Detect, DetectInputs
 from skills.detection import NoDetector
-from skills.files.errors import InputError
-from skills.files.object_model import ObjectModel, read_model
 from skills.geometry import inside_polygon
-from skills.perception.model_detector import ModelDetector
+from skills.inputs.errors import InputError
+from skills.perception.object_model import ModelDetector, ObjectModel, read_model
 from tests.benchmarks.find_things import room_bench
 from tests.benchmarks.flat_scene import SURFACES, FlatScene, surface_of, viewpoint_of
 from tests.benchmarks.foreign_models import CATALOGUES, OTHERS, entries

@@ -3,9 +3,9 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from executive.app.mission_run import run_request
-from executive.app.prepare import prepare
-from executive.app.simulated import SimulatedBackend
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.one_run import run_request
+from executive.app.runs.simulated import SimulatedBackend
 from executive.mission.request import Request
 
 

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from executive.app.placed_robots import shared_detector
+from executive.app.prepare.placed_robots import shared_detector
 from skills.api import LocalisationEstimate
 from skills.detection import box_overlap
 from skills.perception.detection_3d import detections_3d

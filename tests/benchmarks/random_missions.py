@@ -22,7 +22,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from executive.app.goal_conditions import verdict_of
+from executive.app.runs.goal_conditions import verdict_of
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.outcome import Outcome
@@ -40,7 +40,7 @@ from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
 from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Together, Try, While
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectKind, ObjectObservation, Part, Running, Skill, Succeeded
 from skills.check_door.skill import CheckDoorInputs
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.benchmarks.harness import command
 from tests.benchmarks.scripted_world import WORLD, Clock, ScriptedWorld, expected
 from tests.executive.conftest import GRIPPER, PORTS, EmptyCostmap, Script, StandingRobot, StillLocaliser, VirtualClock

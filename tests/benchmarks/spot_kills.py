@@ -176,9 +176,9 @@ def server_of(scripted, credentials):
         clock = VirtualClock()
         robot = ScriptedRobot(clock, capabilities=spot_capabilities())
     else:
-        from executive.app.placed_robots import only_robot
-        from executive.app.simulated import compile_first, simulate
-        from executive.app.worlds import open_world
+        from executive.app.prepare.placed_robots import only_robot
+        from executive.app.prepare.worlds import open_world
+        from executive.app.runs.simulated import compile_first, simulate
 
         world = open_world("flat")
         compile_first()

@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from executive.app.worlds import knowledge_of, open_world
+from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.run.visitor import RunVisitor
 from executive.words.robot_config import RobotConfig
 from plant.robots.robot_kind import robot_kind

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from executive.app import prepare, worlds
+from executive.app.prepare import from_request, worlds
 from executive.record.event_log import EventLog
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
@@ -276,7 +276,7 @@ def what_is_shipped_is_read_once():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(worlds, "load_world", load)
         patch.setattr(worlds, "load_knowledge", know)
-        patch.setattr(prepare, "installed_skills", cache(installed_skills))
+        patch.setattr(from_request, "installed_skills", cache(installed_skills))
         yield
 
 
@@ -299,7 +299,7 @@ def missions_collect_no_garbage():
     """A collection of all that the tests of a process hold takes longer than most of the missions here."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gc, "get_freeze_count", lambda: 0)
-        patch.setattr("executive.app.runs.return_memory", lambda: None)
+        patch.setattr("executive.app.runs.queue.return_memory", lambda: None)
         patch.setattr("executive.app.evaluate.evaluation.return_memory", lambda: None)
         yield
 

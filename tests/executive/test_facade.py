@@ -9,10 +9,10 @@ import pytest
 
 import executive
 from executive.app.evaluate.results import Case, Cases, RunSpec
-from executive.app.mission_files import request_of
-from executive.app.report import RunReport
+from executive.app.prepare.mission_files import request_of
+from executive.app.report.run_report import RunReport
 from executive.testing.bench import room_knowledge
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 GO = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"

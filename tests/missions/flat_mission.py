@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
-from executive.app.goal_conditions import verdict_of
-from executive.app.simulated import run_entry
-from executive.app.worlds import knowledge_of, open_world
+from executive.app.prepare.worlds import knowledge_of, open_world
+from executive.app.runs.goal_conditions import verdict_of
+from executive.app.runs.simulated import run_entry
 from executive.run.outcome import Outcome
 from executive.run.runner import run
 from executive.run.visitor import RunSettings

@@ -5,8 +5,8 @@ import shutil
 import pytest
 import yaml
 
-from executive.app.mission_run import run_request
-from executive.app.prepare import prepare
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.one_run import run_request
 from executive.mission.request import Request
 from plant.worlds.world import WORLDS_FOLDER
 

@@ -6,10 +6,10 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
-from executive.app.mission_run import run_request
-from executive.app.placed_robots import only_robot
-from executive.app.prepare import prepare
-from executive.app.simulated import SimulatedBackend
+from executive.app.prepare.from_request import prepare
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.runs.one_run import run_request
+from executive.app.runs.simulated import SimulatedBackend
 from executive.mission.request import Request
 from plant.worlds.world import load_world
 from skills.robot import Pose2D

@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 from websockets.sync.client import connect
 
 from executive import run_mission
-from executive.app.mission_run import run_request
-from executive.app.prepare import prepare
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.one_run import run_request
 from executive.cli.entry import app
 from executive.mission.request import Request
 from executive.record.history import read_events

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from executive.app.checker import Checker
-from executive.app.mission_run import run_request
-from executive.app.prepare import prepare
+from executive.app.prepare.checker import Checker
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.one_run import run_request
 from executive.mission.request import Request
 from skills.robot import Pose2D
 from tests.tables import table

@@ -5,7 +5,7 @@ import pytest
 from py_trees.common import Status
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from executive.app.worlds import open_world
+from executive.app.prepare.worlds import open_world
 from executive.run.outcome import Outcome
 from plant.diagram import LooseModel
 from plant.robots.robot_kind import PlacedRobot

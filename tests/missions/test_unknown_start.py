@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from executive.app.mission_run import run_request
-from executive.app.prepare import prepare
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.one_run import run_request
 from executive.mission.request import Request
 
 MISSION = Path(__file__).parents[2] / "missions" / "go_to_pose.yaml"

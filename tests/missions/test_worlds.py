@@ -2,8 +2,8 @@
 
 import pytest
 
-from executive.app.mission_run import run_request
-from executive.app.prepare import prepare
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.one_run import run_request
 from executive.mission.request import Request
 
 pytestmark = [pytest.mark.mission, pytest.mark.nightly]

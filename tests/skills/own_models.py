@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from table_scene import GREY, TABLE, Can, taken
 
-from skills.files.object_model import ObjectModel, view_of
 from skills.manipulation.arm.poses import camera_pose
+from skills.perception.object_model import ObjectModel, view_of
 
 
 def can_model(name, radius, height, colour, points=2000):

@@ -4,7 +4,7 @@ import pytest
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from skills import quantities
-from skills.files.schema import first_error
+from skills.inputs.schema import first_error
 from skills.quantities import Count, Delay, Duration, Number, QuantityError, Share, clock_text, number_in, number_of
 from tests.tables import table
 

@@ -19,11 +19,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.app.checker import prepare_checked
 from executive.app.evaluate.results import Case, Evaluation, Evidence, Results, ResultsFile, RunSpec, Standing
 from executive.app.evaluate.workers import Pool, installed_code
-from executive.app.mission_run import return_memory, run_request
-from executive.app.report import RunReport
+from executive.app.prepare.checker import prepare_checked
+from executive.app.report.run_report import RunReport
+from executive.app.runs.one_run import return_memory, run_request
 from executive.mission.request import Request
 from executive.record.history import Event, read_events, timeline
 from executive.record.schemas import TRANSITIONS, TREE
@@ -31,7 +31,7 @@ from executive.tree.node_view import logged_view
 from executive.view.map_picture import map_picture
 from executive.words.goal import RefereeReport
 from executive.words.variation import NO_VARIATION
-from skills.files.errors import InputError, Problems
+from skills.inputs.errors import InputError, Problems
 
 Progress = Callable[[int], AbstractContextManager[Callable[[], None]]]
 """Shows progress over a number of runs; the yielded function is called after each run."""

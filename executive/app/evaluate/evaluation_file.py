@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.app.evaluate.results import Evaluation, RunSpec
-from executive.app.mission_files import mission_file
+from executive.app.prepare.mission_files import mission_file
 from executive.mission.load import stack_file
 from executive.mission.request import Request
 from executive.mission.scenario import NO_SCENARIO, RandomFaults, Scenario
@@ -19,10 +19,10 @@ from executive.words.robot_config import NamedRobot, RobotConfig, robots_of_file
 from executive.words.slug import slug
 from executive.words.variation import NORMAL_LIGHT, Brightness, Clutter, Friction, MorePeople, Variation, parse_light
 from plant.robots.robot_kind import robot_kinds
-from skills.files.errors import InputError
-from skills.files.outside import is_file, read_text
-from skills.files.schema import Name, Text, validate
-from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
+from skills.inputs.errors import InputError
+from skills.inputs.outside import is_file, read_text
+from skills.inputs.schema import Name, Text, validate
+from skills.inputs.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import LongDuration, Seed
 
 MOST_RUNS: Final = 200_000

@@ -9,14 +9,14 @@ from typing import Any, Final
 
 from executive.app.evaluate.evaluation_file import MOST_RUNS, seed_range
 from executive.app.evaluate.results import Evaluation, RunSpec
-from executive.app.feasibility import abilities_in
-from executive.app.worlds import knowledge_of, open_world
+from executive.app.prepare.feasibility import abilities_in
+from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.mission.request import Request
 from executive.words.knowledge import Knowledge
 from skills.detect.descriptions import plural
-from skills.files.errors import InputError, with_article
-from skills.files.outside import is_file
-from skills.files.yaml_source import read_yaml
+from skills.inputs.errors import InputError, with_article
+from skills.inputs.outside import is_file
+from skills.inputs.yaml_source import read_yaml
 
 _TABLE: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(Path(__file__).with_suffix(".yaml")).data
 KINDS: Final[Mapping[str, tuple[str, ...]]] = {kind: tuple(about["sentences"]) for kind, about in _TABLE.items()}

@@ -11,10 +11,10 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
-from executive.app.report import RunReport
+from executive.app.report.run_report import RunReport
 from executive.mission.request import Request
 from executive.store.database import Database, FileKind, form
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 FALSE_CLAIM: Final = "FALSE CLAIM"
 _ID_LETTERS: Final = 16

@@ -24,7 +24,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Final, Generic, TypeVar
 
 from executive.record.announce import versions
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 MOST_DEATHS: Final = 3
 """Number of dead workers after which an item is given up."""

@@ -63,7 +63,7 @@ def _settings(config: pytest.Config) -> SkillTestSettings:
         from executive.testing.skill_suite import SkillTestSettings
         from executive.testing.skill_test import scripted_maker
         from executive.tree.registry import installed_skills
-        from skills.files.errors import InputError
+        from skills.inputs.errors import InputError
 
         capabilities = _spot()
         makers = {"scripted": scripted_maker(capabilities), "plant": _plant_bench}
@@ -87,7 +87,7 @@ class SmallPlant:
 
 def _small_plant(folder: Path, *, can: bool = True) -> SmallPlant:
     """Writes the world into `folder` and places the robot at (-0.5, 0), 1.7 m before the table."""
-    from executive.app.placed_robots import shared_detector
+    from executive.app.prepare.placed_robots import shared_detector
     from executive.testing.bench import SkillBench, write_small_room
     from plant.robots.robot_kind import PlacedRobot
     from plant.simulation import Simulation

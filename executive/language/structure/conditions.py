@@ -17,7 +17,7 @@ from executive.language.structure.plain import IS, IT, PlainReader, SpokenCondit
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import DoorToOpen, OpenDoor
-from skills.files.errors import listing
+from skills.inputs.errors import listing
 
 _SIGNS: Final = {
     **dict.fromkeys(("below", "under", "less than", "lower than", "smaller than", "beneath"), "<"),

@@ -14,7 +14,7 @@ from executive.language.structure.plain import PlainReader, State, phrase_of_nam
 from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.knowledge import ANYBODY, Knowledge
 from skills.api import ObjectKind
-from skills.files.errors import listing
+from skills.inputs.errors import listing
 
 _PEOPLE: Final = Patterns("structures.yaml", "people")
 _TASKS: Final = {

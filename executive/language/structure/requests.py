@@ -26,7 +26,7 @@ from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Awaited, Charging, Dock, Wait, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Steps
-from skills.files.errors import listing, with_article
+from skills.inputs.errors import listing, with_article
 
 _INTRODUCTION: Final = "Hello, I am the robot here. I bring things, and I follow and guide people."
 _WAITING: Final = Patterns("structures.yaml", "waiting", AMOUNTS)

@@ -50,7 +50,7 @@ from executive.words.condition import Look
 from executive.words.leaf_steps import Awaited, Check, Do, Speak, Wait, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Repeat, Steps, Together, Try
-from skills.files.schema import first_error
+from skills.inputs.schema import first_error
 
 
 class SentenceBuilder(DecisionBuilder):

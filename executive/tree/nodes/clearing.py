@@ -21,7 +21,7 @@ from executive.words.command import START, Command, Task
 from executive.words.knowledge import EVERYTHING
 from skills.api import Cause, ObjectKind, ObjectObservation
 from skills.detect.descriptions import count_of
-from skills.files.errors import listing
+from skills.inputs.errors import listing
 from skills.perception.class_forms import ANY_OBJECT
 from skills.robot import Robot
 

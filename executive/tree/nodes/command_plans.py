@@ -30,7 +30,7 @@ from executive.words.goal import GoalCondition, When
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Do, Say
 from skills.detect.descriptions import count_of
-from skills.files.errors import InputError, listing
+from skills.inputs.errors import InputError, listing
 from skills.quantities import Quantity
 
 MAX_TRIPS: Final = 20

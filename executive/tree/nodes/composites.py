@@ -22,7 +22,7 @@ from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import steps as model
 from executive.words.expression import Value
 from skills.api import Cause, Part
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 _MERELY_NOT_SO = frozenset({Cause.PRECONDITION, Cause.POSTCONDITION})
 

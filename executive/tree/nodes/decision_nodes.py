@@ -37,7 +37,7 @@ from executive.words.condition import (
 )
 from executive.words.expression import ExpressionError, Kind, Value
 from skills.api import Cause, Failed
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 DAY_S: Final = 86_400.0
 Keys = Mapping[str, str]

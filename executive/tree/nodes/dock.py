@@ -14,7 +14,7 @@ from executive.words import leaf_steps as model
 from executive.words.command import Command, Task
 from executive.words.knowledge import DOCK
 from skills.api import Cause
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 
 _BEFORE_M: Final = 0.7

@@ -23,7 +23,7 @@ from executive.words.goal import GoalCondition, GoalKind, When
 from executive.words.leaf_steps import UseMission
 from executive.words.mission import Mission
 from skills.api import Zone
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 class Always(Afterwards):

@@ -18,7 +18,7 @@ from executive.words.condition import READINGS, Condition, ValueIs, parts_of
 from executive.words.leaf_steps import CallSkill, Check, Do, Say, Set
 from executive.words.step import Step
 from skills.api import Cause
-from skills.files.errors import InputError, count_text
+from skills.inputs.errors import InputError, count_text
 from skills.robot import Clock
 
 

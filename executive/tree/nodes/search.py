@@ -20,8 +20,8 @@ from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Publish, Surface
 from skills.detect.descriptions import count_of, count_sentence, distinct_objects, plural
-from skills.files.errors import listing, with_article
 from skills.geometry import compose
+from skills.inputs.errors import listing, with_article
 from skills.robot import Pose2D
 
 ANSWER_TOPIC: Final = "answer"

@@ -29,7 +29,7 @@ from executive.words.knowledge import Knowledge, Pose
 from executive.words.leaf_steps import CallSkill
 from executive.words.slug import slug
 from skills.api import Cause, Failed, Part, Running, Skill, Step, Succeeded, Surface
-from skills.files.errors import listing, suggestion
+from skills.inputs.errors import listing, suggestion
 from skills.robot import Pose2D
 
 ResultT = TypeVar("ResultT")

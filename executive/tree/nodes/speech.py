@@ -21,7 +21,7 @@ from executive.words.expression import LARGEST, ExpressionError, Kind, Template,
 from executive.words.leaf_steps import Speak
 from executive.words.slug import slug
 from skills.api import Asked, Cause, Failed, Question
-from skills.files.errors import InputError, suggestion
+from skills.inputs.errors import InputError, suggestion
 
 SPEECH_TOPIC: Final = "speech"
 _FILLERS: Final = re.compile(

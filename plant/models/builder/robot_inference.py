@@ -15,7 +15,7 @@ from plant.robots.urdf_robot.assembly import PACKAGE, mesh_points
 from plant.robots.urdf_robot.description import Description
 from plant.robots.urdf_robot.robot_file import CameraFile, LidarFile
 from plant.robots.urdf_robot.urdf_file import UrdfFile, UrdfJoint
-from skills.files.yaml_source import yaml_of
+from skills.inputs.yaml_source import yaml_of
 from skills.robot import Capabilities, FloatArray
 
 _LIDAR: Final = re.compile(r"lidar|laser|scan|hokuyo|velodyne|rplidar|ouster|sick", re.IGNORECASE)

@@ -14,7 +14,7 @@ from pydrake.math import RollPitchYaw, RotationMatrix
 
 from plant.models import urdf
 from plant.sensors.camera_spec import CameraSpec
-from skills.files.yaml_source import read_yaml
+from skills.inputs.yaml_source import read_yaml
 
 FACTS = Path(__file__).with_name("fetch.yaml")
 BASE_LINK, BODY_LINK, CASTERS_LINK, HAND_LINK, HEAD_LINK = "base_link", "body", "casters", "wrist_roll", "head_tilt"

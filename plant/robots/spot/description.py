@@ -12,7 +12,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from plant.models import urdf
-from skills.files.yaml_source import read_yaml
+from skills.inputs.yaml_source import read_yaml
 
 FACTS = Path(__file__).with_name("spot.yaml")
 CAMERAS = Path(__file__).with_name("cameras.yaml")

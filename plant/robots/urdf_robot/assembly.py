@@ -20,8 +20,8 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from plant.models import urdf as urdf_text
 from plant.robots.urdf_robot.robot_file import GripperFile, HandFile, RobotFile
 from plant.robots.urdf_robot.urdf_file import UrdfFile, UrdfJoint
-from skills.files.errors import InputError, suggestion
-from skills.files.yaml_source import KeyPath
+from skills.inputs.errors import InputError, suggestion
+from skills.inputs.yaml_source import KeyPath
 from skills.robot import FloatArray, GripperKind
 
 BODY: Final = "body"

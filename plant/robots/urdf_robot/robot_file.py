@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
-from skills.files.schema import Name, validate
-from skills.files.yaml_source import YamlSource, read_yaml
+from skills.inputs.schema import Name, validate
+from skills.inputs.yaml_source import YamlSource, read_yaml
 from skills.robot import BaseKind, GripperKind, quantities
 
 FieldOfView = Annotated[float, quantities.Quantity(gt=0.0, le=6.2832, unit="rad")]

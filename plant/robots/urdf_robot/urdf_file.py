@@ -16,8 +16,8 @@ import numpy as np
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.files.errors import InputError, suggestion
-from skills.files.outside import read_text
+from skills.inputs.errors import InputError, suggestion
+from skills.inputs.outside import read_text
 from skills.robot import FloatArray
 
 MOVING: Final = ("revolute", "continuous", "prismatic")

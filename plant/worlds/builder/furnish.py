@@ -27,8 +27,8 @@ from plant.worlds.builder.rooms import (
 )
 from plant.worlds.geometry_files import OWN_PACKAGE
 from plant.worlds.world import WORLDS_FOLDER, Polygon, World, WorldError
-from skills.files.errors import InputError
-from skills.files.yaml_source import parse_yaml, read_yaml, yaml_of
+from skills.inputs.errors import InputError
+from skills.inputs.yaml_source import parse_yaml, read_yaml, yaml_of
 from skills.robot import Pose2D
 
 Size = tuple[float, float, float]

@@ -27,7 +27,7 @@ from plant.worlds.builder.rooms import (
 )
 from plant.worlds.geometry_files import OWN_PACKAGE
 from plant.worlds.world import WorldError
-from skills.files.yaml_source import yaml_of
+from skills.inputs.yaml_source import yaml_of
 from skills.robot import Pose2D
 
 FINEST_M: Final = 0.02

@@ -17,7 +17,7 @@ import typer
 
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, writing
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.quantities import Port, Seed
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import numpy as np
 
 from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
-from skills.files.errors import InputError
 from skills.geometry import compose
+from skills.inputs.errors import InputError
 from skills.quantities import Angle, Coordinate, Delay, Length, Turn
 from skills.robot import OwnLocalisation, Pose2D, Robot
 

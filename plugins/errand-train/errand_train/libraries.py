@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Sequence
 
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 __all__ = ["check_libraries"]
 

@@ -27,8 +27,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from skills.files.errors import InputError
-from skills.files.outside import read_bytes
+from skills.inputs.errors import InputError
+from skills.inputs.outside import read_bytes
 from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ import pytest
 from executive.app.evaluate import evaluation
 from executive.app.evaluate.workers import Pool
 from executive.app.evaluate.workers import WorkResult as Done
-from executive.app.mission_run import FinishedRun
-from executive.app.report import RunReport
+from executive.app.report.run_report import RunReport
+from executive.app.runs.one_run import FinishedRun
 from executive.cli import entry, listen_command
 from executive.record.event_log import EventLog
 from executive.tree.node_view import node_view

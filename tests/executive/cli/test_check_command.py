@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.app import checker
+from executive.app.prepare import checker
 from tests.executive.cli.calls import errand, json_of
 from tests.executive.distribution import write_distribution
 

@@ -5,23 +5,23 @@ import os
 
 import pytest
 
-from executive.app.mission_run import run_request
-from executive.app.prepare import prepare
-from executive.app.runs import note_run
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.one_run import run_request
+from executive.app.runs.queue import note_run
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.record.history import read_events
 from executive.run.outcome import Outcome
 from executive.store.missions import MissionState, MissionStore
-from skills.files.errors import InputError
-from tests.executive.app.scripted_backend import ScriptedBackend
+from skills.inputs.errors import InputError
+from tests.executive.app.runs.scripted_backend import ScriptedBackend
 
 FULL_AT_S = 3.0
 
 
 @pytest.fixture
 def prepared(tmp_path, monkeypatch):
-    monkeypatch.setattr("executive.app.prepare.load_parser", lambda: None)  # no step here is a sentence
+    monkeypatch.setattr("executive.app.prepare.from_request.load_parser", lambda: None)  # no step here is a sentence
     path = tmp_path / "drive.yaml"
     path.write_text("name: drive\nsteps:\n  - {skill: navigate, with: {x: 3.0, y: 0.5}}\n")
     return prepare(Request(file=path, out=tmp_path, seed=4))

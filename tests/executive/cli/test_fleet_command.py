@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from executive.app import fleet_run
+from executive.app.fleet import fleet_run
 from executive.cli.fleet_command import _faults, _to_do
 from executive.mission.request import Request
 from executive.store.missions import GivenMissions, MissionState, MissionStore
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.executive.cli.calls import errand
 
 GO = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"

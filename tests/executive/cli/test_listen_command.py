@@ -14,7 +14,7 @@ from executive.language.understand import Status, Understanding
 from executive.mission.request import Request
 from executive.speech.listener import follow
 from executive.words.robot_config import RobotConfig
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.executive.cli.calls import done, errand
 
 GO = "Hey Alice, go to the kitchen."

@@ -8,7 +8,7 @@ import pytest
 
 from executive.cli.map_command import _route_points
 from skills.estimate.grid_map import load_grid_map
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.executive.cli.calls import done, errand, json_of, refusal, write_room
 
 KEYS = {"world", "seed", "map", "distance_m", "loop_closures", "sim_time_s", "wall_time_s", "trajectory_error_m"}

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from executive.app.mission_files import mission_file, shipped_missions
-from skills.files.errors import InputError
+from executive.app.prepare.mission_files import mission_file, shipped_missions
+from skills.inputs.errors import InputError
 from tests.executive.cli.calls import done, errand
 
 MISSIONS = Path(__file__).parents[3] / "missions"

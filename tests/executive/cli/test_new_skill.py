@@ -3,7 +3,7 @@
 import pytest
 
 from executive.cli.new_command import render_skill
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 def test_a_package_with_skill_tests_and_registration_is_written(tmp_path):

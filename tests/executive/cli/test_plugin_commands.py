@@ -15,7 +15,7 @@ from tests.executive.distribution import write_distribution
 ROOT = Path(__file__).parents[3]
 MODULE = """
 import typer
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 def count(ports: int = 3):
     if ports < 0:
@@ -38,7 +38,7 @@ def moor():
 def install(tmp_path, monkeypatch):
     """Makes distributions that register commands, as an installer would leave them; they are found anew."""
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr("skills.files.plugins._all_installed", entry_points)
+    monkeypatch.setattr("skills.inputs.plugins._all_installed", entry_points)
 
     def installed(name, commands, summary="Commands for ships."):
         write_distribution(tmp_path, name, "errand.commands", *commands, summary=summary)
@@ -110,7 +110,7 @@ def test_a_command_of_errand_is_not_replaced_by_one_of_its_name(install):
 # not installed             Not installed: pip install PLUG-IN    refused with the same hint
 @pytest.fixture
 def nothing_installed(monkeypatch):
-    monkeypatch.setattr("skills.files.plugins.installed_plugins", lambda _group: ())
+    monkeypatch.setattr("skills.inputs.plugins.installed_plugins", lambda _group: ())
     monkeypatch.setattr("executive.cli.entry._text", lambda _file: "")
 
 

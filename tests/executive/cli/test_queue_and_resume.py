@@ -12,8 +12,8 @@ import pytest
 from py_trees.common import Status
 from rich.console import Console
 
-from executive.app.mission_run import FinishedRun
-from executive.app.report import RunReport
+from executive.app.report.run_report import RunReport
+from executive.app.runs.one_run import FinishedRun
 from executive.run.visitor import TickNote
 from executive.store.missions import MissionStore
 from executive.store.wakeup import WakeupPipe
@@ -25,13 +25,13 @@ from executive.words.command import Command
 from executive.words.goal import RefereeReport
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 from tests.executive.cli import calls
 from tests.executive.distribution import write_distribution
 from tests.tables import yaml_beside
 
-RUN_REQUEST = "executive.app.runs.run_request"
+RUN_REQUEST = "executive.app.runs.queue.run_request"
 SESSIONS = yaml_beside(__file__, "queue_sessions.yaml")
 GO = "Take [Nothing] to [%s] and do [Nothing] to [Nothing]"
 PARTS = """name: two
@@ -85,7 +85,7 @@ def first_leaf(tree):
 def plant(monkeypatch):
     stand_in = Plant()
     monkeypatch.setattr(RUN_REQUEST, stand_in)
-    monkeypatch.setattr("executive.app.prepare.load_parser", lambda: None)  # no step here is a sentence
+    monkeypatch.setattr("executive.app.prepare.from_request.load_parser", lambda: None)  # no step here is a sentence
     return stand_in
 
 

@@ -2,11 +2,11 @@
 
 import pytest
 
-from executive.app.checker import prepare_checked
 from executive.app.evaluate import evaluation
 from executive.app.evaluate.random_missions import random_missions
+from executive.app.prepare.checker import prepare_checked
 from executive.words.goal import RefereeReport
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.executive.cli.calls import errand, json_of
 
 ASKED = ("evaluate", "--random-missions", "6", "--worlds", "flat,lab", "--seeds", "8001-", "--jobs", "1")

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw
 
-from executive.app.mission_files import save_pose
-from executive.app.placed_robots import only_robot
-from executive.app.simulated import simulate
-from executive.app.worlds import open_world
+from executive.app.prepare.mission_files import save_pose
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.prepare.worlds import open_world
+from executive.app.runs.simulated import simulate
 from executive.cli.robot_command import TerminalKeys, advance, context_for, page_actions
 from executive.mission.load import load_mission
 from executive.view.page_control import RefusedError
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Pose2D
 from skills.teleop.driver import SavedPose, Teleop, TeleopOptions

@@ -5,8 +5,8 @@ import shutil
 
 import pytest
 
-from executive.app.mission_run import FinishedRun
-from executive.app.report import RunReport
+from executive.app.report.run_report import RunReport
+from executive.app.runs.one_run import FinishedRun
 from executive.tree.node_view import node_view
 from executive.words.goal import RefereeReport
 from plant.worlds.world import WORLDS_FOLDER
@@ -32,7 +32,7 @@ def no_plant(monkeypatch):
         prepared.request.out.mkdir(parents=True, exist_ok=True)
         return FinishedRun(ended["report"], node_view(prepared.tree.root))
 
-    monkeypatch.setattr("executive.app.runs.run_request", run_request)
+    monkeypatch.setattr("executive.app.runs.queue.run_request", run_request)
     return ended
 
 
@@ -181,7 +181,7 @@ def test_run_with_foxglove_serves_what_the_run_logs(no_plant, tmp_path, monkeypa
 
     monkeypatch.setattr("executive.view.foxglove.LiveServer", Server)
     monkeypatch.setattr(
-        "executive.app.runs.run_request", lambda prepared, live, **_: served.append(type(live)) or 1 / 0
+        "executive.app.runs.queue.run_request", lambda prepared, live, **_: served.append(type(live)) or 1 / 0
     )
     errand("run", "--say", FETCH, "--foxglove", "127.0.0.1:0", "--out", str(tmp_path / "out"))
     assert served == ["127.0.0.1:0", Server, "closed"]

@@ -16,7 +16,7 @@ from executive.run.visitor import Progress
 from executive.speech import voice as voices
 from executive.tree.node import NodeState
 from skills.api import Cause
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 def a_voice():

@@ -3,7 +3,7 @@
 import pytest
 import yaml
 
-from executive.app.goal_conditions import Share, conditions_of
+from executive.app.runs.goal_conditions import Share, conditions_of
 from executive.mission.load import load_mission
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission

@@ -2,9 +2,9 @@
 
 import pytest
 
-from executive.app.conversations import conversation_of
-from executive.app.mission_run import run_request
-from executive.app.prepare import prepare
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.conversations import conversation_of
+from executive.app.runs.one_run import run_request
 from executive.mission.request import Request
 from executive.run.control import Control
 from tests.visitors import OnTick

@@ -9,7 +9,7 @@ from executive.words.condition import AllOf, AnyOf, ButtonPressed, Look, Not, Va
 from executive.words.expression import Template
 from executive.words.leaf_steps import Awaited, Charging, Check, Dock, Set, Speak, Wait
 from executive.words.steps import Ask, Choose, Group, Handler, Repeat, Together, Try
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 BEER = Look(object="beer", at="kitchen")
 HOLDING, PRESSED = ValueIs(text="holding"), ButtonPressed(button="go")

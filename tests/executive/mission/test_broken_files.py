@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from executive.app.checker import Checker
-from skills.files.errors import InputError
+from executive.app.prepare.checker import Checker
+from skills.inputs.errors import InputError
 from tests.executive.mission import mutations
 
 COUNT, SEED = 300, 7

@@ -5,7 +5,7 @@ import pytest
 from executive.mission.load import knowledge_of_mission, load_mission
 from executive.mission.resolve import MAX_DEPTH, mission_from_file
 from executive.tree.board import Constant, FromBoard
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 
 VISIT = """\

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from executive.mission.load import load_stack, stack_file
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.stack import default_stack
 
 

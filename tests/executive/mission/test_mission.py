@@ -11,8 +11,8 @@ from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.mission import Mission
 from executive.words.step import Place
 from executive.words.steps import Loop, Repeat, lines_of_steps, steps_from_lines
-from skills.files.errors import InputError
-from skills.files.yaml_source import YamlSource
+from skills.inputs.errors import InputError
+from skills.inputs.yaml_source import YamlSource
 
 ROOT = Path(__file__).parents[3]
 MISSION = """\

@@ -5,7 +5,7 @@ import pytest
 from executive.mission.load import load_mission
 from executive.mission.parameters import parse_values
 from executive.mission.resolve import mission_from_file
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 FILE = """name: trial
 parameters:

@@ -5,7 +5,7 @@ import pytest
 from executive.mission.load import knowledge_of_mission, load_mission, mission_of_robot
 from executive.mission.resolve import mission_from_file
 from executive.words.robot_config import RobotConfig, robots_of_file
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 
 KINDS = ("fetch", "spot")

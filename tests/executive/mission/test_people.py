@@ -3,7 +3,7 @@
 import pytest
 
 from executive.mission.load import load_mission, routes_of_people
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 WALKS = """\
 name: busy

@@ -2,7 +2,7 @@
 
 import pytest
 
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import yaml_beside
 
 FORMS = yaml_beside(__file__, "refusals.yaml")

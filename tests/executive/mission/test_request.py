@@ -6,7 +6,7 @@ import pytest
 
 from executive.mission.request import Request, parse_start
 from executive.words.robot_config import RobotConfig
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 
 

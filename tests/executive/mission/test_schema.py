@@ -8,7 +8,7 @@ from executive.mission.json_schema import mission_json_schema
 from executive.mission.load import load_mission
 from executive.words.mission import Mission
 from executive.words.policy import Guards, OnFailure, OperatorQuestion, StaleData
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 GOOD = """\
 name: round

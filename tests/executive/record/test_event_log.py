@@ -23,7 +23,7 @@ from executive.record.schemas import WALL
 from executive.run.outcome import RunResult
 from executive.run.visitor import Progress, RunSettings
 from skills.api import Cause
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from executive.record.history import Event, read_history, timeline
 from executive.tree.node_view import node_view, to_json
 from executive.view.styles import style_of
 from skills.api import Cause, Failed
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 @pytest.fixture

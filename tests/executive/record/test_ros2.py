@@ -17,7 +17,7 @@ from executive.record.history import read_events
 from executive.record.ros2 import write_bag, write_ros2
 from executive.record.schemas import DERIVED
 from skills.estimate.grid_map import GridMap
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Joints, Scan
 
 

@@ -4,7 +4,7 @@ import contextlib
 
 import pytest
 
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.benchmarks.random_missions import claimed, ran
 
 MISSIONS, CLAIMS, GROUP = 300, 60, 20

@@ -4,7 +4,7 @@ import pytest
 from executive.speech import adapter
 from executive.speech.adapter import Adapter, LowRank, packaged_adapter, read_adapter, read_model_file
 from executive.speech.whisper import BASE_SHA256
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 BASE = "0123"
 DRAW = np.random.default_rng(1)

@@ -12,7 +12,7 @@ from executive.speech.hearing import Reader, spoken_phrases
 from executive.speech.listener import Listener, follow, microphone_blocks
 from executive.speech.recogniser import vocabulary_of_world
 from executive.speech.sound import RATE_HZ
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 GO = "Hey Alice, go to the kitchen."
 

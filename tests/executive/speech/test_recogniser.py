@@ -1,7 +1,7 @@
 import pytest
 
 from executive.speech.recogniser import Vocabulary, read_vocabulary, vocabulary_of_world
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 def test_a_world_gives_all_its_names_and_the_robots_own_last(flat):

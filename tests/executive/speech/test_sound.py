@@ -6,7 +6,7 @@ import pytest
 from made_speech import silence, tone, write_raw_wav, write_wav
 
 from executive.speech.sound import RATE_HZ, Loudness, concatenate, level_db, read_wav
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 def test_silence_differs_from_a_soft_voice():

@@ -3,7 +3,7 @@ import time
 import pytest
 
 from executive.speech.voice import EspeakVoice, Silence, installed_voice, queued_voice
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 def test_without_a_synthesiser_nothing_is_said():

@@ -13,7 +13,7 @@ from executive.speech.listener import Listener
 from executive.speech.recogniser import vocabulary_of_world
 from executive.speech.sound import concatenate, read_wav
 from executive.speech.whisper import load_whisper
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import table
 
 pytest.importorskip("faster_whisper")

@@ -18,7 +18,7 @@ from executive.store.missions import MissionState, MissionStore
 from executive.tree.node import Change, NodeState
 from executive.words.robot_config import RobotConfig
 from skills.api import Cause
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 
 REQUEST = Request(

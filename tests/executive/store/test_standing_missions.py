@@ -12,7 +12,7 @@ from executive.store import standing_missions as standing_module
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing_missions import MOST_WAITING, StandingMissions, TooManyError
 from executive.store.triggers import Missed, trigger_of
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import yaml_beside
 
 REQUEST = Request("go to the kitchen", seed=3, name="go kitchen", world_name="flat", robot="Alice", commands=("Take",))

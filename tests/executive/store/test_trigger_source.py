@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from executive.store.trigger_source import refuse_missing_source, trigger_source
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.executive.distribution import write_distribution
 
 MODULE = """

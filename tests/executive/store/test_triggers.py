@@ -21,7 +21,7 @@ from executive.store.triggers import (
     schedule_of,
     trigger_of,
 )
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import yaml_beside
 
 TEXTS = yaml_beside(__file__, "triggers.yaml")

@@ -13,7 +13,7 @@ from executive.store import wakeup as wakeup_module
 from executive.store.missions import MissionStore
 from executive.store.standing_missions import LATE
 from executive.store.wakeup import LONGEST_WAIT, WakeupPipe, wake_server
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 ROOT = Path(__file__).parents[3]
 

@@ -9,7 +9,7 @@ import pytest
 
 from executive.testing.skill_test import carry_out, load_skill_tests, scripted_maker
 from skills.api import Cause, Failed, Running, Skill, Succeeded
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 from skills.testing.robot import BASE_ONLY
 from tests.tables import yaml_beside

@@ -5,7 +5,7 @@ import yaml
 
 from executive.tree.compiler import compile_mission
 from executive.words.mission import Mission
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import yaml_beside
 
 TABLE = yaml_beside(__file__, "assembly.yaml")

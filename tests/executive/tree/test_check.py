@@ -19,7 +19,7 @@ from executive.words.steps import Group, Loop, Repeat, Together
 from executive.words.zone import ZoneFacts
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap
-from skills.files.yaml_source import YamlSource
+from skills.inputs.yaml_source import YamlSource
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import LatticePlanner
 from skills.navigate.zones import Zone, ZoneKind

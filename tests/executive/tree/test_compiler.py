@@ -18,8 +18,8 @@ from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.mission import Mission
 from executive.words.step import Place
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
-from skills.files.errors import InputError
-from skills.files.yaml_source import YamlSource
+from skills.inputs.errors import InputError
+from skills.inputs.yaml_source import YamlSource
 from skills.locate_dock.skill import LocateDock
 from skills.robot import Pose2D
 from tests.tables import yaml_beside

@@ -18,7 +18,7 @@ import pytest
 import skills
 from executive.tree.registry import GROUP, built_in_skills, faults_of, installed_skills, missing_skill, skills_of
 from skills.api import Skill
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import yaml_beside
 
 ROOT = Path(__file__).resolve().parents[3]

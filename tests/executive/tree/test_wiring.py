@@ -12,7 +12,7 @@ from executive.tree.plan import PlanBuilder
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from skills.api import Skill, Succeeded
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.executive.conftest import KNOWLEDGE
 
 

@@ -11,7 +11,7 @@ from executive.tree.node_view import NodeView, node_view
 from executive.view.formats import to_btcpp
 from executive.view.text import fold_below
 from skills.api import Cause, Failed
-from skills.files.errors import SourceLine
+from skills.inputs.errors import SourceLine
 
 CONTROLS = {"Sequence", "Fallback", "Control"}
 

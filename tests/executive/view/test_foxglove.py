@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 from executive.record.event_log import EventLog
 from executive.record.history import read_events
 from executive.view.foxglove import LiveServer, serve_live
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 ANY_PORT = "127.0.0.1:0"
 PROTOCOL = "foxglove.sdk.v1"

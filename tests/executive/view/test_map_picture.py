@@ -10,8 +10,8 @@ import pytest
 from executive.record.history import Event
 from executive.view.map_picture import WIDTH_PX, map_picture
 from executive.view.styles import ROBOT_COLOURS, rgb_of
-from skills.files.errors import InputError
-from skills.files.map_drawing import ZONE_COLOURS, draw_zone
+from skills.inputs.errors import InputError
+from skills.map_drawing import ZONE_COLOURS, draw_zone
 from skills.navigate.zones import Zone, ZoneKind, zone_messages
 
 SCALE = WIDTH_PX / 7.0

@@ -9,8 +9,8 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 
-from executive.app.report import ReportedAnswer, RobotReport
-from executive.app.report_file import ReportPage, ReportPart, StepRow
+from executive.app.report.report_page import ReportPage, ReportPart, StepRow
+from executive.app.report.run_report import ReportedAnswer, RobotReport
 from executive.conversation import Conversation, Speech
 from executive.language.questions import ClarifyingQuestion, Slot
 from executive.language.understand import Status, Understanding

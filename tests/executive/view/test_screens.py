@@ -5,8 +5,8 @@ import pytest
 
 from executive.app.evaluate.results import Case, Evidence, Results, RunSpec
 from executive.app.evaluate.summary import to_page
-from executive.app.report import ReportedAnswer, ReportedObject, RobotReport, RunReport
-from executive.app.report_file import ReportPage, ReportPart, StepRow
+from executive.app.report.report_page import ReportPage, ReportPart, StepRow
+from executive.app.report.run_report import ReportedAnswer, ReportedObject, RobotReport, RunReport
 from executive.mission.request import Request
 from executive.record.announce import map_message
 from executive.run.outcome import Said

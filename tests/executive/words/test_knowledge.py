@@ -4,7 +4,7 @@ import pytest
 
 from executive.words.command import Task
 from executive.words.knowledge import load_knowledge
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import table
 
 WORLD = Path(__file__).with_name("test_knowledge_world.yaml").read_text(encoding="utf-8")

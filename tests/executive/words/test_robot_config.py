@@ -3,7 +3,7 @@
 import pytest
 
 from executive.words.robot_config import RobotConfig, display_name, find_robot, parse_robots
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 from tests.tables import table
 

@@ -3,7 +3,7 @@
 import pytest
 
 from executive.words.variation import LIGHTS, Light, Variation, parse_light
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 def test_a_light_is_named_or_a_brightness():

@@ -4,7 +4,7 @@ import pytest
 
 from executive.words.knowledge import load_knowledge
 from skills.api import FilterType, Zone, ZoneKind, ZoneMask
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import table
 
 ROOM = ((2.0, 0.0), (4.0, 0.0), (4.0, 2.0), (2.0, 2.0))

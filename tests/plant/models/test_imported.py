@@ -5,7 +5,7 @@ import re
 import pytest
 
 from plant.models.catalogue import ImportedObject, read_imported, write_imported
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import table
 
 DRILL = ImportedObject(

@@ -7,6 +7,7 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialVelocity
 
+from executive.words.json_values import pack, unpack
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
@@ -16,7 +17,6 @@ from plant.referee import Referee
 from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import SPOT
 from plant.worlds.seeding import Placement, PointRoute, PointStop, Receiving
-from skills.files.json_values import pack, unpack
 from skills.robot import ArmTrajectory, Pose2D
 from tests.plant.boxes import box_world
 

@@ -12,7 +12,7 @@ from plant.robots.spot.description import CAMERAS
 from plant.sensors.camera_spec import load_cameras
 from plant.sensors.noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from plant.sensors.suite import Camera
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import FrameTree, Intrinsics
 from tests.tables import table
 

@@ -11,7 +11,7 @@ import pytest
 
 from plant.worlds.geometry_files import MOST_XML_DEPTH, check_directives, check_model
 from plant.worlds.world import known_worlds, load_world
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import table
 
 FILES = Path(__file__).with_name("geometry_files")

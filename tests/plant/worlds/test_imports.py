@@ -10,7 +10,7 @@ from plant.models.builder.importing import ImportOptions, import_object
 from plant.simulation import Simulation
 from plant.worlds.seeding import place_objects
 from plant.worlds.world import WORLDS_FOLDER, ObjectRule, load_world
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("coacd")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from errand_train.worlds.plan import PLANS
-from executive.app.worlds import knowledge_of
+from executive.app.prepare.worlds import knowledge_of
 from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.seeding import place_people
 from plant.worlds.world import load_world

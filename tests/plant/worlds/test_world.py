@@ -8,7 +8,7 @@ import pytest
 from executive.words.mission import Route
 from plant.worlds.seeding import PointStop, place_objects, place_people
 from plant.worlds.world import WORLDS_FOLDER, known_worlds, load_world
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 from tests.tables import table
 

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from skills.estimate.grid_map import FilterMask, GridMap, load_grid_map
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import table
 
 YAML = """image: room.pgm

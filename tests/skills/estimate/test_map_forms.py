@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skills.estimate.grid_map import load_grid_map
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.skills.estimate.map_forms import FORMS, FREE, OCCUPIED, UNKNOWN, room
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from skills.estimate.grid_map import GridMap
 from skills.estimate.particle_filter import FilterOptions, ParticleFilter
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 from skills.testing.blocks import Block, block_array, cast_rays, grid_of
 

@@ -7,8 +7,8 @@ import pytest
 from planar_robot import TWO_ROOMS, Box, PlanarRobot, capabilities_of
 
 from skills.estimate.grid_map import load_grid_map
-from skills.files.errors import InputError
 from skills.geometry import relative_pose
+from skills.inputs.errors import InputError
 from skills.mapping.map_folder import load_mapper, map_grids, save_graph, save_grids
 from skills.mapping.mapper import Mapper
 from skills.mapping.survey import Survey

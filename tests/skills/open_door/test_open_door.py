@@ -13,8 +13,7 @@ from planar_robot import Bench, Box
 from skills.api import Cause, Failed, Succeeded
 from skills.check_door.skill import CheckDoorInputs
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.open_door.arm_door import ArmDoor
-from skills.open_door.http_door import HttpDoor
+from skills.open_door.openers import ArmDoor, HttpDoor
 from skills.open_door.skill import OpenDoor
 from skills.perception.doorway import Doorway
 from skills.robot import CommandCause, CommandId, CommandState, CommandStatus, Pose2D

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skills.files.object_model import view_of
+from skills.perception.object_model import view_of
 from skills.perception.view_matching import likeness
 
 RED, BLUE, WHITE = (190, 40, 35), (40, 60, 190), (230, 230, 230)

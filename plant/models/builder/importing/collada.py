@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Colour
 from plant.models.catalogue import ObjectImportError
-from skills.files.outside import read_text
+from skills.inputs.outside import read_text
 from skills.robot import FloatArray
 
 MOST_BYTES: Final = 100_000_000

@@ -18,9 +18,9 @@ from plant.models.builder.importing.collada import read_collada
 from plant.models.builder.mesh import Colour
 from plant.models.catalogue import ObjectImportError, objects_module
 from plant.worlds.geometry_files import check_model
-from skills.files.errors import InputError, listing
-from skills.files.outside import is_file, plain_file
-from skills.files.picture_files import MOST_PIXELS, read_pixels
+from skills.inputs.errors import InputError, listing
+from skills.inputs.outside import is_file, plain_file
+from skills.inputs.picture_files import MOST_PIXELS, read_pixels
 from skills.robot import FloatArray, Picture
 
 MAX_BYTES: Final = 200_000_000

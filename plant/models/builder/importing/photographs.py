@@ -15,9 +15,9 @@ from plant.models.builder.importing.import_object import ImportOptions, ImportRe
 from plant.models.builder.importing.mesh_files import MeshContent, Patch
 from plant.models.builder.importing.solid import hull_of
 from plant.models.catalogue import ImportedObject, write_imported
-from skills.files.errors import InputError, count_text
-from skills.files.object_model import read_model, view_of
-from skills.files.picture_files import read_pixels
+from skills.inputs.errors import InputError, count_text
+from skills.inputs.picture_files import read_pixels
+from skills.perception.object_model import read_model, view_of
 
 FEWEST, MOST = 4, 60
 _LONGEST_PX, _SMALLEST_PX = 640, 48

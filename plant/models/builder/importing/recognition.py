@@ -9,7 +9,7 @@ import numpy as np
 
 from plant.models.builder.importing.mesh_files import Patch
 from plant.models.builder.importing.resting_pose import resting_rotations
-from skills.files.object_model import ObjectModel
+from skills.perception.object_model import ObjectModel
 from skills.robot import FloatArray
 
 POINTS: Final = 2500

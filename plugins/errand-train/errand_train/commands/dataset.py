@@ -20,7 +20,7 @@ from errand_train.dataset.errors import DatasetError
 from executive.app.evaluate.workers import Pool, Workers
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json, show_table
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.quantities import Count, Quantity, Seed
 
 if TYPE_CHECKING:

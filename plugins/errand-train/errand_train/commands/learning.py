@@ -25,7 +25,7 @@ from errand_train.detector.schedule import (
 from errand_train.libraries import check_libraries
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.perception.detector.model_files import MODEL_FILE
 from skills.quantities import Count, Quantity, Seed
 

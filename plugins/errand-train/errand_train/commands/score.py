@@ -19,12 +19,12 @@ from errand_train.commands.worst_sheet import Shown, contact_sheet
 from errand_train.detector.scoring import BODY, BODY_CLASSES, by_camera, judge_picture, picture_errors, score
 from errand_train.detector.scoring_labels import LabelledPicture, pictures_of_coco
 from errand_train.libraries import check_libraries
-from executive.app.picture_files import open_detector, read_picture, write_picture
+from executive.app.report.pictures import open_detector, read_picture, write_picture
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json
 from skills.detection import Detection
-from skills.files.errors import InputError
-from skills.files.outside import read_text
+from skills.inputs.errors import InputError
+from skills.inputs.outside import read_text
 from skills.perception.detector.augmentation import AugmentedDetector
 from skills.perception.detector.camera_images import rotate_180, rotate_boxes_180
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector

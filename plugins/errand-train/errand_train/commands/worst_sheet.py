@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from errand_train.detector.scoring import Judged
-from executive.app.picture_files import FOUND_COLOUR, draw_box
+from executive.app.report.pictures import FOUND_COLOUR, draw_box
 from skills.robot import Picture
 
 __all__ = ["Shown", "contact_sheet"]

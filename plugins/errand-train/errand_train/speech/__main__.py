@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from errand_train.libraries import check_libraries
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 _BAD_INPUT = 2
 

@@ -16,7 +16,7 @@ import numpy as np
 from errand_train.speech.grammar import Grammar, load_grammar
 from errand_train.speech.voices import Speaker, draw_speaker, speak, speakers
 from executive.speech.sound import RATE_HZ, Samples
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 __all__ = ["SpokenSentence", "spoken_sentences", "without_long"]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from executive.speech.recogniser import Vocabulary
-from skills.files.yaml_source import read_yaml
+from skills.inputs.yaml_source import read_yaml
 
 __all__ = ["Grammar", "TrainingSentence", "load_grammar"]
 

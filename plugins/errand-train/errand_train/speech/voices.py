@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from executive.speech.sound import Samples, concatenate, read_wav
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 __all__ = ["Speaker", "draw_speaker", "speak", "speakers"]
 

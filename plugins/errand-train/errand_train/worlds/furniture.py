@@ -13,7 +13,7 @@ import numpy as np
 from errand_train.models.expressions import evaluate
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.shapes import Box, Cylinder, Shape
-from skills.files.yaml_source import read_yaml
+from skills.inputs.yaml_source import read_yaml
 
 Names = dict[str, Any]
 """Numbers, and names of materials."""

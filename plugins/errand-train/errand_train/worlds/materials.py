@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 
 from errand_train.models.pictures import cloth, noise, speckle, to_picture, wood
 from plant.models.builder.mesh import Material
-from skills.files.yaml_source import read_yaml
+from skills.inputs.yaml_source import read_yaml
 from skills.robot import FloatArray, Picture
 
 TEXTURE_PX = 384

@@ -9,7 +9,7 @@ from typing import Final, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
-from skills.files.yaml_source import read_yaml
+from skills.inputs.yaml_source import read_yaml
 
 Rectangle = tuple[float, float, float, float]
 """(x0, y0, x1, y1)"""

@@ -6,7 +6,7 @@ import pytest
 from errand_train.speech import data
 from errand_train.speech.data import spoken_sentences
 from errand_train.speech.voices import Speaker
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.executive.speech.made_speech import tone
 
 

@@ -7,7 +7,7 @@ import pytest
 from errand_train.speech import voices
 from errand_train.speech.voices import draw_speaker, speak, speakers
 from executive.speech.sound import RATE_HZ
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 HELD_OUT = ("scotland", "rp", "+f3", "awb", "slt", "ked")
 

@@ -6,7 +6,7 @@ import pytest
 
 from executive.app.evaluate import workers as module
 from executive.app.evaluate.workers import scheduler_at
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.executive.app.evaluate import cheap_run
 
 distributed = pytest.importorskip("distributed")

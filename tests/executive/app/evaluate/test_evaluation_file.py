@@ -5,7 +5,7 @@ import re
 import pytest
 
 from executive.app.evaluate.evaluation_file import is_evaluation, load_evaluation
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import yaml_beside
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from executive.app.evaluate.results import Case, Evaluation, Evidence, ResultsFile, RunSpec
-from executive.app.report import RunReport
+from executive.app.report.run_report import RunReport
 from executive.mission.request import Request
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 RUNS = tuple(RunSpec(Request("go", seed=seed), "go") for seed in range(3))
 EVALUATION = Evaluation("scenario.yaml", RUNS)

@@ -3,7 +3,7 @@
 import pytest
 
 from executive.app.evaluate.evaluation_file import seed_range
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 
 
 @pytest.mark.parametrize(

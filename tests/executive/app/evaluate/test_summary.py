@@ -7,7 +7,7 @@ import pytest
 from executive.app.evaluate import summary
 from executive.app.evaluate.results import Case, Evidence, Results, RunSpec, Standing
 from executive.app.evaluate.summary import Rate, cases_to_inspect, comparisons_of, fisher, groups_of, mcnemar
-from executive.app.report import RunReport
+from executive.app.report.run_report import RunReport
 from executive.mission.request import Request
 from executive.words.goal import RefereeReport
 

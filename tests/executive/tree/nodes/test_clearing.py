@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.app.goal_conditions import conditions_of
+from executive.app.runs.goal_conditions import conditions_of
 from executive.run.outcome import Outcome
 from executive.tree.board import Constant
 from executive.words.goal import GoalKind

@@ -1,6 +1,6 @@
 """Several objects by count: one trip for each."""
 
-from executive.app.goal_conditions import conditions_of
+from executive.app.runs.goal_conditions import conditions_of
 from executive.run.outcome import Outcome
 from executive.tree.board import Constant
 from executive.words.goal import GoalKind

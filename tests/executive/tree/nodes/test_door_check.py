@@ -12,9 +12,9 @@ from executive.words.knowledge import Door, Knowledge
 from skills.back_off.skill import BackOff
 from skills.check_door.skill import CheckDoor
 from skills.clear_costmap.skill import ClearCostmap
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.navigate.skill import Navigate
-from skills.open_door.http_door import HttpDoor
+from skills.open_door.openers import HttpDoor
 from skills.open_door.skill import OpenDoor
 from skills.perception.doorway import DoorState, Doorway
 from skills.robot import Pose2D

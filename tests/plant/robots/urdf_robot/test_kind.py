@@ -9,8 +9,8 @@ from rover_urdf import write_package
 
 from executive.cli.new_command import render_robot
 from plant.robots.urdf_robot.description import Description
-from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml
+from skills.inputs.errors import InputError
+from skills.inputs.yaml_source import read_yaml
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import BaseKind, Mount
 from tests.tables import table

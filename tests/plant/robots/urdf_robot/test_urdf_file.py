@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from plant.robots.urdf_robot.urdf_file import UrdfFile
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from tests.tables import table
 
 JOINT = '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 2"/></joint>'

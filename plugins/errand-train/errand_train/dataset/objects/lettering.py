@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from plant.models.builder.mesh import Colour
-from skills.files.yaml_source import read_yaml
+from skills.inputs.yaml_source import read_yaml
 from skills.robot import FloatArray
 
 _DECORATION: Final[Mapping[str, Any]] = read_yaml(Path(__file__).with_name("decoration.yaml")).data

@@ -30,7 +30,7 @@ from errand_train.models.surfaces import (
     add_tube,
 )
 from plant.models.builder.mesh import IDENTITY, Mesh
-from skills.files.yaml_source import read_yaml
+from skills.inputs.yaml_source import read_yaml
 from skills.robot import FloatArray
 
 _FOLDER: Final = Path(__file__).resolve().parent

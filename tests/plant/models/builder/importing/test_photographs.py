@@ -7,8 +7,8 @@ import pytest
 from plant.models.builder.importing import ImportOptions, ImportReports, import_photographs
 from plant.models.builder.importing.photographs import cut_out
 from plant.models.catalogue import read_imported
-from skills.files.errors import InputError
-from skills.files.object_model import read_model
+from skills.inputs.errors import InputError
+from skills.perception.object_model import read_model
 from tests.tables import table
 
 RED, GROUND = (190, 40, 35), (120, 150, 160)

@@ -1,0 +1,209 @@
+"""Runs the queued missions with several robots in one plant; writes log, recording and report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from executive.app.fleet.dispatch import Dispatch, silence
+from executive.app.fleet.fleet_mission import (
+    NOT_GIVEN,
+    FleetMission,
+    charging_missions,
+    fleet_mission,
+    missions_json,
+    missions_message,
+)
+from executive.app.prepare.placed_robots import placed_robots
+from executive.app.prepare.prepared import Prepared
+from executive.app.prepare.worlds import knowledge_of, open_world
+from executive.app.report.artifacts import Artifacts
+from executive.app.report.report_page import MissionRow, ReportPage, ReportPart, map_of, part_of, save_report
+from executive.app.report.run_report import VERDICTS
+from executive.app.runs.one_run import log_map
+from executive.app.runs.page_view import PageView
+from executive.app.runs.signals import ended_by_signals
+from executive.app.runs.simulated import SimulatedBackend, compile_first
+from executive.record.event_log import EventLog
+from executive.record.history import Event, read_events
+from executive.run.control import Control
+from executive.run.runner import run
+from executive.run.visitor import MissionEnd, RunSettings, RunVisitor
+from executive.run.worker import LockStepWorker
+from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission
+from executive.view.foxglove import LiveServer
+from executive.words.robot_config import RobotConfig
+from plant.worlds.world import World
+from skills.inputs.errors import InputError, Problems
+
+TIME_LIMIT_S: Final = 1200.0
+"""Time limit for each mission of the queue, on the robots' clock."""
+_OPEN: Final = frozenset({MissionState.QUEUED.value, MissionState.RUNNING.value})
+
+
+def run_fleet(
+    dispatch: Dispatch,
+    *,
+    out: Path,
+    seed: int,
+    time_limit_s: float | None = None,
+    page: PageView | None = None,
+    live: LiveServer | None = None,
+    first: Prepared | None = None,
+    ended: Callable[[], None] | None = None,
+) -> None:
+    """Runs until no mission can be assigned any more; writes log, recording and report into the folder `out`.
+
+    `page` shows the run, `live` sends what is logged, and `ended` is called as each mission ends. The log begins with
+    the map of the `first` mission. Raises InputError.
+    """
+    backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
+    watching = () if ended is None else (_EndedMissions(dispatch.store, (*dispatch.missions,), ended),)
+    limit_s = TIME_LIMIT_S * max(1, len(dispatch.missions)) if time_limit_s is None else time_limit_s
+    with closing(EventLog(out / "log.mcap", backend.clock, apart=True)) as log:
+        dispatch.log = log
+        if page is not None:
+            page.serve(log, backend.show_live())
+        if live is not None:
+            live.follow(log)
+        if first is not None:
+            log_map(log, first.world, first.knowledge)
+        control = Control(pace=None) if page is None else page.control
+        with ended_by_signals(dispatch.stop), ended_by_signals(control.cancel), LockStepWorker(backend.clock) as worker:
+            result = run(
+                dispatch,
+                clock=backend.clock,
+                worker=worker,
+                visitors=(artifacts, log, *watching, *([] if page is None else [page]), *backend.visitors(control)),
+                settings=RunSettings(seed=seed, time_limit_s=limit_s),
+                control=control,
+                spare=dispatch.spare(),
+            )
+        dispatch.close()
+    recording = backend.leave(artifacts, out)
+    lasted = f"{backend.clock.now() - begun_s:.1f} s simulated in {result.wall_time_s:.1f} s"
+    facts = (("world and seed", f"{first.world.name}, seed {seed}"),) if first is not None else ()
+    _write_report(dispatch, out, artifacts, read_events(log.path), (*facts, ("duration", lasted)))
+    if page is not None:
+        page.offer(recording)
+
+
+@dataclass
+class _EndedMissions(RunVisitor):
+    """Watch of the missions of these numbers: calls `ended` for each that has ended."""
+
+    store: MissionStore
+    numbers: Sequence[int]
+    ended: Callable[[], None]
+    count: int = 0
+
+    def mission_ended(self, end: MissionEnd) -> None:
+        """Counts them; the dispatch, which comes before, has stored the end of the robot's mission."""
+        states = [self.store.mission(number).state.value for number in self.numbers]
+        for _ in range(self.count, over := sum(state not in _OPEN for state in states)):
+            self.ended()
+        self.count = over
+
+
+def simulated_fleet(
+    store: MissionStore,
+    queued: Sequence[StoredMission],
+    configs: Sequence[RobotConfig],
+    *,
+    world: str | None = None,
+    seed: int = 1,
+    faults: Mapping[str, Sequence[str]] | None = None,
+    tell: Callable[[str], None] = silence,
+    record: bool = False,
+) -> Dispatch:
+    """Builds a fleet in the plant of a world.
+
+    A mission that cannot be prepared for these robots in this world stays in the queue, with the reason as its message.
+
+    Args:
+        store: the missions and their state.
+        queued: the missions to run.
+        configs: the robots.
+        world: name or folder; None: the world of the first mission whose world exists.
+        seed: seed of objects and noise.
+        faults: faults in words, by the robots' names.
+        tell: shows a line.
+        record: whether to write a recording and pictures.
+
+    Raises:
+        InputError: the robots do not fit into the world, or no mission can be run.
+    """
+    where = _world_of(queued) if world is None else open_world(world)
+    knowledge = knowledge_of(where)
+    robots = placed_robots(where, knowledge, configs)
+    given = GivenMissions(store).all()
+    missions, left_out = dict[int, FleetMission](), Problems()
+    for each in queued:
+        try:
+            missions[each.id] = fleet_mission(
+                replace(each, request=replace(each.request, seed=seed)),
+                world=where,
+                knowledge=knowledge,
+                robots=robots,
+                given=given.get(each.id, NOT_GIVEN),
+            )
+        except InputError as error:
+            left_out.add(error)
+            store.finish(each.id, MissionState.QUEUED, str(error))
+            tell(f"It is left out of this run: {error}")
+    if not missions:
+        left_out.raise_any()
+    compile_first()
+    return Dispatch(
+        store,
+        missions,
+        robots,
+        SimulatedBackend(where, robots, seed=seed, record=record),
+        faults or {},
+        charging_missions(where, knowledge, robots),
+        knowledge.battery,
+        tell,
+    )
+
+
+def _world_of(queued: Sequence[StoredMission]) -> World:
+    """Opens the world of the first mission whose world exists. Raises InputError if none does."""
+    problems = Problems()
+    for each in queued:
+        with problems:
+            return open_world(each.request.world or each.request.world_name)
+    problems.raise_any()
+    raise AssertionError("nothing is queued")
+
+
+def _write_report(
+    dispatch: Dispatch, out: Path, artifacts: Artifacts, events: Sequence[Event], facts: Sequence[tuple[str, str]]
+) -> None:
+    """Writes the report of a fleet's run into the folder `out`."""
+    kinds = {name: robot.kind for name, robot in dispatch.robots.items()}
+    values = missions_json(dispatch.store, list(dispatch.missions))
+    rows: list[MissionRow] = []
+    for row, full in zip(missions_message(dispatch.store, values)["missions"], values, strict=True):
+        seen = None if full["referee"] is None else full["referee"]["success"]
+        word = row["outcome"] if full["referee"] is None else f"{row['outcome']}, {VERDICTS[seen]}"
+        good = None if row["outcome"] in _OPEN else row["outcome"] == MissionState.SUCCESS.value and seen is not False
+        number, robot = row["id"], row["robot"] or ""
+        rows.append(MissionRow(number, row["sentence"], robot, good, word, row["reassigned"], row["message"]))
+    parts: list[ReportPart] = []
+    for each in dispatch.over:
+        tree, kind = each.ended.tree, each.ended.report.kind
+        own = [event for event in events if each.since_s <= event.stamp_s <= each.until_s]
+        title = f"Mission {each.number}, {tree.robot_name} ({kind}): {tree.mission_name}"
+        parts.append(part_of(each.ended, tuple(kinds), artifacts, own, title=title))
+    page = ReportPage(
+        title="Fleet",
+        request=f"{sum(row.good is True for row in rows)} of {len(rows)} missions done",
+        facts=(("robots", ", ".join(f"{name} ({kind})" for name, kind in kinds.items())), *facts),
+        missions=rows,
+        map=map_of(artifacts, events, several=len(kinds) > 1),
+        parts=parts,
+    )
+    save_report(out, page)

@@ -1,0 +1,124 @@
+"""Checks missions without running them: errors, warnings, and estimates of time, path and charge."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from graphlib import TopologicalSorter
+from html import escape
+from pathlib import Path
+from typing import Final
+
+from executive.app.prepare.feasibility import check_prepared, refuse_impossible, route_planner_of
+from executive.app.prepare.from_request import prepare
+from executive.app.prepare.prepared import Prepared
+from executive.app.prepare.worlds import refuse_unusable
+from executive.language.questions import Answerer
+from executive.mission.request import Request
+from executive.tree.compiler import CompiledTree
+from executive.tree.estimate import Estimate, RoutePlanner
+from executive.tree.node_view import node_view
+from executive.view.formats import to_svg
+from executive.view.text import DRAWN_NODES, readable
+from skills.inputs.errors import InputError
+
+MOST_LETTERS: Final = 300
+
+
+@dataclass(frozen=True)
+class Checked:
+    """Result of checking a mission: errors and warnings, the tree of each robot, and one estimate for all robots.
+
+    `file` is the mission's file, if it has one.
+    """
+
+    file: Path | None
+    errors: tuple[InputError, ...] = ()
+    trees: tuple[CompiledTree, ...] = ()
+    estimate: Estimate = field(default_factory=Estimate)
+    warnings: tuple[InputError, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """True if the mission has no errors."""
+        return not self.errors
+
+    def _repr_html_(self) -> str:
+        """Returns the errors, warnings and commands, or the estimate, and the tree of each robot."""
+        taken = self.estimate
+        lines = [f"error: {error}" for error in self.errors] + [f"warning: {warning}" for warning in self.warnings]
+        lines += [str(command) for tree in self.trees for command in tree.commands]
+        lines += [f"about {taken.duration_s:.0f} s, {taken.distance_m:.0f} m of driving"] if self.ok else []
+        pictures = (to_svg(readable(node_view(tree.root), DRAWN_NODES)) for tree in self.trees)
+        return "".join(f"<p>{escape(line)}</p>" for line in lines) + "".join(pictures)
+
+
+def prepare_checked(request: Request, *, ask: Answerer | None = None, anyway: bool = False) -> Prepared:
+    """Prepares a request; unless `anyway`, raises InputError with all that `errand check` finds."""
+    prepared = prepare(request, ask=ask)
+    if not anyway:
+        refuse_impossible(prepared)
+    return prepared
+
+
+class Checker:
+    """Checker of missions, which plans each route once for each world and kind of robot."""
+
+    def __init__(self, like: Request | None = None) -> None:
+        """Takes the options that all files share: world, stack, start, robots and values of parameters."""
+        self._like = like or Request()
+        self._routes: dict[tuple[Path, str, Path | None], RoutePlanner] = {}
+
+    def check_file(self, file: Path) -> Checked:
+        """Checks one file. Never raises for its content."""
+        return self.check(replace(self._like, file=file))
+
+    def check(self, request: Request) -> Checked:
+        """Checks a request. Never raises for its content."""
+        trees, file = tuple[CompiledTree, ...](), request.file
+        try:
+            prepared = prepare(request)
+            trees = tuple(each.tree for each in prepared.all)
+            refuse_unusable(prepared.world)
+            checked = {each.mission.robot_name: check_prepared(each, self._planner(each)) for each in prepared.all}
+        except InputError as error:
+            return Checked(file, _placed(file, (error, *error.others)), trees)
+        except Exception as defect:  # the other files must be checked as well
+            what = f"errand cannot check it ({type(defect).__name__}: {defect})"[:MOST_LETTERS]
+            return Checked(file, _placed(file, (InputError(what, hint="report it with this file"),)), trees)
+        errors = tuple(error for each in checked.values() for error in each.errors)
+        warnings = tuple(warning for each in checked.values() for warning in each.warnings)
+        estimates = {name: each.estimate for name, each in checked.items()}
+        return Checked(file, _placed(file, errors), trees, _total(prepared, estimates), warnings)
+
+    def _planner(self, prepared: Prepared) -> RoutePlanner:
+        world, robot = prepared.world, prepared.robot
+        key = (world.folder, robot.kind, robot.stack_file)
+        if key not in self._routes:
+            self._routes[key] = route_planner_of(world, robot)
+        return self._routes[key]
+
+
+def _total(prepared: Prepared, estimates: Mapping[str, Estimate]) -> Estimate:
+    """Combines the estimates of robots: the end of the last one, the sum of distances, the largest charge."""
+    after = {each.mission.robot_name: each.after for each in prepared.all}
+    done_s: dict[str, float] = {}
+    latest_s: dict[str, float] = {}
+    for name in TopologicalSorter(after).static_order():
+        done_s[name] = estimates[name].duration_s + max((done_s[first] for first in after[name]), default=0.0)
+        latest_s[name] = estimates[name].most_s + max((latest_s[first] for first in after[name]), default=0.0)
+    whole = Estimate(
+        max(done_s.values()),
+        sum(each.distance_m for each in estimates.values()),
+        max(each.charge for each in estimates.values()),
+    )
+    return whole.up_to(max(latest_s.values()), *(reason for each in estimates.values() for reason in each.reasons))
+
+
+def _placed(file: Path | None, errors: Sequence[InputError]) -> tuple[InputError, ...]:
+    """Sorts errors by file and line; an error without a file gets the first line of `file`."""
+    if file is None:
+        return tuple(errors)
+    placed = [
+        error if error.file is not None else InputError(error.message, hint=error.hint, file=file, line=1)
+        for error in errors
+    ]
+    return tuple(sorted(placed, key=lambda error: (str(error.file) != str(file), str(error.file), error.line or 0)))

@@ -1,0 +1,225 @@
+"""Checks whether a mission can be done: routes on the map, and the abilities of the robot."""
+
+import hashlib
+import json
+import math
+import os
+from contextlib import suppress
+from dataclasses import replace
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any, Final
+
+from executive.app.prepare.placed_robots import DEFAULT_KIND, robot_stack, shared_detector
+from executive.app.prepare.prepared import Prepared
+from executive.app.prepare.worlds import refuse_unusable
+from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
+from executive.tree.estimate import Route, RoutePlanner, load_estimates
+from plant.models.catalogue import load_catalogue
+from plant.robots.robot_kind import PlacedRobot, robot_kind
+from plant.worlds.world import World
+from skills.api import Zone
+from skills.inputs.errors import Problems
+from skills.manipulation.arm.kinematics import arm_model
+from skills.perception.class_forms import class_forms, known_attributes, shipped_forms
+from skills.robot import Capabilities, Pose2D
+from skills.stack import DEFAULT_FILE, default_component
+
+
+class _RoutesOnMap(RoutePlanner):
+    """Planner of routes on the robot's map of a world, for the robot's footprint.
+
+    It reads the map at the first route. The costmap and the planner of the robot's stack plan; of the default stack
+    only these two are loaded, and the controller where there are zones.
+    """
+
+    def __init__(self, world: World, robot: PlacedRobot) -> None:
+        self._world, self._robot = world, robot
+        self._stack = None if robot.stack_file is None else robot_stack(robot)
+
+    @cached_property
+    def _routes(self) -> PlannedRoutes:
+        from skills.estimate.grid_map import load_grid_map
+        from skills.navigate.footprint import Footprint
+
+        keepout_map = load_grid_map(self._world.keepout_map_path)
+        costmap, planner = self._component("costmap"), self._component("planner")
+        footprint = Footprint.of(self._robot.capabilities)
+        return PlannedRoutes(costmap.build(keepout_map), footprint, planner, self._full_m_s)
+
+    def _component(self, slot: str) -> Any:
+        return default_component(slot) if self._stack is None else getattr(self._stack, slot)
+
+    def _full_m_s(self) -> float:
+        """Full speed of the robot with its controller."""
+        most_m_s = self._robot.capabilities.max_speed_m_s
+        return min(most_m_s, getattr(self._component("controller"), "max_speed_m_s", most_m_s))
+
+    def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
+        """Plans a route. Raises ValueError with one sentence if there is none, InputError if the map is broken."""
+        return self._routes.route(start, goal, zones)
+
+
+def route_planner_of(world: World, robot: PlacedRobot, *, cached: bool = True) -> RoutePlanner:
+    """Returns a planner of a robot's routes on its map of a world.
+
+    With `cached` the routes are stored for later processes. Without a map the first route raises InputError.
+
+    Raises:
+        InputError: its stack file cannot be used; with file and line.
+    """
+    facts = robot_kind(robot.kind).facts
+    files = (facts,) if robot.stack_file is None else (facts, robot.stack_file)
+    planned = _RoutesOnMap(world, robot)
+    return route_cache_of(world, planned, *files) if cached else planned
+
+
+def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> Checked:
+    """Checks a prepared request: errors, warnings, and an estimate. `planner` may hold routes that are planned already.
+
+    Raises:
+        InputError: the world's map or the request's stack file cannot be used.
+    """
+    world, robot = prepared.world, prepared.robot
+    abilities = abilities_in(world, robot.kind)
+    tagged = frozenset(tag.on for tag in prepared.tree.tags if tag.on is not None)
+    stack = None if robot.stack_file is None else robot_stack(robot)
+    if stack is not None and stack.detector != default_component("detector"):
+        seen = frozenset(class_forms()) & {*shared_detector(stack).class_names} | {*world.own_objects}
+        abilities = replace(abilities, classes=seen)
+    return check_tree(
+        prepared.tree,
+        knowledge=prepared.knowledge,
+        start=world.start,
+        abilities=replace(abilities, classes=abilities.classes | tagged),
+        planner=planner or route_planner_of(world, robot),
+        estimates=load_estimates(),
+    )
+
+
+def refuse_impossible(prepared: Prepared) -> None:
+    """Raises InputError with all that `errand check` finds."""
+    refuse_unusable(prepared.world)
+    problems = Problems()
+    for error in (error for each in prepared.all for error in check_prepared(each).errors):
+        problems.add(error)
+    problems.raise_any()
+
+
+def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
+    """Returns the abilities of a kind of robot in a world: imported models, people who take objects, full surfaces."""
+    abilities = abilities_of(kind)
+    masses, others = dict(abilities.masses_kg), {rule.model for rule in world.seed_rules.objects}
+    for name in sorted(world.own_objects.keys() | (others & world.imports.keys())):
+        own = world.imports[name].object
+        only = own.class_name not in others or own.class_name not in masses
+        masses[own.class_name] = own.mass_kg if only else min(own.mass_kg, masses[own.class_name])
+        others.add(own.class_name)
+    widths = {name: min(each.object.size_m) for name, each in world.own_objects.items()}
+    rules = world.seed_rules
+    takers = frozenset(person.name for person in rules.people if person.receives)
+    taken_m2: dict[str, float] = {}
+    for rule in rules.objects:
+        if len(rule.surfaces) == 1:
+            width_m = abilities.widths_m.get(rule.model, 0.0)
+            taken_m2[rule.surfaces[0]] = taken_m2.get(rule.surfaces[0], 0.0) + (width_m + rules.rules.clear_m) ** 2
+    return replace(
+        abilities,
+        masses_kg=masses,
+        classes=abilities.classes | widths.keys(),
+        widths_m={**abilities.widths_m, **widths},
+        takers=takers,
+        taken_m2=taken_m2,
+        apart_m=rules.rules.clear_m,
+    )
+
+
+@cache
+def abilities_of(kind: str) -> Abilities:
+    """Returns payload, reach and gripper of a kind of robot, and the least mass and width of each object class."""
+    known = {name: form.mass_kg for name, form in class_forms().items() if name in load_catalogue()}
+    masses = {name: 0.0 if mass_kg is None else mass_kg[0] for name, mass_kg in known.items()}
+    capabilities = robot_kind(kind).capabilities()
+    return Abilities(
+        masses,
+        0.0 if capabilities.arm is None else capabilities.arm.max_payload_kg,
+        frozenset(shipped_forms()),
+        known_attributes(),
+        reached_heights_m(capabilities),
+        {name: form.width_m[0] for name, form in class_forms().items()},
+        math.inf if capabilities.gripper is None else capabilities.gripper.max_grasp_m,
+        capabilities.gripper is not None and capabilities.arm is not None,
+    )
+
+
+def reached_heights_m(capabilities: Capabilities) -> tuple[float, float]:
+    """Lowest and highest surface that the arm reaches, in metres above the floor.
+
+    Counts the arm's length, the range of body heights, and the nearest standing distance. Unlimited without an arm
+    that can be planned for.
+    """
+    try:
+        model, arm = arm_model(capabilities), capabilities.arm
+    except ValueError:
+        return -math.inf, math.inf
+    assert arm is not None
+    x_m, _, z_m = model.p_BS
+    ahead_m = max(0.0, min(*arm.standing_m, *arm.nearer_m) - float(x_m))
+    upright_m = math.sqrt(max(0.0, arm.max_reach_m**2 - ahead_m**2))
+    low_m, high_m = capabilities.height_range_m
+    return low_m + float(z_m) - upright_m, high_m + float(z_m) + upright_m
+
+
+_SKILLS: Final = DEFAULT_FILE.parent
+
+
+class RouteCache(RoutePlanner):
+    """Cache of routes in a file; missing routes are planned and added for later processes."""
+
+    def __init__(self, file: Path, planned: RoutePlanner) -> None:
+        self._file, self._planned = file, planned
+
+    @cached_property
+    def _routes(self) -> dict[str, list[float] | str]:
+        """Length and progress of each route by start and goal, or the reason why there is none."""
+        with suppress(OSError, ValueError):
+            routes: dict[str, list[float] | str] = json.loads(self._file.read_text(encoding="utf-8"))
+            return routes
+        return {}
+
+    def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
+        """Returns a route, planned if the file lacks it; a mask's file may change, so that its routes are planned.
+
+        Raises ValueError with one sentence if there is none.
+        """
+        if any(zone.mask is not None for zone in zones):
+            return self._planned.route(start, goal, zones)
+        name = f"{start} {goal}{f' {zones}' if zones else ''}"
+        if name not in self._routes:
+            try:
+                route = self._planned.route(start, goal, zones)
+                parts = [number for part in route.limited for number in part]
+                self._routes[name] = [route.length_m, route.progress_m, *parts]
+            except ValueError as error:
+                self._routes[name] = str(error)
+            with suppress(OSError):
+                self._file.parent.mkdir(parents=True, exist_ok=True)
+                partial = self._file.with_suffix(f".{os.getpid()}")
+                partial.write_text(json.dumps(self._routes), encoding="utf-8")
+                partial.replace(self._file)  # another process sees the old file or the new one
+        known = self._routes[name]
+        if isinstance(known, str):
+            raise ValueError(known)
+        length_m, progress_m, *parts = known
+        return Route(length_m, progress_m, tuple(zip(parts[::2], parts[1::2], strict=True)))
+
+
+def route_cache_of(world: World, planned: RoutePlanner, *robot_files: Path) -> RouteCache:
+    """Returns the route cache of a world; its file name changes with the maps, the planner and the robot's files."""
+    planner = (DEFAULT_FILE, *_SKILLS.glob("navigate/*.py"), *_SKILLS.glob("estimate/*.py"), *_SKILLS.glob("*.py"))
+    files, content = (*world.keepout_map_path.parent.glob("*"), *planner, *robot_files), hashlib.sha256()
+    for file in sorted(path for path in files if path.is_file()):
+        content.update(file.name.encode() + hashlib.sha256(file.read_bytes()).digest())
+    digest = content.hexdigest()[:24]
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return RouteCache(home / "errand" / "routes" / f"{digest}.json", planned)

@@ -1,0 +1,197 @@
+"""The robots of a run with their starts and docks, which the user gives or which are found on the map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from executive.mission.load import load_stack
+from executive.mission.request import Start
+from executive.words.knowledge import DOCK, Knowledge, Pose, RobotFacts
+from executive.words.robot_config import RobotConfig
+from plant.robots.robot_kind import PlacedRobot, robot_kind
+from plant.worlds.world import World
+from skills.inputs.errors import InputError
+from skills.navigate.footprint import Footprint
+from skills.robot import FloatArray, Pose2D
+from skills.stack import DetectorComponent, RobotStack, default_stack
+
+if TYPE_CHECKING:
+    from skills.detection import Detector
+    from skills.estimate.grid_map import GridMap
+
+
+DEFAULT_KIND: Final = "spot"
+TURNING_M: Final = 0.7
+FROM_PEOPLE_M: Final = 1.2
+BETWEEN_M: Final = 0.35
+"""Clearance between two robots whose starts are chosen."""
+_START_STREAM: Final = 7
+
+
+def robot_stack(robot: PlacedRobot) -> RobotStack:
+    """Loads the components of a robot's stack. Raises InputError with file and line if the file cannot be used."""
+    return load_stack(robot.stack_file)
+
+
+def placed_robots(world: World, knowledge: Knowledge, configs: Sequence[RobotConfig]) -> Mapping[str, PlacedRobot]:
+    """Places the robots of a run in the world; returns them by name, in the order of `configs`.
+
+    By default the first robot stands at the world's start and charges at the world's dock. Each other robot stands at
+    the nearest free pose, and charges there.
+
+    Raises:
+        InputError: two robots overlap, a robot stands in an obstacle, a dock is no place, or there is no free pose.
+    """
+    placed: dict[str, PlacedRobot] = {}
+    given = {each.name: each.start or (world.start if each is configs[0] else None) for each in configs}
+    for each in sorted(configs, key=lambda one: given[one.name] is None):
+        try:
+            start = given[each.name] or _free_start(world, each.kind, placed.values())
+            if each.start is not None:
+                _refuse_overlap(each, each.start, placed.values(), world)
+            dock = _dock(each, knowledge) or (world.dock if each is configs[0] else start)
+        except InputError as error:
+            raise InputError.at(each.source, error.message, hint=error.hint) from error
+        placed[each.name] = PlacedRobot(each.name, each.kind, start, dock, each.stack)
+    return {each.name: placed[each.name] for each in configs}
+
+
+def only_robot(
+    name: str,
+    world: World,
+    *,
+    start: Start | None = None,
+    stack: Path | None = None,
+    seed: int = 0,
+    kind: str = DEFAULT_KIND,
+) -> PlacedRobot:
+    """Places the only robot of a run, by default at the world's start; it charges there. Raises InputError."""
+    pose = world.start if start is None else stand_at(world, start, seed)
+    return PlacedRobot(name, kind, pose, world.dock, stack, start != "unknown")
+
+
+def _dock(robot: RobotConfig, knowledge: Knowledge) -> Pose2D | None:
+    """Returns the pose of the dock that the user names. Raises InputError if it is no place."""
+    if robot.dock is None:
+        return None
+    place = knowledge.place(robot.dock)
+    if place is None:
+        known = ", ".join(sorted(knowledge.places))
+        raise InputError(f"the dock of {robot.name}, '{robot.dock}', is no place", hint=f"known: {known}")
+    pose = knowledge.place_pose(place)
+    return Pose2D(pose.x, pose.y, pose.yaw)
+
+
+def _free_start(world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2D:
+    """Returns the free pose nearest to the world's start, clear of placed robots and of people's places.
+
+    Raises InputError if there is none.
+    """
+    from plant.worlds.seeding import standing_points_W
+
+    reach_m, free = _reach_m(kind), _free_ground(world)
+    places = free.centres(np.argwhere(free.distance > max(TURNING_M, reach_m)))
+    for other in placed:
+        away_m = np.hypot(*(places - [other.start.x_m, other.start.y_m]).T)
+        places = places[away_m > reach_m + _reach_m(other.kind) + BETWEEN_M]
+    for person_W in standing_points_W(world):
+        places = places[np.hypot(*(places - person_W).T) > FROM_PEOPLE_M]
+    if not len(places):
+        what = f"there is no free place in {world.name} for one more robot"
+        raise InputError(what, hint="leave one out, or give starts")
+    x, y = places[np.argmin(np.hypot(*(places - [world.start.x_m, world.start.y_m]).T))]
+    return Pose2D(float(x), float(y), world.start.yaw_rad)
+
+
+def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRobot], world: World) -> None:
+    """Raises InputError if a robot would stand in another robot or in an obstacle."""
+    own = _discs(robot.kind, start)
+    for other in placed:
+        theirs = _discs(other.kind, other.start)
+        apart = np.hypot(*(own[:, None, :2] - theirs[None, :, :2]).transpose(2, 0, 1))
+        if np.any(apart < own[:, None, 2] + theirs[None, :, 2]):
+            raise InputError(f"the starts of {robot.name} and {other.name} overlap", hint="put them further apart")
+    refuse_blocked(world, start, robot.name, robot.kind)
+
+
+def refuse_blocked(world: World, pose: Pose2D, name: str = "the robot", kind: str = DEFAULT_KIND) -> None:
+    """Raises InputError unless a robot's body is in free space at a pose, by the world's surveyed map."""
+    discs = _discs(kind, pose)
+    if float(np.min(_free_ground(world).distance_m(discs[:, :2]) - discs[:, 2])) < 0.0:
+        there = f"({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g})"
+        hint = "give a free pose; `errand world show` draws the world"
+        raise InputError(f"at the start {there} {name} stands in an obstacle or outside of {world.name}", hint=hint)
+
+
+def _free_ground(world: World) -> GridMap:
+    """Loads the world's surveyed map, with unknown cells blocked."""
+    from skills.estimate.grid_map import load_grid_map
+
+    return load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
+
+
+def _discs(kind: str, pose: Pose2D) -> FloatArray:
+    """Returns discs (N, 3) of x, y and radius (m, world frame) that cover a kind of robot at a pose."""
+    discs = Footprint.of(robot_kind(kind).capabilities()).discs
+    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    middles = discs[:, :2] @ np.array([[c, s], [-s, c]]) + [pose.x_m, pose.y_m]
+    return np.column_stack([middles, discs[:, 2]])
+
+
+def _reach_m(kind: str) -> float:
+    """Largest distance from the middle of a kind of robot to its outline, in metres."""
+    return float(np.linalg.norm(np.array(robot_kind(kind).capabilities().footprint_m), axis=1).max())
+
+
+def knowledge_for(robot: PlacedRobot, names: Iterable[str], knowledge: Knowledge) -> Knowledge:
+    """Returns the knowledge of one robot among several: its own name, start and dock, and the others' names."""
+    others = tuple(other for other in names if other != robot.name)
+    facts = RobotFacts(name=robot.name, others=others, require_wake=knowledge.robot.require_wake)
+    dock = None if robot.dock is None else _pose(robot.dock)
+    tags = tuple(tag for tag in knowledge.tags if tag.on != DOCK or dock == knowledge.dock)
+    return knowledge.model_copy(update={"robot": facts, "start": _pose(robot.start), "dock": dock, "tags": tags})
+
+
+def _pose(pose: Pose2D) -> Pose:
+    return Pose(x=pose.x_m, y=pose.y_m, yaw=pose.yaw_rad)
+
+
+def stand_at(world: World, start: Start, seed: int) -> Pose2D:
+    """Returns a given start, or a free pose chosen by the seed, away from people and with space to turn.
+
+    Raises InputError if there is none.
+    """
+    if isinstance(start, Pose2D):
+        return start
+    from plant.worlds.seeding import place_people
+
+    keepout = _free_ground(world)
+    places = keepout.centres(np.argwhere(keepout.distance > TURNING_M))
+    for person in place_people(world, seed):
+        places = places[np.hypot(*(places - person.X_WO.translation()[:2]).T) > FROM_PEOPLE_M]
+    if not len(places):
+        raise InputError(f"there is nowhere in {world.name} where the robot can turn", hint="give --start X Y YAW")
+    rng = np.random.default_rng([seed, _START_STREAM])
+    x, y = places[rng.integers(len(places))]
+    return Pose2D(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
+
+
+def shared_detector(stack: RobotStack | None = None) -> Detector:
+    """Returns the detector of a stack, or the default one; loads it once in a process. Raises InputError."""
+    return _built((stack or default_stack()).detector)
+
+
+@cache
+def _built(component: DetectorComponent) -> Detector:
+    from skills.perception.detector.model_files import ModelFileError  # loads the network runtime
+
+    try:
+        return component.build()
+    except ModelFileError as error:
+        raise InputError(error.message, hint=error.hint, file=error.file) from error

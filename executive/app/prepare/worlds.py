@@ -1,0 +1,52 @@
+"""Opens worlds and their knowledge by name; loads nothing of the simulation."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+from executive.words.knowledge import Knowledge, load_knowledge
+from plant.worlds.world import WORLDS_FOLDER, World, WorldError, known_worlds, load_world
+from skills.inputs.errors import InputError, known_names, suggestion
+
+
+def open_world(name: str) -> World:
+    """Opens a world by its name or folder. Raises InputError."""
+    try:
+        return load_world(name)
+    except (WorldError, OSError) as error:
+        if isinstance(error, WorldError) and not str(error).startswith("unknown world"):
+            raise InputError(str(error)) from error
+        known = f"{known_names(name, known_worlds())}, and folders with a world.dmd.yaml"
+        raise InputError(f"unknown world '{name[:60]}'", hint=suggestion(name, known_worlds(), known)) from error
+
+
+def refuse_unusable(world: World) -> None:
+    """Raises InputError unless the simulation can load a user's world and the imported models."""
+    is_ours = world.folder.is_relative_to(WORLDS_FOLDER)
+    if is_ours and not world.imports:
+        return
+    models = tuple(each.folder / f"{name}.sdf" for name, each in world.imports.items())
+    _try(None if is_ours else world.directives_path, models)
+
+
+@cache
+def _try(directives: Path | None, models: tuple[Path, ...]) -> None:
+    """Loads the files in the simulation; once in a process if they are good."""
+    from plant.diagram import try_geometry
+
+    try_geometry(directives, models)
+
+
+def with_map(world: World, folder: Path) -> World:
+    """Gives the world the map in a folder of `errand map build`. Raises InputError if the folder has no map."""
+    chosen = replace(world, maps=folder.resolve())
+    for path in (chosen.scan_map_path, chosen.keepout_map_path):
+        if not path.is_file():
+            hint = "make one by `errand map build`, or let it finish"
+            raise InputError(f"there is no map: {path.name} is missing", hint=hint, file=folder)
+    return chosen
+
+
+def knowledge_of(world: World) -> Knowledge:
+    """Loads the knowledge of a world and of its imported objects. Raises InputError."""
+    return load_knowledge(world.knowledge_path, tuple(world.own_objects))

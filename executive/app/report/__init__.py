@@ -1,0 +1,1 @@
+"""Results of a run: its report as data and as a page, with pictures."""

@@ -1,0 +1,106 @@
+"""Interface of a backend: a simulated or real robot behind a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from executive.app.report.artifacts import Artifacts
+from executive.record.work import Profile
+from executive.run.control import Control
+from executive.run.outcome import RobotResult
+from executive.run.visitor import RunEntry, RunVisitor
+from executive.store.journal import StoreJournal
+from executive.tree.compiler import CompiledTree
+from executive.words.goal import RefereeReport
+from skills.robot import Clock, Pose2D
+
+if TYPE_CHECKING:
+    from executive.app.runs.goal_conditions import Share
+
+
+@dataclass(frozen=True)
+class Durable:
+    """Stored state of a run, so that a later run can resume it.
+
+    `plant` is the file in which the plant stores its state for the mission `label`. With `take_up` the run begins from
+    the state stored for `take_up_label` (None: for any mission). `journals` are the robots' journals by name, `poses`
+    their last estimated poses.
+    """
+
+    plant: Path
+    journals: Mapping[str, StoreJournal]
+    label: str
+    take_up: bool = False
+    take_up_label: str | None = None
+    poses: Mapping[str, Pose2D] = field(default_factory=dict)
+    log: str = "log.mcap"
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """Messages on state that could not be stored."""
+        return tuple(dict.fromkeys(trouble for each in self.journals.values() for trouble in each.troubles))
+
+
+class Scene(Protocol):
+    """Live 3D picture of the world, for the page."""
+
+    @property
+    def url(self) -> str:
+        """Address of the picture."""
+
+    def publish(self) -> None:
+        """Refreshes it now. Browsers draw a texture only with the first refresh after it has arrived."""
+
+    def refresh_seldom(self) -> None:
+        """Refreshes it less often."""
+
+    def follow(self, wanted: bool) -> None:
+        """Lets the camera follow the robot, or shows the whole world."""
+
+
+class Backend(Protocol):
+    """Robots and their clock, perhaps with a referee, a recording and a live picture."""
+
+    @property
+    def clock(self) -> Clock:
+        """The robots' clock."""
+
+    def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
+        """Returns the robot of a tree with its estimators; with `durable` its state is stored, or resumed.
+
+        Raises:
+            InputError: there is no such robot, or a file that it needs cannot be read.
+        """
+
+    def happened(self) -> Sequence[tuple[float, str]]:
+        """Returns the scenario's events so far, as times (s) and sentences; empty for a real robot."""
+
+    def visitors(self, control: Control) -> Sequence[RunVisitor]:
+        """Returns the backend's own visitors of a run with this control; empty for a real robot."""
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Sentences for the report on how the robots sense; empty in a simulation."""
+
+    def work(self) -> Mapping[str, int]:
+        """Returns the backend's work counters by name; empty for a real robot."""
+
+    def attach(self, profile: Profile) -> None:
+        """Times the backend's subsystems."""
+
+    def show_live(self) -> Scene | None:
+        """Starts the live picture; None if there is none."""
+
+    def judge(
+        self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
+    ) -> RefereeReport | None:
+        """Returns the referee's report on a mission since `since_s`, with the shares that others did `before`.
+
+        None if there is no referee.
+        """
+
+    def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
+        """Writes recording and pictures into the folder `out`; returns the recording's path, None if there is none."""

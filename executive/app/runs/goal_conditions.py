@@ -1,0 +1,207 @@
+"""Judges an ended mission: its goal conditions at the times of the run, and its speech."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from executive.run.mission_history import is_speech
+from executive.run.outcome import Execution, Outcome, RobotResult
+from executive.tree.board import FromBoard
+from executive.tree.compiler import CompiledTree, StepPart
+from executive.words.expression import Expression, Template
+from executive.words.goal import GoalCondition, GoalKind, RefereeReport, When
+from skills.inputs.errors import listing
+
+SHOWN_CHARS = 60
+_MOVING = frozenset({GoalKind.GRASPED, GoalKind.PLACED, GoalKind.HANDED_OVER, GoalKind.CLEARED})
+
+
+@dataclass(frozen=True)
+class Share:
+    """Share of a mission that another robot did, before or beside this one.
+
+    The first `done` parts of its tree are judged with the mission; objects that it moved count as moved by the mission.
+    """
+
+    tree: CompiledTree
+    result: RobotResult
+    done: int
+
+
+@dataclass(frozen=True)
+class _Move:
+    """Interval in which a mission moved objects of some classes on purpose (empty: of any class)."""
+
+    classes: frozenset[str]
+    from_s: float
+    until_s: float
+
+    def concerns(self, goal: GoalCondition) -> bool:
+        """Returns whether it may have moved the object of a goal condition."""
+        return not self.classes or not goal.classes or not self.classes.isdisjoint(goal.classes)
+
+
+def verdict_of(
+    tree: CompiledTree,
+    result: RobotResult,
+    judge: Callable[[Sequence[GoalCondition]], RefereeReport],
+    *,
+    before: Sequence[Share] = (),
+    since_s: float = 0.0,
+) -> RefereeReport:
+    """Returns the verdict on an ended tree; `judge` is the referee, which judges goal conditions.
+
+    A run without success has not fulfilled its mission, whatever holds. A run with success is judged by its goal
+    conditions, answers and speech; the verdict names the steps that leave nothing to judge. The shares of other robots
+    `before` belong to the mission; events before `since_s` (simulated time) do not.
+    """
+    conditions = conditions_of(tree, result, before=before)
+    verdict = judge([replace(condition, since_s=since_s) for condition in conditions])
+    if result.outcome is not Outcome.SUCCESS:
+        why = _joined(f"The mission ended with {result.outcome.value}.", verdict.why)
+        return replace(verdict, success=False, why=why, holds=verdict.success)
+    said = dict.fromkeys(_speech(tree, result))
+    if said:
+        success = verdict.success is not False and all(holds for holds, _ in said)
+        verdict = replace(verdict, success=success, why=_joined(verdict.why, *(sentence for _, sentence in said)))
+    unseen = listing(_unseen(tree, result)) if _unseen(tree, result) else ""
+    if verdict.success is None:
+        nothing = f"No goal condition stands for {unseen}." if unseen else "There are no goal conditions."
+        return replace(verdict, why=_joined(nothing, verdict.why))
+    return replace(verdict, why=_joined(verdict.why, f"Not judged: {unseen}." if unseen else ""))
+
+
+def _unseen(tree: CompiledTree, result: RobotResult) -> Sequence[str]:
+    """Returns the names of executed skills that have no goal condition."""
+    done = {one.path_id for one in result.executions if one.done}
+    names = {node.path_id: node.name for node in tree.root.walk() if not is_speech(node)}
+    paths = [_node_of(part) for part in tree.parts if part.goal is None and part.skill is not None]
+    return list(dict.fromkeys(names[path] for path in paths if path in done and path in names))
+
+
+def conditions_of(
+    tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = ()
+) -> tuple[GoalCondition, ...]:
+    """Returns the goal conditions of an ended tree: one for each execution of a part, and one for each answer.
+
+    A count of objects is one condition for all trips. The place of a robot must hold until it drives again; the place
+    or holder of an object must hold until the mission moves such an object again.
+    """
+    shares = (*before, Share(tree, result, len(tree.parts)))
+    moves = [move for share in shares for move in _moves(share)]
+    return tuple(each for share in shares for each in _conditions_of_share(share, moves, last=share is shares[-1]))
+
+
+def _conditions_of_share(share: Share, moves: Sequence[_Move], *, last: bool) -> Iterator[GoalCondition]:
+    """Yields the goal conditions of one robot's share."""
+    result = share.result
+    for part in share.tree.parts[: share.done]:
+        if part.goal is None:
+            continue
+        condition = replace(part.goal, robot=share.tree.robot_name)
+        executions = [one for one in result.executions if one.path_id == _node_of(part) and one.done]
+        if part.goal.kind in (GoalKind.ANSWERED, GoalKind.DOOR_OPEN):
+            yield from _answers(part, condition, result, done=bool(executions))
+            continue
+        if not executions and result.outcome is not Outcome.SUCCESS:
+            yield condition
+        for one in executions:
+            yield _timed(condition, one, share, moves, last=last)
+
+
+def _answers(part: StepPart, condition: GoalCondition, result: RobotResult, *, done: bool) -> Iterator[GoalCondition]:
+    """Yields a condition for each answer of a check, even if the step around it failed, because the answer was said."""
+    below = f"{part.path_id}/"
+    answers = [one for one in result.findings if f"{one.path_id}/".startswith(below) and isinstance(one.answer, bool)]
+    for finding in answers:
+        yield replace(condition, answer=bool(finding.answer), answered_s=finding.t_s)
+    if not answers and done:
+        yield condition
+
+
+def _timed(
+    condition: GoalCondition,
+    one: Execution,
+    share: Share,
+    moves: Sequence[_Move],
+    *,
+    last: bool,
+) -> GoalCondition:
+    """Returns the condition of one execution with the times at which it must hold."""
+    result, ended_s = share.result, math.inf if one.ended_s is None else one.ended_s
+    between = [_Move(frozenset(), each.began_s, _end(each)) for other in result.preempting for each in other.executions]
+    later = [move for move in (*moves, *between) if move.until_s > ended_s and move.concerns(condition)]
+    drove = not last or result.stepped_aside or bool(result.preempting) or (result.moved_s or 0.0) > ended_s
+    let_go = condition.kind is GoalKind.GRASPED and later
+    when = condition.when
+    if when is When.END_OF_MISSION and (let_go or (condition.kind is GoalKind.WENT and drove)):
+        when = When.END_OF_STEP
+    taken_s = tuple((move.from_s, move.until_s) for move in later)
+    spoken_s = tuple(said.t_s for said in result.said if not said.asked and one.began_s <= said.t_s <= ended_s)
+    return replace(
+        condition,
+        when=when,
+        began_s=one.began_s,
+        ended_s=one.ended_s,
+        spoken_s=spoken_s if condition.kind is GoalKind.GREETED else (),
+        taken_s=taken_s,
+    )
+
+
+def _moves(share: Share) -> Iterator[_Move]:
+    """Yields the intervals in which a robot moved objects on purpose, also in failed or stopped parts."""
+    for part in share.tree.parts:
+        goal = part.goal
+        if goal is None:
+            if part.skill is None or part.skill.gripper_after is None:
+                continue
+        elif goal.kind not in _MOVING or goal.when is When.ALWAYS:
+            continue
+        classes = frozenset(() if goal is None else goal.classes)
+        for one in share.result.executions:
+            if one.path_id == _node_of(part):
+                yield _Move(classes, one.began_s, _end(one))
+
+
+def _end(one: Execution) -> float:
+    return math.inf if one.ended_s is None else one.ended_s
+
+
+def _node_of(part: StepPart) -> str:
+    return part.node or part.path_id
+
+
+def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str]]:
+    """Yields for each execution of a speech step whether the robot said the text, and a sentence on it.
+
+    Each utterance counts for one step, in the order of time.
+    """
+    nodes = list(tree.root.walk())
+    filled = {key: text for node in nodes if node.kind == "set" for key, text in node.options["values"].items()}
+    texts = {node.path_id: node.options["inputs"]["text"] for node in nodes if is_speech(node)}
+    unheard = [said for said in result.said if not said.asked]
+    for one in sorted(result.executions, key=lambda one: one.began_s):
+        if not one.done or one.path_id not in texts:
+            continue
+        binding = texts[one.path_id]
+        text = filled.get(binding.key) if isinstance(binding, FromBoard) else " ".join(str(binding.value).split())
+        begun_s, end_s = one.began_s - 1e-3, _end(one) + 1e-3
+        found = next((said for said in unheard if begun_s <= said.t_s <= end_s and _is_text(said.text, text)), None)
+        if found is not None:
+            unheard.remove(found)
+        expected = text.text if isinstance(text, Template) else str(text or "")
+        shown = (expected if found is None else found.text)[:SHOWN_CHARS]
+        end = "" if shown.endswith((".", "!", "?")) else "."
+        if found is not None and found.silent:
+            yield True, f'It showed "{shown}" in the silent zone {found.silent}.'
+            continue
+        yield found is not None, f'It {"said" if found is not None else "did not say"} "{shown}"{end}'
+
+
+def _is_text(heard: str, text: str | Template | Expression | None) -> bool:
+    """Returns whether an utterance is the text of a step, with any values in it."""
+    return text.matches(heard) if isinstance(text, Template) else not isinstance(text, str) or heard == text
+
+
+def _joined(*sentences: str) -> str:
+    return " ".join(filter(None, sentences))

@@ -1,0 +1,364 @@
+"""Runs one request on a backend and writes log, tree, report and pictures into its folder."""
+
+import ctypes
+import gc
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from py_trees.behaviour import Behaviour
+
+from executive.app.prepare.prepared import Prepared
+from executive.app.report.artifacts import Artifacts, draw_answer
+from executive.app.report.report_page import EndedTree, with_findings, write_report
+from executive.app.report.run_report import RobotReport, RunReport
+from executive.app.runs.backend import Backend, Durable
+from executive.app.runs.goal_conditions import Share
+from executive.app.runs.page_view import PageView
+from executive.app.runs.signals import ended_by_signals
+from executive.app.runs.simulated import SimulatedBackend, compile_first
+from executive.mission.request import Request
+from executive.record.announce import announce, map_message
+from executive.record.event_log import EventLog
+from executive.record.history import Event, read_events
+from executive.record.schemas import CONTROL, MAP, RUN, WORK
+from executive.record.work import CountedDetector, Profile
+from executive.run.control import Control
+from executive.run.outcome import RobotResult, RunResult
+from executive.run.runner import run
+from executive.run.visitor import Progress, RunEntry, RunSettings, RunVisitor
+from executive.run.worker import LockStepWorker, ThreadWorker
+from executive.tree.context import RunContext
+from executive.tree.node_view import NodeView, node_view
+from executive.tree.nodes.skill_leaf import ERROR_TOPIC, SkillLeaf
+from executive.view.foxglove import LiveServer
+from executive.words.goal import RefereeReport
+from executive.words.knowledge import Knowledge
+from plant.worlds.world import World
+from skills.api import PlanningError, Publish, Worker
+from skills.estimate.grid_map import load_grid_map
+from skills.faults.faulty_robot import FaultyRobot, inject_faults, parse_fault
+from skills.inputs.errors import InputError
+from skills.navigate.footprint import Footprint
+from skills.navigate.planner import plan_path
+from skills.robot import Pose2D, Robot
+
+_MOST_STARTS: Final = 1000
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """Report of an ended run, and the last state of its tree."""
+
+    report: RunReport
+    tree: NodeView
+
+
+def run_request(
+    prepared: Prepared,
+    backend: Backend | None = None,
+    *,
+    visitors: Sequence[RunVisitor] = (),
+    control: Control | None = None,
+    page: PageView | None = None,
+    live: LiveServer | None = None,
+    durable: Durable | None = None,
+    profile: Profile | None = None,
+    worker: ThreadWorker | None = None,
+) -> FinishedRun:
+    """Runs a prepared request and writes log, tree, report and pictures into its folder.
+
+    The `backend` is by default the plant of the request's world. `visitors` and the log watch the run, `control`
+    pauses, steps and cancels it, `page` shows it, and `live` sends what is logged. `durable` stores its state so that
+    another process can resume it, or resumes an earlier run. `profile` measures the time of the subsystems. The
+    `worker` runs jobs beside the ticks (None: in lock-step with the backend's clock).
+
+    Raises InputError if the world or the stored state cannot be used.
+    """
+    request, scenario, settings = prepared.request, prepared.request.scenario, _settings(prepared.request)
+    out, world, kinds = request.out, prepared.world, {name: robot.kind for name, robot in prepared.robots.items()}
+    backend = backend or simulated_backend(prepared)
+    entries = [entry_for(each, backend, durable) for each in prepared.all]
+    idle = [name for name in kinds if all(name != entry.tree.robot_name for entry in entries)]
+    spare = [backend.entry(replace(prepared.tree, robot_name=name), None) for name in idle]
+    path, artifacts = out / ("log.mcap" if durable is None else durable.log), Artifacts()
+    clock = backend.clock
+    with closing(EventLog(path, clock, apart=prepared.several)) as log:
+        if page is not None:
+            page.serve(log, backend.show_live())
+        if live is not None:
+            live.follow(log)
+        log_map(log, world, prepared.knowledge)
+        facts: dict[str, Any] = {"world": world.name, "seed": request.seed, "scenario": scenario.lines()}
+        for each in prepared.all:
+            announce(log, clock, each.tree, each.knowledge, **facts, robots=kinds if prepared.several else {})
+        journals = () if durable is None else durable.journals.values()
+        watching = [artifacts, log, *journals, *visitors, *([] if page is None else [page])]
+        if scenario:
+            watching.append(DisturbanceLog(log, entries[0].robot, backend.happened))
+        if profile is not None:
+            watching.append(RunProfile(profile, backend, (artifacts, log), journals))
+        watching += backend.visitors(control := control or Control(pace=None))
+        with ended_by_signals(control.cancel), closing(worker or LockStepWorker(clock)) as jobs:
+            result = run(
+                entries, clock=clock, worker=jobs, visitors=watching, settings=settings, control=control, spare=spare
+            )
+        if durable is not None:  # the next mission of the queue begins in the world that this one leaves
+            next(iter(durable.journals.values())).keep_world()
+            for trouble in durable.troubles:
+                error = {"node": prepared.tree.robot_name, "what": "keep the mission's state", "traceback": trouble}
+                log(ERROR_TOPIC, error)
+        counts = dict(sorted(Counter({**result.work, **backend.work(), "bytes_logged": log.bytes}).items()))
+        log(WORK, counts)
+    finished, recording = _conclude(prepared, backend, result, log, artifacts, counts)
+    if page is not None:
+        page.offer(recording)
+    return finished
+
+
+def _conclude(
+    prepared: Prepared,
+    backend: Backend,
+    result: RunResult,
+    log: EventLog,
+    artifacts: Artifacts,
+    counts: Mapping[str, int],
+) -> tuple[FinishedRun, Path | None]:
+    """Judges an ended run and writes report, pictures and recording; returns the recording's path as well."""
+    out, events = prepared.request.out, mission_events(log.path)
+    artifacts.recall(events)
+    finished, ended = _judge(prepared, backend, result, log)
+    report = with_findings(replace(finished.report, work=counts), prepared.knowledge, result, artifacts, events)
+    draw_answer(artifacts, out)
+    recording = backend.leave(artifacts, out)
+    write_report(prepared, report, ended, artifacts, events)
+    return replace(finished, report=report), recording
+
+
+def simulated_backend(prepared: Prepared) -> Backend:
+    """Builds the plant of a request's world."""
+    compile_first()
+    request = prepared.request
+    return SimulatedBackend(
+        prepared.world,
+        prepared.robots,
+        seed=request.seed,
+        record=request.record,
+        variation=request.variation,
+        spared=mentioned_classes(prepared),
+    )
+
+
+def mentioned_classes(prepared: Prepared) -> frozenset[str]:
+    """Classes of the objects that a mission mentions; clutter has none of them."""
+    named = {each.name for command in prepared.tree.commands for each in (command.item, command.object) if each}
+    known = prepared.knowledge
+    return frozenset(one for name in named for one in known.classes(known.object_name(name) or name))
+
+
+def log_map(log: EventLog, world: World, knowledge: Knowledge) -> None:
+    """Writes the map into the log, so that the log needs no other file."""
+    log(MAP, map_message(load_grid_map(world.scan_map_path), knowledge, world=world.name))
+
+
+def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> RunEntry:
+    """Returns the robot of a mission with its faults, its numeric code compiled."""
+    entry, clock = backend.entry(prepared.tree, durable), backend.clock
+    preload(entry)
+    every = map(parse_fault, prepared.request.scenario.faults)
+    faults = [each for each in every if not each.over_by(clock.now())]  # a resumed run may be past some faults
+    return replace(
+        entry,
+        robot=inject_faults(entry.robot, clock, faults, since_s=0.0),
+        after=prepared.after,
+        speaker_W=prepared.speaker_W,
+    )
+
+
+def _settings(request: Request) -> RunSettings:
+    """Returns the settings of a run: seed, time of day and time limit."""
+    usual = RunSettings(seed=request.seed)
+    limit_s = usual.time_limit_s if request.time_limit_s is None else request.time_limit_s
+    hours, minutes = map(int, (request.time_of_day or "0:0").split(":"))
+    time_s = None if request.time_of_day is None else 3600.0 * hours + 60.0 * minutes
+    return replace(usual, time_limit_s=limit_s, time_of_day_s=time_s)
+
+
+def log_name(start: int) -> str:
+    """Returns the name of the log of a mission's first start, second start, and so on."""
+    return "log.mcap" if start == 1 else f"log-{start}.mcap"
+
+
+def mission_events(log: Path) -> tuple[Event, ...]:
+    """Returns the events of all starts of a mission, from this log and the readable logs of earlier starts.
+
+    Raises InputError if this log cannot be read.
+    """
+
+    def facts(events: Sequence[Event]) -> object:
+        """Returns the commands, world and seed at the beginning of a log."""
+        return next((event.data for event in events if event.topic == RUN), None)
+
+    events, before = read_events(log), list[Event]()
+    for name in (log_name(start) for start in range(1, _MOST_STARTS)):
+        if name == log.name:
+            break
+        with suppress(InputError):
+            earlier = read_events(log.with_name(name))
+            before += earlier if facts(earlier) == facts(events) else ()
+    return (*before, *events)
+
+
+def _judge(
+    prepared: Prepared, backend: Backend, result: RunResult, log: EventLog
+) -> tuple[FinishedRun, Sequence[EndedTree]]:
+    """Builds the report of a run with the referee's verdict, and the last state of each robot's tree.
+
+    Objects that the other robots moved count as moved by the mission.
+    """
+    shares = {each.robot_name: Share(each.tree, each, 0) for each in result.robots}
+    robots: dict[str, RobotReport] = {}
+    for name, own in shares.items():
+        seen = backend.judge(own.tree, own.result, before=[each for each in shares.values() if each is not own])
+        robots[name] = robot_report(own.result, prepared.robots[name].kind, seen)
+    worst = min(robots, key=lambda name: (robots[name].achieved, name != result.worst.robot_name))
+    views = {name: node_view(each.tree.root, each.result.states) for name, each in shares.items()}
+    ending = {name: value for name, value in vars(robots[worst]).items() if name != "kind"}
+    report = RunReport(
+        **ending,
+        world=prepared.world.name,
+        seed=prepared.request.seed,
+        sim_time_s=round(result.sim_time_s, 3),
+        wall_time_s=round(result.wall_time_s, 3),
+        real_time_factor=round(result.sim_time_s / max(result.wall_time_s, 1e-6), 2),
+        ticks=result.ticks,
+        log=str(log.path),
+        scenario=(*prepared.request.scenario.lines(), *prepared.request.variation.lines()),
+        notes=tuple(backend.notes),
+        zones=tuple(dict.fromkeys(zone.words for each in result.every for zone in each.tree.all_zones)),
+        robots=robots if prepared.request.robots else {},
+    )
+    return FinishedRun(report, views[worst]), [
+        EndedTree(shares[name].tree, view, robots[name]) for name, view in views.items()
+    ]
+
+
+def robot_report(ended: RobotResult, kind: str, seen: RefereeReport | None) -> RobotReport:
+    """Returns a robot's report: outcome, commands, and the referee's verdict."""
+    return RobotReport(
+        kind=kind,
+        outcome=ended.outcome.value,
+        cause=None if ended.cause is None else ended.cause.value,
+        message=ended.message,
+        referee=seen,
+        commands=tuple(map(str, ended.tree.commands)),
+    )
+
+
+def preload(entry: RunEntry) -> None:
+    """Processes the robot's first scan and plans a short path, so that all code is compiled before the run."""
+    robot, localiser, costmap = entry.robot, entry.localiser, entry.costmap
+    localiser.update(robot)
+    estimate = localiser.estimate()
+    costmap.update(robot, estimate)
+    here = Pose2D.from_transform(estimate.X_WO @ robot.odometry().X_OB)
+    there = Pose2D(here.x_m, here.y_m, here.yaw_rad + 0.5)
+    with suppress(PlanningError):
+        plan_path(costmap, Footprint.of(robot.capabilities()), here, there)
+    # objects that live as long as the run are excluded from garbage collection; garbage of an earlier run goes first
+    if gc.get_freeze_count():
+        gc.unfreeze()
+        gc.collect()
+    gc.freeze()
+
+
+class RunProfile(RunVisitor):
+    """Timer of a run's subsystems; the rest of the time counts for the executive."""
+
+    def __init__(
+        self, profile: Profile, backend: Backend, logs: Iterable[RunVisitor], journals: Iterable[RunVisitor]
+    ) -> None:
+        """`logs` are the visitors that write the log, `journals` those that write the store."""
+        self._profile, self._backend = profile, backend
+        self._begun_s = 0.0
+        for each in logs:
+            profile.attach("log", each, "message", "tick")
+        for each in journals:
+            profile.attach("journal", each, "tick")
+
+    def begin(self, settings: RunSettings, worker: Worker) -> None:
+        """Times the backend's subsystems and the worker's jobs."""
+        self._backend.attach(self._profile)
+        submit, timed = worker.submit, self._profile.timed
+
+        def submit_timed(work: Callable[[], Any], *, latency_s: float, name: str) -> Any:
+            return submit(timed("planning", work), latency_s=latency_s, name=name)
+
+        vars(worker)["submit"] = submit_timed
+        self._profile.begin()
+        self._begun_s = self._profile.enter()
+
+    def mission_begun(self, nodes: Sequence[Behaviour], context: RunContext) -> None:
+        """Times a robot's estimators, detector and skills."""
+        attach = self._profile.attach
+        attach("localiser", context.localiser, "update")
+        attach("costmap", context.costmap, "update", "add_points", "clearance_m")
+        if isinstance(context.detector, CountedDetector):
+            attach("detector", context.detector, *context.detector.methods)
+        for leaf in nodes:
+            if isinstance(leaf, SkillLeaf):
+                attach("skills", leaf, "initialise", "update", "terminate")
+
+    def end(self, result: RunResult) -> None:
+        """Ends the measurement."""
+        self._profile.leave("executive", self._begun_s)
+
+
+Happened = Callable[[], Sequence[tuple[float, str]]]
+FAULT: Final = "fault"
+EVENT: Final = "event"
+
+
+class DisturbanceLog(RunVisitor):
+    """Logger of the faults that begin and end, and of the events in the world."""
+
+    def __init__(self, publish: Publish, robot: Robot, happened: Happened) -> None:
+        """`happened` returns all events in the world so far, as times (s) and sentences."""
+        self._publish, self._happened = publish, happened
+        self._robot = robot if isinstance(robot, FaultyRobot) else None
+        self._active: tuple[str, ...] = ()
+        self._logged = len(happened())
+
+    def tick(self, progress: Progress) -> None:
+        """Logs the faults and events since the last tick."""
+        for now_s, sentence in self._happened()[self._logged :]:
+            self._log(now_s, EVENT, sentence)
+        self._logged = len(self._happened())
+        now = () if self._robot is None else self._robot.faults_at_work()
+        for words in now:
+            if words not in self._active:
+                self._log(progress.now_s, FAULT, f"{words}: begins")
+        for words in self._active:
+            if words not in now:
+                self._log(progress.now_s, FAULT, f"{words}: is over")
+        self._active = now
+
+    def _log(self, now_s: float, what: str, message: str) -> None:
+        self._publish(CONTROL, {"t": round(now_s, 6), "what": what, "message": message})
+
+
+_LIBRARY: Final = ctypes.CDLL(None)
+
+
+def return_memory() -> None:
+    """Returns freed memory to the system.
+
+    Otherwise a worker would grow by some hundred megabytes with each mission, because the C library keeps freed memory
+    in small pieces. Does nothing if the C library has no `malloc_trim`.
+    """
+    gc.collect()
+    with suppress(AttributeError):
+        _LIBRARY.malloc_trim(0)

@@ -1,0 +1,169 @@
+"""The live page of a run (`--view`), which stays as a replay after the end."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from executive.app.prepare.checker import prepare_checked
+from executive.app.prepare.mission_files import shipped_missions
+from executive.app.prepare.prepared import Prepared
+from executive.app.runs.backend import Scene
+from executive.app.runs.conversations import Conversations, load_ahead
+from executive.conversation import ReplyKind
+from executive.mission.parameters import parse_values
+from executive.mission.request import Request
+from executive.record.event_log import EventLog
+from executive.run.control import Control
+from executive.run.visitor import Progress, RunVisitor
+from executive.store.missions import MissionStore
+from executive.view.feed import Feed
+from executive.view.page_control import (
+    Action,
+    ControlWatch,
+    ProgressWatch,
+    RefusedError,
+    asked_json,
+    control_actions,
+    robot_of,
+    text_of,
+)
+from skills.inputs.errors import InputError
+
+if TYPE_CHECKING:
+    from executive.view.server import PageServer
+
+
+class PageView(RunVisitor):
+    """Live page of one run: call `serve` before the run, `offer` and `stay` after it."""
+
+    def __init__(
+        self,
+        prepared: Prepared | None,
+        tell: Callable[[str], None],
+        *,
+        port: int = 0,
+        later: Callable[[str], str] | None = None,
+    ) -> None:
+        """Without a `prepared` request the page takes no sentences.
+
+        `tell` shows a line. `later` queues a sentence and returns an answer; without it the page offers no queue.
+        """
+        self._tell, self._port, self._later = tell, port, later
+        self.control = Control(attended=True)
+        self._feed = Feed()
+        self._progress = ProgressWatch(self._feed)
+        self.conversations = None if prepared is None else Conversations(prepared, self.control)
+        if self.conversations is not None:
+            self.conversations.listen(lambda name, waiting: self._feed.tell(f"asked/{name}", asked_json(waiting, name)))
+        self._server: PageServer | None = None
+        self._watch: ControlWatch | None = None
+        self._scene: Scene | None = None
+
+    def serve(self, log: EventLog, scene: Scene | None) -> None:
+        """Serves the page and shows its address. Raises InputError if the port is taken."""
+        from executive.view.server import PageContent, serve
+
+        log.listen(lambda each: self._feed(each.topic, each.stamp_s, each.values))
+        self._scene = scene
+        sentences: dict[str, Action] = {}
+        if self.conversations is not None:
+            load_ahead()
+            sentences["say"] = sentence_action(self.hear)
+        if (later := self._later) is not None:
+            sentences["queue"] = sentence_action(lambda sentence, _: later(sentence))
+        actions = {**control_actions(self.control), **sentences, **({} if scene is None else scene_actions(scene))}
+        content = PageContent(self._feed, actions, scene_url=None if scene is None else scene.url)
+        self._server = serve(content, self._port)
+        self._watch = ControlWatch(self.control, self._feed)
+        self._tell(f"The page: {self._server.url}")
+
+    def hear(self, sentence: str, robot: str | None) -> str:
+        """Returns the robots' reply to a sentence. Raises InputError with the reason of a refusal."""
+        assert self.conversations is not None
+        reply = self.conversations.hear(sentence, robot)
+        if reply.kind in (ReplyKind.REFUSED, ReplyKind.IGNORED):
+            raise InputError(reply.text)
+        return reply.text
+
+    def tick(self, progress: Progress) -> None:
+        """Sends the progress to the page."""
+        self._progress.tick(progress)
+
+    def offer(self, recording: Path | None) -> None:
+        """Shows the recording of the ended run, if there is one."""
+        if self._server is not None and recording is not None and recording.is_file():
+            self._server.offer_recording(recording)
+
+    def stay(self, limit_s: float | None) -> None:
+        """Serves until Ctrl-C or the limit (s, wall time), and closes."""
+        from executive.view.server import wait
+
+        try:
+            if self._server is not None:
+                self._tell("The page stays until Ctrl-C." if limit_s is None else f"The page: {limit_s:g} s more.")
+                wait(limit_s, self._refresh)
+        finally:
+            self.close()
+
+    def _refresh(self) -> None:
+        """Refreshes the scene of the ended run, so that a page opened late shows its textures and follows."""
+        if self._scene is not None:
+            self._scene.publish()
+
+    def close(self) -> None:
+        """Stops serving; idempotent."""
+        if self._watch is not None:
+            self._watch.close()
+        if self._server is not None:
+            self._server.close()
+
+
+def sentence_action(do: Callable[[str, str | None], str]) -> Action:
+    """Returns a page action that calls `do` with the typed sentence and the robot that it is for."""
+
+    def say(values: Mapping[str, Any]) -> str:
+        sentence = text_of(values, "text")
+        try:
+            return do(sentence, robot_of(values))
+        except (InputError, ValueError) as error:
+            raise RefusedError(str(error)) from error
+
+    return say
+
+
+def queue_function(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], str]:
+    """Returns a function that queues a sentence, as `errand queue add` does, and returns an answer.
+
+    World, seed and robots are those of the prepared request. In place of a sentence it takes the name of a shipped
+    mission, with NAME=VALUE for its parameters.
+    """
+    before = prepared.request
+
+    def later(text: str) -> str:
+        named, *settings = text.split()
+        world = before.world or before.world_name
+        asked = Request(text, world=world, seed=before.seed, out=out, robots=before.robots)
+        if named in shipped_missions():
+            asked = replace(asked, sentence=None, file=Path(named), given=parse_values(settings))
+        request = prepare_checked(asked).request.from_anywhere()
+        with MissionStore(store) as missions:
+            number = missions.add(request, queued=True).id
+        return f"queued as mission {number}: {'; '.join(request.commands)} (errand queue run --out {out})"
+
+    return later
+
+
+def scene_actions(scene: Scene) -> Mapping[str, Action]:
+    """Returns the page's actions on the scene: a slower refresh for slow browsers, and the camera."""
+
+    def ease(_: Mapping[str, Any]) -> str:
+        scene.refresh_seldom()
+        return "the scene is refreshed less often"
+
+    def follow(values: Mapping[str, Any]) -> str:
+        wanted = values.get("wanted") is True
+        scene.follow(wanted)
+        return "the camera follows the robot" if wanted else "the camera shows the whole world"
+
+    return {"ease": ease, "follow": follow}

@@ -1,0 +1,167 @@
+"""Loading of entry points of other distributions, with a time limit and one error for all that they raise."""
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from functools import cache
+from importlib.metadata import Distribution, EntryPoint, EntryPoints, SelectableGroups, entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from skills.inputs.errors import InputError
+
+__all__ = [
+    "CLASSES",
+    "KERNELS",
+    "LIMIT_S",
+    "OURS",
+    "PluginDefect",
+    "class_entries",
+    "class_tables",
+    "distribution_of",
+    "installed_plugins",
+    "run_in_thread",
+    "run_plugin",
+]
+
+CLASSES: Final = "errand.classes"
+"""Group of the packages with classes of objects; the value names the package, whose code does not run."""
+
+KERNELS: Final = "errand.kernels"
+"""Group of the functions without arguments that run numeric code for a short time, so that it is compiled."""
+
+OURS: Final = "spot-errand"
+"""Distribution of this project, whose modules need no time limit."""
+LIMIT_S: Final = 30.0
+_BAD_INPUT: Final = 2
+_LONGEST: Final = 300
+
+ResultT = TypeVar("ResultT")
+
+
+class PluginDefect(Exception):  # noqa: N818
+    """Any error that the code of a plug-in raised: its type and its text."""
+
+
+def distribution_of(entry: EntryPoint) -> str:
+    """Name of the distribution that registers an entry point."""
+    return "an unknown distribution" if entry.dist is None else _name_of(entry.dist)
+
+
+@cache
+def _name_of(distribution: Distribution) -> str:
+    """Caches the name of a distribution, which is read from its file each time."""
+    return distribution.name
+
+
+def installed_plugins(group: str) -> EntryPoints:
+    """Entry points of a group. Reads them once, since each reading opens the files of all distributions."""
+    return _all_installed().select(group=group)
+
+
+@cache
+def _all_installed() -> SelectableGroups:
+    return entry_points()
+
+
+def class_tables(name: str) -> Iterator[tuple[Path, Any]]:
+    """Yields path and data of a YAML file from each package with classes that has it. Raises InputError."""
+    from skills.inputs.yaml_source import read_yaml
+
+    for entry in sorted(installed_plugins(CLASSES), key=lambda entry: entry.name):
+        try:
+            spec = find_spec(entry.value)
+        except (ImportError, ValueError):
+            spec = None
+        if spec is None or not spec.submodule_search_locations:
+            what = f"{entry.value} of distribution {distribution_of(entry)}, which has classes, is no package"
+            raise InputError(what, hint="repair or uninstall that distribution")
+        file = Path(spec.submodule_search_locations[0]) / name
+        if file.is_file():
+            yield file, read_yaml(file).data
+
+
+def class_entries(name: str, kind: type[ResultT]) -> Iterator[tuple[Path, dict[str, ResultT]]]:
+    """Yields the file and its entries by class of each package with classes that has it. Raises InputError."""
+    from pydantic import TypeAdapter, ValidationError
+
+    from skills.inputs.schema import first_error
+
+    for file, data in class_tables(name):
+        try:
+            yield file, TypeAdapter(dict[str, kind]).validate_python(data)  # type: ignore[valid-type]
+        except ValidationError as error:
+            where, what, hint = first_error(error.errors())
+            raise InputError(f"{'.'.join(map(str, where))}: {what}", hint=hint, file=file) from error
+
+
+def run_plugin(entry: EntryPoint, call: Callable[[], ResultT], *, limit_s: float = LIMIT_S) -> ResultT:
+    """Calls the code of an entry point, such as `entry.load`, and returns its result.
+
+    A call that exceeds the limit (s of wall-clock time) ends the process with one line that names the distribution,
+    since an import cannot be interrupted. Raises PluginDefect when the code raises anything but a plain
+    KeyboardInterrupt, which is the user's.
+    """
+    try:
+        with _ended_after(entry, limit_s):
+            return call()
+    except BaseException as defect:
+        if type(defect) is KeyboardInterrupt:
+            raise
+        raise PluginDefect(_error_text(defect)) from defect
+
+
+def run_in_thread(call: Callable[[], ResultT], *, limit_s: float) -> ResultT:
+    """Calls the code of a plug-in in a thread, and returns its result.
+
+    Raises PluginDefect when the code raises anything, or exceeds the limit (s of wall-clock time); then its thread is
+    left behind.
+    """
+    result: Future[ResultT] = Future()
+
+    def run() -> None:
+        try:
+            result.set_result(call())
+        except BaseException as defect:
+            result.set_exception(PluginDefect(_error_text(defect)))
+
+    threading.Thread(target=run, daemon=True).start()
+    try:
+        return result.result(limit_s)
+    except TimeoutError as error:
+        raise PluginDefect(f"it is not done within {limit_s:g} s") from error
+
+
+@contextmanager
+def _ended_after(entry: EntryPoint, limit_s: float) -> Iterator[None]:
+    """Ends the process when the block takes too long; has no limit for our own modules."""
+    if distribution_of(entry) == OURS:
+        yield
+        return
+    timer = threading.Timer(limit_s, _end_process, (entry, limit_s))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _end_process(entry: EntryPoint, limit_s: float) -> None:
+    what = f"{entry.group} '{entry.name}' ({entry.value}) of distribution {distribution_of(entry)}"
+    sys.stderr.write(f"errand: {what} is not loaded within {limit_s:g} s; repair or uninstall that distribution\n")
+    sys.stderr.flush()
+    os._exit(_BAD_INPUT)
+
+
+def _error_text(defect: BaseException) -> str:
+    """Type and text of an error, whose text may be broken or very long."""
+    try:
+        text = str(defect)[:_LONGEST]
+    except Exception:
+        text = "without a text"
+    return f"{type(defect).__name__}: {' '.join(text.split())}"

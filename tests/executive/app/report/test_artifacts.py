@@ -1,0 +1,87 @@
+"""Which pictures of a run are kept for an answer."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from executive.app.report.artifacts import MOST_SHOWN, Artifacts, draw_answer
+from executive.app.report.report_page import _pictures
+from executive.testing.bench import scripted_bench
+from plant.robots.spot.kind import spot_capabilities
+
+
+def looked(*boxes, grey=False):
+    picture = np.full((48, 64) if grey else (48, 64, 3), 90, np.uint8)
+    found = [{"class_name": "hammer", "score": 0.9, "box": list(box)} for box in boxes]
+    return {"detections": found, "image": picture}
+
+
+def answered(artifacts, answer):
+    return artifacts.message("answer", {"node": "alice/q", "question": "q", "answer": answer, "message": "m"})
+
+
+def test_a_positive_answer_shows_the_found_object_with_its_box(tmp_path):
+    artifacts = Artifacts()
+    artifacts.message("detections", looked())
+    artifacts.message("detections", looked((10, 10, 40, 30)))
+    artifacts.message("object_destination", {"class_name": "hammer"})
+    told = answered(artifacts, True)
+    assert told["image"].shape == (48, 64, 3)
+    assert np.any(told["image"] != 90)
+    assert draw_answer(artifacts, tmp_path).stat().st_size > 100
+
+
+def test_a_negative_answer_shows_all_views():
+    artifacts = Artifacts()
+    for grey in (False, True, False, False, False):
+        artifacts.message("detections", looked(grey=grey))
+    assert answered(artifacts, False)["image"].shape == (480, 960, 3)
+
+
+def test_a_picture_that_stands_on_end_keeps_its_shape_among_the_views():
+    # 48 x 64 upright in a tile of 320 x 240: 180 wide, with empty sides
+    artifacts = Artifacts()
+    artifacts.message("detections", {"detections": [], "image": np.full((64, 48, 3), 90, np.uint8)})
+    sheet = answered(artifacts, False)["image"]
+    assert sheet.shape == (240, 320, 3)
+    assert int(np.all(sheet[120] == 90, axis=1).sum()) == 180
+
+
+def test_an_answer_about_a_person_shows_the_person_and_not_an_object_of_an_earlier_answer():
+    # a hammer is found and confirmed, then a person is seen: no object is confirmed
+    artifacts = Artifacts()
+    artifacts.message("detections", looked((10, 10, 40, 30)))
+    artifacts.message("object_destination", {"class_name": "hammer"})
+    hammer = answered(artifacts, True)["image"]
+    artifacts.message("detections", looked())
+    artifacts.message("detections", looked((30, 20, 60, 44)))
+    assert np.any(answered(artifacts, True)["image"] != hammer)
+
+
+def test_without_a_question_there_is_no_picture(tmp_path):
+    artifacts = Artifacts()
+    artifacts.message("detections", looked((10, 10, 40, 30)))
+    assert draw_answer(artifacts, tmp_path) is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_the_last_views_before_an_answer_are_kept():
+    artifacts = Artifacts()
+    for _ in range(100):
+        artifacts.message("detections", looked())
+    assert len(artifacts.of_robot("").looked) == 12
+
+
+def test_pictures_that_a_skill_shows_go_into_the_report_with_their_captions():
+    artifacts = Artifacts()
+    context = replace(
+        scripted_bench(spot_capabilities())[0].context(), publish=lambda topic, message: logged.append((topic, message))
+    )
+    logged = []
+    for number in range(MOST_SHOWN + 2):
+        context.show_picture(np.full((48, 64, 3), 90, np.uint8), f"gauge {number}")
+    for topic, message in logged:
+        artifacts.message(topic, {"robot": "Alice", **message})
+    pictures = list(_pictures(artifacts, "Alice", ["Alice"]))
+    assert [caption for caption, _ in pictures] == [f"gauge {number}" for number in range(MOST_SHOWN)]
+    assert all(data.startswith(b"\xff\xd8") for _, data in pictures)

@@ -1,0 +1,34 @@
+"""A run: memory that was freed goes back to the system, and clutter spares what the mission names."""
+
+import ctypes
+import sys
+from pathlib import Path
+
+import pytest
+
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.one_run import mentioned_classes, return_memory
+from executive.mission.request import Request
+from executive.words.variation import Variation
+
+MB = 1_000_000
+
+
+def resident_mb():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / MB
+
+
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim") or sys.platform != "linux", reason="needs glibc")
+def test_memory_that_was_freed_in_pieces_is_returned():
+    blocks = [bytearray(b"x") * 60_000 for _ in range(3_000)]
+    some = blocks[::50]
+    del blocks
+    before_mb = resident_mb()
+    return_memory()
+    assert before_mb - resident_mb() > 100
+    assert len(some) == 60
+
+
+def test_clutter_spares_the_classes_that_are_asked_for(tmp_path):
+    request = Request("Hey Alice, bring me a beer", world="flat", seed=2, out=tmp_path, variation=Variation(clutter=5))
+    assert "beer" in mentioned_classes(prepare(request, ask=None))

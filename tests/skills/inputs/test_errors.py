@@ -1,0 +1,33 @@
+import pytest
+
+from skills.inputs.errors import MOST_LETTERS, InputError, definite, known_names, with_article
+
+
+def test_a_message_that_repeats_an_endless_name_is_cut_off():
+    error = InputError(f"unknown place '{'x' * 5000}'", hint="known are kitchen", file="m.yaml", line=3)
+    assert len(error.message) == MOST_LETTERS + 3
+    assert str(error).startswith("m.yaml:3: unknown place 'xxx")
+    assert str(error).endswith("...; known are kitchen")
+
+
+def test_a_message_escapes_control_characters():
+    assert str(InputError("no 'a\x1b[31m\u202eb\nc\udcff'", hint="x\x07")) == r"no 'a\x1b[31m\u202eb c\udcff'; x\x07"
+
+
+def test_without_a_known_name_none_is_listed():
+    assert known_names("x", []) == "none is known"
+
+
+@pytest.mark.parametrize(
+    "phrase", ["a hammer", "an extinguisher", "an orange cube", "a unit", "an hour", "a one-way door"]
+)
+def test_a_noun_gets_the_article_of_its_sound(phrase):
+    assert with_article(phrase.partition(" ")[2]) == phrase
+
+
+@pytest.mark.parametrize(
+    ("noun", "said"),
+    [("hammer", "the hammer"), ("my mug", "my mug"), ("the desk", "the desk"), ("Robin's mug", "Robin's mug")],
+)
+def test_a_noun_has_one_definite_article_at_most(noun, said):
+    assert definite(noun) == said

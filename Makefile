@@ -7,7 +7,8 @@
 # make check  lint, format and strict types
 # make bench  benchmarks, as ratios
 # make nightly  further missions, tutorials, seeds and worlds, and the smallest case of each measure
-# make wheels  whether wheels of all dependencies exist for each Python
+# make wheels  a wheel of each distribution, the core and the plug-ins, in dist
+# make pythons  whether wheels of all dependencies exist for each Python
 # make docs   the documentation as a site: open out/site/index.html
 
 PYTHON ?= $(shell command -v python3.11 || echo python3)
@@ -32,7 +33,7 @@ define install
 	$$run apt-get update -qq && $$run apt-get install -y -qq --no-install-recommends $(1) >/dev/null; }
 endef
 
-.PHONY: env train demo test affected fast nightly check bench docs wheels format debian voices clean
+.PHONY: env train demo test affected fast nightly check bench docs wheels pythons format debian voices clean
 
 env: $(VENV)/.ready
 
@@ -45,7 +46,7 @@ $(VENV)/.run: pyproject.toml VERSION $(PLUGINS:%=%/pyproject.toml) constraints.t
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
 	  || { echo "Errand needs Python 3.11, 3.12 or 3.13; set PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable .
 	@touch $@
 
 train: $(VENV)/.train
@@ -85,8 +86,11 @@ check: env
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-wheels: $(VENV)/.run
+wheels:
 	.ci/wheels
+
+pythons: $(VENV)/.run
+	.ci/pythons
 
 format: env
 	$(BIN)/ruff check --fix .

@@ -10,7 +10,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from types import GenericAlias
+from typing import Any, NewType
+
+from skills.quantities import quantity_of, range_text
 
 LIST = Path(__file__).resolve().parent / "api.md"
 _ROW = re.compile(r"^\| `([\w.]+)` \| ((?:`\w+`(?:, )?)+) \|", re.MULTILINE)
@@ -45,6 +48,10 @@ def api_page(note: str) -> str:
 
 
 def _section(name: str, thing: Any) -> str:
+    if quantity_of(thing) is not None:
+        return f"- `{name}`: {range_text(thing)}\n"
+    if isinstance(thing, NewType | GenericAlias):
+        return f"### {name}\n\n`{getattr(thing, '__supertype__', thing)}`\n"
     if not inspect.isclass(thing):
         return f"### {name}\n\n```python\n{name}{_signature(thing)}\n```\n\n{_doc(thing)}\n"
     return f"### {name}\n\n{_doc(thing)}\n" + "".join(f"\n{part}\n" for part in _members(thing))

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 
 from errand_spot.server.calls import service_calls
 from errand_spot.server.server import LISTED, MOTIONS, SERVICES
-from executive.app.scenarios import ScenarioFile
+from executive.app.prepare.scenarios import ScenarioFile
 from executive.mission.json_schema import mission_json_schema
 from executive.testing.skill_test import SkillTestFile
 from executive.tree.port_values import describe_type, field_types

@@ -11,7 +11,7 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3284,
+    "executive/words": 3428,
     "executive/language": 8250,
     "executive/speech": 1582,
     "executive/mission": 1646,
@@ -22,12 +22,12 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1594,
     "executive/testing": 849,
-    "executive/app": 7883,
-    "executive/cli": 4742,
-    "skills": 30296,
+    "executive/app": 8094,
+    "executive/cli": 4522,
+    "skills": 30146,
     "plant": 14940,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 478, 76, 9
+MODULES, ONE_IMPORTER, SAME_NAME = 479, 75, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -62,20 +62,17 @@ def kernel_steps() -> Sequence[Callable[[], None]]:
     fails.
     """
     drives = (partial(_drive, kind, stack) for kind, stack in _DRIVES)
-    return (*drives, _solve_arm, _map_cells, _survey, _see_blocks, *map(_step_of, installed_plugins(KERNELS)))
+    of_plugins = (partial(_compile_plugin, entry) for entry in installed_plugins(KERNELS))
+    return (*drives, _solve_arm, _map_cells, _survey, _see_blocks, *of_plugins)
 
 
-def _step_of(entry: EntryPoint) -> Callable[[], None]:
-    """Returns the step that a plug-in registers, loaded when it is called."""
-
-    def step() -> None:
-        try:
-            run_plugin(entry, lambda: entry.load()(), limit_s=_LIMIT_S)
-        except PluginDefect as defect:
-            what = f"cannot compile '{entry.name}' ({entry.value}) of {distribution_of(entry)}: {defect}"
-            raise InputError(what, hint="repair or uninstall that distribution") from defect
-
-    return step
+def _compile_plugin(entry: EntryPoint) -> None:
+    """Loads and calls the function that a plug-in registers. Raises InputError."""
+    try:
+        run_plugin(entry, lambda: entry.load()(), limit_s=_LIMIT_S)
+    except PluginDefect as defect:
+        what = f"cannot compile '{entry.name}' ({entry.value}) of {distribution_of(entry)}: {defect}"
+        raise InputError(what, hint="repair or uninstall that distribution") from defect
 
 
 def _drive(kind: str, components: str | None) -> None:

@@ -15,9 +15,10 @@ import typer
 from executive.cli.defaults import typed_options, yielding
 from executive.cli.number_options import quantity_option
 from executive.cli.options import ANYWAY, AS_JSON, REQUEST_OPTIONS, request_arguments, takes_request
-from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer, writing
+from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer
 from executive.mission.request import Request
 from skills.inputs.errors import InputError
+from skills.inputs.outside import writing
 from skills.quantities import Count
 
 if TYPE_CHECKING:

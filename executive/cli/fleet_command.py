@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from executive.app.report.run_report import VERDICTS
-from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, VIEW, VIEW_FOR, VIEW_PORT, StartCommand, takes_request
+from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, VIEW, VIEW_PORT, StartCommand, stay_s, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, progress_bar, show_table
 from executive.mission.request import Request
 from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission, store_in
@@ -37,8 +37,7 @@ def run(
         Path | None, typer.Option(help="Folder for log, report and recording; by default `fleet` beside the store.")
     ] = None,
     quiet: QUIET = False,
-    view: VIEW = False,
-    view_for: VIEW_FOR = None,
+    view: VIEW = None,
     view_port: VIEW_PORT = 0,
     foxglove: FOXGLOVE = None,
     as_json: AS_JSON = False,
@@ -72,7 +71,7 @@ def run(
         )
         folder = out or (queue if is_folder(queue) else store.parent) / "fleet"
         first = next(iter(next(iter(dispatch.missions.values())).options.values()))
-        page = PageView(None, tell, port=view_port) if view or view_for is not None else None
+        page = PageView(None, tell, port=view_port) if view is not None else None
         limit_s, bar = request.time_limit_s, progress_bar(console, "missions", len(dispatch.missions))
         run_in = partial(run_fleet, dispatch, out=folder, seed=request.seed, time_limit_s=limit_s)
         with serve_live(foxglove, tell) as live, bar as ended:
@@ -85,8 +84,8 @@ def run(
         console.print(line, markup=False)
     if as_json:
         print_json({"missions": results})
-    if page is not None:
-        page.stay(view_for)
+    if page is not None and view is not None:
+        page.stay(stay_s(view))
     if not all(achieved):
         raise typer.Exit(NOT_ACHIEVED)
 

@@ -17,7 +17,7 @@ from rich.text import Text
 
 from executive.cli.number_options import quantity_option
 from executive.cli.options import takes_request
-from executive.cli.output import console_for, new_folder, show_table, terminal_answerer, writing
+from executive.cli.output import console_for, new_folder, show_table, terminal_answerer
 from executive.mission.request import Request
 from executive.record.history import Entry, History, read_history, timeline
 from executive.record.schemas import ERRORS
@@ -26,7 +26,7 @@ from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.styles import style_of
 from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, printable, readable, to_text
 from skills.inputs.errors import InputError
-from skills.inputs.outside import is_file
+from skills.inputs.outside import is_file, writing
 from skills.quantities import Count, Delay, Port, Tries, Wait
 
 RECORDING: Final = "recording.html"

@@ -9,7 +9,8 @@ from typing import Annotated, Final
 import typer
 
 from executive.app.prepare.mission_files import FOLDER, shipped_missions
-from executive.cli.output import console_for, show_table, writing
+from executive.cli.output import console_for, show_table
+from skills.inputs.outside import writing
 
 _FOR_EDITORS: Final = "# yaml-language-server"
 

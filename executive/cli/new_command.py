@@ -11,8 +11,9 @@ from typing import Annotated, Final
 
 import typer
 
-from executive.cli.output import console_for, new_folder, progress_bar, writing
+from executive.cli.output import console_for, new_folder, progress_bar
 from skills.inputs.errors import InputError
+from skills.inputs.outside import writing
 
 _TEMPLATES: Final = Path(__file__).parent / "new"
 _SUFFIX: Final = ".template"

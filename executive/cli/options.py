@@ -18,15 +18,17 @@ import typer
 from typer.core import TyperCommand
 
 from executive.cli.defaults import yielding
-from executive.cli.number_options import quantity_option
+from executive.cli.number_options import NumberReader, quantity_option
 from executive.mission.request import Request, parse_start
 from executive.words.forms import Option
 from executive.words.forms import OptionGroup as Group
 from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
 
-_START, _FOXGLOVE = "--start", "--foxglove"
+_START, _FOXGLOVE, _VIEW = "--start", "--foxglove", "--view"
 _FOXGLOVE_ADDRESS: Final = "127.0.0.1:8765"
+_UNTIL_CTRL_C_S: Final = 1e9
+"""Value of `--view` alone: the longest wait."""
 _WITH_PORT: Final = re.compile(r"[^\s/=]*:[^\s/=]*")
 _NUMERIC: Final = re.compile(r"[-+]?\.?\d[\d.,]*(?:e[-+]?\d+)?", re.IGNORECASE)
 
@@ -47,9 +49,15 @@ AS_JSON = Annotated[
     bool, grouped(Group.OUTPUT, "--json", help="The last line of standard output is the result as JSON.")
 ]
 QUIET = Annotated[bool, grouped(Group.OUTPUT, "--quiet", help="Show no lines and no tree during the run.")]
-VIEW = Annotated[bool, grouped(Group.PAGE, "--view", help="Serve a live page on 127.0.0.1, which stays after the end.")]
-VIEW_FOR = Annotated[
-    float | None, quantity_option(Wait, help="Time that the page stays after the end, s.", group=Group.PAGE)
+VIEW = Annotated[
+    float | None,
+    grouped(
+        Group.PAGE,
+        _VIEW,
+        metavar="[SECONDS]",
+        parser=NumberReader(Wait),
+        help="Serve a live page on 127.0.0.1, which stays after the end: so long, or until Ctrl-C.",
+    ),
 ]
 VIEW_PORT = Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.", group=Group.PAGE)]
 
@@ -74,7 +82,7 @@ FOXGLOVE = Annotated[
 
 
 class StartCommand(TyperCommand):
-    """Command with `--start` of three numbers or one word, `--foxglove` of one or none, and groups in its help."""
+    """Command with `--start` of three numbers or one word, optional values, and groups in its help."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Joins the values of options that take any number of words, and parses as click does."""
@@ -94,7 +102,7 @@ class StartCommand(TyperCommand):
 
 
 def join_values(arguments: Sequence[str]) -> list[str]:
-    """Joins three numbers after `--start` into one argument, and an address after `--foxglove`, or the usual one."""
+    """Joins three numbers after `--start` into one argument, and what may follow `--foxglove` and `--view`."""
     words, rest = list[str](), list(arguments)
     while rest:
         word = rest.pop(0)
@@ -104,6 +112,9 @@ def join_values(arguments: Sequence[str]) -> list[str]:
         elif word == _FOXGLOVE:
             given = rest and _WITH_PORT.fullmatch(rest[0])
             word = f"{_FOXGLOVE}={rest.pop(0) if given else _FOXGLOVE_ADDRESS}"
+        elif word == _VIEW:
+            given = rest and _NUMERIC.fullmatch(rest[0])
+            word = f"{_VIEW}={rest.pop(0) if given else _UNTIL_CTRL_C_S}"
         words.append(word)
     return words
 
@@ -190,6 +201,11 @@ def _typed_fields(model: Any = Request, part: str = "") -> Iterator[_Typed]:
 
 REQUEST_OPTIONS: Final = frozenset(each.name for each in _typed_fields()) - {"file", "out"}
 """Names of the options that make a request what it is, wherever its files go."""
+
+
+def stay_s(view: float) -> float | None:
+    """Time (s) that a page stays by the value of `--view`; None: until Ctrl-C."""
+    return None if view >= _UNTIL_CTRL_C_S else view
 
 
 def start_pose(text: str | None) -> Pose2D | None:

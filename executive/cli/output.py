@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import typer
 
 from skills.inputs.errors import InputError
-from skills.inputs.outside import LONGEST_ANSWER, LONGEST_TEXT, plain_text
+from skills.inputs.outside import LONGEST_ANSWER, LONGEST_TEXT, plain_text, writing
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -118,15 +118,6 @@ def refuse(error: InputError | OSError) -> NoReturn:
     for each in (refused, *refused.others):
         typer.echo(f"errand: {each}", err=True)
     raise typer.Exit(BAD_INPUT) from error
-
-
-@contextmanager
-def writing(file: Path, hint: str = "name another file") -> Iterator[None]:
-    """Raises InputError if the block cannot write a file or folder that the user names."""
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"cannot write it ({error.strerror})", hint=hint, file=file) from error
 
 
 @contextmanager

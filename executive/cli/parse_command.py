@@ -12,13 +12,13 @@ import typer
 
 import executive
 from executive.app.prepare.worlds import knowledge_of, open_world
-from executive.cli.output import BAD_INPUT, print_json, writing
+from executive.cli.output import BAD_INPUT, print_json
 from executive.language.explain import arcs_svg, explain, explanation_lines
 from executive.language.understand import Status, Understanding
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.steps import steps_to_yaml
 from skills.inputs.errors import InputError
-from skills.inputs.outside import read_text
+from skills.inputs.outside import read_text, writing
 
 
 class ParseFormat(StrEnum):

@@ -19,9 +19,9 @@ from executive.cli.options import (
     ROBOT,
     STORE,
     VIEW,
-    VIEW_FOR,
     VIEW_PORT,
     grouped,
+    stay_s,
     takes_request,
 )
 from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, terminal_answerer
@@ -52,18 +52,17 @@ def run(
     aloud: Annotated[
         bool, grouped(Group.OUTPUT, "--voice", help="Say aloud what the robot says, by espeak-ng.")
     ] = False,
-    view: VIEW = False,
-    view_for: VIEW_FOR = None,
+    view: VIEW = None,
     view_port: VIEW_PORT = 0,
     foxglove: FOXGLOVE = None,
     robot: ROBOT = None,
 ) -> None:
     """Runs a sentence or a mission file in the simulated world, or with a real robot."""
     refuse_unaddressed(request)
-    from executive.app.checker import prepare_checked
-    from executive.app.page_view import PageView, queue_function
-    from executive.app.real_robot import real_runner
-    from executive.app.runs import MissionRuns
+    from executive.app.prepare.checker import prepare_checked
+    from executive.app.runs.page_view import PageView, queue_function
+    from executive.app.runs.queue import MissionRuns
+    from executive.app.runs.real_robot import real_runner
     from executive.cli.listen_command import hear_request
     from executive.cli.screen import ConsoleScreen, voice_for
     from executive.record.work import Profile
@@ -82,15 +81,15 @@ def run(
         if listen_to is not None:
             request = replace(request, sentence=hear_request(listen_to, request, console=console))
         prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
-        page = page_of if view or view_for is not None else None
+        page = page_of if view is not None else None
         screen = ConsoleScreen(console, quiet, whole_tree, voice, page, live, timing)
         connection = real_runner(prepared, robot) if robot else nullcontext()
         with MissionStore(kept_in) as missions, missions.claim(), connection as runner:
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
             ended = MissionRuns(missions, screen, run=runner).run(mission, prepared)
     _tell(console, timing, ended.report if as_json else None)
-    if screen.shown_page is not None:
-        screen.shown_page.stay(0.0 if ended.hung_up else view_for)
+    if screen.shown_page is not None and view is not None:
+        screen.shown_page.stay(0.0 if ended.hung_up else stay_s(view))
     if not ended.achieved:
         raise typer.Exit(NOT_ACHIEVED)
 

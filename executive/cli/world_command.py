@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, StartCommand, start_pose
-from executive.cli.output import new_folder, writing
+from executive.cli.output import new_folder
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import inside
 from executive.words.zone import ZoneFacts
@@ -27,7 +27,7 @@ from plant.worlds.world import World, WorldError
 from skills.api import ZoneKind
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError, count_text, listing, suggestion
-from skills.inputs.outside import read_text
+from skills.inputs.outside import read_text, writing
 from skills.inputs.schema import first_error
 from skills.quantities import Angle, Coordinate, Opening, Quantity, Share, Speed
 from skills.robot import Pose2D

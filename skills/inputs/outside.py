@@ -1,16 +1,18 @@
-"""Guarded reading of foreign input: plain files below a size, texts that a user types or says, and JSON."""
+"""Guarded reading and writing: plain files below a size, texts that a user types or says, and JSON."""
 
 import json
 import os
 import re
 import stat
 import unicodedata
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 from skills.inputs.errors import InputError
 
-__all__ = ["file_beside", "is_file", "is_folder", "is_there", "plain_file", "read_bytes", "read_text"]
+__all__ = ["file_beside", "is_file", "is_folder", "is_there", "plain_file", "read_bytes", "read_text", "writing"]
 
 TEXT_BYTES: Final = 1_000_000
 """Most bytes of a text, unless a reader sets another limit."""
@@ -35,6 +37,15 @@ def is_folder(path: Path) -> bool:
 def is_there(path: Path) -> bool:
     """Returns whether a path exists; False as for `is_file`."""
     return os.path.exists(path)  # noqa: PTH110 (Path.exists raises for a name that is too long)
+
+
+@contextmanager
+def writing(file: Path, hint: str = "name another file") -> Iterator[None]:
+    """Raises InputError if the block cannot write a file or folder that the user names."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"cannot write it ({error.strerror})", hint=hint, file=file) from error
 
 
 def read_bytes(file: Path, *, most_bytes: int, hint: str = "name a file that exists", line: int | None = None) -> bytes:

@@ -44,7 +44,7 @@ def measure(repeat: int = 3, seed: int = 1, world: str = "flat"):
     rounds = []
     for _ in range(repeat):
         mission, plant = mission_factor(world, seed, "--no-record"), plant_factor(world, seed)
-        shown = mission_factor(world, seed, "--view", "--view-for", "0")
+        shown = mission_factor(world, seed, "--view", "0")
         rounds.append({"mission": mission, "recorded_and_shown": shown, "plant": plant, "ratio": mission / plant})
         tell(rounds[-1])
     return {name: quantile([each[name] for each in rounds]) for name in rounds[0]}

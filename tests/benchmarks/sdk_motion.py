@@ -31,9 +31,9 @@ from errand_spot.messages import frame_tree, seconds, transform
 from errand_spot.server.commands import RobotCommandService
 from errand_spot.server.identity import credentials
 from errand_spot.server.server import Options, SpotServer
-from executive.app.placed_robots import only_robot
-from executive.app.simulated import compile_first, simulate
-from executive.app.worlds import open_world
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.prepare.worlds import open_world
+from executive.app.runs.simulated import compile_first, simulate
 from plant.simulation import Simulation
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Pose2D

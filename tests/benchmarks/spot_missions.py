@@ -16,12 +16,12 @@ from lock_step import LockStep
 
 from errand_spot.perception import SpotPerception
 from errand_spot.server.identity import credentials
-from executive.app.goal_conditions import verdict_of
-from executive.app.mission_run import run_request
-from executive.app.placed_robots import robot_stack
-from executive.app.prepare import prepare
-from executive.app.real_robot import RealBackend
-from executive.app.simulated import simulate
+from executive.app.prepare.from_request import prepare
+from executive.app.prepare.placed_robots import robot_stack
+from executive.app.runs.goal_conditions import verdict_of
+from executive.app.runs.one_run import run_request
+from executive.app.runs.real_robot import RealBackend
+from executive.app.runs.simulated import simulate
 from executive.mission.request import Request
 from skills.robot import ConnectedRobot
 from tests.benchmarks.errand_process import ROOT

@@ -18,7 +18,7 @@ import typer
 from errand_spot.adapter.connection import Address, Connection, LostError, WallClock
 from errand_spot.adapter.robot import PRESSED, ApiRobot
 from plant.robots.spot.kind import spot_capabilities
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.quantities import Margin
 from skills.robot import Clock, CommandId, CommandState, ConnectedRobot, LeaseError, Robot, RobotStoppedError
 

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from executive.cli.number_options import quantity_option
-from executive.cli.output import console_for, writing
+from executive.cli.output import console_for
 from skills.inputs.errors import InputError
+from skills.inputs.outside import writing
 from skills.quantities import Port, Seed
 
 if TYPE_CHECKING:
@@ -134,10 +135,9 @@ def _write_graph(world: World, folder: Path) -> None:
     """Writes a GraphNav map of a world. Raises InputError."""
     from errand_spot.perception import world_map
     from errand_spot.server.graph_map import write_map
-    from executive.app.placed_robots import DEFAULT_KIND
 
     with writing(folder, "name another --graph"):
-        write_map(world_map(world, DEFAULT_KIND), folder)
+        write_map(world_map(world), folder)
 
 
 @contextmanager
@@ -151,9 +151,9 @@ def _server(
     from errand_spot.server.estop import Tablet
     from errand_spot.server.identity import credentials
     from errand_spot.server.server import Options, SpotServer
-    from executive.app.placed_robots import only_robot
-    from executive.app.simulated import compile_first, simulate
-    from executive.app.worlds import knowledge_of, open_world
+    from executive.app.prepare.placed_robots import only_robot
+    from executive.app.prepare.worlds import knowledge_of, open_world
+    from executive.app.runs.simulated import compile_first, simulate
     from plant.models.catalogue import user_cache
     from skills.geometry import compose, inverse
     from skills.manipulation.arm.kinematics import arm_model

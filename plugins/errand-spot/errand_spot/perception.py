@@ -11,9 +11,9 @@ import numpy as np
 
 from errand_spot.server.computer import SeenTag
 from errand_spot.server.graph_map import GraphMap, map_of
-from executive.app.worlds import knowledge_of
+from executive.app.prepare.worlds import knowledge_of
 from executive.words.slug import slug
-from plant.robots.robot_kind import robot_kind
+from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.world import World
 from skills.api import FreeSpace, LocalisationEstimate, PlanningError
 from skills.estimate.costmap import CostmapOptions
@@ -90,12 +90,12 @@ def _grid(points_S: FloatArray) -> GridMap:
     return GridMap(occupied, cell_m, (float(origin[0]), float(origin[1])), height_band_m=_HEIGHTS_M)
 
 
-def world_map(world: World, kind: str) -> GraphMap:
+def world_map(world: World) -> GraphMap:
     """Returns a GraphNav map of a world: waypoints along the paths from its start to its places, with their points.
 
     Its seed frame is the world's frame. Raises InputError when the world's maps or knowledge cannot be read.
     """
-    knowledge, capabilities = knowledge_of(world), robot_kind(kind).capabilities()
+    knowledge, capabilities = knowledge_of(world), spot_capabilities()
     keepout, grid = load_grid_map(world.keepout_map_path), load_grid_map(world.scan_map_path)
     costmap, footprint = CostmapOptions().build(keepout), Footprint.of(capabilities)
     waypoints, edges = {"start": world.start}, set[tuple[str, str]]()

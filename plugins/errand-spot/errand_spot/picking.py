@@ -14,8 +14,16 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
 from executive.run.worker import LockStepWorker
-from skills.api import Cause, Failed, LocalisationEstimate, ObjectKind, ObjectObservation, Running, SkillContext
-from skills.detection import Detection
+from skills.api import (
+    Cause,
+    Detection,
+    Failed,
+    LocalisationEstimate,
+    ObjectKind,
+    ObjectObservation,
+    Running,
+    SkillContext,
+)
 from skills.manipulation.grasp.candidates import GraspCandidate
 from skills.manipulation.grasp.skill import Grasp
 from skills.perception.class_forms import ANY_OBJECT

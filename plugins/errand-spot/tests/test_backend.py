@@ -26,7 +26,7 @@ from errand_spot.backend import Access, connected
 from errand_spot.server import computer, identity, keepalive
 from errand_spot.server.computer import Motors
 from errand_spot.server.estop import Tablet
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import Pose2D, RobotStoppedError
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from errand_spot.localiser import GraphNav
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import OwnLocalisation, Pose2D
 from skills.stack import stack_of
 from skills.testing.clock import VirtualClock

@@ -17,9 +17,9 @@ from errand_spot.messages import timestamp
 from errand_spot.perception import SpotPerception, world_map
 from errand_spot.server.faults import Fault
 from errand_spot.server.identity import credentials
-from executive.app.placed_robots import only_robot
-from executive.app.simulated import simulate
-from executive.app.worlds import open_world
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.prepare.worlds import open_world
+from executive.app.runs.simulated import simulate
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.control_state import Mode
@@ -57,7 +57,7 @@ def tablet_at(step):
 def localised_by_a_person(step):
     """Uploads a map of the flat and localises the robot at its start, as a person does with a tablet."""
     robot = tablet_at(step)
-    client, flat = robot.ensure_client(GraphNavClient.default_service_name), world_map(open_world("flat"), "spot")
+    client, flat = robot.ensure_client(GraphNavClient.default_service_name), world_map(open_world("flat"))
     client.upload_graph(graph=flat.graph)
     for snapshot in flat.waypoint_snapshots.values():
         client.upload_waypoint_snapshot(snapshot)
@@ -100,7 +100,7 @@ def test_graph_nav_takes_the_robot_into_another_room(tmp_path):
 
         Status = graph_nav_pb2.NavigationFeedbackResponse
         step.until(lambda: status() != Status.STATUS_FOLLOWING_ROUTE, 60.0, every_s=0.2)
-        truth, there = made[0].true_pose("Alice"), world_map(world, "spot").poses("start")["kitchen"].translation()
+        truth, there = made[0].true_pose("Alice"), world_map(world).poses("start")["kitchen"].translation()
         assert status() == Status.STATUS_REACHED_GOAL
         assert (truth.x_m, truth.y_m) == pytest.approx((there[0], there[1]), abs=0.14)  # 0.2 m in all
     finally:

@@ -7,7 +7,7 @@ pytest.importorskip("bosdyn.client", reason="not installed: pip install errand-s
 
 from errand_spot.perception import SpotPerception, world_map
 from errand_spot.server.graph_map import write_map
-from executive.app.worlds import open_world
+from executive.app.prepare.worlds import open_world
 from skills.robot import Pose2D
 from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock
@@ -18,7 +18,7 @@ ROOM = [Block(2.0, -2.0, 2.2, 2.0), Block(-1.5, 2.0, 2.0, 2.2), Block(-1.5, -2.2
 
 @pytest.fixture(scope="module")
 def flat():
-    return world_map(open_world("flat"), "spot")
+    return world_map(open_world("flat"))
 
 
 @pytest.fixture

@@ -1,8 +1,59 @@
+"""Warming up compiles all that a mission needs, and what plug-ins register in the group `errand.kernels`."""
+
 import os
 import subprocess
 import sys
+from importlib.metadata import entry_points
 
 import pytest
+
+from executive.app.kernels import kernel_steps
+from skills.inputs.errors import InputError
+from tests.executive.distribution import write_distribution
+
+SAILS = """
+import numba
+
+@numba.njit
+def area(width):
+    return 2.0 * width
+
+def warm():
+    area(1.0)
+
+def torn():
+    raise RuntimeError("the sail is torn")
+"""
+
+
+@pytest.fixture
+def install(tmp_path, monkeypatch):
+    """Makes a distribution that registers kernels."""
+    (tmp_path / "sails.py").write_text(SAILS)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr("skills.inputs.plugins._all_installed", entry_points)
+    yield lambda *kernels: write_distribution(tmp_path, "sails", "errand.kernels", *kernels)
+    sys.modules.pop("sails", None)
+
+
+def sails():
+    """The steps of the distribution."""
+    return [step for step in kernel_steps() if "sails" in str(step)]
+
+
+def test_warming_up_runs_the_kernels_of_plug_ins(install):
+    assert sails() == []
+    install("sails = sails:warm")
+    (step,) = sails()
+    step()
+    assert len(sys.modules["sails"].area.signatures) == 1
+
+
+def test_a_kernel_that_fails_is_refused_with_its_distribution(install):
+    install("sails = sails:torn")
+    (step,) = sails()
+    with pytest.raises(InputError, match=r"cannot compile 'sails' \(sails:torn\) of sails: .*the sail is torn"):
+        step()
 
 
 @pytest.mark.nightly

@@ -108,6 +108,21 @@ def test_a_start_is_one_word_or_three_numbers(words, value):
     assert (context.params["start"], str(context.params["file"])) == (value, "missions/go_to_pose.yaml")
 
 
+@pytest.mark.parametrize(
+    ("words", "value"),
+    [
+        (["--quiet"], None),
+        (["--view"], 1e9),
+        (["--view", "--quiet"], 1e9),
+        (["--view", "3.5"], 3.5),
+        (["--view=0"], 0.0),
+    ],
+)
+def test_a_view_has_a_time_or_stays_until_the_user_ends_it(words, value):
+    context = shipped_command("run").make_context("run", [*words, "missions/go_to_pose.yaml"])
+    assert (context.params["view"], str(context.params["file"])) == (value, "missions/go_to_pose.yaml")
+
+
 def test_the_version_is_that_of_the_distribution():
     assert errand("--version").stdout == f"errand {version('spot-errand')}\n"
 

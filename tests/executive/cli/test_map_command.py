@@ -6,7 +6,7 @@ import sys
 import cv2
 import pytest
 
-from executive.cli.map_command import _route_points
+from executive.app.runs.map_drive import route_points
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from tests.executive.cli.calls import done, errand, json_of, refusal, write_room
@@ -51,14 +51,14 @@ def test_a_map_is_built_along_a_route_goes_on_and_carries_a_mission(room, tmp_pa
 @pytest.mark.parametrize("text", ["1.0 2.0\n3 4\n", "[[1.0, 2.0], [3, 4]]", "- [1, 2]\n- [3, 4]\n", "1,2\n3,4 # end\n"])
 def test_a_route_is_lines_or_a_list(tmp_path, text):
     (tmp_path / "route").write_text(text)
-    assert _route_points(tmp_path / "route") == [(1.0, 2.0), (3.0, 4.0)]
+    assert route_points(tmp_path / "route") == [(1.0, 2.0), (3.0, 4.0)]
 
 
 @pytest.mark.parametrize("text", ["", "1 2 3\n", "here there\n", "[[1, .nan]]", "[[1, 2], 3]", "{x: 1}"])
 def test_a_file_that_is_no_route_is_refused(tmp_path, text):
     (tmp_path / "route").write_text(text)
     with pytest.raises(InputError, match="it is not a route"):
-        _route_points(tmp_path / "route")
+        route_points(tmp_path / "route")
 
 
 def test_without_its_extra_it_says_what_to_install(room, tmp_path, monkeypatch):

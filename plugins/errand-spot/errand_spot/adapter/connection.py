@@ -18,7 +18,7 @@ from bosdyn.api.spot import door_pb2
 
 from errand_spot.adapter.statuses import call_trouble, response_trouble, trouble
 from errand_spot.messages import seconds
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import CommandCause
 
 CLIENT: Final = "errand"

@@ -19,7 +19,7 @@ from errand_spot.adapter.readings import picture
 from errand_spot.adapter.robot import ApiRobot
 from errand_spot.server.faults import Fault
 from plant.robots.spot.kind import spot_capabilities
-from skills.files.errors import InputError
+from skills.inputs.errors import InputError
 from skills.robot import ArmTrajectory, CommandCause, CommandState, FrameTree, LeaseError, NoImageError
 from skills.testing.blocks import Block
 from tests.tables import table

@@ -14,9 +14,9 @@ from errand_spot.picking import PointPicker
 from errand_spot.server.calls import Call
 from errand_spot.server.computer import Motors, Pace
 from errand_spot.server.server import Options, SpotServer
-from executive.app.placed_robots import only_robot
-from executive.app.simulated import simulate
-from executive.app.worlds import open_world
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.prepare.worlds import open_world
+from executive.app.runs.simulated import simulate
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Pose2D
 

@@ -96,7 +96,7 @@ def test_a_shipped_mission_is_queued_for_later_with_its_parameters(prepared, tmp
 @pytest.mark.mission
 def test_a_mission_is_told_to_the_page_while_it_runs_and_after(tmp_path):
     said = ["--say", "go to the living room", "--no-wake", "--quiet", "--no-record", "--json"]
-    command = [sys.executable, "-m", "executive.cli", "run", *said, "--view-for", "0.5", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "executive.cli", "run", *said, "--view", "0.5", "--out", str(tmp_path)]
     told: list[dict] = []
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None and process.stdout is not None

@@ -32,7 +32,7 @@ def run(tmp_path, monkeypatch):
     write_distribution(tmp_path, project["name"], group, *(f"{name} = {value}" for name, value in entries.items()))
     (tmp_path / "errand_turtle.py").write_text(files["errand_turtle.py"])
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr("skills.files.plugins._all_installed", entry_points)
+    monkeypatch.setattr("skills.inputs.plugins._all_installed", entry_points)
     yield ["run", "--say", "say hello", "--out", tmp_path / "out", "--quiet", "--robot"]
     sys.modules.pop("errand_turtle", None)
 

@@ -15,14 +15,14 @@ from urllib.parse import parse_qsl
 
 from yaml import YAMLError
 
-from executive.app.artifacts import Artifacts
-from executive.app.backend import Durable
-from executive.app.goal_conditions import Share
-from executive.app.mission_run import FinishedRun, run_request
-from executive.app.placed_robots import robot_stack
-from executive.app.prepared import Prepared
-from executive.app.signals import ended_by_signals
-from executive.app.simulated import compile_first, run_entry
+from executive.app.prepare.placed_robots import robot_stack
+from executive.app.prepare.prepared import Prepared
+from executive.app.report.artifacts import Artifacts
+from executive.app.runs.backend import Durable
+from executive.app.runs.goal_conditions import Share
+from executive.app.runs.one_run import FinishedRun, run_request
+from executive.app.runs.signals import ended_by_signals
+from executive.app.runs.simulated import compile_first, run_entry
 from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.outcome import RobotResult
@@ -31,8 +31,8 @@ from executive.run.worker import ThreadWorker
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
 from plant.worlds.world import World
-from skills.files.errors import InputError
-from skills.files.yaml_source import scalar_of
+from skills.inputs.errors import InputError
+from skills.inputs.yaml_source import scalar_of
 from skills.robot import Clock, ConnectedRobot, Pose2D
 from skills.stack import RobotStack, StackError, robot_backend
 

@@ -24,10 +24,10 @@ LINES = {
     "executive/testing": 849,
     "executive/app": 8343,
     "executive/cli": 5031,
-    "skills": 30194,
+    "skills": 30182,
     "plant": 22156,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 517, 93, 13
+MODULES, ONE_IMPORTER, SAME_NAME = 505, 93, 13
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

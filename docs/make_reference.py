@@ -92,7 +92,7 @@ SCHEMA_PAGES = (
         "Skill tests",
         "`*.skilltest.yaml`: tests of one skill as data, collected by pytest.",
         SkillTestFile,
-        "tests/skills/manipulation/stow/stow.skilltest.yaml",
+        "tests/skills/manipulation/stow.skilltest.yaml",
     ),
 )
 

@@ -54,7 +54,7 @@ class BackOffInputs:
 class BackOffPorts(Skill[BackOffInputs]):
     """Drives a short distance out of a tight place: straight, slowly, in the first direction with enough clearance."""
 
-    done_by: ClassVar[str] = "skills.back_off.skill:BackOff"
+    done_by: ClassVar[str] = "skills.small.back_off:BackOff"
     name: ClassVar[str] = "back_off"
     Inputs: ClassVar[type] = BackOffInputs
     uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
@@ -78,7 +78,7 @@ class RelocaliseInputs:
 class RelocalisePorts(Skill[RelocaliseInputs]):
     """Finds the robot's pose on the map again. A pose counts once new scans agree with it for a second."""
 
-    done_by: ClassVar[str] = "skills.relocalise.skill:Relocalise"
+    done_by: ClassVar[str] = "skills.small.relocalise:Relocalise"
     name: ClassVar[str] = "relocalise"
     Inputs: ClassVar[type] = RelocaliseInputs
     uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
@@ -155,7 +155,7 @@ class FindPeopleInputs:
 class FindPeoplePorts(Skill[FindPeopleInputs]):
     """Looks for people with body cameras and LiDAR; with the LiDAR alone if the detector has no class of people."""
 
-    done_by: ClassVar[str] = "skills.find_people.skill:FindPeople"
+    done_by: ClassVar[str] = "skills.people.find_people:FindPeople"
     name = "find_people"
     Inputs = FindPeopleInputs
     uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
@@ -188,7 +188,7 @@ class MeetPersonInputs:
 class MeetPersonPorts(Skill[MeetPersonInputs]):
     """Goes beside a person, also if they move on, and faces them. The output `person` is where they are."""
 
-    done_by: ClassVar[str] = "skills.meet_person.skill:MeetPerson"
+    done_by: ClassVar[str] = "skills.people.meet_person:MeetPerson"
     name = "meet_person"
     Inputs = MeetPersonInputs
     uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
@@ -221,7 +221,7 @@ class GuidePersonInputs:
 class GuidePersonPorts(Skill[GuidePersonInputs]):
     """Goes ahead of a person to a place: at their pace, waits for them, and goes back for them."""
 
-    done_by: ClassVar[str] = "skills.guide_person.skill:GuidePerson"
+    done_by: ClassVar[str] = "skills.people.guide_person:GuidePerson"
     name = "guide_person"
     Inputs = GuidePersonInputs
     uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE, Part.VOICE})
@@ -254,7 +254,7 @@ class FollowPersonInputs:
 class FollowPersonPorts(Skill[FollowPersonInputs]):
     """Keeps behind a walking person by LiDAR and body cameras; searches for a person whom it has lost, and asks."""
 
-    done_by: ClassVar[str] = "skills.follow_person.skill:FollowPerson"
+    done_by: ClassVar[str] = "skills.people.follow_person:FollowPerson"
     name = "follow_person"
     Inputs = FollowPersonInputs
     uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE, Part.VOICE})
@@ -416,7 +416,7 @@ class PoseArmInputs:
 class PoseArmPorts(Skill[PoseArmInputs]):
     """Moves the arm on a free path to joint angles, then the gripper to an opening."""
 
-    done_by: ClassVar[str] = "skills.manipulation.pose_arm.skill:PoseArm"
+    done_by: ClassVar[str] = "skills.manipulation.pose_arm:PoseArm"
     name = "pose_arm"
     Inputs = PoseArmInputs
     uses: ClassVar[frozenset[Part]] = frozenset({Part.ARM})
@@ -437,7 +437,7 @@ class StowInputs:
 class StowPorts(Skill[StowInputs]):
     """Brings the arm near the body, and the body to its usual height. An arm that is near the body stays there."""
 
-    done_by: ClassVar[str] = "skills.manipulation.stow.skill:Stow"
+    done_by: ClassVar[str] = "skills.manipulation.stow:Stow"
     name = "stow"
     Inputs = StowInputs
     uses: ClassVar[frozenset[Part]] = frozenset({Part.ARM})

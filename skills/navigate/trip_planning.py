@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from skills.api import Cause, ClearableCostmap, Job, SkillContext
 from skills.geometry import compose
 from skills.navigate.cut_off import closed_doors_sentence
+from skills.navigate.door_openers import DoorCalls
 from skills.navigate.giving_way import Avoided
 from skills.navigate.path import Path
 from skills.navigate.planner import LatticePlanner
 from skills.navigate.surroundings import NavigateOptions, Surroundings
 from skills.navigate.zones import zones_sentence
-from skills.open_door.openers import DoorCalls
 from skills.ports import NavigateInputs
 from skills.robot import Pose2D
 from skills.routine import Patience, SkillFailure

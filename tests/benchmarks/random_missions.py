@@ -39,8 +39,8 @@ from executive.words.mission import Mission
 from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
 from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Together, Try, While
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectKind, ObjectObservation, Part, Running, Skill, Succeeded
-from skills.check_door.skill import CheckDoorInputs
 from skills.inputs.errors import InputError
+from skills.small.check_door import CheckDoorInputs
 from tests.benchmarks.harness import command
 from tests.benchmarks.scripted_world import WORLD, Clock, ScriptedWorld, expected
 from tests.executive.conftest import GRIPPER, PORTS, EmptyCostmap, Script, StandingRobot, StillLocaliser, VirtualClock

@@ -8,7 +8,6 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, InputsT, Surface
-from skills.back_off.skill import BackOff
 from skills.manipulation.arm.collision import Box
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, towards_shoulder
 from skills.manipulation.arm.releasing_skill import ReleasingSkill
@@ -20,6 +19,7 @@ from skills.perception.surface_segmentation import segment_surface
 from skills.ports import BackOffInputs
 from skills.robot import FloatArray, Image
 from skills.routine import Routine, SkillFailure
+from skills.small.back_off import BackOff
 
 LOOKS = 3
 """Number of views of a head camera of the place where it saw nothing."""

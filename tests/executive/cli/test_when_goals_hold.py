@@ -14,8 +14,8 @@ from executive.words.leaf_steps import Awaited, CallSkill, Check, Do, DoorToOpen
 from executive.words.mission import Mission
 from executive.words.steps import Choose, Group, Loop, Repeat, Try, While
 from skills.api import Cause, Failed, Succeeded
-from skills.check_door.skill import CheckDoorInputs
-from skills.speak.skill import Speak
+from skills.small.check_door import CheckDoorInputs
+from skills.small.speak import Speak
 from tests.executive.conftest import KNOWLEDGE, scripted_skill
 from tests.tables import yaml_beside
 

@@ -5,12 +5,12 @@ import pytest
 from planar_robot import TWO_ROOMS, Bench, Box
 
 from skills.api import Cause, Failed, Succeeded
-from skills.back_off.skill import BackOff, BackOffInputs
 from skills.faults.faulty_robot import inject_faults
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, WatchOptions, low_points
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 from skills.robot_wrapper import RobotWrapper
+from skills.small.back_off import BackOff, BackOffInputs
 
 START = Pose2D(1.5, 5.4, 0.0)
 SHOE_BOX = Box(2.8, 5.2, 3.1, 5.6, 0.0, 0.15)

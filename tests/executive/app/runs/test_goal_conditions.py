@@ -13,7 +13,7 @@ from executive.words.leaf_steps import CallSkill, Do, Speak, UseMission
 from executive.words.mission import Mission
 from executive.words.policy import OnFailure, Policy
 from executive.words.steps import Loop, Repeat
-from skills.speak.skill import Speak as SpeakSkill
+from skills.small.speak import Speak as SpeakSkill
 from tests.tables import yaml_beside
 
 

@@ -9,15 +9,15 @@ from executive.tree.plan import PlanBuilder
 from executive.words import leaf_steps as model
 from executive.words.command import Command
 from executive.words.knowledge import Door, Knowledge
-from skills.back_off.skill import BackOff
-from skills.check_door.skill import CheckDoor
-from skills.clear_costmap.skill import ClearCostmap
 from skills.inputs.errors import InputError
+from skills.navigate.door_openers import HttpDoor
 from skills.navigate.skill import Navigate
-from skills.open_door.openers import HttpDoor
-from skills.open_door.skill import OpenDoor
 from skills.perception.doorway import DoorState, Doorway
 from skills.robot import Pose2D
+from skills.small.back_off import BackOff
+from skills.small.check_door import CheckDoor
+from skills.small.clear_costmap import ClearCostmap
+from skills.small.open_door import OpenDoor
 from tests.executive.tree.scripted import Leaf
 
 SKILLS = {skill.name: skill for skill in (Navigate, CheckDoor, ClearCostmap, BackOff)}

@@ -1,1 +1,0 @@
-"""The check_door skill."""

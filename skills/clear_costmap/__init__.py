@@ -1,1 +1,0 @@
-"""The clear_costmap skill."""

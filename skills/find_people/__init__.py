@@ -1,1 +1,0 @@
-"""The find_people skill: looks for people around the robot."""

@@ -1,1 +1,0 @@
-"""The follow_person skill: keeps behind a walking person."""

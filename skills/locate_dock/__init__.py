@@ -1,1 +1,0 @@
-"""The locate_dock skill."""

@@ -1,1 +1,0 @@
-"""The pose_arm skill."""

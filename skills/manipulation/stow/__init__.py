@@ -1,1 +1,0 @@
-"""The stow skill."""

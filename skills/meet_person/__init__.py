@@ -1,1 +1,0 @@
-"""The meet_person skill: goes beside a person."""

@@ -1,1 +1,0 @@
-"""The open_door skill, and plug-ins that open doors."""

@@ -1,0 +1,1 @@
+"""Skills that find, meet, follow and guide people."""

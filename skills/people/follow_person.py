@@ -1,0 +1,446 @@
+"""The follow_person skill: keeps behind a walking person, searches for a person whom it has lost, and asks."""
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from skills.api import Cause, ClearableCostmap, Failed, Running, SkillContext, Succeeded
+from skills.geometry import bearing_rad, inside_polygon, wrap
+from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
+from skills.navigate.giving_way import GivingWayOptions, pose_aside
+from skills.navigate.skill import Navigate
+from skills.navigate.surroundings import Company
+from skills.navigate.trip_planning import place_text
+from skills.people.followed_person import (
+    Target,
+    TargetOptions,
+    is_addressed,
+    line_through,
+    people_about,
+    poses_around,
+    poses_behind,
+    poses_beyond,
+)
+from skills.perception.doorway import Doorway
+from skills.perception.people import SeenPerson
+from skills.perception.people_tracking import PeopleOptions, PeopleWatch
+from skills.ports import FollowPersonInputs, FollowPersonPorts, NavigateInputs
+from skills.quantities import Delay, Duration, Factor, Length, Speed, Tries, Turn
+from skills.robot import FloatArray, Pose2D
+from skills.routine import Routine, SkillFailure
+from skills.small.speak import ListeningSkill, say
+
+_SURELY_M = 0.1
+"""Distance of a person from the edge of a place at which they are certainly in it."""
+_SAME_PLACE_M = 1.5
+"""Distance from the place where the person was seen last at which somebody is that person."""
+_WALKS_M_S, _THERE_M, _SEEN_S, _LOCKED = 0.25, 0.4, 0.6, 3
+_TRIED_AGAIN = (Cause.PLANNING, Cause.POSTCONDITION, Cause.EXECUTION)
+_CLEARED, _CLEARED_M, _LEFT_M = 20, 0.45, 0.7
+"""Last points of the trail about which the costmap is cleared, radius, and their least distance from the person."""
+_PERSON_M, _ASIDE_M, _BY_DOOR_M = 0.3, 4.0, 1.2
+"""Radius of a person on a path, reach of the search for a pose aside from it, and distance from a doorway."""
+
+
+@dataclass(frozen=True)
+class FollowPersonOptions:
+    """Distances (m) between the middles of robot and person, and patience (s).
+
+    The robot drives to `behind_m` behind where the person will be in `ahead_s`, plans again every `replan_s`, and slows
+    down so that it stands at `close_m`. It stays where it is while a standing person is within `near_m`, and turns to
+    one who is more than `turn_rad` to the side. For a person who comes towards it within `meeting_m`, it goes aside for
+    `aside_s` at most. A person who stays hidden for `lost_s` is lost, or for `gone_s` once the robot stands where they
+    were seen last: the robot says so, searches beyond `doors` doors and in the named place, each for `search_s` or
+    `plans` plans `again_s` apart, then asks and listens for `asking_s`. Somebody who may be another is asked for the
+    name within `hearing_m`, with `answer_s` for the answer, and is another after so many `silences`. The robot also
+    asks a person who stands outside the named place for `standing_s`. At the beginning it looks for the person for
+    `finding_s`. It fails after `tries` drives in a row that failed, and at the end
+    if the person was out of its sight for longer than `longest_loss_s`.
+    """
+
+    behind_m: Length = 1.6
+    close_m: Length = 1.35
+    near_m: Length = 2.0
+    meeting_m: Length = 2.5
+    aside_s: Delay = 5.0
+    ahead_s: Duration = 0.8
+    replan_s: Duration = 0.5
+    gain: Factor = 1.0
+    lost_s: Delay = 6.0
+    gone_s: Delay = 1.5
+    finding_s: Delay = 8.0
+    asking_s: Delay = 12.0
+    search_s: Delay = 20.0
+    plans: Tries = 6
+    again_s: Duration = 1.0
+    hearing_m: Length = 2.8
+    answer_s: Delay = 5.0
+    standing_s: Delay = 30.0
+    silences: Tries = 2
+    doors: Tries = 3
+    tries: Tries = 60
+    longest_loss_s: Delay = 20.0
+    max_speed_m_s: Speed = 1.2
+    ahead_rad: Turn = 1.2
+    turn_rad: Turn = 0.6
+    ahead_m: Length = 4.0
+    target: TargetOptions = field(default_factory=TargetOptions)
+    people: PeopleOptions = field(default_factory=lambda: PeopleOptions(period_s=1.0, idle_s=4.0, track_m=7.0))
+
+
+def _at_pace(context: SkillContext, max_speed_m_s: float) -> SkillContext:
+    """The context with a controller that drives as fast as people walk, if it has a speed limit of its own."""
+    controller: Any = context.stack.controller
+    if not hasattr(controller, "max_speed_m_s"):
+        return context
+    limit_m_s = min(max_speed_m_s, context.robot.capabilities().max_speed_m_s)
+    return replace(context, stack=replace(context.stack, controller=replace(controller, max_speed_m_s=limit_m_s)))
+
+
+class _Told(Exception):  # noqa: N818 - no program error
+    """Somebody told the robot to end."""
+
+
+class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
+    """Implementation of `FollowPersonPorts`; the navigate skill drives."""
+
+    Options: ClassVar[type] = FollowPersonOptions
+    options: FollowPersonOptions
+
+    def __init__(self, context: SkillContext, options: FollowPersonOptions | None = None) -> None:
+        super().__init__(context, options)
+        self._target: Target | None = None
+        self._company = Company(PeopleWatch(context, self.options.people))
+        self._navigate = Navigate(_at_pace(context, self.options.max_speed_m_s), None, self._company)
+        self._goal: Pose2D | None = None
+        self._aside: Pose2D | None = None
+
+    def begin(self, inputs: FollowPersonInputs) -> None:
+        """Starts to look for the person."""
+        super().begin(inputs)
+        self._inputs, self._limit_s = inputs, self.context.clock.now() + inputs.time_limit_s
+        self._outline, self._tries, self._silences = ArmFootprint(self.context).now(), 0, 0
+        self._planned_s = self._aside_until_s = -math.inf
+        self._aside, self._made_way = None, False
+        self._company.watch = PeopleWatch(self.context, self.options.people)
+
+    def end(self) -> None:
+        """Stops the base, and listens no longer."""
+        self._halt()
+        super().end()
+
+    def suspend(self) -> None:
+        """Stops the base; the person may walk on."""
+        self._halt()
+        super().suspend()
+
+    def resume(self, inputs: FollowPersonInputs) -> None:
+        """Looks for the person again, first where they were seen last."""
+        last_W = inputs.place_W if self._target is None else self._target.place_W(self.context.clock.now())
+        self.begin(replace(inputs, place_W=last_W))
+
+    def run(self, inputs: FollowPersonInputs) -> Routine[Succeeded]:
+        """Finds the person and keeps behind them to the end. Raises SkillFailure."""
+        try:
+            self._target = yield from self._find(inputs)
+            while not (yield from self._keep_behind(self._target)):
+                self._target.doubt()
+                yield from self._search(self._target)
+        except _Told as told:
+            return Succeeded(f'stopped following {self._inputs.person} when told "{told}"')
+        self._halt()
+        yield from self.pause(0.5, "coming to rest")
+        if (lost_s := self._target.longest_loss_s) > self.options.longest_loss_s:
+            why = f"is with {inputs.person} in the {inputs.until}, but had lost them for {lost_s:.0f} s on the way"
+            raise SkillFailure(Cause.POSTCONDITION, why)
+        return Succeeded(f"followed {self._inputs.person} to the {inputs.until or 'place'}")
+
+    def _now(self) -> float:
+        return self.context.clock.now()
+
+    def _tick(self, message: str) -> Routine[None]:
+        """Waits for the next tick; looks for people and listens. Raises SkillFailure at the time limit, and _Told."""
+        yield Running(message)
+        company = self._company
+        company.watch.step(np.zeros(3))
+        if self._target is not None:
+            self._target.update(company.watch.tracks(), company.others(), self._now())
+            company.track = self._target.seen.track
+        if self.remark is not None:
+            raise _Told(self.remark)
+        if self._now() > self._limit_s:
+            for_s = f"for {self._inputs.time_limit_s:.0f} s"
+            raise SkillFailure(Cause.TIMEOUT, f"followed {self._inputs.person} {for_s}")
+
+    def _find(self, inputs: FollowPersonInputs) -> Routine[Target]:
+        """Looks for the person to follow. Raises SkillFailure when nobody is seen."""
+        self._target, begun_s = None, self._now()
+        while self._now() < begun_s + self.options.finding_s:
+            waited = self._now() - begun_s > 0.25 * self.options.finding_s
+            if (first := self._first(inputs, waited)) is not None:
+                say(self.context, "I follow you.")
+                return Target(first, self.context.pose(), self.options.target)
+            yield from self._tick(f"looking for {self._inputs.person}")
+        where = "ahead" if inputs.place_W is None else f"at {place_text(inputs.place_W)}"
+        raise SkillFailure(Cause.PRECONDITION, f"nobody is seen {where}, so {self._inputs.person} cannot be followed")
+
+    def _first(self, inputs: FollowPersonInputs, waited: bool) -> SeenPerson | None:
+        """The nearest person ahead, or at the place of the inputs; a standing one without a picture after a wait."""
+        tracks, ahead_rad = self._company.watch.tracks(), self.options.ahead_rad
+        reach_m = self.options.ahead_m if inputs.place_W is None else _SAME_PLACE_M * (2.0 if waited else 1.0)
+        near = people_about(tracks, self.context.pose(), inputs.place_W, reach_m, ahead_rad)
+        sure = {one.track for one in self._company.others()}
+        known = [one for one in near if waited or one.track in sure]
+        return min(known, key=lambda one: one.track not in sure, default=None)
+
+    def _keep_behind(self, target: Target) -> Routine[bool]:
+        """Follows until the person stands in the place (True), or is lost (False)."""
+        place = self._inputs.until_W
+        while (hidden_s := target.hidden_s(self._now())) < self.options.lost_s:
+            if hidden_s > self.options.gone_s and self._goal is None:
+                return False
+            here, seen_W = self.context.pose(), target.seen.place_W
+            if target.doubted is not None and not (yield from self._is_right(target, target.doubted)):
+                return False
+            near = not hidden_s and math.dist((here.x_m, here.y_m), seen_W) < self.options.near_m + 0.5
+            rests = near and target.doubted is None and target.stands_still(self._now())
+            if rests and place and inside_polygon(np.array([seen_W]), place, -_SURELY_M).all():
+                return True
+            if rests and target.standing_s(self._now()) > self.options.standing_s:
+                target.doubt()
+            if self._now() >= self._planned_s + self.options.replan_s:
+                self._planned_s = self._now()
+                self._clear_trail(target, hidden_s)
+                self._plan(self._next_pose(target, hidden_s))
+            self._company.most_m_s = math.inf if hidden_s else self._speed_m_s(target)
+            doing = f"following {self._inputs.person}" if not hidden_s else f"going to where {self._inputs.person} went"
+            yield from self._tick(self._drive(doing))
+        return False
+
+    def _is_right(self, target: Target, before: SeenPerson) -> Routine[bool]:
+        """Asks a doubted person for their name, unless somebody else may answer.
+
+        Who says no or nothing, so often, is the person no longer.
+        """
+        here, seen, stands = self.context.pose(), target.seen, target.stands_still(self._now())
+        tracks = [one for one in self._company.watch.tracks() if one.stamp_s > self._now() - _SEEN_S]
+        near = people_about(tracks, here, None, self.options.hearing_m, math.pi)
+        if self._inputs.place_W is None:  # the person before the robot has no name
+            target.doubted = None
+        in_sight = self._is_clear(np.array([(here.x_m, here.y_m), seen.place_W]))
+        if target.doubted is None or not is_addressed(seen, near, here, still=stands, in_sight=in_sight):
+            return True
+        if stands:
+            self._halt()
+            self._plan(self._turned(here, seen.place_W))
+        asked = self.ask_for_name(self._inputs.person, self.options.answer_s)
+        try:
+            while not asked.done():
+                yield from self._tick(self._drive("asking who it is"))
+                if target.hidden_s(self._now()) and not stands:
+                    return True
+        finally:
+            asked.withdraw()
+        answer = asked.result()
+        self._silences = self._silences + 1 if answer not in ("yes", "no") else 0
+        if answer == "yes":
+            target.trust()
+        elif answer == "no" or self._silences >= self.options.silences:
+            self._silences = 0
+            target.reject(before)
+            return False
+        return True
+
+    def _search(self, target: Target) -> Routine[None]:
+        """Looks for a lost person through the doors where they were going, then asks. Raises SkillFailure."""
+        say(self.context, "I have lost sight of you.")
+        self._company.most_m_s = math.inf
+        if self._inputs.place_W is not None:  # the robot asks for the name
+            target.farthest_m = math.inf
+        for goal in self._poses_to_search(target):
+            self._halt()
+            until_s, tries = self._now() + self.options.search_s, 0
+            while _apart_m(goal, self.context.pose()) > _THERE_M and self._now() < until_s:
+                if self._goal is None and self._now() >= self._planned_s + self.options.again_s:
+                    if (tries := tries + 1) > self.options.plans:
+                        break
+                    self._planned_s = self._now()
+                    self._plan(goal)
+                yield from self._tick(self._drive(f"searching {self._inputs.person}"))
+                if not target.hidden_s(self._now()):
+                    return
+        self._halt()
+        say(self.context, "I lost you. Where are you?")
+        until_s = self._now() + self.options.asking_s
+        while self._now() < until_s:
+            yield from self._tick(f"waiting for {self._inputs.person}")
+            if not target.hidden_s(self._now()):
+                return
+        last = f"seen last at {place_text(target.seen.place_W)} {target.hidden_s(self._now()):.0f} s ago"
+        raise SkillFailure(Cause.EXECUTION, f"{self._inputs.person} is lost, {last}")
+
+    def _plan(self, goal: Pose2D | None) -> None:
+        """Starts or changes the drive; None keeps the present goal."""
+        now = self._goal or self.context.pose()
+        if goal is None or _apart_m(goal, now) < (0.1 if self._goal else 0.3):
+            return
+        inputs = NavigateInputs(goal, 0.15, 0.35, self._inputs.max_speed_m_s)
+        if self._goal is None:
+            self._navigate.begin(inputs)
+        elif not self._navigate.retarget(inputs):
+            return
+        else:
+            self._tries = 0
+        self._goal = goal
+
+    def _drive(self, doing: str) -> str:
+        """Drives on for one tick; returns the message. Raises SkillFailure when the robot cannot drive any longer."""
+        if self._goal is None:
+            return doing
+        step = self._navigate.step()
+        if isinstance(step, Running):
+            return f"{doing}: {step.message}"
+        self._halt()
+        self._tries = self._tries + 1 if isinstance(step, Failed) else 0
+        if isinstance(step, Failed):
+            self._planned_s = self._now() + self.options.replan_s
+            if step.cause not in _TRIED_AGAIN or self._tries > self.options.tries:
+                raise SkillFailure(step.cause, step.message)
+        return doing
+
+    def _halt(self) -> None:
+        """Stops the drive."""
+        self._goal = None
+        self._navigate.end()
+
+    def _speed_m_s(self, target: Target) -> float:
+        """The speed at which the robot does not come too near to the person; unlimited on a path away from them."""
+        here, options, place_W = self.context.pose(), self.options, target.place_W(self._now())
+        distance_m = math.dist((here.x_m, here.y_m), place_W)
+        if self._goal is None or math.dist((self._goal.x_m, self._goal.y_m), place_W) > distance_m:
+            return math.inf
+        return max(0.0, target.away_m_s(here)) + options.gain * max(0.0, distance_m - options.close_m)
+
+    def _next_pose(self, target: Target, hidden_s: float) -> Pose2D | None:
+        """The pose to drive to: behind the person, or aside from the path of one who comes towards the robot.
+
+        After `_LOCKED` drives in a row that failed, it is aside from the path of the nearest other person.
+        """
+        here, now_s, options = self.context.pose(), self._now(), self.options
+        near = not hidden_s and math.dist((here.x_m, here.y_m), target.seen.place_W) < options.meeting_m
+        away_m_s, blocks = target.away_m_s(here), near and self._blocks_door(target, here)
+        if blocks or (near and away_m_s < -max(_WALKS_M_S, 0.6 * target.speed_m_s)):
+            if now_s >= self._aside_until_s:
+                self._aside = self._pose_aside(np.vstack([target.trail, line_through(target.seen, here, 0.0)]), here)
+            self._aside_until_s = now_s + options.aside_s
+        elif self._tries >= _LOCKED and now_s >= self._aside_until_s:
+            others = people_about(self._company.others(), here, None, options.meeting_m, math.pi)
+            self._aside = self._pose_aside(line_through(others[0], here, options.meeting_m), here) if others else None
+            self._aside_until_s = now_s + options.aside_s if self._aside else -math.inf
+        elif away_m_s > _WALKS_M_S:
+            self._aside_until_s = -math.inf
+        return self._aside if now_s < self._aside_until_s else self._pose_behind(target, hidden_s)
+
+    def _blocks_door(self, target: Target, here: Pose2D) -> bool:
+        """Returns once whether the person has stood still by a doorway, perhaps since the robot is in the way."""
+        made_way, self._made_way = self._made_way, target.stands_still(self._now())
+        if made_way or not self._made_way:
+            return False
+        places_W = (here.x_m, here.y_m), target.seen.place_W
+        return any(door.distance_m(place_W) < _BY_DOOR_M for door in self.context.doors for place_W in places_W)
+
+    def _pose_aside(self, path_W: FloatArray, here: Pose2D) -> Pose2D | None:
+        """The nearest pose off the path (N, 2) of a person."""
+        paths = with_discs(NoObstacles(), np.column_stack([path_W, np.full(len(path_W), _PERSON_M)]))
+        return pose_aside(self.context.free_space(), paths, self._outline, here, GivingWayOptions(reach_m=_ASIDE_M))
+
+    def _pose_behind(self, target: Target, hidden_s: float) -> Pose2D | None:
+        """The nearest free pose behind the person on their trail; None to stay.
+
+        While the person is hidden, it is where they were seen last.
+        """
+        here, options, walks = self.context.pose(), self.options, target.speed_m_s > _WALKS_M_S
+        end_W = np.array(target.place_W(self._now() + (options.ahead_s if walks and not hidden_s else 0.0)))
+        distance_m = math.dist((here.x_m, here.y_m), end_W)
+        near_m = options.behind_m if walks else options.near_m
+        if not hidden_s and (options.close_m - 0.1 if not walks else 0.0) < distance_m < near_m:
+            return self._turned(here, target.seen.place_W)
+        trail = target.trail if hidden_s else np.vstack([target.trail, end_W])
+        behind_m = 0.0 if hidden_s else options.behind_m
+        straight = np.array([(here.x_m, here.y_m), end_W])
+        if not hidden_s and distance_m > behind_m and self._is_clear(straight):
+            trail = straight
+        away_m = (options.behind_m, options.close_m, options.near_m) if behind_m else ()
+        along, around = poses_behind(trail, behind_m), poses_around(end_W, here, away_m, self.context.costmap)
+        poses = [*along, *around] if walks else [*around, *along]
+        return self._free(np.array(poses).reshape(-1, 3))
+
+    def _turned(self, here: Pose2D, place_W: tuple[float, float]) -> Pose2D | None:
+        """The pose here that faces a person, where the robot can turn; None when it faces them nearly."""
+        turn_rad = bearing_rad(here, place_W)
+        if abs(turn_rad) < self.options.turn_rad:
+            return None
+        return self._free(np.array([(here.x_m, here.y_m, wrap(here.yaw_rad + turn_rad))]))
+
+    def _clear_trail(self, target: Target, hidden_s: float) -> None:
+        """Clears the costmap where the person has walked: behind a jamb the LiDAR cannot see that they have gone."""
+        trail = target.trail[-_CLEARED:]
+        left = np.linalg.norm(trail - target.seen.place_W, axis=1) > (-1.0 if hidden_s else _LEFT_M)
+        if isinstance(self.context.costmap, ClearableCostmap) and left.any():
+            self.context.costmap.clear_obstacles(np.column_stack([trail[left], np.full(left.sum(), _CLEARED_M)]))
+
+    def _is_clear(self, straight: FloatArray) -> bool:
+        """Returns whether the robot can drive straight from a point towards another one (2, 2), as far as it may."""
+        length_m = float(np.linalg.norm(straight[1] - straight[0]))
+        share = max(0.0, 1.0 - self.options.close_m / max(length_m, 1e-3))
+        points = np.linspace(
+            straight[0], straight[0] + share * (straight[1] - straight[0]), 1 + math.ceil(length_m / 0.1)
+        )
+        return bool(self.context.free_space().clearance_m(points).min() > self._outline.inscribed_m + SAFE_MARGIN_M)
+
+    def _free(self, poses: FloatArray) -> Pose2D | None:
+        """The first of some poses (N, 3) with clearance."""
+        clear = footprint_clearance_m(self.context.free_space(), self._outline, poses) > SAFE_MARGIN_M
+        return Pose2D(*poses[int(np.argmax(clear))].tolist()) if clear.any() else None
+
+    def _poses_to_search(self, target: Target) -> Iterator[Pose2D]:
+        """Poses beyond the likeliest door, in the place where the person was going, and beyond more doors."""
+        likely = self._poses_beyond_doors(target)
+        yield from itertools.islice(likely, 1)
+        until_W = self._inputs.until_W
+        for door in self.context.doors if until_W else ():
+            for yaw in (door.through_rad, wrap(door.through_rad + math.pi)):
+                beyond = np.array(list(poses_beyond(door, yaw)))
+                is_in = inside_polygon(beyond[:1, :2], until_W or ()).all()
+                if is_in and (pose := self._free(beyond)) is not None:
+                    yield pose
+        yield from likely
+
+    def _poses_beyond_doors(self, target: Target) -> Iterator[Pose2D]:
+        """Poses behind the doors where the person may have gone: from room to room, each time the likeliest door."""
+        place_W, heading, left = np.array(target.seen.place_W), np.array(target.seen.velocity_W), [*self.context.doors]
+
+        def unlikely_m(door: Doorway) -> float:
+            off = np.array(door.middle_W) - place_W
+            along = float(off @ heading) / max(float(np.linalg.norm(off) * np.linalg.norm(heading)), 1e-3)
+            return float(np.linalg.norm(off)) - 1.5 * along
+
+        for _ in range(min(self.options.doors, len(left))):
+            door = min(left, key=unlikely_m)
+            left.remove(door)
+            here, middle_W = self.context.pose(), np.array(door.middle_W)
+            heading = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
+            heading *= math.copysign(1.0, float((middle_W - (here.x_m, here.y_m)) @ heading))
+            place_W = middle_W + heading
+            if (pose := self._free(np.array(list(poses_beyond(door, math.atan2(*heading[::-1])))))) is not None:
+                yield pose
+
+
+def _apart_m(a: Pose2D, b: Pose2D) -> float:
+    """Distance of two poses (m), a radian counting half a metre."""
+    return math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) + 0.5 * abs(wrap(a.yaw_rad - b.yaw_rad))

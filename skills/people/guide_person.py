@@ -1,0 +1,284 @@
+"""The guide_person skill: goes ahead of a person at their pace, waits for them, and goes back for them."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Final
+
+import numpy as np
+
+from skills.api import Cause, Running, Step, Succeeded
+from skills.geometry import grid_inside, inside_polygon, wrap
+from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
+from skills.navigate.skill import Navigate
+from skills.navigate.surroundings import Company
+from skills.people.followed_person import Target, TargetOptions, people_about
+from skills.people.meet_person import MeetPerson, MeetPersonOptions, person_text
+from skills.perception.people import SeenPerson
+from skills.perception.people_tracking import PeopleOptions, PeopleWatch
+from skills.ports import GuidePersonInputs, GuidePersonPorts, MeetPersonInputs, NavigateInputs
+from skills.quantities import Delay, Length, Speed, Tries
+from skills.robot import Pose2D
+from skills.routine import ENDED_EARLY, Patience, Routine, SkillFailure
+from skills.small.speak import ListeningSkill, say
+
+_TRACKING: Final = PeopleOptions(period_s=1.0, idle_s=4.0, track_m=6.0, hidden_s=8.0)
+_NEAR: Final = MeetPersonOptions(apart_m=(1.3, 1.6, 2.2, 2.7))
+"""Where the robot goes for a person who fell behind: not beside them, if they stand in a doorway."""
+_SLOWEST_M_S = 0.25
+_CLEAR_M = SAFE_MARGIN_M + 0.05
+_SURELY_M = 0.25
+"""Distance of a person from the edge of a room at which they are certainly in it, and not in its door."""
+_AHEAD_M, _AHEAD_RAD = 3.0, 1.2
+_STEPS_IN, _STANDS_S = 3, 2.0
+"""Drives into the room, and time for which the person stands before its door."""
+_COMES_M, _STEP_IN_M, _YAWS_RAD = 2.7, 0.3, (0.0, 0.8, -0.8, 1.6, -1.6, 2.4, -2.4, math.pi)
+"""Distance at which a person comes after the robot, least further distance, and turns of the robot there."""
+_TIMES_ASKED, _ANSWER_S = 2, 5.0
+"""Number of questions for the name of somebody who may be another, and the time for each answer."""
+_ASK_AFTER_S, _WALKS_M_S, _ON_M = 2.0, 0.3, 2.0
+"""Wait before the robot asks the person to come; steps in which it looks ahead and back for one who walked."""
+
+
+@dataclass(frozen=True)
+class GuidePersonOptions:
+    """Distances between robot and person, and times.
+
+    The robot drives at up to most_m_s while the person is within `close_m`, slower beyond, and stands beyond `wait_m`
+    or when it has not seen them for `hidden_s`. After `behind_s` of standing it goes back for them, at most `returns`
+    times. At the goal it waits `arrive_s` for them. Somebody within `same_m` of where they should be is taken for them.
+    """
+
+    most_m_s: Speed = 0.7
+    close_m: Length = 2.2
+    wait_m: Length = 2.8
+    hidden_s: Delay = 1.5
+    behind_s: Delay = 5.0
+    returns: Tries = 6
+    arrive_s: Delay = 8.0
+    same_m: Length = 1.2
+
+
+class Leading(Navigate):
+    """Drive of a robot that leads, and stands where it waits for its company; that is no trouble."""
+
+    def _give_way(self) -> tuple[float, str | None]:
+        most_m_s, waits = super()._give_way()
+        if waits is None and self._company is not None and self._company.most_m_s <= 0.0:
+            waits = self._waits("waiting for the person")
+        return most_m_s, waits
+
+
+class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
+    """Implementation of `GuidePersonPorts`."""
+
+    Options: ClassVar[type] = GuidePersonOptions
+    options: GuidePersonOptions
+
+    def begin(self, inputs: GuidePersonInputs) -> None:
+        """Starts with the person at the place of the inputs."""
+        super().begin(inputs)
+        self._inputs, self._place_W, self._who = inputs, inputs.place_W, person_text(inputs.person)
+        self._company = Company(PeopleWatch(self.context, _TRACKING))
+        self._target: Target | None = None
+        self._doubted = False
+        self._behind = Patience(self.context.clock, self.options.behind_s)
+        self._waiting, self._asked = Patience(self.context.clock, _ASK_AFTER_S), False
+
+    def step(self) -> Step:
+        """Looks for the person; then as `RoutineSkill.step`."""
+        watch, now_s = self._company.watch, self.context.clock.now()
+        watch.step(np.zeros(3))
+        if self._target is None:
+            if (first := next(iter(self._candidates(watch.tracks())), None)) is not None:
+                self._target = Target(first, self.context.pose(), TargetOptions())
+        else:
+            self._target.update(watch.tracks(), (), now_s)
+        self._company.track = 0 if self._target is None else self._target.seen.track
+        return super().step()
+
+    def _candidates(self, tracks: Sequence[SeenPerson]) -> list[SeenPerson]:
+        """People who may be the one to guide, the likeliest first."""
+        reach_m = _AHEAD_M if self._place_W is None else self.options.same_m
+        return people_about(tracks, self.context.pose(), self._place_W, reach_m, _AHEAD_RAD)
+
+    def _gap_m(self) -> float:
+        """Distance from the robot to the person, in metres; infinite while they are hidden."""
+        if self._target is None or self._target.hidden_s(self.context.clock.now()) > self.options.hidden_s:
+            return math.inf
+        here = self.context.pose()
+        return math.dist(self._target.seen.place_W, (here.x_m, here.y_m))
+
+    def trouble(self) -> SkillFailure | None:
+        """Returns a failure when a person ends it before both are there."""
+        if (said := self.remark) is None or self._are_there():
+            return None
+        return SkillFailure(Cause.POSTCONDITION, f"'{said}' was said before {self._who} was at {self._inputs.place}")
+
+    def run(self, inputs: GuidePersonInputs) -> Routine[Succeeded]:
+        """Leads the person, and goes back for them as often as needed."""
+        yield from self._fetch()
+        for _ in range(self.options.returns + 1):
+            say(self.context, f"Please follow me to {inputs.place}.")
+            if (yield from self._lead()):
+                yield from self._make_sure()
+                say(self.context, f"Here we are: {inputs.place}.")
+                apart_m = self._gap_m()
+                return Succeeded(f"{self._who} came along to {inputs.place}, {apart_m:.1f} m from the robot")
+            yield from self._fetch()
+        raise SkillFailure(Cause.POSTCONDITION, f"{self._who} does not come along to {inputs.place}")
+
+    def _lead(self) -> Routine[bool]:
+        """Drives to the goal; returns whether both are there, or False once the person is too far behind."""
+        inputs, goal = self._inputs, self._inputs.goal
+        for _ in range(_STEPS_IN):
+            drive = NavigateInputs(goal, 0.25, 0.4, self.options.most_m_s)
+            leading = Leading(self.context, None, self._company)
+            try:
+                if (yield from self.perform(leading, drive, self._must_stop)) is ENDED_EARLY:
+                    break
+            except SkillFailure as failure:
+                if failure.cause is not Cause.PLANNING or not self._is_in():
+                    raise
+                if goal is not inputs.goal:
+                    break
+            end_s = self.context.clock.now() + self.options.arrive_s
+            while not (self._are_there() or self._waits_outside(end_s)) and self.context.clock.now() < end_s:
+                yield Running(f"waiting for {self._who} at {inputs.place}")
+            further = None if self._are_there() else self._pose_further_in()
+            if further is None:
+                break
+            say(self.context, "Please come in.")
+            goal = further
+        return self._are_there()
+
+    def _make_sure(self) -> Routine[None]:
+        """Asks somebody who may be another for their name, twice. Raises SkillFailure unless they say yes."""
+        doubted, answer = self._doubted or (self._target is not None and self._target.doubted is not None), ""
+        if self._inputs.place_W is None or not doubted:
+            return
+        for _ in range(_TIMES_ASKED):
+            asked = self.ask_for_name(self._inputs.person, _ANSWER_S)
+            try:
+                while not asked.done():
+                    yield Running(f"asking whether it is {self._who}")
+            finally:
+                asked.withdraw()
+            if answer := asked.result():
+                break
+        if answer != "yes":
+            why = f"is not {self._who}" if answer else f"did not say whether they are {self._who}"
+            raise SkillFailure(Cause.POSTCONDITION, f"the person who came along to {self._inputs.place} {why}")
+
+    def _must_stop(self) -> bool:
+        """Sets the pace; returns whether the drive has to end, since the person fell behind or has ended it."""
+        self._company.most_m_s = self._pace_m_s()
+        return self._is_behind() or self.remark is not None
+
+    def _waits_outside(self, end_s: float) -> bool:
+        """Returns whether the person has stood near the robot for a while, but not at the goal."""
+        return self._is_close() and self.context.clock.now() > end_s - self.options.arrive_s + _STANDS_S
+
+    def _pose_further_in(self) -> Pose2D | None:
+        """A free pose in the room, so far from where the person was seen last that they come in; None without one."""
+        area, here = self._inputs.area_W, self.context.pose()
+        if self._target is None or not area:
+            return None
+        person_W, footprint = np.array(self._target.seen.place_W), ArmFootprint(self.context).now()
+        apart_m = math.dist(person_W, (here.x_m, here.y_m))
+        if apart_m > self.options.wait_m:
+            return None
+        points = grid_inside(area, 0.25, first_m=0.3, margin_m=-0.4)
+        away_m = np.linalg.norm(points - person_W, axis=1)
+        drive_m = np.linalg.norm(points - (here.x_m, here.y_m), axis=1)
+        for n in np.lexsort((drive_m, np.maximum(0.0, _COMES_M - away_m).round(1))):
+            if away_m[n] > apart_m + _STEP_IN_M:
+                (x, y), ahead_rad = points[n], math.atan2(*(points[n] - person_W)[::-1])
+                poses = [Pose2D(float(x), float(y), wrap(ahead_rad + turn)) for turn in _YAWS_RAD]
+                clear_m = footprint_clearance_m(self.context.free_space(), footprint, pose_array(poses))
+                if clear_m.max() > _CLEAR_M:
+                    return poses[int(np.argmax(clear_m > _CLEAR_M))]
+        return None
+
+    def _fetch(self) -> Routine[None]:
+        """Goes back to where the person was seen last, or was going. Raises SkillFailure when nobody is there."""
+        if self._is_close():
+            return
+        inputs, failures = self._inputs, list[SkillFailure]()
+        last = None if self._target is None else self._target.seen
+        if last is not None:
+            say(self.context, "I come back for you.")
+        for place_W in (self._place_W,) if self._target is None else _places_of(self._target):
+            try:
+                goal = MeetPersonInputs(inputs.person, place_W)
+                met = yield from self.perform(MeetPerson(self.context, _NEAR), goal, self._is_close)
+            except SkillFailure as failure:
+                if failure.cause not in (Cause.POSTCONDITION, Cause.PLANNING):
+                    raise
+                failures.append(failure)
+                continue
+            if met is not ENDED_EARLY and not self._is_close():
+                self._place_W, self._target = met.outputs["person"].position_W[:2], None
+                self._doubted = True
+            return
+        why = f"lost {self._who} on the way to {inputs.place}: {failures[0].message}"
+        raise SkillFailure(failures[0].cause, why)
+
+    def _pace_m_s(self) -> float:
+        """Speed that the distance of the person allows; 0 to wait."""
+        options, gap_m = self.options, self._gap_m()
+        if gap_m > options.wait_m:
+            return 0.0
+        share = min(1.0, (options.wait_m - gap_m) / (options.wait_m - options.close_m))
+        return _SLOWEST_M_S + share * (options.most_m_s - _SLOWEST_M_S)
+
+    def _is_behind(self) -> bool:
+        """Returns whether the person has been too far away for too long; asks them once to come."""
+        if self._gap_m() <= self.options.wait_m:
+            self._behind.reset()
+            self._waiting.reset()
+            self._asked = False
+            return False
+        if not self._waiting.is_left() and not self._asked:
+            say(self.context, "I wait for you.")
+            self._asked = True
+        return not self._behind.is_left()
+
+    def _is_close(self) -> bool:
+        return self._gap_m() <= self.options.close_m
+
+    def _are_there(self) -> bool:
+        """Returns whether the person is seen near the robot, and both are at the goal."""
+        area = self._inputs.area_W
+        if self._target is None or self._gap_m() > self.options.wait_m:
+            return False
+        if not area:
+            return True
+        return self._is_in() and bool(inside_polygon(np.array([self._target.seen.place_W]), area, -_SURELY_M).all())
+
+    def _is_in(self) -> bool:
+        """Returns whether the robot is in the area at the goal."""
+        area, here = self._inputs.area_W, self.context.pose()
+        return bool(area) and bool(inside_polygon(np.array([(here.x_m, here.y_m)]), area).all())
+
+
+def _places_of(target: Target) -> Iterator[tuple[float, float]]:
+    """Places of a person who is out of sight: the last one, further in the same direction, and back along the trail.
+
+    Where the robot sees the person from one of them, that place comes next.
+    """
+    last, trail = target.seen, target.trail[::-1]
+    guesses, back_m = [last.place_W], _ON_M
+    if target.speed_m_s >= _WALKS_M_S:
+        x, y = (at + _ON_M * v / target.speed_m_s for at, v in zip(last.place_W, last.velocity_W, strict=True))
+        guesses.append((x, y))
+    for (x, y), length_m in zip(trail[1:], np.cumsum(np.linalg.norm(np.diff(trail, axis=0), axis=1)), strict=True):
+        if length_m >= back_m:
+            back_m += _ON_M
+            guesses.append((float(x), float(y)))
+    for place_W in guesses:
+        yield place_W
+        if target.seen.stamp_s > last.stamp_s:
+            last = target.seen
+            yield last.place_W

@@ -1,0 +1,98 @@
+"""The find_people skill: turns and observations."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planar_people import PeopleDetector, person_at
+from planar_robot import LENS, TWO_ROOMS, Bench, Box
+
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
+from skills.people.find_people import FindPeople, FindPeopleInputs
+from skills.robot import Pose2D
+
+ROOM = tuple((x, y) for x, y in ((0.2, 0.2), (4.8, 0.2), (4.8, 3.8), (0.2, 3.8)))
+
+
+CORRIDOR = (Box(-4.0, -0.1, 4.0, 0.0), Box(-4.0, 1.2, 4.0, 1.3), Box(-4.1, -0.1, -4.0, 1.3), Box(4.0, -0.1, 4.1, 1.3))
+BODY = Box(2.8, 1.8, 3.2, 2.2)
+"""A body 0.4 m wide at (3.0, 2.0)."""
+
+
+def bench_in_room(*unmapped, start=Pose2D(1.5, 2.0, 0.0), surveyed=TWO_ROOMS, cameras=False):  # noqa: B008
+    return Bench(start, unmapped=unmapped, surveyed=surveyed, cameras=cameras)
+
+
+def ended(bench, detector=None, **inputs):
+    """Runs the skill in the room; returns its last step."""
+    bench.tick(10)
+    context = bench.context() if detector is None else replace(bench.context(), detector=detector)
+    return bench.run(FindPeople(context), FindPeopleInputs(**{"area_W": ROOM, "place": "room", **inputs}))
+
+
+def lit_bench(monkeypatch, person):
+    """Bench with cameras, whose pictures are not dark."""
+    bench = bench_in_room(person, cameras=True)
+    take = bench.robot.image
+    lit = lambda source: replace(take(source), grey=np.full((LENS.height, LENS.width), 120, np.uint8))  # noqa: E731
+    monkeypatch.setattr(bench.robot, "image", lit)
+    return bench
+
+
+def test_in_a_narrow_corridor_the_robot_turns_no_further_than_is_clear():
+    bench = bench_in_room(start=Pose2D(0.0, 0.6, 0.0), surveyed=CORRIDOR)
+    step = ended(bench, area_W=((-3.9, 0.1), (3.9, 0.1), (3.9, 1.1), (-3.9, 1.1)), place="corridor")
+    assert "nobody is seen in the corridor from here" in step.message
+    assert abs(bench.robot.pose.yaw_rad) < 0.9  # 1.1 m long and 0.5 m wide, it would touch the walls at about 1.2
+
+
+def test_the_observation_is_at_the_persons_position():
+    step = ended(bench_in_room(BODY))
+    assert isinstance(step, Succeeded)
+    assert math.dist(step.outputs["observation"].position_W[:2], (3.0, 2.0)) < 0.3
+
+
+def test_people_near_avoided_positions_do_not_count():
+    known = ObjectObservation(0.0, ObjectKind("person"), (3.3, 2.2, 0.8), (0.5, 0.5, 1.7), 0.0, 1.0, "room")
+    assert ended(bench_in_room(BODY), avoid=(known,)).message == "nobody else is seen in the room from here"
+
+
+def test_the_pictures_with_a_person_are_published_with_their_boxes(monkeypatch):
+    # a person 2 m ahead in the room; the first look has both cameras' pictures
+    person = person_at(3.5, 2.0)
+    bench = lit_bench(monkeypatch, person)
+    ended(bench, PeopleDetector(bench, [person]))
+    shown = [message for topic, message in bench.published if topic == "detections"]
+    assert all(message["detections"][0]["class_name"] == "person" for message in shown)
+    assert shown
+
+
+@pytest.mark.parametrize(("unpictured", "kind"), [(False, Failed), (True, Succeeded)])
+def test_a_body_that_no_picture_shows_counts_only_where_that_is_asked_for(unpictured, kind, monkeypatch):
+    # a body 1.5 m ahead, as wide as a person, for whom the detector sees nobody
+    bench = lit_bench(monkeypatch, person_at(3.0, 2.0))
+    step = ended(bench, PeopleDetector(bench, []), unpictured=unpictured)
+    assert isinstance(step, kind), step
+
+
+# the room on the left, in which a screen hides the right half of it
+SCREEN = (*TWO_ROOMS, Box(2.6, 0.1, 2.7, 2.2))
+
+
+def test_a_robot_that_may_move_finds_a_person_behind_a_screen():
+    step = ended(bench_in_room(Box(3.9, 0.9, 4.3, 1.3), start=Pose2D(1.8, 1.6, 0.0), surveyed=SCREEN), moves=True)
+    assert isinstance(step, Succeeded), step.message
+    assert math.dist(step.outputs["observation"].position_W[:2], (4.1, 1.1)) < 0.3
+
+
+def test_a_robot_that_sees_the_whole_empty_room_stays_where_it_is():
+    bench = bench_in_room()
+    step = ended(bench, moves=True)
+    assert (step.cause, step.message) == (Cause.POSTCONDITION, "nobody is seen in the room from here")
+    assert math.dist((bench.robot.pose.x_m, bench.robot.pose.y_m), (1.5, 2.0)) < 0.1
+
+
+def test_a_hidden_part_is_the_cause_where_no_pose_shows_it():
+    step = ended(bench_in_room(surveyed=(*TWO_ROOMS, Box(2.4, 0.1, 2.5, 3.9))), moves=True)
+    assert (step.cause, step.message[-23:]) == (Cause.EXECUTION, "of it was never in view")

@@ -24,10 +24,10 @@ LINES = {
     "executive/testing": 849,
     "executive/app": 8094,
     "executive/cli": 4522,
-    "skills": 30146,
+    "skills": 30134,
     "plant": 14940,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 479, 75, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 467, 75, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 PATH = Path(__file__).resolve().parent / "architecture.svg"
-WIDTH, HEIGHT = 1300, 740
+WIDTH, HEIGHT = 1300, 830
 INK, PALE = "#1f2933", "#52606d"
 FILLS = {
     "executive": "#e6f0fa",
@@ -18,7 +18,7 @@ FILLS = {
     "plant": "#fbf1e0",
     "cli": "#f1ecf8",
     "app": "#e3ddf3",
-    "training": "#f3f4f6",
+    "plug-ins": "#f3f4f6",
 }
 
 
@@ -72,14 +72,20 @@ WORLDS = Box(420, 540, 200, 80, "worlds, models", ("rooms, furniture, objects,",
 REFEREE = Box(40, 540, 340, 80, "referee", ("knows the truth and judges afterwards;", "nobody else may ask it"))
 APP = Box(1010, ROW, 130, 550, "app", ("the application:", "one request,", "prepared for", "its robots;", "one loop of runs;", "dispatch, report,", "evaluate", "", "puts all three", "together"))  # fmt: skip  # noqa: E501
 CLI = Box(1160, ROW, 120, 550, "cli", ("commands,", "options, output", "", "parse, check,", "tree, run,", "queue, resume,", "log, replay,", "evaluate"))  # fmt: skip  # noqa: E501
-TRAINING = Box(20, 660, 1260, 56, "training: errand-train, a distribution of its own", ("data sets, training of the detector and of speech, makers of shipped models and worlds; imports all, and nothing imports it",))  # fmt: skip  # noqa: E501
+PLUGINS = (
+    Box(40, 716, 290, 80, "errand-spot", ("serves Spot's API in simulation;", "drives a real Spot: a backend")),
+    Box(350, 716, 290, 80, "errand-make", ("objects, worlds and robots", "of your own")),
+    Box(660, 716, 290, 80, "errand-train", ("data sets, training, makers of the", "shipped models and worlds")),
+    Box(970, 716, 290, 80, "yours", ("commands, backends, skills, components,", "robots, classes, doors, triggers")),
+)
+WALL = "plug-ins: import the core's public names; the core imports none, and finds them by entry points"
 TALL = (APP, CLI)
 
 
-def area(kind: str, y: int, height: int, title: str) -> str:
+def area(kind: str, y: int, height: int, title: str, width: int = 955) -> str:
     """The ground of a package."""
     return (
-        f'<rect x="20" y="{y}" width="955" height="{height}" rx="12" fill="{FILLS[kind]}"/>'
+        f'<rect x="20" y="{y}" width="{width}" height="{height}" rx="12" fill="{FILLS[kind]}"/>'
         f'<text x="36" y="{y + 26}" font-size="18" font-weight="bold" fill="{INK}">{escape(title)}</text>'
     )
 
@@ -132,7 +138,8 @@ def svg() -> str:
         *map(drawn, (SKILL, ESTIMATE, PROTOCOL, SPOT, WORLDS, REFEREE)),
         drawn(APP, FILLS["app"]),
         drawn(CLI, FILLS["cli"]),
-        drawn(TRAINING, FILLS["training"]),
+        area("plug-ins", 670, 145, WALL, 1260),
+        *map(drawn, PLUGINS),
         arrow(CLI.left, APP.right),
         *(arrow(a.right, b.left) for a, b in ((UNDERSTAND, MISSION), (MISSION, COMPILE), (COMPILE, TREE))),
         arrow(RUN.left, TREE.right),

@@ -11,7 +11,7 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3429,
+    "executive/words": 3430,
     "executive/language": 8250,
     "executive/speech": 1582,
     "executive/mission": 1646,
@@ -24,10 +24,10 @@ LINES = {
     "executive/testing": 849,
     "executive/app": 8343,
     "executive/cli": 5031,
-    "skills": 30182,
-    "plant": 22156,
+    "skills": 30170,
+    "plant": 22160,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 505, 93, 13
+MODULES, ONE_IMPORTER, SAME_NAME = 504, 93, 13
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

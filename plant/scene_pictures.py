@@ -167,7 +167,7 @@ def draw_map(
     """Draws paths (N, 2 or more columns: x, y), labels and marked points on a copy of a map, with a legend below it.
 
     Each path has the text of its legend and a colour. No name covers another one or a mark. The zones, as
-    `skills.navigate.zones.zone_messages` has them, are below all else.
+    `skills.navigate.zone_map.zone_messages` has them, are below all else.
     """
     picture = view.picture.copy()
     for zone in zones:

@@ -80,7 +80,7 @@ class Simulation:
         )
         self.referee.observe(self.engine.context, 0.0)
         self.engine.observe(self._referee_observes, every=REFEREE_PERIOD_STEPS)
-        self.listeners = Listeners(self.engine, people, seed=seed)
+        self.listeners = Listeners(built, self.engine.context, self.engine.doors, people, seed=seed)
         self.recorder = Recorder(built, self.engine.context) if record else None
         if self.recorder is not None:
             self.engine.observe(self.recorder)

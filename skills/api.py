@@ -23,11 +23,7 @@ from numpy.typing import NDArray
 from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
-from skills.navigate.zones import FilterType as FilterType
-from skills.navigate.zones import Zone as Zone
-from skills.navigate.zones import ZoneKind as ZoneKind
-from skills.navigate.zones import ZoneMask as ZoneMask
-from skills.perception.doorway import DoorMemory, Doorway
+from skills.doorway import DoorMemory, Doorway
 from skills.robot import Clock, Image, Lease, Picture, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 from skills.world_model import FLOOR as FLOOR
@@ -36,6 +32,7 @@ from skills.world_model import NO_WORK_COUNTER as NO_WORK_COUNTER
 from skills.world_model import ClearableCostmap as ClearableCostmap
 from skills.world_model import Costmap as Costmap
 from skills.world_model import ExcludesRobots as ExcludesRobots
+from skills.world_model import FilterType as FilterType
 from skills.world_model import FreeSpace as FreeSpace
 from skills.world_model import LocalisationEstimate as LocalisationEstimate
 from skills.world_model import Localiser as Localiser
@@ -51,6 +48,9 @@ from skills.world_model import Surface as Surface
 from skills.world_model import SurveyView as SurveyView
 from skills.world_model import Tag as Tag
 from skills.world_model import WorkCounter as WorkCounter
+from skills.world_model import Zone as Zone
+from skills.world_model import ZoneKind as ZoneKind
+from skills.world_model import ZoneMask as ZoneMask
 
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform, RotationMatrix

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from skills.api import Cause, ObjectObservation, Part, Skill, Surface
-from skills.perception.class_forms import PERSON
 from skills.quantities import Angle, Coordinate, Cosine, Duration, Height, Length, Speed, Tries, Turn
 from skills.robot import Pose2D
-from skills.world_model import IN_THE_WAY
+from skills.world_model import IN_THE_WAY, PERSON
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""World model of skills: seen objects, the estimated pose, free space, and the traffic of the robots of one run.
+"""World model of skills: seen objects, the estimated pose, free space, zones, and the traffic of the robots of one run.
 
 Skills of others import these names from `skills.api`. Nothing in the traffic is the simulator's truth. A robot that
 reports nothing for some seconds is not listed any more, and is only an obstacle that others see.
@@ -6,6 +6,7 @@ reports nothing for some seconds is not listed any more, and is only an obstacle
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,11 +15,15 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.quantities import Angle, Coordinate, Delay, Height, Margin, Share, TagNumber, TagSize
+from skills.quantities import Angle, Coordinate, Delay, Height, Margin, Share, Speed, TagNumber, TagSize
 from skills.robot import FloatArray, Robot, Scan
 
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform
+
+
+PERSON: Final = "person"
+"""The class of people."""
 
 
 class PlanningError(Exception):
@@ -283,3 +288,75 @@ class _Alone:
 
 
 NO_TRAFFIC: Final[Traffic] = _Alone()
+
+
+class ZoneKind(enum.StrEnum):
+    """Kind of a zone."""
+
+    KEEP_OUT = "keep_out"  # no part of the body enters
+    PREFERRED = "preferred"  # paths lead through it where that is not much longer
+    SPEED_LIMIT = "speed_limit"  # the base is no faster while a part of the body is in it
+    ONE_WAY = "one_way"  # the base moves in its direction, or across, and never against it
+    SILENT = "silent"  # the robot shows what it has to say, and does not speak
+
+
+_WORDS: Final = {
+    ZoneKind.KEEP_OUT: "keep out of",
+    ZoneKind.PREFERRED: "preferably through",
+    ZoneKind.SPEED_LIMIT: "at most {speed} in",
+    ZoneKind.ONE_WAY: "one way through",
+    ZoneKind.SILENT: "silent in",
+}
+
+
+class FilterType(enum.IntEnum):
+    """Type of a costmap filter of Nav2, by its number in `nav2_msgs/CostmapFilterInfo`."""
+
+    KEEP_OUT = 0
+    SPEED_SHARE = 1  # percent of the full speed
+    SPEED = 2  # m/s
+
+
+@dataclass(frozen=True)
+class ZoneMask:
+    """Filter mask of Nav2: the YAML file of its picture, and the values (type, base, multiplier) of its filter info.
+
+    The limit in a cell is base + multiplier * value, where value is the cell's occupancy in percent; 0 is no limit.
+    """
+
+    file: str
+    type: FilterType
+    base: float
+    multiplier: float
+
+
+@dataclass(frozen=True)
+class Zone:
+    """Zone of the map: its kind, and its ground as corners (x, y) in the world frame (m) or as a filter mask.
+
+    A speed limit is `speed_m_s`, or a `share` of the robot's full speed; a mask has its own. `direction_rad` is that of
+    a one-way zone.
+    """
+
+    name: str
+    kind: ZoneKind
+    corners_W: tuple[tuple[Coordinate, Coordinate], ...] = ()
+    mask: ZoneMask | None = None
+    speed_m_s: Speed | None = None
+    share: Share | None = None
+    direction_rad: Angle = 0.0
+
+    @property
+    def words(self) -> str:
+        """Rule of the zone in words, with its name: "keep out of: bathroom"."""
+        speed = (
+            f"{self.speed_m_s:g} m/s" if self.speed_m_s is not None else f"{100 * (self.share or 1):g} % of full speed"
+        )
+        return f"{_WORDS[self.kind].format(speed=speed if self.mask is None else 'the speed of its mask')}: {self.name}"
+
+
+def zones_sentence(names: Sequence[str], what: str) -> str:
+    """ "The bathroom is a keep-out zone." or "The hall and the lab are keep-out zones."."""
+    *first, last = (f"the {name}" for name in names)
+    said = f"{', '.join(first)} and {last} are {what}s" if first else f"{last} is a {what}"
+    return f"{said[0].upper()}{said[1:]}."

@@ -5,7 +5,7 @@ The homes of executive import each other one way, from the last of `HOMES` to th
 plain modules of skills. No files import each other in a circle, not for types either.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import pytest
 
@@ -15,7 +15,7 @@ Check = Callable[[str, str], list[str]]
 Graph = Mapping[str, frozenset[str]]
 WORDS_MAY = (
     *("executive.words", "skills.api", "skills.inputs", "skills.quantities", "skills.durations", "skills.robot"),
-    "skills.perception.class_forms",
+    *("skills.world_model", "skills.perception.class_forms"),
 )
 """All that the words import: what things are, how files are read, and which numbers a quantity may have."""
 PLANT_MAY = ("executive.words", "skills.robot", "skills.robot_wrapper", "skills.inputs", "skills.map_drawing")
@@ -40,6 +40,42 @@ APP = ("prepare", "report", "runs", "fleet", "evaluate")
 """The folders of executive.app, the lowest first; modules beside them stand above all."""
 BUILDERS = ("plant.models.builder", "plant.worlds.builder")
 """What makes models and worlds; at run time only the commands import it that make them."""
+SKILL_ROOMS = (
+    ("skills",),
+    ("skills.estimate",),
+    ("skills.perception",),
+    ("skills.manipulation.arm",),
+    ("skills.navigate",),
+    ("skills.mapping",),
+    ("skills.detect",),
+    ("skills.small",),
+    ("skills.manipulation",),
+    ("skills.people",),
+    ("skills.faults", "skills.teleop", "skills.testing"),
+)
+"""The rooms of skills, the lowest first; the lowest is the interface: modules beside the rooms, and `skills.inputs`."""
+NAMES_ABOVE = {
+    "skills.api": ("skills.navigate.footprint", "skills.navigate.zone_map"),
+    "skills.stack": (
+        *("skills.estimate.grid_map", "skills.manipulation.arm.collision", "skills.manipulation.arm.motion"),
+        *("skills.manipulation.grasp.candidates", "skills.manipulation.grasp.placements"),
+        *("skills.manipulation.grasp.planning", "skills.navigate.follower", "skills.navigate.footprint"),
+        *("skills.navigate.path", "skills.navigate.zone_map"),
+    ),
+}
+"""What the interface of skills names of the rooms above: zones in a context, and types in the protocols of slots."""
+PLANT_ROOMS = (
+    ("plant.rendering", "plant.saved_state"),
+    ("plant.sensors",),
+    ("plant.models",),
+    ("plant.robots",),
+    ("plant.worlds",),
+    ("plant.diagram", "plant.events", "plant.recording", "plant.scene_pictures"),
+    ("plant.people", "plant.referee"),
+    ("plant",),
+    BUILDERS,
+)
+"""The rooms of the plant, the lowest first; what steps the plant stands above what stands in it."""
 USES_BUILDERS = (*BUILDERS, "executive.cli.new_command", "executive.cli.object_command", "executive.cli.world_command")
 FOR_COMMANDS = ("executive.cli.number_options", "executive.cli.output")
 """What a command of any distribution may use of the command line."""
@@ -71,6 +107,20 @@ def breaches(path: str, source: str) -> list[str]:
 def ours(source: str) -> list[str]:
     """The imports of a source from the product."""
     return [name for name in read(source).imports if name.partition(".")[0] in PRODUCT]
+
+
+def room(name: str, rooms: Sequence[tuple[str, ...]]) -> int:
+    """How high the room of a module stands, which is the one with the longest name that fits."""
+    return max((len(each), number) for number, names in enumerate(rooms) for each in names if within(name, each))[1]
+
+
+def upward_in_rooms(path: str, source: str) -> list[str]:
+    """The modules of the same package that a module imports although their room stands above its own."""
+    own = dotted(path)
+    rooms = {"skills": SKILL_ROOMS, "plant": PLANT_ROOMS}[own.partition(".")[0]]
+    names = [name for name in ours(source) if within(name, own.partition(".")[0])]
+    above = [name for name in names if room(name, rooms) > room(own, rooms)]
+    return [name for name in above if not within(name, *NAMES_ABOVE.get(own, ()))]
 
 
 def rank(name: str) -> int | None:
@@ -136,6 +186,16 @@ def test_the_folders_of_the_application_import_each_other_one_way() -> None:
     assert found(upward_in_app, *(f"executive/app/{folder}" for folder in APP)) == {}
 
 
+@pytest.mark.parametrize("package", ["skills", "plant"])
+def test_the_rooms_of_a_package_import_each_other_one_way(package: str) -> None:
+    assert found(upward_in_rooms, package) == {}
+
+
+def test_the_interface_of_skills_names_all_that_it_may_of_the_rooms_above() -> None:
+    graph = import_graph(*PRODUCT)
+    assert [(own, name) for own, names in NAMES_ABOVE.items() for name in names if name not in graph[own]] == []
+
+
 def test_the_root_of_executive_holds_no_modules() -> None:
     assert [path for path in modules("executive") if path.count("/") == 1] == ["executive/__init__.py"]
 
@@ -180,6 +240,13 @@ CALL = "def f():\n    "
         (upward_in_app, "executive/app/runs/a.py", "import executive.app.fleet.chain", ["executive.app.fleet.chain"]),
         (upward_in_app, "executive/app/runs/a.py", "from executive.app.kernels import k", ["executive.app.kernels.k"]),
         (upward_in_app, "executive/app/runs/a.py", "from executive.app.report.run_report import RunReport", []),
+        (upward_in_rooms, "skills/estimate/a.py", "import skills.navigate.path", ["skills.navigate.path"]),
+        (upward_in_rooms, "skills/manipulation/arm/a.py", f"{CALL}import skills.detect.u", ["skills.detect.u"]),
+        (upward_in_rooms, "skills/manipulation/place/a.py", "import skills.navigate.path, skills.api", []),
+        (upward_in_rooms, "skills/geometry.py", "import skills.navigate.footprint", ["skills.navigate.footprint"]),
+        (upward_in_rooms, "skills/api.py", "import skills.navigate.footprint", []),
+        (upward_in_rooms, "plant/people/walkers.py", "from plant.engine import Engine", ["plant.engine.Engine"]),
+        (upward_in_rooms, "plant/engine.py", "from plant.people.walkers import Walkers", []),
         (builder_imports, "executive/cli/map.py", "import plant.models.builder.mesh", ["plant.models.builder.mesh"]),
         (builder_imports, "executive/cli/object_command.py", f"{CALL}import plant.models.builder.importing", []),
         (builder_imports, "plant/worlds/builder/own.py", "from plant.models.builder import mesh", []),

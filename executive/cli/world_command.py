@@ -371,7 +371,7 @@ def show(
 ) -> None:
     """Draws the plan of a world: rooms, doors, walls, surfaces and the start."""
     from plant.scene_pictures import draw_world, save_png
-    from skills.navigate.zones import zone_messages
+    from skills.navigate.zone_map import zone_messages
 
     drawn = open_world(folder)
     facts = knowledge_of(drawn)

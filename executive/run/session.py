@@ -20,9 +20,9 @@ from executive.tree.node import NodeState, Snapshot
 from executive.tree.plan import start_key
 from executive.words.slug import slug
 from skills.api import Cause, LocalisationEstimate, ObstacleLayerView, ParticleView
+from skills.doorway import Doorway, SeenDoor
 from skills.inputs.errors import disk_is_full
 from skills.navigate.cut_off import DoorWatch
-from skills.perception.doorway import Doorway, SeenDoor
 from skills.robot import Pose2D
 
 POSE_PERIOD_S: Final = 0.5

@@ -23,7 +23,7 @@ from executive.tree.nodes.skill_leaf import SkillLeaf
 from executive.tree.nodes.wait import WaitFor
 from executive.words.goal import GoalKind
 from skills.api import Cause
-from skills.navigate.zones import zone_messages
+from skills.navigate.zone_map import zone_messages
 
 POSE_NOTE_PERIOD_S = 1.0
 

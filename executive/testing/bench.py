@@ -21,10 +21,10 @@ from executive.tree.context import RunContext
 from executive.tree.nodes.skill_leaf import SkillLeaf
 from executive.words.knowledge import Knowledge
 from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
+from skills.doorway import Doorway
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.faulty_robot import Fault, inject_faults, parse_fault
 from skills.inputs.yaml_source import read_yaml
-from skills.perception.doorway import Doorway
 from skills.robot import Capabilities, Clock, Robot
 from skills.testing.blocks import ROOM, TABLE_CAN, Block, grid_of
 from skills.testing.clock import VirtualClock

@@ -26,12 +26,12 @@ from executive.tree.port_values import (
 )
 from executive.tree.registry import missing_skill
 from skills.api import Cause, Skill
+from skills.doorway import Doorway
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.faulty_robot import parse_fault
 from skills.inputs.errors import with_article
 from skills.inputs.schema import validate
 from skills.inputs.yaml_source import YamlSource, read_yaml
-from skills.perception.doorway import Doorway
 from skills.quantities import Angle, Coordinate, Delay, Duration, Height, Length, Quantity, Share, Turn
 from skills.robot import Capabilities, Pose2D
 from skills.stack import StackError, door_opener

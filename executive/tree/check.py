@@ -20,9 +20,9 @@ from skills.api import FreeSpace, PlanningError, Zone, ZoneKind
 from skills.inputs.errors import InputError, listing, suggestion
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import Path, path_length
-from skills.navigate.zones import zones_sentence
 from skills.robot import Pose2D
 from skills.stack import GlobalPlanner
+from skills.world_model import zones_sentence
 
 if TYPE_CHECKING:
     from skills.navigate.zone_map import ZoneMap

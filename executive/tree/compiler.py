@@ -31,8 +31,8 @@ from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
 from executive.words.step import Step
 from skills.api import Surface, Tag, Zone
+from skills.doorway import Doorway
 from skills.inputs.errors import InputError, suggestion, with_article
-from skills.perception.doorway import Doorway
 
 __all__ = ["CompiledTree", "StepPart", "compile_mission"]
 

@@ -16,8 +16,9 @@ from skills.api import Tag, Zone
 from skills.inputs.errors import InputError, suggestion
 from skills.inputs.schema import Name, validate
 from skills.inputs.yaml_source import YamlSource, read_yaml
-from skills.perception.class_forms import ANY_OBJECT, PERSON, class_forms
+from skills.perception.class_forms import ANY_OBJECT, class_forms
 from skills.quantities import Angle, Coordinate, Height, Opening, Quantity, TagNumber, TagSize, TopHeight
+from skills.world_model import PERSON
 
 ANYTHING: Final = "object"
 """Name that stands for every class of objects."""

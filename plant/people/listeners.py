@@ -7,8 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
+from pydrake.systems.framework import Context
 
-from plant.engine import Engine
+from plant.diagram import WorldDiagram
+from plant.events import Doors
 from plant.people.ground import Ground
 from plant.people.walkers import HEARS_M, segments_cross
 from plant.worlds.seeding import Placement
@@ -26,18 +28,20 @@ _STREAM: Final = 14
 class Listeners:
     """The people of one plant as listeners."""
 
-    def __init__(self, engine: Engine, people: Iterable[Placement], *, seed: int) -> None:
-        """`people` are the people of the plant; `seed` draws answers that nobody has given them."""
-        self._engine, self._seed = engine, seed
+    def __init__(
+        self, world: WorldDiagram, context: Context, doors: Doors, people: Iterable[Placement], *, seed: int
+    ) -> None:
+        """`context` is the plant's; `seed` draws answers that nobody has given to the people."""
+        self._world, self._context, self._doors, self._seed = world, context, doors, seed
         self._answers = {each.name: each.answers for each in people}
-        plant, models = engine.world.plant, engine.world.models
+        plant, models = world.plant, world.models
         self._bodies = {name: plant.get_body(plant.GetBodyIndices(models[name])[0]) for name in self._answers}
         self._walls: Ground | None = None
 
     def hearer(self, robot: str) -> str | None:
         """Returns the nearest person whom a robot faces and who hears it speak now, else the nearest; or None."""
-        world = self._engine.world
-        X_WR = world.plant.EvalBodyPoseInWorld(self._engine.context, world.robots[robot].body)
+        world = self._world
+        X_WR = world.plant.EvalBodyPoseInWorld(self._context, world.robots[robot].body)
         robot_W = float(X_WR.translation()[0]), float(X_WR.translation()[1])
         places_W = {name: self._place_W(body) for name, body in self._bodies.items()}
         away_m = {name: math.dist(place_W, robot_W) for name, place_W in places_W.items()}
@@ -68,15 +72,15 @@ class Listeners:
 
     def _in_sight(self, from_W: Point, to_W: Point) -> bool:
         """Returns whether neither wall nor closed door stands between a robot and a person."""
-        world = self._engine.world
+        world = self._world
         if self._walls is None:
             inspector, corners = world.scene_graph.model_inspector(), (from_W, to_W)
             self._walls = Ground.from_plant(world.plant, inspector, corners, EYES_M)
         share = max(0.0, 1.0 - BESIDE_M / max(math.dist(from_W, to_W), BESIDE_M))
         beside_W = (from_W[0] + share * (to_W[0] - from_W[0]), from_W[1] + share * (to_W[1] - from_W[1]))
-        door = any(segments_cross((from_W, to_W), each) for each in self._engine.doors.barriers)
+        door = any(segments_cross((from_W, to_W), each) for each in self._doors.barriers)
         return not door and self._walls.sees(from_W, beside_W)
 
     def _place_W(self, body: object) -> Point:
-        x, y, _ = self._engine.world.plant.EvalBodyPoseInWorld(self._engine.context, body).translation()
+        x, y, _ = self._world.plant.EvalBodyPoseInWorld(self._context, body).translation()
         return float(x), float(y)

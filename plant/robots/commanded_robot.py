@@ -12,9 +12,9 @@ from pydrake.systems.framework import Context
 
 from plant.robots.command_table import CommandTable, HeadGoal, Part, Velocity
 from plant.robots.robot_kind import RobotBody
+from plant.robots.sensor_suite import SensorSuite
 from plant.robots.servos import ActuatedJoints, ArmServos, Closing, GripperGoal, GripperServo, GripperTolerances
 from plant.saved_state import State, Stateful
-from plant.sensors.suite import SensorSuite
 from skills.robot import (
     ArmTrajectory,
     Battery,

@@ -10,9 +10,9 @@ from pydrake.systems.framework import Context
 from plant.robots.command_table import HeadGoal, Part, Velocity
 from plant.robots.commanded_robot import CommandedRobot
 from plant.robots.robot_kind import RobotBody
+from plant.robots.sensor_suite import SensorSuite
 from plant.robots.servos import ActuatedJoints, GripperTolerances, gripper_set_point
 from plant.sensors.proprioception import GripperNoise
-from plant.sensors.suite import SensorSuite
 from skills.robot import BaseKind, CommandState, FloatArray, GripperKind
 
 _HEAD_ARRIVED_RAD, _HEAD_STILL_RAD_S = 0.01, 0.05

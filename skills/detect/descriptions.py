@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 from skills.api import ObjectObservation, Surface
 from skills.inputs.errors import with_article
-from skills.perception.class_forms import PERSON
+from skills.world_model import PERSON
 
 SAME_WITHIN_M = 0.12
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")

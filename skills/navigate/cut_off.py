@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import ClearableCostmap, FreeSpace, SkillContext
+from skills.doorway import DoorState, Doorway, measure_opening
 from skills.navigate.footprint import Footprint, clearance_on_grid, with_segments
-from skills.perception.doorway import DoorState, Doorway, measure_opening
 from skills.quantities import Delay, Length, Margin, Turn
 from skills.robot import FloatArray, Pose2D
 

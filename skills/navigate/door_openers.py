@@ -8,8 +8,8 @@ from typing import Annotated, Final
 from pydantic import Field
 
 from skills.api import Job, SkillContext
+from skills.doorway import DoorOpener, Doorway
 from skills.geometry import relative_pose
-from skills.perception.doorway import DoorOpener, Doorway
 from skills.quantities import Angle, Coordinate, Duration, Height
 from skills.robot import DoorHandle, Pose2D
 

@@ -16,9 +16,9 @@ from skills.navigate.lattice import Lattice, cost_to_go, lattice_moves, search
 from skills.navigate.motion_cost import NO_ZONES, TURNING_RADIUS_M, Needs, Space, Weights, ZoneCosts, segment_cost
 from skills.navigate.path import Path, clearances, densify, relax, shortcut
 from skills.navigate.zone_map import ZoneMap
-from skills.navigate.zones import ZoneKind, zones_sentence
 from skills.quantities import Count, Factor, Length, Margin, Speed, TurnRate
 from skills.robot import BaseKind, FloatArray, Pose2D
+from skills.world_model import ZoneKind, zones_sentence
 
 FIELD_CELL_M = 0.05
 STEP_M = 0.06

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from skills.api import ClearableCostmap, FreeSpace, SkillContext
+from skills.doorway import Doorway
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.cut_off import DoorOptions, DoorWatch
@@ -15,14 +16,13 @@ from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
 from skills.navigate.path import progress_m
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, ScanHealthOptions, WatchOptions
 from skills.navigate.zone_map import KeepOut, ZoneMap
-from skills.navigate.zones import Zone, ZoneKind
-from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.quantities import Delay, Duration, Length, Margin, Speed, Tries, TurnRate
 from skills.robot import FloatArray, Pose2D
 from skills.routine import PATIENCE_S
 from skills.stack import LocalController
+from skills.world_model import Zone, ZoneKind
 
 
 @dataclass(frozen=True)

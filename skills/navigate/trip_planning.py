@@ -12,10 +12,10 @@ from skills.navigate.giving_way import Avoided
 from skills.navigate.path import Path
 from skills.navigate.planner import LatticePlanner
 from skills.navigate.surroundings import NavigateOptions, Surroundings
-from skills.navigate.zones import zones_sentence
 from skills.ports import NavigateInputs
 from skills.robot import Pose2D
 from skills.routine import Patience, SkillFailure
+from skills.world_model import zones_sentence
 
 __all__ = ["TripPlanning", "place_text"]
 

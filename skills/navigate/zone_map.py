@@ -6,10 +6,10 @@ A robot that stands in a keep-out zone may leave it: the part that lies deeper, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -19,9 +19,8 @@ from skills.estimate.compiled import distances
 from skills.estimate.grid_map import BoolGrid, load_filter_mask, signed_distance
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, WithObstacles, clearance_on_grid, disc_centres
 from skills.navigate.motion_cost import ZoneCosts
-from skills.navigate.zones import FilterType, Zone, ZoneKind
 from skills.robot import FloatArray, Pose2D
-from skills.world_model import FreeSpace
+from skills.world_model import FilterType, FreeSpace, Zone, ZoneKind
 
 _CELL_M, _MOST_CELLS = 0.05, 4_000_000
 """Size of a cell, larger where the zones would fill more cells."""
@@ -286,3 +285,20 @@ def _points_of(buffer: bytes, grown_m: float) -> FloatArray:
     points = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
     apart = np.linalg.norm(points[:, None] - discs[None, :, :2], axis=2)
     return np.asarray(points[np.any(apart <= reach[:, 0] + 0.5 * _SAMPLE_M, axis=1)])
+
+
+def zone_messages(zones: Iterable[Zone]) -> list[dict[str, Any]]:
+    """Encodes the zones that have an outline: name, kind, rule in words, outlines (world frame, m), one-way direction.
+
+    The outlines of a mask are those of its keep-out cells or of its limits. Raises InputError for an unreadable mask.
+    """
+    found = []
+    for zone in zones:
+        outlines: list[Any] = [zone.corners_W]
+        if zone.mask is not None:
+            least = 100 if zone.kind is ZoneKind.KEEP_OUT else 1
+            outlines = [each.round(3).tolist() for each in load_filter_mask(Path(zone.mask.file)).outlines_W(least)]
+        ahead = {"direction_rad": zone.direction_rad} if zone.kind is ZoneKind.ONE_WAY else {}
+        message = {"name": zone.name, "kind": zone.kind.value, "rule": zone.words, "outlines": outlines, **ahead}
+        found += [message] if outlines else []
+    return found

@@ -18,7 +18,6 @@ from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clear, footprint_clearance_m, pose_array
-from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark, turn_upright
 from skills.perception.people import SeenPerson, located_people, people_detections, people_in_scan
 from skills.perception.people_tracking import SCAN_APART_M, PeopleTracker
@@ -26,6 +25,7 @@ from skills.ports import FindPeopleInputs, FindPeoplePorts, NavigateInputs
 from skills.quantities import Count, Delay, Length, Share, Tries, Turn, TurnRate
 from skills.robot import FloatArray, Image, Pose2D
 from skills.routine import Patience, Routine, SkillFailure
+from skills.world_model import PERSON
 
 _SCAN_AGE_S = 1.0
 _AHEAD_RAD = 0.2

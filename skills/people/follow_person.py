@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from skills.api import Cause, ClearableCostmap, Failed, Running, SkillContext, Succeeded
+from skills.doorway import Doorway
 from skills.geometry import bearing_rad, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
@@ -26,7 +27,6 @@ from skills.people.followed_person import (
     poses_behind,
     poses_beyond,
 )
-from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.ports import FollowPersonInputs, FollowPersonPorts, NavigateInputs

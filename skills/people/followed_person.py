@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from skills.api import FreeSpace
+from skills.doorway import Doorway
 from skills.geometry import bearing_rad, line_of_sight, wrap
-from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import predicted_place_W
 from skills.quantities import Delay, Length, Speed

@@ -14,13 +14,13 @@ from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
 from skills.navigate.trip_planning import place_text
-from skills.perception.class_forms import PERSON
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.ports import MeetPersonInputs, MeetPersonPorts, NavigateInputs
 from skills.quantities import Delay, Length, Tries, Turn
 from skills.robot import Pose2D
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
+from skills.world_model import PERSON
 
 PERSON_SIZE_M: Final = (0.5, 0.5, 1.7)
 _SCAN_AGE_S = 1.0

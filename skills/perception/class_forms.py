@@ -15,8 +15,6 @@ from skills.inputs.plugins import class_entries
 from skills.inputs.yaml_source import read_yaml
 
 FORMS_FILE: Final = "class_forms.yaml"
-PERSON: Final = "person"
-"""The class of people."""
 ANY_OBJECT: Final = "thing"
 """The class word for any object that stands on a surface, whether the detector knows its class or not."""
 MEANS_BIG: Final[Mapping[str, bool]] = MappingProxyType(

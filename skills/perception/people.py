@@ -15,11 +15,11 @@ from pydrake.math import RigidTransform
 
 from skills.api import Detection, Detector, SurveyView
 from skills.estimate.scan_points import placed_points, scan_points
-from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import detect_class_in_grey
 from skills.perception.point_cloud import grid_labels
 from skills.perception.position import locate
 from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D, Scan
+from skills.world_model import PERSON
 
 _CELL_M = 0.05
 _LOWEST_M = 0.8

@@ -14,7 +14,6 @@ from pydrake.math import RigidTransform
 
 from skills.api import Job, ObstacleLayerView, SkillContext, SurveyView
 from skills.geometry import relative_pose
-from skills.perception.class_forms import PERSON
 from skills.perception.people import (
     ARM_AHEAD_M,
     STOWED_AHEAD_M,
@@ -27,6 +26,7 @@ from skills.perception.people import (
 from skills.perception.point_cloud import camera_pose_W, project
 from skills.quantities import Count, Delay, Duration, Length, Margin, Share, Turn
 from skills.robot import CameraCapabilities, FloatArray, Image, NoImageError, Pose2D
+from skills.world_model import PERSON
 
 _ACCELERATION_M_S2 = 1.5
 _SPEED_SIGMA_M_S = 1.0

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from skills.api import Cause, Part, Running, Succeeded
-from skills.perception.doorway import DoorState, Doorway, Opening, measure_opening
+from skills.doorway import DoorState, Doorway, Opening, measure_opening
 from skills.quantities import Angle, Coordinate, Count, Delay, Length, Margin, Turn
 from skills.robot import Scan
 from skills.routine import PATIENCE_S, Routine, RoutineSkill, SkillFailure

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from skills.api import Cause, Part, Running, Succeeded
+from skills.doorway import DoorState, Doorway
 from skills.navigate.door_openers import ArmDoor, DoorCalls
-from skills.perception.doorway import DoorState, Doorway
 from skills.quantities import Delay
 from skills.routine import Routine, RoutineSkill, SkillFailure
 from skills.small.check_door import CheckDoorInputs

@@ -22,8 +22,8 @@ from executive.words.knowledge import Door, Knowledge
 from executive.words.leaf_steps import OpenDoor
 from executive.words.outlines import Point, distance_m, fits, nearest_side
 from skills.api import Cause
+from skills.doorway import DoorState, Doorway
 from skills.inputs.errors import InputError
-from skills.perception.doorway import DoorState, Doorway
 from skills.robot import Pose2D
 from skills.stack import StackError, door_opener
 

@@ -14,8 +14,8 @@ from plant.robots.fetch.model import FetchJoints, FetchModel
 from plant.robots.fetch.wheels import Axle, WheelOdometer, WheelServos
 from plant.robots.jointed_robot import JointedRobot, JointedSensors, gripper_noise
 from plant.robots.robot_kind import SensorOptions
+from plant.robots.sensor_suite import LidarMount
 from plant.sensors.lidar import LidarSpec
-from plant.sensors.suite import LidarMount
 from skills.robot import CommandCause, CommandId, CommandState, FloatArray, Lease
 
 _LIDAR_SIGMA_M = 0.015

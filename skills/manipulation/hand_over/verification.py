@@ -11,7 +11,6 @@ from skills.api import Cause, InputsT, Surface
 from skills.manipulation.arm.collision import Box
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, towards_shoulder
 from skills.manipulation.arm.releasing_skill import ReleasingSkill
-from skills.perception.class_forms import PERSON
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
 from skills.perception.point_cloud import cloud_from_image
@@ -20,6 +19,7 @@ from skills.ports import BackOffInputs
 from skills.robot import FloatArray, Image
 from skills.routine import Routine, SkillFailure
 from skills.small.back_off import BackOff
+from skills.world_model import PERSON
 
 LOOKS = 3
 """Number of views of a head camera of the place where it saw nothing."""

@@ -34,6 +34,7 @@ IMPORTS = [
 ]
 PROGRAM = f"""
 import sys
+from importlib.metadata import entry_points
 from executive.cli.entry import command_line
 for words in %r:
     sys.argv = ["errand", *words]
@@ -44,7 +45,7 @@ for words in %r:
     assert not [name for name in sys.modules if name.startswith({UNUSED_AT_RUN_TIME!r})]
     print("imported:", *sorted({{name.split(".")[0] for name in sys.modules}} & {HEAVY!r}))
 print(*sorted(name for name in sys.modules if name.startswith("executive.language.")))
-print(*sorted(name for name in sys.modules if name.startswith("skills.") and name.endswith(".skill")))
+print(*sorted({{entry.module for entry in entry_points(group="errand.skills")}} & sys.modules.keys()))
 """
 
 
@@ -74,7 +75,7 @@ def test_a_check_imports_nothing_that_understands_sentences_and_no_skill_that_de
     language, skills = (line.split() for line in call_in_process([CHECK])[0][-2:])
     assert language == ["executive.language.parser", "executive.language.questions"]
     assert skills == [
-        f"skills.{name}.skill"
+        f"skills.small.{name}"
         for name in ("charge", "check_door", "clear_costmap", "locate_dock", "open_door", "speak")
     ]
 

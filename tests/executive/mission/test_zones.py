@@ -1,6 +1,6 @@
 """Zones of mission files: their two forms."""
 
-from skills.navigate.zones import ZoneKind
+from skills.world_model import ZoneKind
 
 FILE = "name: m\nzones:\n{}\nsteps:\n{}\n"
 GO, QUIET = "- to: kitchen", "- silent: hall"

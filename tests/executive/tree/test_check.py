@@ -22,8 +22,8 @@ from skills.estimate.grid_map import GridMap
 from skills.inputs.yaml_source import YamlSource
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import LatticePlanner
-from skills.navigate.zones import Zone, ZoneKind
 from skills.robot import Pose2D
+from skills.world_model import Zone, ZoneKind
 
 START = Pose2D(0.0, 0.0, 0.0)
 MASSES = {"coke": 0.35, "beer": 0.55, "hammer": 0.5}

@@ -22,7 +22,8 @@ from executive.words.goal import RefereeReport
 from executive.words.knowledge import Pose
 from executive.words.mission import Mission
 from skills.estimate.grid_map import GridMap
-from skills.navigate.zones import Zone, ZoneKind, zone_messages
+from skills.navigate.zone_map import zone_messages
+from skills.world_model import Zone, ZoneKind
 
 SIZES = [(1400, 900), (390, 844)]
 LONG = f"waits until sixty seconds are over, as the mission says, and goes on with the rest of the round {'x' * 60}"

@@ -8,10 +8,10 @@ import pytest
 from planar_robot import Bench, Box
 
 from skills.api import Cause, Failed, Succeeded
+from skills.doorway import DoorState, Doorway, SeenDoor
 from skills.navigate.cut_off import DoorOptions, DoorWatch, closed_doors_sentence
 from skills.navigate.footprint import Footprint
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.perception.doorway import DoorState, Doorway, SeenDoor
 from skills.robot import Pose2D
 
 LEFT = Doorway((2.45, 4.05), 0.9, math.pi / 2, ("study", "corridor"))

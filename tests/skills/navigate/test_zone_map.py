@@ -14,8 +14,8 @@ from skills.navigate.footprint import Footprint, disc_centres, footprint_clearan
 from skills.navigate.planner import LatticePlanner, NoPathError
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.navigate.zone_map import KeepOut, zone_map
-from skills.navigate.zones import FilterType, Zone, ZoneKind, ZoneMask, zones_sentence
 from skills.robot import Pose2D
+from skills.world_model import FilterType, Zone, ZoneKind, ZoneMask, zones_sentence
 
 FOOTPRINT = Footprint.rectangle(OUTLINE)
 FULL_M_S = 0.8

@@ -9,13 +9,13 @@ from planar_people import LateAnswer, PeopleDetector, person_at
 from planar_robot import Bench
 
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
-from skills.navigate.zones import Zone, ZoneKind
+from skills.doorway import Doorway
 from skills.people.follow_person import FollowPerson, FollowPersonOptions
 from skills.people.followed_person import Target, TargetOptions
-from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.ports import FollowPersonInputs
 from skills.robot import Pose2D
+from skills.world_model import Zone, ZoneKind
 
 START, LANE_M = Pose2D(1.5, 5.4, 0.0), 5.4
 END = ((5.0, 4.5), (8.0, 4.5), (8.0, 6.5), (5.0, 6.5))

@@ -11,9 +11,9 @@ import pytest
 from planar_robot import Bench, Box
 
 from skills.api import Cause, Failed, Succeeded
+from skills.doorway import Doorway
 from skills.navigate.door_openers import ArmDoor, HttpDoor
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.perception.doorway import Doorway
 from skills.robot import CommandCause, CommandId, CommandState, CommandStatus, Pose2D
 from skills.small.check_door import CheckDoorInputs
 from skills.small.open_door import OpenDoor

@@ -9,10 +9,10 @@ from executive.tree.plan import PlanBuilder
 from executive.words import leaf_steps as model
 from executive.words.command import Command
 from executive.words.knowledge import Door, Knowledge
+from skills.doorway import DoorState, Doorway
 from skills.inputs.errors import InputError
 from skills.navigate.door_openers import HttpDoor
 from skills.navigate.skill import Navigate
-from skills.perception.doorway import DoorState, Doorway
 from skills.robot import Pose2D
 from skills.small.back_off import BackOff
 from skills.small.check_door import CheckDoor

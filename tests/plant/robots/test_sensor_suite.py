@@ -8,10 +8,10 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
+from plant.robots.sensor_suite import Camera
 from plant.robots.spot.description import CAMERAS
 from plant.sensors.camera_spec import load_cameras
 from plant.sensors.noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
-from plant.sensors.suite import Camera
 from skills.inputs.errors import InputError
 from skills.robot import FrameTree, Intrinsics
 from tests.tables import table

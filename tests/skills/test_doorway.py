@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from skills.perception.doorway import Doorway, measure_opening
+from skills.doorway import Doorway, measure_opening
 from skills.robot import Pose2D
 from skills.testing.blocks import Block, take_scan
 

@@ -11,7 +11,7 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3428,
+    "executive/words": 3429,
     "executive/language": 8250,
     "executive/speech": 1582,
     "executive/mission": 1646,
@@ -24,10 +24,10 @@ LINES = {
     "executive/testing": 849,
     "executive/app": 8094,
     "executive/cli": 4522,
-    "skills": 30134,
-    "plant": 14940,
+    "skills": 30122,
+    "plant": 14944,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 467, 75, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 466, 75, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -37,7 +37,7 @@ endef
 env: $(VENV)/.ready
 
 $(VENV)/.ready: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,objects,cluster,foxglove,spot,test,browser,bench,dev]' $(PLUGINS:%=--editable %)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,cluster,foxglove,spot,test,browser,bench,dev]' $(PLUGINS:%=--editable %)
 	$(BIN)/errand warm-up
 	@touch $@
 

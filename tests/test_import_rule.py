@@ -1,15 +1,24 @@
 """The import rule: executive -> skills; plant -> executive.words, skills.robot, skills.files; skills imports neither.
 
 Only executive.app and executive.cli import all three. Nothing of the core imports executive.cli, nor a plug-in.
+Plug-ins import the public names of the core, and of others what a table lists.
 The homes of executive import each other one way, from the last of `HOMES` to the first, the words nothing but a few
 plain modules of skills. No files import each other in a circle, not for types either.
 """
 
+import re
+import sys
+import tomllib
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import pytest
 
-from tests.sources import PLUGINS, PRODUCT, dotted, graph_of, import_graph, modules, read
+from tests.sources import PLUGINS, PRODUCT, ROOT, dotted, graph_of, import_graph, modules, read
+from tests.tables import yaml_beside
+
+sys.path.insert(0, str(ROOT / "docs"))
+from make_api import public_names
 
 Check = Callable[[str, str], list[str]]
 Graph = Mapping[str, frozenset[str]]
@@ -34,11 +43,9 @@ HOMES = (
     ("executive.cli",),
 )
 """The homes of executive, the lowest first."""
-BUILDERS = ("plant.models.builder", "plant.worlds.builder")
-"""What makes models and worlds; at run time only the commands import it that make them."""
-USES_BUILDERS = (*BUILDERS, "executive.cli.new_command", "executive.cli.object_command", "executive.cli.world_command")
-FOR_COMMANDS = ("executive.cli.number_options", "executive.cli.output")
-"""What a command of any distribution may use of the command line."""
+PUBLIC = {f"{module}.{name}" for module, names in public_names().items() for name in names}
+PRIVATE = yaml_beside(__file__, "test_import_rule.yaml")
+"""What each plug-in imports of the core that `docs/api.md` does not name, which may only become less."""
 
 
 def within(name: str, *packages: str) -> bool:
@@ -81,20 +88,19 @@ def upward(path: str, source: str) -> list[str]:
     return [name for name in names if own is None or (above := rank(name)) is None or above > own]
 
 
-def builder_imports(path: str, source: str) -> list[str]:
-    """What a module that is needed at run time imports of the builders."""
-    own = within(dotted(path), *USES_BUILDERS)
-    return [] if own else [name for name in ours(source) if within(name, *BUILDERS)]
-
-
 def plugin_imports(_: str, source: str) -> list[str]:
     """What a module of the core imports of plug-ins."""
     return [name for name in read(source).imports if name.startswith("errand_")]
 
 
-def other_commands(_: str, source: str) -> list[str]:
-    """What a module imports of the command line beyond what a command of any distribution may use."""
-    return [name for name in ours(source) if within(name, "executive.cli") and not within(name, *FOR_COMMANDS)]
+def private_imports(_: str, source: str) -> list[str]:
+    """What a module imports of the core that is not public."""
+    return [name for name in ours(source) if name not in PUBLIC]
+
+
+def imported_names(check: Check, folder: str) -> set[str]:
+    """The distinct names that a check finds in the modules of a folder."""
+    return {name for names in found(check, folder).values() for name in names}
 
 
 def found(check: Check, *folders: str) -> dict[str, list[str]]:
@@ -116,16 +122,27 @@ def test_the_root_of_executive_holds_no_modules() -> None:
     assert [path for path in modules("executive") if path.count("/") == 1] == ["executive/__init__.py"]
 
 
-def test_only_the_commands_that_make_models_and_worlds_import_the_builders() -> None:
-    assert found(builder_imports, *PRODUCT) == {}
-
-
 def test_the_core_imports_no_plug_in() -> None:
     assert found(plugin_imports, *PRODUCT, "missions") == {}
 
 
-def test_plug_ins_use_of_the_command_line_only_what_is_public() -> None:
-    assert found(other_commands, *PLUGINS) == {}
+@pytest.mark.parametrize("folder", PLUGINS)
+def test_a_plug_in_imports_no_further_private_name_of_the_core(folder: str) -> None:
+    """A name that is gone leaves the table; a new one becomes public, or is done without."""
+    assert sorted(imported_names(private_imports, folder)) == PRIVATE[Path(folder).name]
+
+
+@pytest.mark.parametrize("folder", PLUGINS)
+def test_plug_ins_use_of_the_command_line_only_what_is_public(folder: str) -> None:
+    assert [name for name in PRIVATE[Path(folder).name] if within(name, "executive.cli")] == []
+
+
+def test_a_plug_in_imports_another_only_where_its_project_requires_it() -> None:
+    for folder in PLUGINS:
+        project = tomllib.loads((ROOT / folder).with_name("pyproject.toml").read_text(encoding="utf-8"))["project"]
+        required = {re.split(r"[^\w-]", each)[0].replace("-", "_") for each in project["dependencies"]}
+        packages = {name.partition(".")[0] for name in imported_names(plugin_imports, folder)}
+        assert packages <= {Path(folder).name, *required}, folder
 
 
 CALL = "def f():\n    "
@@ -153,12 +170,9 @@ CALL = "def f():\n    "
         (upward, "executive/tree/estimate.py", f"{CALL}import executive.run.runner", ["executive.run.runner"]),
         (upward, "executive/tree/estimate.py", "from executive.attic import old", ["executive.attic.old"]),
         (upward, "executive/view/formats.py", "from executive.tree.node_view import NodeView", []),
-        (builder_imports, "executive/cli/map.py", "import plant.models.builder.mesh", ["plant.models.builder.mesh"]),
-        (builder_imports, "executive/cli/object_command.py", f"{CALL}import plant.models.builder.importing", []),
-        (builder_imports, "plant/worlds/builder/own.py", "from plant.models.builder import mesh", []),
         (plugin_imports, "plant/work.py", f"{CALL}import errand_train", ["errand_train"]),
-        (other_commands, "errand_train/a.py", "import executive.cli.screen", ["executive.cli.screen"]),
-        (other_commands, "errand_train/a.py", "from executive.cli.output import console_for", []),
+        (private_imports, "errand_train/a.py", f"{CALL}import executive.cli.screen", ["executive.cli.screen"]),
+        (private_imports, "errand_train/a.py", "from executive.cli.output import console_for", []),
     ],
 )  # fmt: skip
 def test_a_check_finds_breaches(check: Check, path: str, source: str, expected: list[str]) -> None:

@@ -23,11 +23,11 @@ LINES = {
     "executive/view": 1594,
     "executive/testing": 849,
     "executive/app": 8351,
-    "executive/cli": 5032,
+    "executive/cli": 4324,
     "skills": 30355,
-    "plant": 22156,
+    "plant": 18640,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 517, 95, 14
+MODULES, ONE_IMPORTER, SAME_NAME = 497, 89, 14
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -16,8 +16,8 @@ from plant.robots.command_table import Part, Velocity
 from plant.robots.jointed_robot import FINGER_GAINS, JointedRobot, JointedSensors, JointIndex, gripper_noise
 from plant.robots.robot_kind import PlacedRobot, RobotBody, SensorOptions
 from plant.robots.spot.floating_base import FloatingBase, FloatingBaseLimits
-from plant.robots.urdf_robot.assembly import PACKAGE
 from plant.robots.urdf_robot.description import Description
+from plant.robots.urdf_robot.urdf_file import PACKAGE
 from plant.sensors.lidar import LidarSpec
 from plant.sensors.suite import LidarMount
 from skills.robot import CommandCause, CommandId, CommandState, FloatArray, Lease, Pose2D

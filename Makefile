@@ -38,7 +38,7 @@ endef
 env: $(VENV)/.ready
 
 $(VENV)/.ready: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,objects,cluster,foxglove,test,browser,bench,dev]' $(PLUGINS:%=--editable %)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,cluster,foxglove,test,browser,bench,dev]' $(PLUGINS:%=--editable %)
 	$(BIN)/errand warm-up
 	@touch $@
 

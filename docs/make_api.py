@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import enum
 import inspect
+import itertools
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from types import GenericAlias
-from typing import Any, NewType
+from types import ModuleType
+from typing import Any
 
 from skills.quantities import quantity_of, range_text
 
@@ -33,8 +35,25 @@ world `W`, odometry `O`, body `B` (x ahead, y left, z up), hand `H`, camera `C` 
 
 def public_names() -> dict[str, tuple[str, ...]]:
     """The public names by module, as `docs/api.md` lists them."""
-    rows = _ROW.findall(LIST.read_text(encoding="utf-8"))
-    return {module: tuple(re.findall(r"`(\w+)`", names)) for module, names in rows}
+    found = dict[str, tuple[str, ...]]()
+    for module, names in _ROW.findall(LIST.read_text(encoding="utf-8")):
+        found[module] = (*found.get(module, ()), *re.findall(r"`(\w+)`", names))
+    return found
+
+
+def meaning(module: ModuleType, name: str) -> str:
+    """The docstring of a public name; of a number its range, of another constant the text below it in the source."""
+    thing = getattr(module, name)
+    if inspect.isclass(thing) or inspect.isroutine(thing):
+        return _doc(thing)
+    if quantity_of(thing) is not None:
+        return f"A number {range_text(thing)}."
+    body = ast.parse(inspect.getsource(module)).body
+    for statement, following in itertools.pairwise(body):
+        targets = statement.targets if isinstance(statement, ast.Assign) else [getattr(statement, "target", None)]
+        if name in (getattr(each, "id", None) for each in targets) and isinstance(following, ast.Expr):
+            return inspect.cleandoc(str(ast.literal_eval(following.value)))
+    return ""
 
 
 def api_page(note: str) -> str:
@@ -43,18 +62,16 @@ def api_page(note: str) -> str:
     for module, names in public_names().items():
         loaded = import_module(module)
         parts.append(f"## {module}\n\n{_doc(loaded)}\n")
-        parts += [_section(name, getattr(loaded, name)) for name in names]
+        parts += [_section(loaded, name) for name in names]
     return "\n".join(parts)
 
 
-def _section(name: str, thing: Any) -> str:
-    if quantity_of(thing) is not None:
-        return f"- `{name}`: {range_text(thing)}\n"
-    if isinstance(thing, NewType | GenericAlias):
-        return f"### {name}\n\n`{getattr(thing, '__supertype__', thing)}`\n"
-    if not inspect.isclass(thing):
-        return f"### {name}\n\n```python\n{name}{_signature(thing)}\n```\n\n{_doc(thing)}\n"
-    return f"### {name}\n\n{_doc(thing)}\n" + "".join(f"\n{part}\n" for part in _members(thing))
+def _section(module: ModuleType, name: str) -> str:
+    thing, text = getattr(module, name), meaning(module, name)
+    if inspect.isroutine(thing):
+        return f"### {name}\n\n```python\n{name}{_signature(thing)}\n```\n\n{text}\n"
+    members = _members(thing) if inspect.isclass(thing) else ()
+    return f"### {name}\n\n{text}\n" + "".join(f"\n{part}\n" for part in members)
 
 
 def _members(kind: type[Any]) -> Iterator[str]:

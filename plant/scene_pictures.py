@@ -1,10 +1,10 @@
-"""Pictures of worlds, runs and models: maps with paths and labels, detections, portraits, and views from free cameras.
+"""Pictures of worlds and runs: maps with paths and labels, detections, and views from free cameras.
 
 Pictures are (H, W, 3) uint8 RGB arrays until `save_png` writes them. Drawing is antialiased; text stands on a plate, so
 that it is legible on any ground. All lengths in metres, all poses in the world frame.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,20 +13,12 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydrake.geometry import (
-    GeometryInstance,
-    MakeRenderEngineVtk,
-    Mesh,
-    PerceptionProperties,
     QueryObject,
-    RenderEngineVtkParams,
-    RenderLabel,
-    SceneGraph,
 )
 from pydrake.math import RigidTransform, RotationMatrix
 
-from plant.rendering import lights
 from plant.sensors.camera_spec import FAR_M, NEAR_M, colour_render_camera, depth_render_camera
-from plant.worlds.world import Point, World
+from plant.worlds.world import Point
 from skills.map_drawing import (
     INK,
     PLATE,
@@ -38,7 +30,7 @@ from skills.map_drawing import (
     text_size,
     with_legend,
 )
-from skills.robot import FloatArray, Intrinsics, Picture, Pose2D
+from skills.robot import FloatArray, Intrinsics, Picture
 
 Bounds = tuple[float, float, float, float]
 
@@ -66,6 +58,10 @@ class MapView:
         x, y, z = (self.X_WC.inverse() @ at_height.T).reshape(3, -1)
         k = self.intrinsics
         return np.stack([k.fx * x / z + k.cx, k.fy * y / z + k.cy], axis=-1)
+
+    def whole_pixels(self, points_W: Sequence[Point]) -> NDArray[np.int32]:
+        """Projects points on the floor to whole pixels (N, 2), as OpenCV draws them."""
+        return np.asarray(np.round(self.pixels(np.array(points_W))), dtype=np.int32)
 
     @property
     def pixels_per_m(self) -> float:
@@ -171,7 +167,7 @@ def draw_map(
     """
     picture = view.picture.copy()
     for zone in zones:
-        outlines = [_pixels(view, outline) for outline in zone["outlines"]]
+        outlines = [view.whole_pixels(outline) for outline in zone["outlines"]]
         draw_zone(picture, outlines, zone["kind"], ZONE_COLOURS[zone["kind"]], zone.get("direction_rad"))
     paths = {text: (view.pixels(path), ink) for text, (path, ink) in paths_W.items() if len(path)}
     names = Names(picture, [pixels for pixels, _ in paths.values()])
@@ -275,97 +271,3 @@ def _dot(picture: Picture, pixel: FloatArray, colour: Colour) -> None:
     centre = (round(float(pixel[0])), round(float(pixel[1])))
     cv2.circle(picture, centre, radius + 2, PLATE, cv2.FILLED, cv2.LINE_AA)
     cv2.circle(picture, centre, radius, colour, cv2.FILLED, cv2.LINE_AA)
-
-
-GROUND = (0.86, 0.87, 0.88)
-FOV_Y_RAD = float(np.radians(30.0))
-_FLAT = 0.4
-
-
-@dataclass(frozen=True)
-class Ball:
-    """Ball that encloses a model, in the model's frame: centre (3,) and radius (m)."""
-
-    middle: FloatArray
-    radius_m: float
-
-
-def portrait(mesh: Path, ball: Ball, size_m: tuple[float, float, float], size_px: tuple[int, int]) -> Picture:
-    """Renders a visual mesh so that it fills a picture (width, height); a flat one is seen more from above."""
-    scene = SceneGraph()
-    parameters = RenderEngineVtkParams(default_clear_color=np.array(GROUND), lights=lights())
-    scene.AddRenderer("vtk", MakeRenderEngineVtk(parameters))
-    appearance = GeometryInstance(RigidTransform(), Mesh(str(mesh), np.ones(3)), mesh.stem)
-    properties = PerceptionProperties()
-    properties.AddProperty("label", "id", RenderLabel(1))
-    appearance.set_perception_properties(properties)
-    scene.RegisterAnchoredGeometry(scene.RegisterSource("portrait"), appearance)
-    view = np.array([1.0, -0.75, 0.55]) if size_m[2] > _FLAT * max(size_m) else np.array([0.25, -0.6, 1.0])
-    eye = ball.middle + view / np.linalg.norm(view) * ball.radius_m / np.sin(FOV_Y_RAD / 2.0)
-    query = scene.get_query_output_port().Eval(scene.CreateDefaultContext())
-    assert isinstance(query, QueryObject)
-    return render_view(query, look_at(eye, ball.middle), size_px, fov_y_rad=FOV_Y_RAD)
-
-
-WIDTH_PX = 1400
-_ABOVE_M = 10.0
-_TINTS = ((214, 232, 246), (250, 228, 208), (220, 242, 214), (246, 216, 226), (238, 234, 200), (226, 216, 244))
-_SURFACE = (196, 160, 110)
-_ARROW_M = 0.8
-
-Door = tuple[Point, float]
-"""Centre and width (m) of a door."""
-
-
-def draw_world(
-    world: World,
-    cells: Picture,
-    origin_m: tuple[float, float],
-    resolution_m: float,
-    *,
-    labels: Mapping[str, Point],
-    doors: Iterable[Door],
-    zones: Sequence[Mapping[str, Any]] = (),
-) -> Picture:
-    """Draws the plan of a world over a grid's grey values (rows from the south).
-
-    Rooms are tinted, surfaces outlined, doors are circles of their width, and the start is an arrow. `labels` are
-    written at their points.
-    """
-    rows, columns = cells.shape
-    scale = WIDTH_PX / max(columns, rows)
-    size = (round(columns * scale), round(rows * scale))
-    grey = cv2.resize(np.ascontiguousarray(cells[::-1]), size, interpolation=cv2.INTER_AREA)
-    view = _view(np.repeat(grey[..., None], 3, axis=2), origin_m, scale / resolution_m)
-    ground = np.full_like(view.picture, 255)
-    for index, polygon in enumerate(world.rooms.values()):
-        cv2.fillPoly(ground, [_pixels(view, polygon)], _TINTS[index % len(_TINTS)])
-    picture = np.asarray(np.minimum(view.picture, ground), np.uint8)
-    for surface in world.surfaces.values():
-        cv2.polylines(picture, [_pixels(view, surface.polygon_W)], True, _SURFACE, 3, cv2.LINE_AA)
-    for at, width in doors:
-        radius = max(3, round(width / 2.0 * view.pixels_per_m))
-        x, y = _pixels(view, [at])[0]
-        cv2.circle(picture, (int(x), int(y)), radius, INK, 2, cv2.LINE_AA)
-    start = {"start and its direction": (_arrow(world.start), PATH_COLOUR)}
-    return draw_map(MapView(picture, view.X_WC, view.intrinsics), start, labels=labels, zones=zones)
-
-
-def _view(picture: Picture, origin_m: tuple[float, float], pixels_per_m: float) -> MapView:
-    """Returns the grid as the picture of a camera high above the centre of the floor."""
-    height, width = picture.shape[:2]
-    focal = pixels_per_m * _ABOVE_M
-    down = RotationMatrix(np.diag([1.0, -1.0, -1.0]))
-    middle = np.array([width, height]) / 2.0 / pixels_per_m + origin_m
-    X_WC = RigidTransform(down, np.array([*middle, _ABOVE_M]))
-    return MapView(picture, X_WC, Intrinsics(width, height, focal, focal, width / 2.0 - 0.5, height / 2.0 - 0.5))
-
-
-def _pixels(view: MapView, points: Sequence[Point]) -> NDArray[np.int32]:
-    return np.asarray(np.round(view.pixels(np.array(points))), dtype=np.int32)
-
-
-def _arrow(start: Pose2D) -> FloatArray:
-    ahead = np.array([np.cos(start.yaw_rad), np.sin(start.yaw_rad)])
-    steps = np.array([[0.0], [_ARROW_M / 2.0], [_ARROW_M]])
-    return np.asarray(np.array([start.x_m, start.y_m]) + steps * ahead)

@@ -37,9 +37,11 @@ if TYPE_CHECKING:  # Drake takes a third of a second to import; commands that mo
     from pydrake.math import RigidTransform
 
 FloatArray = NDArray[np.float64]
+"""Array of floats; each use says its shape."""
 Picture = NDArray[np.uint8]
 """Picture, (H, W) grey or (H, W, 3) RGB."""
 CommandId = NewType("CommandId", int)
+"""Number of a motion command, by which its status is asked for."""
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,8 @@ TRAIN = "plugins/errand-train"
         ),
         ("plugins/errand-train/tests/dataset/test_coco.py", "plugins/errand-train/errand_train/nouns.py", False),
         ("plugins/errand-train/tests/detector/test_refine.py", "plugins/errand-train/tests/random_networks.py", True),
+        ("plugins/errand-make/tests/worlds/test_own.py", "plugins/errand-make/errand_make/mesh.py", True),
+        ("plugins/errand-make/tests/test_tags.py", "plugins/errand-make/errand_make/robots/inference.py", False),
     ],
 )
 def test_a_change_touches(test, changed, expected):

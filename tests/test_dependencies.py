@@ -20,7 +20,7 @@ REQUIRED = [
     Requirement(words)
     for project in PROJECTS
     for words in chain(project["dependencies"], *project.get("optional-dependencies", {}).values())
-    if not words.startswith("spot-errand")
+    if Requirement(words).name not in {each["name"] for each in PROJECTS}
 ]
 PINS = dict(line.split("==") for line in (ROOT / "constraints.txt").read_text().splitlines())
 GONE = {"asynchat", "asyncore", "audioop", "cgi", "crypt", "distutils", "imghdr", "imp", "pipes", "smtpd", "telnetlib"}

@@ -1,15 +1,24 @@
 """The import rule: executive -> skills; plant -> executive.words, skills.robot, skills.inputs; skills imports neither.
 
 Only executive.app and executive.cli import all three. Nothing of the core imports executive.cli, nor a plug-in.
+Plug-ins import the public names of the core, and of others what a table lists.
 The homes of executive import each other one way, from the last of `HOMES` to the first, the words nothing but a few
 plain modules of skills. No files import each other in a circle, not for types either.
 """
 
+import re
+import sys
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
 import pytest
 
-from tests.sources import PLUGINS, PRODUCT, dotted, graph_of, import_graph, modules, read
+from tests.sources import PLUGINS, PRODUCT, ROOT, dotted, graph_of, import_graph, modules, read
+from tests.tables import yaml_beside
+
+sys.path.insert(0, str(ROOT / "docs"))
+from make_api import public_names
 
 Check = Callable[[str, str], list[str]]
 Graph = Mapping[str, frozenset[str]]
@@ -19,7 +28,7 @@ WORDS_MAY = (
 )
 """All that the words import: what things are, how files are read, and which numbers a quantity may have."""
 PLANT_MAY = ("executive.words", "skills.robot", "skills.robot_wrapper", "skills.inputs", "skills.map_drawing")
-"""All that the plant imports of others; the builders also the models of objects that they write."""
+"""All that the plant imports of others."""
 HOMES = (
     ("executive.words", "executive.record.schemas", "executive.record.work"),
     ("executive.language",),
@@ -38,8 +47,6 @@ HOMES = (
 """The homes of executive, the lowest first."""
 APP = ("prepare", "report", "runs", "fleet", "evaluate")
 """The folders of executive.app, the lowest first; modules beside them stand above all."""
-BUILDERS = ("plant.models.builder", "plant.worlds.builder")
-"""What makes models and worlds; at run time only the commands import it that make them."""
 SKILL_ROOMS = (
     ("skills",),
     ("skills.estimate",),
@@ -73,12 +80,11 @@ PLANT_ROOMS = (
     ("plant.diagram", "plant.events", "plant.recording", "plant.scene_pictures"),
     ("plant.people", "plant.referee"),
     ("plant",),
-    BUILDERS,
 )
 """The rooms of the plant, the lowest first; what steps the plant stands above what stands in it."""
-USES_BUILDERS = (*BUILDERS, "executive.cli.new_command", "executive.cli.object_command", "executive.cli.world_command")
-FOR_COMMANDS = ("executive.cli.number_options", "executive.cli.output")
-"""What a command of any distribution may use of the command line."""
+PUBLIC = {f"{module}.{name}" for module, names in public_names().items() for name in names}
+PRIVATE = yaml_beside(__file__, "test_import_rule.yaml")
+"""What each plug-in imports of the core that `docs/api.md` does not name, which may only become less."""
 
 
 def within(name: str, *packages: str) -> bool:
@@ -97,8 +103,6 @@ def breaches(path: str, source: str) -> list[str]:
         return []
     if within(own, "executive.words"):
         return [name for name in names if not within(name, *WORDS_MAY)]
-    if within(own, *BUILDERS):
-        names = [name for name in names if not within(name, "skills.perception.object_model")]
     sees_all = own == "executive" or within(own, "executive.app")
     outside = [name for name in names if not within(name, *allowed) and not sees_all]
     return outside + [name for name in names if within(name, "executive.cli")]
@@ -150,20 +154,19 @@ def upward_in_app(path: str, source: str) -> list[str]:
     return [name for name in names if app_rank(name) > app_rank(own)]
 
 
-def builder_imports(path: str, source: str) -> list[str]:
-    """What a module that is needed at run time imports of the builders."""
-    own = within(dotted(path), *USES_BUILDERS)
-    return [] if own else [name for name in ours(source) if within(name, *BUILDERS)]
-
-
 def plugin_imports(_: str, source: str) -> list[str]:
     """What a module of the core imports of plug-ins."""
     return [name for name in read(source).imports if name.startswith("errand_")]
 
 
-def other_commands(_: str, source: str) -> list[str]:
-    """What a module imports of the command line beyond what a command of any distribution may use."""
-    return [name for name in ours(source) if within(name, "executive.cli") and not within(name, *FOR_COMMANDS)]
+def private_imports(_: str, source: str) -> list[str]:
+    """What a module imports of the core that is not public."""
+    return [name for name in ours(source) if name not in PUBLIC]
+
+
+def imported_names(check: Check, folder: str) -> set[str]:
+    """The distinct names that a check finds in the modules of a folder."""
+    return {name for names in found(check, folder).values() for name in names}
 
 
 def found(check: Check, *folders: str) -> dict[str, list[str]]:
@@ -200,16 +203,27 @@ def test_the_root_of_executive_holds_no_modules() -> None:
     assert [path for path in modules("executive") if path.count("/") == 1] == ["executive/__init__.py"]
 
 
-def test_only_the_commands_that_make_models_and_worlds_import_the_builders() -> None:
-    assert found(builder_imports, *PRODUCT) == {}
-
-
 def test_the_core_imports_no_plug_in() -> None:
     assert found(plugin_imports, *PRODUCT, "missions") == {}
 
 
-def test_plug_ins_use_of_the_command_line_only_what_is_public() -> None:
-    assert found(other_commands, *PLUGINS) == {}
+@pytest.mark.parametrize("folder", PLUGINS)
+def test_a_plug_in_imports_no_further_private_name_of_the_core(folder: str) -> None:
+    """A name that is gone leaves the table; a new one becomes public, or is done without."""
+    assert sorted(imported_names(private_imports, folder)) == PRIVATE[Path(folder).name]
+
+
+@pytest.mark.parametrize("folder", PLUGINS)
+def test_plug_ins_use_of_the_command_line_only_what_is_public(folder: str) -> None:
+    assert [name for name in PRIVATE[Path(folder).name] if within(name, "executive.cli")] == []
+
+
+def test_a_plug_in_imports_another_only_where_its_project_requires_it() -> None:
+    for folder in PLUGINS:
+        project = tomllib.loads((ROOT / folder).with_name("pyproject.toml").read_text(encoding="utf-8"))["project"]
+        required = {re.split(r"[^\w-]", each)[0].replace("-", "_") for each in project["dependencies"]}
+        packages = {name.partition(".")[0] for name in imported_names(plugin_imports, folder)}
+        assert packages <= {Path(folder).name, *required}, folder
 
 
 CALL = "def f():\n    "
@@ -247,12 +261,9 @@ CALL = "def f():\n    "
         (upward_in_rooms, "skills/api.py", "import skills.navigate.footprint", []),
         (upward_in_rooms, "plant/people/walkers.py", "from plant.engine import Engine", ["plant.engine.Engine"]),
         (upward_in_rooms, "plant/engine.py", "from plant.people.walkers import Walkers", []),
-        (builder_imports, "executive/cli/map.py", "import plant.models.builder.mesh", ["plant.models.builder.mesh"]),
-        (builder_imports, "executive/cli/object_command.py", f"{CALL}import plant.models.builder.importing", []),
-        (builder_imports, "plant/worlds/builder/own.py", "from plant.models.builder import mesh", []),
         (plugin_imports, "plant/work.py", f"{CALL}import errand_train", ["errand_train"]),
-        (other_commands, "errand_train/a.py", "import executive.cli.screen", ["executive.cli.screen"]),
-        (other_commands, "errand_train/a.py", "from executive.cli.output import console_for", []),
+        (private_imports, "errand_train/a.py", f"{CALL}import executive.cli.screen", ["executive.cli.screen"]),
+        (private_imports, "errand_train/a.py", "from executive.cli.output import console_for", []),
     ],
 )  # fmt: skip
 def test_a_check_finds_breaches(check: Check, path: str, source: str, expected: list[str]) -> None:

@@ -23,11 +23,11 @@ LINES = {
     "executive/view": 1594,
     "executive/testing": 849,
     "executive/app": 8094,
-    "executive/cli": 4522,
-    "skills": 30122,
-    "plant": 14944,
+    "executive/cli": 3813,
+    "skills": 30123,
+    "plant": 11428,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 466, 75, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 446, 69, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

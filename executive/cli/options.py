@@ -41,6 +41,7 @@ def grouped(group: Group, *names: str, **settings: Any) -> Any:
 START = Annotated[
     str | None, typer.Option(_START, metavar="X Y YAW", help="Start of the robot, in metres and radians.")
 ]
+"""Type of a parameter for the option `--start` of a `StartCommand`; `start_pose` parses it."""
 STORE = Annotated[
     Path | None, grouped(Group.OUTPUT, help="File of the missions; by default a hidden one in the folder for logs.")
 ]
@@ -48,6 +49,7 @@ ANYWAY = Annotated[bool, grouped(Group.REQUEST, "--anyway", help="Begin in spite
 AS_JSON = Annotated[
     bool, grouped(Group.OUTPUT, "--json", help="The last line of standard output is the result as JSON.")
 ]
+"""Type of a parameter for the option `--json`, by default False."""
 QUIET = Annotated[bool, grouped(Group.OUTPUT, "--quiet", help="Show no lines and no tree during the run.")]
 VIEW = Annotated[
     float | None,

@@ -1,4 +1,4 @@
-"""Classes of objects in `plant/models`, imported objects and their errors, and cached folders of models."""
+"""Classes of objects in `plant/models`, imported objects, and cached folders of models."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ import shutil
 import tempfile
 from collections.abc import Callable, Mapping
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -65,7 +64,8 @@ def load_catalogue() -> Mapping[str, ModelClass]:
 
 FACTS_FILE: Final = "object.yaml"
 _AGAIN: Final = "make it by `errand object import`"
-NAME: Final = r"^[A-Za-z][A-Za-z0-9_]{0,39}$"
+OBJECT_NAME: Final = r"^[A-Za-z][A-Za-z0-9_]{0,39}$"
+"""Pattern of the names of imported objects."""
 Inertia = Annotated[float, quantities.Quantity(ge=-1e6, le=1e6)]
 Photographs = Annotated[int, quantities.Quantity(ge=0, le=1000)]
 Parts = Annotated[int, quantities.Quantity(ge=1, le=10_000_000)]
@@ -80,8 +80,8 @@ class ImportedObject(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, allow_inf_nan=False)
 
-    name: Annotated[str, Field(pattern=NAME)]
-    class_name: Annotated[str, Field(alias="class", pattern=NAME)]
+    name: Annotated[str, Field(pattern=OBJECT_NAME)]
+    class_name: Annotated[str, Field(alias="class", pattern=OBJECT_NAME)]
     mass_kg: quantities.Mass
     size_m: tuple[quantities.Length, quantities.Length, quantities.Length]
     com_m: tuple[quantities.Coordinate, quantities.Coordinate, quantities.Coordinate]
@@ -97,6 +97,11 @@ class ImportedObject(BaseModel):
         file = str((folder / f"{self.name}.sdf").resolve())
         return ModelForm(file=file, half_extents_m=(x / 2, y / 2), rest_height_m=z / 2, round=self.round)
 
+    def write(self, folder: Path) -> None:
+        """Writes the facts of the object into a folder, from which `read_imported` reads them."""
+        text = yaml_of(self.model_dump(mode="json", by_alias=True))
+        (folder / FACTS_FILE).write_text(f"# Made by `errand object import`, don't edit.\n{text}", encoding="utf-8")
+
 
 def read_imported(folder: Path) -> ImportedObject:
     """Reads the object in a folder. Raises InputError when there is none, or it is damaged."""
@@ -110,12 +115,6 @@ def read_imported(folder: Path) -> ImportedObject:
     if not (folder / f"{found.name}.sdf").is_file():
         raise InputError(f"{found.name}.sdf is missing", hint=_AGAIN, file=folder)
     return found
-
-
-def write_imported(folder: Path, imported: ImportedObject) -> None:
-    """Writes the facts of an object, which `read_imported` reads."""
-    text = yaml_of(imported.model_dump(mode="json", by_alias=True))
-    (folder / FACTS_FILE).write_text(f"# Made by `errand object import`, don't edit.\n{text}", encoding="utf-8")
 
 
 def user_cache() -> Path:
@@ -139,23 +138,3 @@ def cached_folder(folder: Path, fill: Callable[[Path], None]) -> Path:
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
     return folder
-
-
-class ObjectImportError(Exception):
-    """A mesh file or an option that cannot be used; the message says why, `hint` what to do."""
-
-    def __init__(self, message: str, hint: str) -> None:
-        self.message, self.hint = message, hint
-        super().__init__(f"{message}; {hint}")
-
-
-class ObjectsExtraMissingError(ImportError):
-    """A missing library of the extra `objects`."""
-
-
-def objects_module(name: str) -> Any:
-    """Imports a library of the extra `objects`. Raises ObjectsExtraMissingError when it is not installed."""
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise ObjectsExtraMissingError(f"importing objects needs {name}, which is not installed") from error

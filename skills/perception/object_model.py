@@ -81,9 +81,8 @@ def read_model(folder: Path) -> ObjectModel:
             colours, views = (np.asarray(each, np.uint8) for each in (data["colours"], data.get("views", _no_views())))
             model = ObjectModel(str(data["name"]), points, normals, colours, rests, views)
     except FileNotFoundError as error:
-        raise InputError(
-            f"the robot cannot recognise it: {RECOGNITION_FILE} is missing", hint=_AGAIN, file=folder
-        ) from error
+        what = f"the robot cannot recognise it: {RECOGNITION_FILE} is missing"
+        raise InputError(what, hint=_AGAIN, file=folder) from error
     except Exception as error:  # a damaged archive raises anything
         raise InputError("it is damaged", hint=_AGAIN, file=file) from error
     shapes = {points.shape, normals.shape, model.colours.shape}

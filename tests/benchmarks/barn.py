@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from errand_make.worlds.own import world_from_cylinders
 from executive.mission.load import load_stack
-from plant.worlds.builder.own import world_from_cylinders
 from plant.worlds.world import load_world
 from skills.estimate.grid_map import GridMap
 from skills.navigate.skill import NavigateInputs

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from errand_make.worlds.own import world_from_grid
+from errand_make.worlds.rooms import FREE, OCCUPIED, Grid
 from executive.mission.load import load_stack
-from plant.worlds.builder.own import world_from_grid
-from plant.worlds.builder.rooms import FREE, OCCUPIED, Grid
 from plant.worlds.seeding import place_people
 from plant.worlds.world import load_world
 from skills.api import PlanningError

@@ -6,6 +6,7 @@ Tells for each kind how many were refused and how many were read, how much memor
 """
 
 import shutil
+import sys
 import tempfile
 import time
 import traceback
@@ -17,6 +18,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+sys.path.append(str(Path(__file__).parents[2] / "plugins/errand-make/tests"))
+from mesh_forms import collada
+
+from errand_make.objects import ObjectImportError
+from errand_make.objects.mesh_files import read_mesh
+from errand_make.objects.solid import solid_of
 from executive.app.evaluate.evaluation_file import load_evaluation
 from executive.app.prepare.scenarios import read_scenario
 from executive.language.parser import load_parser
@@ -26,9 +33,6 @@ from executive.testing.skill_test import load_skill_tests
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import load_knowledge
-from plant.models.builder.importing import ObjectImportError
-from plant.models.builder.importing.mesh_files import read_mesh
-from plant.models.builder.importing.solid import solid_of
 from plant.models.catalogue import read_imported
 from plant.worlds.world import WORLDS_FOLDER, load_world
 from skills.estimate.grid_map import load_grid_map
@@ -37,7 +41,6 @@ from tests.benchmarks.errand_process import ROOT
 from tests.benchmarks.harness import command
 from tests.executive.mission.mutations import mutated_files, some_bytes
 from tests.hostile_values import FILES
-from tests.plant.models.builder.importing.mesh_forms import collada
 
 MOST_S, MOST_MB = 3.0, 300.0
 FLAT = WORLDS_FOLDER / "flat"

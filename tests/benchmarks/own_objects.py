@@ -37,7 +37,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from trimesh import creation
 
-from plant.models.builder.importing import (
+from errand_make.objects import (
     ImportOptions,
     ImportReports,
     ObjectImportError,
@@ -138,7 +138,7 @@ def imported(folder, half):
     """Imports the objects of one half, up to `FOREIGN` of others; leaves out those that no import takes."""
     folder.mkdir(parents=True, exist_ok=True)
     models = []
-    with mock.patch("plant.models.builder.importing.import_object.convex_parts", _bounding_box):  # they lie still
+    with mock.patch("errand_make.objects.import_object.convex_parts", _bounding_box):  # they lie still
         for file, options in (*generated(folder, half), *foreign(folder, half)):
             if sum(model.name.startswith("other") for model in models) == FOREIGN:
                 break

@@ -18,9 +18,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from errand_make.worlds.own import world_from_grid
+from errand_make.worlds.rooms import FREE, OCCUPIED, Grid
 from executive.words.mission import Route
-from plant.worlds.builder.own import world_from_grid
-from plant.worlds.builder.rooms import FREE, OCCUPIED, Grid
 from skills.robot import Pose2D
 from tests.benchmarks.harness import benchmark, for_each, quantile
 from tests.benchmarks.plant_mission import PlantMission

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from errand_make.mesh import Colour
 from errand_train.dataset.objects.draft import Draft
-from plant.models.builder.mesh import Colour
 from tests.benchmarks.foreign_models import kept_model
 from tests.tables import yaml_beside
 

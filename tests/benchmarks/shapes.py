@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from plant.models.builder.importing import ImportOptions, import_object
+from errand_make.objects import ImportOptions, import_object
 
 KINDS = ("box", "cylinder", "block")
 WIDTH_M, LENGTH_M, DENSITY_KG_M3 = (0.02, 0.10), (0.02, 0.30), (300.0, 900.0)

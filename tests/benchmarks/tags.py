@@ -13,7 +13,7 @@ import numpy as np
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
-from plant.models.builder.tags import write_plate
+from errand_make.tags import write_plate
 from plant.robots.spot.description import CAMERAS
 from plant.sensors.camera_spec import load_cameras
 from skills.perception.fiducials import find_tags

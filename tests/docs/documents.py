@@ -11,6 +11,8 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 _COMMANDS = {name: shipped_command(name) for name in COMMANDS}
 _COMMANDS |= {name: plugin_command(name) for name in PLUGIN_COMMANDS if "." not in name}
+for group, short in (name.split(".") for name in PLUGIN_COMMANDS if "." in name):
+    _COMMANDS[group].add_command(plugin_command(f"{group}.{short}"), short)
 _BLOCK = re.compile(r"(?:^<!-- (?P<mark>[^>]*) -->\n+)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\]\((?!https?:)([^)#]*)(#[^)]*)?\)")
 

@@ -5,16 +5,12 @@ import os
 import re
 import shlex
 import subprocess
-import sys
 import sysconfig
 import venv
-from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "plant/robots/urdf_robot"))
 from rover_urdf import write_package
+from typer.testing import CliRunner
 
 from executive.cli.entry import app
 from tests.docs.documents import DOCS, Block, blocks

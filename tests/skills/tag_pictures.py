@@ -4,11 +4,11 @@ import cv2
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from plant.models.builder.tags import CELLS, tag_picture
 from skills.robot import FrameTree, Image, Intrinsics
 
 HAND = Intrinsics(640, 480, 552.0, 552.0, 320.0, 240.0)
-_CELL_PX, _FINE = 16, 4
+_CELLS, _CELL_PX, _FINE = 8, 16, 4
+"""Cells along a tag's black square, pixels of a cell, and pixels drawn for one of the picture."""
 
 
 def facing(distance_m, tilt_deg, turn_deg=0.0, aside_m=(0.0, 0.0)):
@@ -24,13 +24,20 @@ def picture_of(tags, lens=HAND, *, depth=True, seed=4801, ground=150):
     grey = np.full((lens.height * _FINE, lens.width * _FINE), ground, np.uint8)
     depth_m = np.full((lens.height, lens.width), 3.5)
     for tag, size_m, X_CT in tags:
-        grey, depth_m = _drawn(grey, depth_m, lens, tag_picture(tag, _CELL_PX), size_m * (CELLS + 2) / CELLS, X_CT)
+        grey, depth_m = _drawn(grey, depth_m, lens, _sheet(tag), size_m * (_CELLS + 2) / _CELLS, X_CT)
     small = cv2.resize(grey, (lens.width, lens.height), interpolation=cv2.INTER_AREA)
     noisy = np.clip(small + rng.normal(0.0, 2.5, small.shape), 0, 255).astype(np.uint8)
     depth_m += rng.normal(0.0, 1.0, depth_m.shape) * (0.0015 + 0.0012 * depth_m**2)
     frames = FrameTree({"hand_camera": ("odom", RigidTransform())})
     seen = depth_m.astype(np.float32) if depth else np.zeros((0, 0), np.float32)
     return Image(2.5, "hand", "hand_camera", lens, lens, np.repeat(noisy[..., None], 3, axis=2), noisy, seen, frames)
+
+
+def _sheet(tag):
+    """Picture of a tag of the family 36h11 with a white margin of one cell."""
+    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+    square = cv2.aruco.generateImageMarker(family, tag, _CELLS * _CELL_PX)
+    return np.pad(square, _CELL_PX, constant_values=255)
 
 
 def _drawn(grey, depth_m, lens, sheet, side_m, X_CT):

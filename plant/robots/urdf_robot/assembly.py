@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -25,7 +24,6 @@ from skills.inputs.yaml_source import KeyPath
 from skills.robot import FloatArray, GripperKind
 
 BODY: Final = "body"
-PACKAGE: Final = "robot"
 _STRAIGHT: Final = 1e-4
 _OFF_AXIS_M: Final = 0.01
 _PAD_RADIUS_M: Final = 0.005
@@ -200,20 +198,11 @@ class Assembly:
 
     def _box_of(self, mesh: Element, X_CS: RigidTransform) -> tuple[Element, RigidTransform]:
         """Geometry of a mesh's bounding box, and its pose."""
-        points = mesh_points(self.mesh_path(mesh)) * self.urdf.numbers(mesh, "scale", "1 1 1")
+        points = self.urdf.mesh_points(mesh)
         low, high = points.min(axis=0), points.max(axis=0)
         geometry = Element("geometry")
         ElementTree.SubElement(geometry, "box", size=urdf_text.text(np.maximum(high - low, 1e-3)))
         return geometry, X_CS @ RigidTransform((low + high) / 2.0)
-
-    def mesh_path(self, mesh: Element) -> Path:
-        """File of a mesh of the package. Raises InputError when there is none."""
-        name = mesh.get("filename", "")
-        path = self.urdf.path.parent / name.removeprefix(f"package://{PACKAGE}/")
-        if not name.startswith(f"package://{PACKAGE}/") or not path.is_file():
-            hint = "make the package by `errand new robot`, which copies meshes"
-            raise self.urdf.error(mesh, f"there is no mesh {name[:100]}", hint)
-        return path
 
     def _add_pads(self, element: Element, carrier: str, X_BC: RigidTransform, gripper: GripperFile) -> None:
         """Adds rubber pads to the inner face of a finger that slides: spheres that stand a little proud of it."""
@@ -293,9 +282,3 @@ def _unit(axis: str) -> FloatArray:
 def _add_origin(element: Element, X: RigidTransform) -> None:
     rpy = RollPitchYaw(X.rotation()).vector()
     ElementTree.SubElement(element, "origin", xyz=urdf_text.text(X.translation()), rpy=urdf_text.text(rpy))
-
-
-def mesh_points(path: Path) -> FloatArray:
-    """Vertices (N, 3) of an OBJ file."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    return np.asarray(np.array([line.split()[1:4] for line in lines if line.startswith("v ")], dtype=np.float64))

@@ -17,8 +17,8 @@ from plant.robots.jointed_robot import FINGER_GAINS, JointedRobot, JointedSensor
 from plant.robots.robot_kind import PlacedRobot, RobotBody, SensorOptions
 from plant.robots.sensor_suite import LidarMount
 from plant.robots.spot.floating_base import FloatingBase, FloatingBaseLimits
-from plant.robots.urdf_robot.assembly import PACKAGE
 from plant.robots.urdf_robot.description import Description
+from plant.robots.urdf_robot.urdf_file import PACKAGE
 from plant.sensors.lidar import LidarSpec
 from skills.robot import CommandCause, CommandId, CommandState, FloatArray, Lease, Pose2D
 

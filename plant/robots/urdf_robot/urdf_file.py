@@ -20,6 +20,8 @@ from skills.inputs.errors import InputError, suggestion
 from skills.inputs.outside import read_text
 from skills.robot import FloatArray
 
+PACKAGE: Final = "robot"
+"""Package of the robot's own folder in the names of its meshes: `package://robot/meshes/..`."""
 MOVING: Final = ("revolute", "continuous", "prismatic")
 MOST_BYTES: Final = 20_000_000
 _LINE: Final = "line"
@@ -191,6 +193,21 @@ class UrdfFile:
     def shapes(self, link: str, role: str) -> list[Element]:
         """The `visual` or `collision` elements of a link."""
         return [each for each in self.links[link].findall(role) if each.find("geometry") is not None]
+
+    def mesh_path(self, mesh: Element) -> Path:
+        """File of a mesh of the robot's own folder. Raises InputError when there is none."""
+        name = mesh.get("filename", "")
+        path = self.path.parent / name.removeprefix(f"package://{PACKAGE}/")
+        if not name.startswith(f"package://{PACKAGE}/") or not path.is_file():
+            hint = "make the package by `errand new robot`, which copies meshes"
+            raise self.error(mesh, f"there is no mesh {name[:100]}", hint)
+        return path
+
+    def mesh_points(self, mesh: Element) -> FloatArray:
+        """Vertices (N, 3) of the OBJ file of a mesh, at its scale. Raises InputError when there is none."""
+        lines = self.mesh_path(mesh).read_text(encoding="utf-8").splitlines()
+        points = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], dtype=np.float64)
+        return np.asarray(points * self.numbers(mesh, "scale", "1 1 1"))
 
 
 def _parse(path: Path, text: str) -> Element:

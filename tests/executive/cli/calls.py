@@ -1,6 +1,7 @@
 """Calls of `errand` in this process, as a user types them."""
 
 import json
+import shlex
 
 import cv2
 import numpy as np
@@ -48,3 +49,23 @@ def refusal(*words, **options):
 def json_of(result):
     """The JSON on the last line of what a call printed."""
     return json.loads(result.stdout.splitlines()[-1])
+
+
+def refused_in_one_line(case, folder, monkeypatch):
+    """Calls `errand` in a folder with the files of a case; it is refused as the case says, and changes no file."""
+    for name, text in case.get("files", {}).items():
+        (folder / name).write_text(text)
+    monkeypatch.chdir(folder)
+    before = contents(folder)
+    words = shlex.split(case["input"])
+    refused = errand(*words)
+    (line,) = refused.stderr.splitlines()
+    place = case.get("place", "")
+    assert (refused.exit_code, line.startswith("errand: "), contents(folder) == before) == (2, True, True), line
+    assert place in line and case["message"] in line.partition(place or ": ")[2], line
+    assert refused.stdout in ("", f"✗ {''.join(words[1:2])}: 1 error\n")
+
+
+def contents(folder):
+    """The files below a folder with what is in them."""
+    return {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()}

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from executive.app.evaluate.results import RunSpec
 from executive.cli.entry import shipped_command
-from executive.cli.options import StartCommand, request_arguments, takes_request
+from executive.cli.options import StartCommand, join_values, request_arguments, takes_request
 from executive.mission.request import Request
 from executive.store.database import form
 from executive.store.missions import MissionStore
@@ -76,3 +76,25 @@ def test_a_request_comes_back_from_a_run_of_an_evaluation(words):
     spec = RunSpec(request_of(words), "mission")
     back = form(RunSpec).validate_json(form(RunSpec).dump_json(spec))
     assert (back, back.id) == (spec, spec.id)
+
+
+def test_three_numbers_after_start_are_one_value():
+    assert join_values(["run", "--start", "1", "-2", "0.5", "m.yaml"]) == ["run", "--start=1 -2 0.5", "m.yaml"]
+    assert join_values(["run", "--start", "unknown", "m.yaml"]) == ["run", "--start", "unknown", "m.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("words", "address"),
+    [
+        (["--foxglove"], "127.0.0.1:8765"),
+        (["--foxglove", "--quiet"], "127.0.0.1:8765"),
+        (["--foxglove", "patrol"], "127.0.0.1:8765"),
+        (["--foxglove", "my/patrol.yaml"], "127.0.0.1:8765"),
+        (["--foxglove", "0.0.0.0:9000", "patrol"], "0.0.0.0:9000"),
+        (["--foxglove", "[::1]:9000"], "[::1]:9000"),
+        (["--foxglove", "host:x"], "host:x"),
+    ],
+)
+def test_foxglove_takes_an_address_or_the_usual_one(words, address):
+    given = words[1:2] == [address]
+    assert join_values(words) == [f"--foxglove={address}", *words[2 if given else 1 :]]

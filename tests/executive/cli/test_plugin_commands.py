@@ -115,16 +115,17 @@ def nothing_installed(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("words", "plug_in"),
+    ("words", "command", "plug_in"),
     [
-        ("dataset render", "errand-train"),
-        ("object import", "errand-make"),
-        ("sdk", "errand-spot"),
+        ("dataset render", "dataset", "errand-train"),
+        ("object import", "object", "errand-make"),
+        ("new robot x", "new robot", "errand-make"),
+        ("sdk", "sdk", "errand-spot"),
     ],
 )
-def test_a_command_of_a_missing_plug_in_says_how_to_install_it(words, plug_in, nothing_installed):
+def test_a_command_of_a_missing_plug_in_says_how_to_install_it(words, command, plug_in, nothing_installed):
     ended = errand(*words.split())
-    what = f"'{words.split()[0]}' is a command of {plug_in}, which is not installed; pip install {plug_in}"
+    what = f"'{command}' is a command of {plug_in}, which is not installed; pip install {plug_in}"
     assert (ended.exit_code, ended.stderr) == (2, f"errand: {what}\n")
 
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from plant.models.catalogue import ImportedObject, read_imported, write_imported
+from plant.models.catalogue import ImportedObject, read_imported
 from skills.inputs.errors import InputError
 from tests.tables import table
 
@@ -23,7 +23,7 @@ DRILL = ImportedObject(
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "drill.sdf").write_text("<sdf/>")
-    write_imported(tmp_path, DRILL)
+    DRILL.write(tmp_path)
     return tmp_path
 
 

@@ -1,61 +1,26 @@
-"""Worlds with imported models: they are placed, of their class, and rest where they lie."""
+"""Worlds with imported models: they are placed, and of their class; wrong imports are refused."""
 
 import shutil
 
-import numpy as np
 import pytest
 
-from errand_train.models.outlines import triangles_of
-from plant.models.builder.importing import ImportOptions, import_object
-from plant.simulation import Simulation
 from plant.worlds.seeding import place_objects
 from plant.worlds.world import WORLDS_FOLDER, ObjectRule, load_world
 from skills.inputs.errors import InputError
+from tests.plant.imported_box import write_box
 
-trimesh = pytest.importorskip("trimesh")
-pytest.importorskip("coacd")
-
-T_SHAPE = np.array([[-0.15, -0.013], [0.12, -0.013], [0.12, -0.05], [0.15, -0.05], [0.15, 0.05], [0.12, 0.05]])
-OUTLINE = np.vstack([T_SHAPE, [[0.12, 0.013], [-0.15, 0.013]]])
 OBJECTS = "objects:\n  - {name: my tool, model: tool, surfaces: [workbench]}\n"
-
-
-def import_tool(folder, name="tool"):
-    """A T of 0.5 kg, 28 mm thick, as a hammer, in a folder with a space in its name."""
-    file = folder / "tool.stl"
-    trimesh.creation.extrude_triangulation(OUTLINE, np.array(triangles_of(OUTLINE)), 0.028).export(file)
-    out = folder / f"my {name}"
-    out.mkdir()
-    import_object(file, ImportOptions(name, 0.5, "hammer"), out)
-    return out
 
 
 @pytest.fixture
 def world_folder(tmp_path):
     """The flat with one object, an imported one, and nobody in it."""
-    import_tool(tmp_path)
+    write_box(tmp_path / "my tool", "tool", "hammer", 0.5)
     folder = tmp_path / "flat"
     shutil.copytree(WORLDS_FOLDER / "flat", folder)
     rules = (folder / "objects.yaml").read_text().partition("objects:\n")[0]
     (folder / "objects.yaml").write_text(f"imports: [../my tool]\n{rules}{OBJECTS}")
     return folder
-
-
-def test_an_imported_object_settles_on_a_table(world_folder):
-    simulation = Simulation(load_world(world_folder), seed=1, visuals=False)
-    plant = simulation.engine.world.plant
-    (index,) = plant.GetBodyIndices(plant.GetModelInstanceByName("my tool"))
-    body, (placed,) = plant.get_body(index), place_objects(simulation.world, 1)
-    assert body.default_mass() == pytest.approx(0.5)
-    simulation.clock.advance(0.5)
-    early = plant.EvalBodyPoseInWorld(simulation.engine.context, body)
-    simulation.clock.advance(1.0)
-    late = plant.EvalBodyPoseInWorld(simulation.engine.context, body)
-    np.testing.assert_allclose(late.translation(), early.translation(), atol=2e-4)
-    surface = simulation.world.surfaces["workbench"]
-    assert late.translation()[2] == pytest.approx(surface.height_m + 0.014, abs=5e-4)
-    np.testing.assert_allclose(late.rotation().matrix(), placed.X_WO.rotation().matrix(), atol=2e-3)
-    assert "my tool" in simulation.engine.asleep
 
 
 def test_it_is_of_the_class_that_it_was_imported_with(world_folder):

@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 import pytest
 
-from errand_train.worlds.plan import PLANS
 from executive.app.prepare.worlds import knowledge_of
 from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.seeding import place_people
@@ -18,7 +17,7 @@ BODY_M = 0.3
 """Half the body's width, and a little."""
 
 
-@pytest.fixture(scope="module", params=PLANS)
+@pytest.fixture(scope="module", params=FLOORS_M)
 def world(request):
     return load_world(request.param)
 

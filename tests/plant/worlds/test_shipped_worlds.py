@@ -1,40 +1,24 @@
 """The worlds of our own fit the robot: doors, free poses, heights of surfaces, maps that agree with the shapes."""
 
-from typing import Any
-
 import cv2
 import numpy as np
 import pytest
 import yaml
 from pydrake.systems.analysis import Simulator
 
-from errand_train.worlds.__main__ import build
-from errand_train.worlds.plan import PLANS, load_plan
 from executive.tree.nodes.door_check import view_of
 from executive.words.knowledge import load_knowledge
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.worlds.seeding import place_objects, place_people
-from plant.worlds.world import PACKAGE_NAME, known_worlds, load_world
+from plant.worlds.world import known_worlds, load_world
+from tests.plant.worlds.plain_map import FREE, OCCUPIED, UNKNOWN, Map
 
 FOOTPRINT_M = (1.1, 0.6)  # the standing outline of 1.0 by 0.5 with 5 cm around
-FREE, UNKNOWN, OCCUPIED = 254, 205, 0
+OUTLINES_M = {"flat": (12.0, 9.0), "shop": (18.0, 13.0), "lab": (37.0, 18.0)}
+"""Sides of the worlds."""
 
 
-class Map:
-    """A map_server grid, read on its own here."""
-
-    def __init__(self, path):
-        self.header: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
-        picture = cv2.imread(str(path.parent / self.header["image"]), cv2.IMREAD_GRAYSCALE)
-        assert picture is not None
-        self.cells = picture[::-1]
-
-    def at(self, points):
-        index = np.floor((points - self.header["origin"][:2]) / self.header["resolution"]).astype(int)
-        return self.cells[index[..., 1], index[..., 0]]
-
-
-@pytest.fixture(scope="module", params=PLANS)
+@pytest.fixture(scope="module", params=OUTLINES_M)
 def world(request):
     return load_world(request.param)
 
@@ -79,8 +63,8 @@ def known_poses(knowledge):
     return poses
 
 
-def test_every_plan_is_a_world_that_comes_with_the_project():
-    assert known_worlds() == tuple(sorted(PLANS))
+def test_these_worlds_come_with_the_project():
+    assert known_worlds() == tuple(sorted(OUTLINES_M))
 
 
 def test_every_known_pose_is_free(knowledge, keepout):
@@ -108,21 +92,6 @@ def test_from_before_every_door_it_is_seen_from_a_free_pose(world, keepout):
         lines = [np.linspace([view.x_m, view.y_m], door.at, 100) for view in views]
         seen = [np.vstack([footprint(pose), line]) for pose, line in zip(poses, lines, strict=True)]
         assert any(np.all(keepout.at(points) == FREE) for points in seen), door
-
-
-CLOSED = [(name, door) for name in PLANS for door in load_plan(name).doors if not door.open]
-
-
-@pytest.mark.parametrize(("name", "door"), CLOSED, ids=[f"{name}-{door.name}" for name, door in CLOSED])
-def test_every_door_is_as_wide_as_planned_and_free_on_both_sides(name, door):
-    keepout, width = Map(load_world(name).surveyed.keepout_map_path), load_plan(name).width_m(door)
-    across = np.array([0.0, 1.0]) if door.along_x else np.array([1.0, 0.0])
-    along, middle = across[::-1], np.array([door.x, door.y])
-    line = middle + np.arange(-width / 2 - 0.1, width / 2 + 0.1, 0.005)[:, None] * along
-    assert np.sum(keepout.at(line) == FREE) * 0.005 == pytest.approx(width, abs=0.03)
-    reach, half = 0.65 if name == "lab" else 1.05, width / 2 - 0.02  # the lab's corridors are narrow
-    lines = middle + np.arange(-half, half, 0.01)[:, None] * along
-    assert np.all(keepout.at(lines + np.arange(-reach, reach, 0.01)[:, None, None] * across) == FREE)
 
 
 def test_rooms_hang_together(knowledge, keepout):
@@ -175,7 +144,7 @@ def test_maps_agree_with_the_collision_shapes(name, world, furnished):
     moving = [p.X_WO.translation()[:2] for p in (*place_objects(world, 1), *place_people(world, 1))]
     rng, (z0, z1) = np.random.default_rng(5), grid.header["height_band_m"]
     occupied = 0
-    for point in rng.uniform([0.0, 0.0], load_plan(world.name).outline_m, (400, 2)):
+    for point in rng.uniform([0.0, 0.0], OUTLINES_M[world.name], (400, 2)):
         if min(np.linalg.norm(point - m) for m in moving) < 0.5:
             continue
         depth = min(distance_m(query_object, point, z) for z in np.arange(z0 + 0.01, z1, 0.03))
@@ -194,7 +163,7 @@ def distance_m(query_object, point, z):
 
 
 def test_outside_of_the_walls_is_unknown(world, keepout):
-    x, y = load_plan(world.name).outline_m
+    x, y = OUTLINES_M[world.name]
     assert np.all(keepout.at(np.array([(-0.3, y / 2), (x + 0.3, y / 2), (x / 2, y + 0.3), (x / 2, -0.3)])) == UNKNOWN)
 
 
@@ -226,25 +195,3 @@ def test_things_stay_where_the_seed_put_them(world, furnished):
         X_WO = plant.EvalBodyPoseInWorld(now, plant.GetBodyByName(thing.class_name))
         moved = X_WO.translation() - thing.X_WO.translation()
         assert np.linalg.norm(moved[:2]) < 1e-3 and moved[2] == pytest.approx(-0.001, abs=5e-4)
-
-
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.nightly] * (name != "flat")) for name in PLANS])
-def test_committed_world_is_what_the_builder_writes(name, tmp_path, monkeypatch):
-    monkeypatch.setattr("errand_train.worlds.__main__.save_png", lambda *_: None)  # its bytes are the library's
-    world = load_world(name)
-    build(load_plan(world.name), tmp_path, f"{PACKAGE_NAME}/worlds/{world.name}")
-    written = [p for p in tmp_path.rglob("*") if p.suffix in (".sdf", ".obj", ".mtl", ".yaml", ".pgm")]
-    assert len(written) > 3 * len(load_plan(world.name).furniture)
-    for path in written:
-        assert (world.folder / path.relative_to(tmp_path)).read_bytes() == path.read_bytes(), path.name
-
-
-def test_a_way_of_more_than_a_hundred_metres_leads_around_the_rooms_of_the_lab():
-    plan = load_plan("lab")
-    corridors = {room.name: room.inside for room in plan.rooms if room.name.endswith(("corridor", "passage"))}
-    assert all(0.8 <= min(x1 - x0, y1 - y0) <= 1.2 + 1e-9 for x0, y0, x1, y1 in corridors.values())
-    middles = {name: ((x0 + x1) / 2, (y0 + y1) / 2) for name, (x0, y0, x1, y1) in corridors.items()}
-    along_x = middles["east corridor"][0] - middles["west corridor"][0]
-    along_y = middles["north corridor"][1] - middles["south corridor"][1]
-    assert 2 * (along_x + along_y) > 100
-    assert all(0.75 <= plan.width_m(door) <= 0.9 for door in plan.doors if not door.open)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from errand_make.mesh import Material
 from errand_train.worlds.furniture import Piece
 from errand_train.worlds.materials import materials
-from plant.models.builder.mesh import Material
 
 Materials = Mapping[str, Material]
 Rect = tuple[float, float, float, float]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from pydrake.math import RollPitchYaw
 
+from errand_make.mesh import Material, Mesh
 from errand_train.models.surfaces import add_rounded_box
-from plant.models.builder.mesh import Material, Mesh
 from plant.robots.spot.description import spot_facts
 
 _PALM, _FINGER = "arm_wr1", "arm_f1x"

@@ -29,6 +29,7 @@ from pydrake.geometry import (
 from pydrake.geometry import Mesh as MeshShape
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from errand_make.mesh import Mesh, mtl_text, obj_text, palette_picture
 from errand_train.dataset.coco import annotation, is_black
 from errand_train.dataset.compose import SELDOM_BY_CHANCE, Held, Placed, Scene, compose
 from errand_train.dataset.degrade import Degradation, degrade
@@ -40,7 +41,6 @@ from errand_train.dataset.silhouette import silhouette
 from errand_train.dataset.textures import texture
 from errand_train.dataset.views import View, any_view, camera_specs, roll_deg, view_of
 from errand_train.models.gltf import gltf_text
-from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture
 from plant.scene_pictures import png_bytes
 from plant.sensors.camera_spec import NEAR_M, colour_render_camera
 from skills.robot import Picture

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RollPitchYaw, RotationMatrix
 
+from errand_make.mesh import Material, Mesh
+from errand_make.shapes import Box, Cylinder, Shape
 from errand_train.dataset.furnish import BY_THE_WALL, IN_THE_MIDDLE, Furnished, random_materials
 from errand_train.dataset.textures import ROLES, numbers
-from plant.models.builder.mesh import Material, Mesh
-from plant.models.builder.shapes import Box, Cylinder, Shape
 from skills.robot import FloatArray
 
 WALL_CLEAR_M = 0.02

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from errand_make.mesh import mtl_text, obj_text, palette_picture, plain_colours, write_text
+from errand_make.shapes import Model, model_sdf
 from errand_train.models import objects
 from errand_train.models.appearance import (
     Appearance,
@@ -14,8 +16,6 @@ from errand_train.models.appearance import (
 )
 from errand_train.models.person import person, person_appearance
 from errand_train.models.tray import tray, tray_appearance
-from plant.models.builder.mesh import mtl_text, obj_text, palette_picture, plain_colours, write_text
-from plant.models.builder.shapes import Model, model_sdf
 from plant.models.catalogue import MODELS_FOLDER
 from plant.scene_pictures import save_png
 

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from errand_make.mesh import Material, Mesh
 from errand_train.models import objects as o
 from errand_train.models.pictures import noise, to_picture, wood
-from plant.models.builder.mesh import Material, Mesh
 from skills.robot import FloatArray, Picture
 
 LABEL_SHAPE = (192, 384)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.models.builder.mesh import Material, Mesh
+from errand_make.mesh import Material, Mesh
 from skills.robot import FloatArray
 
 _FLOAT, _UINT = 5126, 5125

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.math import RollPitchYaw, RotationMatrix
 from pydrake.multibody.tree import UnitInertia
 
-from plant.models.builder.shapes import Box, Cylinder, MassProperties, Shape, Sphere
+from errand_make.shapes import Box, Cylinder, MassProperties, Shape, Sphere
 
 
 def shape_mass(shape: Shape, mass_kg: float) -> MassProperties:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from errand_make.shapes import Box, Cylinder, Model, Shape, Sphere
 from errand_train.models.mass import join_masses, shape_mass
-from plant.models.builder.shapes import Box, Cylinder, Model, Shape, Sphere
 
 PROUD_M = 0.0003
 RIM_POINTS = 8

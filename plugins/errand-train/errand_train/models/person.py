@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from errand_make.mesh import Material, Mesh
+from errand_make.shapes import Box, Cylinder, Model, Shape
 from errand_train.models.appearance import Appearance
 from errand_train.models.pictures import cloth, to_picture
-from plant.models.builder.mesh import Material, Mesh
-from plant.models.builder.shapes import Box, Cylinder, Model, Shape
 
 MATERIALS = {
     "skin": Material((0.80, 0.62, 0.50)),

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from errand_make.mesh import Mesh
 from errand_train.models.outlines import area, inset, triangles_of
-from plant.models.builder.mesh import Mesh
 from skills.robot import FloatArray
 
 Radii = ArrayLike

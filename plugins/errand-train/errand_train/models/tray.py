@@ -7,10 +7,10 @@ a thin one. Upright in a person's torso the tray is invisible.
 
 from __future__ import annotations
 
+from errand_make.mesh import Material, Mesh
+from errand_make.shapes import Box, Model, Shape
 from errand_train.models.appearance import Appearance
 from errand_train.models.mass import join_masses, shape_mass
-from plant.models.builder.mesh import Material, Mesh
-from plant.models.builder.shapes import Box, Model, Shape
 
 SIZE_M, PLATE_M, DEEP_M = (0.36, 0.31), 0.008, 0.04
 RIM_M, RIM_HEIGHT_M = 0.006, 0.010

@@ -7,15 +7,15 @@ import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from errand_make.mesh import Mesh, mtl_text, obj_text, palette_picture, write_text
+from errand_make.shapes import Model, model_sdf
+from errand_make.worlds.rooms import BANDS_M, pgm_bytes, yaml_text
 from errand_train.worlds.furniture import Piece
 from errand_train.worlds.grids import DRAWN, Placement, rasterise
 from errand_train.worlds.materials import materials, pictures
 from errand_train.worlds.plan import PLANS, Placed, Plan, load_plan
 from errand_train.worlds.shell import shell_collisions, shell_mesh
-from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, write_text
-from plant.models.builder.shapes import Model, model_sdf
 from plant.scene_pictures import save_png
-from plant.worlds.builder.rooms import BANDS_M, pgm_bytes, yaml_text
 from plant.worlds.world import PACKAGE_NAME, ROBOTS, TRUTH, WORLDS_FOLDER
 
 

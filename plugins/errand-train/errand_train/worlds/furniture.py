@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from errand_make.mesh import Material, Mesh
+from errand_make.shapes import Box, Cylinder, Shape
 from errand_train.models.expressions import evaluate
-from plant.models.builder.mesh import Material, Mesh
-from plant.models.builder.shapes import Box, Cylinder, Shape
 from skills.inputs.yaml_source import read_yaml
 
 Names = dict[str, Any]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from plant.models.builder.shapes import Box, Cylinder, Shape
-from plant.worlds.builder.rooms import FREE, OCCUPIED, UNKNOWN, Bools, Grid
+from errand_make.shapes import Box, Cylinder, Shape
+from errand_make.worlds.rooms import FREE, OCCUPIED, UNKNOWN, Bools, Grid
 from skills.robot import FloatArray
 
 DRAWN = frozenset({"low_scan"})

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from pydantic import TypeAdapter
 
+from errand_make.mesh import Material
 from errand_train.models.pictures import cloth, noise, speckle, to_picture, wood
-from plant.models.builder.mesh import Material
 from skills.inputs.yaml_source import read_yaml
 from skills.robot import FloatArray, Picture
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from errand_make.mesh import Material, Mesh
+from errand_make.shapes import Box, Shape
 from errand_train.worlds.plan import Door, Hanging, Plan, Rectangle, Room
-from plant.models.builder.mesh import Material, Mesh
-from plant.models.builder.shapes import Box, Shape
 from skills.robot import FloatArray
 
 FRAME_M, FRAME_DEPTH_M, SKIRTING_M = 0.07, 0.012, 0.07

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from errand_make.mesh import Material, Mesh
 from errand_train.dataset.compose import Placed, Scene
 from errand_train.dataset.lighting import Lighting
 from errand_train.dataset.objects import instance
@@ -11,7 +12,6 @@ from errand_train.dataset.render import Stage, label_view
 from errand_train.dataset.room import Room
 from errand_train.dataset.silhouette import silhouette
 from errand_train.dataset.views import View, roll_deg
-from plant.models.builder.mesh import Material, Mesh
 from plant.rendering import render_parameters
 from plant.scene_pictures import look_at
 from skills.robot import Intrinsics

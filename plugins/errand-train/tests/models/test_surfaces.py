@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
+from errand_make.mesh import Material, Mesh
+from errand_make.shapes import solid_mass
 from errand_train.models.gltf import gltf_text
 from errand_train.models.mass import join_masses
 from errand_train.models.outlines import area, inset, triangles_of
 from errand_train.models.surfaces import add_ellipsoid, add_extruded, add_ring, add_rounded_box, add_tube
-from plant.models.builder.mesh import Material, Mesh
-from plant.models.builder.shapes import solid_mass
 
 MATERIALS = {"red": Material((1.0, 0.0, 0.0)), "label": Material(texture="label.png")}
 L_SHAPE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]

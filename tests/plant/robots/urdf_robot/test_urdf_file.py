@@ -56,7 +56,7 @@ def test_a_driven_joint_without_limits_is_refused(tmp_path):
     assert refused.value.line == 2
 
 
-def test_poses_follow_the_joints(rover_urdf):
-    urdf = UrdfFile(rover_urdf)
+def test_poses_follow_the_joints(rover_package):
+    urdf = UrdfFile(rover_package / "robot.urdf")
     straight, turned = (urdf.poses({"shoulder_yaw": angle})["palm"].translation() for angle in (0.0, np.pi / 2))
     assert np.allclose(straight, [0.12 + 0.76, 0.0, 0.55]) and np.allclose(turned, [0.12, 0.76, 0.55])

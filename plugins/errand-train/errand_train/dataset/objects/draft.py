@@ -8,10 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from errand_train.models.mass import join_masses
-from errand_train.models.pictures import to_picture
-from plant.models.builder.mesh import IDENTITY, Colour, Material, Mesh
-from plant.models.builder.shapes import (
+from errand_make.mesh import IDENTITY, Colour, Material, Mesh
+from errand_make.shapes import (
     Box,
     Cylinder,
     MassProperties,
@@ -21,6 +19,8 @@ from plant.models.builder.shapes import (
     shell_mass,
     solid_mass,
 )
+from errand_train.models.mass import join_masses
+from errand_train.models.pictures import to_picture
 from skills.robot import FloatArray, Picture
 
 PROUD_M = 0.0003

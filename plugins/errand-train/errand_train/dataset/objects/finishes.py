@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
+from errand_make.mesh import Colour
 from errand_train.dataset.objects.draft import Draft, vary_shade
 from errand_train.dataset.objects.lettering import COLOURS, printed_label, write_word
 from errand_train.dataset.objects.wear import add_rust, add_wear, brushed_metal, plain_picture
 from errand_train.models.expressions import Number, evaluate
 from errand_train.models.pictures import cloth, noise, speckle, wood
-from plant.models.builder.mesh import Colour
 from skills.robot import FloatArray
 
 Colours = str | tuple[Any, ...] | dict[str, Any]

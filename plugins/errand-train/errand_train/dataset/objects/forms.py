@@ -7,10 +7,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
+from errand_make.shapes import Model
 from errand_train.dataset.objects import make
 from errand_train.models.__main__ import write_model
 from errand_train.models.appearance import Appearance
-from plant.models.builder.shapes import Model
 from plant.models.catalogue import MODELS_FOLDER
 
 FORMS: Final[Mapping[tuple[str, str], int]] = MappingProxyType(

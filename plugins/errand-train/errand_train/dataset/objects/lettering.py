@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plant.models.builder.mesh import Colour
+from errand_make.mesh import Colour
 from skills.inputs.yaml_source import read_yaml
 from skills.robot import FloatArray
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from errand_make.mesh import Mesh, mtl_text, obj_text, palette_picture, plain_colours, write_text
+from errand_make.shapes import Model, model_sdf
 from errand_train.dataset.objects.draft import Finished
 from errand_train.models.gltf import gltf_text
-from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, plain_colours, write_text
-from plant.models.builder.shapes import Model, model_sdf
 from plant.scene_pictures import save_png
 from skills.robot import FloatArray
 

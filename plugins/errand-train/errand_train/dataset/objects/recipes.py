@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
+from errand_make.mesh import IDENTITY, Mesh
 from errand_train.dataset.objects.draft import Draft, Finished, rotation
 from errand_train.dataset.objects.finishes import Colours, Finish, apply_finish, draw_colour
 from errand_train.models.expressions import Number, evaluate
@@ -29,7 +30,6 @@ from errand_train.models.surfaces import (
     add_rounded_box,
     add_tube,
 )
-from plant.models.builder.mesh import IDENTITY, Mesh
 from skills.inputs.yaml_source import read_yaml
 from skills.robot import FloatArray
 

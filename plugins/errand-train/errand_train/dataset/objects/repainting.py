@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from errand_make.mesh import Material, Mesh
 from errand_train.dataset.objects.draft import Finished, pick, vary_colour
 from errand_train.dataset.objects.lettering import COLOURS, GREYS
-from plant.models.builder.mesh import Material, Mesh
 
 __all__ = ["paint_in_one_colour", "paint_plainly"]
 

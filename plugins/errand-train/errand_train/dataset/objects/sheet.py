@@ -9,9 +9,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from errand_make.objects.portrait import Ball, portrait
 from errand_train.dataset.objects import CLASSES, DISTRACTORS, instance
 from errand_train.dataset.objects.model import ObjectModel
-from plant.scene_pictures import Ball, portrait, save_png
+from plant.scene_pictures import save_png
 from skills.robot import Picture
 
 

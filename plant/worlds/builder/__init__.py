@@ -1,1 +1,0 @@
-"""Builders of worlds: the folder of a world from a map or from cylinders."""

@@ -1,0 +1,1 @@
+"""Makes objects, worlds and robots of the user's own."""

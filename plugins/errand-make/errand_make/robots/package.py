@@ -1,0 +1,58 @@
+"""Installable package with a robot from a URDF: its parts, meshes, tests and registration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from errand_make.robots.inference import write_robot_file
+from errand_make.robots.meshes import copy_meshes
+from executive.cli.new_command import PackageTemplates
+from executive.cli.output import console_for, progress_bar
+from plant.robots.robot_kind import robot_kinds
+from plant.robots.urdf_robot.urdf_file import UrdfFile
+from skills.inputs.errors import InputError
+from skills.manipulation.arm.poses import compact_configuration
+
+_TEMPLATES: Final = PackageTemplates("robot", Path(__file__).parent / "templates")
+_BAND_M: Final = 0.05
+"""Half the band of heights of the returns of a planar LiDAR, which a robot that tilts a little smears."""
+
+
+def check_robot_name(name: str) -> None:
+    """Raises InputError if a robot cannot have a name, or is installed under it."""
+    _TEMPLATES.check(name, robot_kinds())
+
+
+def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, Path]) -> list[str]:
+    """Writes a package with the robot `name` into a folder; returns what a person has to check.
+
+    Raises:
+        InputError: the URDF or a mesh cannot be used; with file and line.
+    """
+    home = folder / _TEMPLATES.package(name)
+    home.mkdir(parents=True)
+    source = UrdfFile(urdf)
+    count = sum(1 for _ in source.robot.iter("mesh"))
+    with progress_bar(console_for(as_json=True), "meshes", count) as advance:
+        for _ in copy_meshes(source, packages, home):
+            advance()
+    try:
+        can, notes = write_robot_file(source, name, home, compact_configuration)
+    except InputError as error:
+        if error.file != home / "robot.urdf":
+            raise
+        raise InputError(error.message, hint=error.hint, file=urdf, line=error.line) from error
+    height_m = can.lidar_height_m or 0.0
+    words = {
+        "controller": "mppi" if can.base_kind.value == "omnidirectional" else "path_follower",
+        "low": f"{height_m - _BAND_M:.2f}",
+        "high": f"{height_m + _BAND_M:.2f}",
+        "grasp_x": f"{1.38 - (0.0 if can.arm is None else can.arm.standing_m[0]):.2f}",
+    }
+    lacking = [] if can.arm is not None else ["look", "stow"]
+    lacking += [] if can.object_camera is not None else ["look"]
+    lacking += [] if can.object_camera is not None and can.gripper is not None else ["take", "grasp"]
+    _TEMPLATES.render(name, folder, words=words, without={f"{each}.skilltest.yaml" for each in lacking})
+    return notes

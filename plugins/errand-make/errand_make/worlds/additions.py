@@ -1,0 +1,88 @@
+"""Additions to a world of the user's own: furniture, objects, a person, a dock, and names of rooms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Final
+
+from errand_make.worlds import furnish
+from errand_make.worlds.rooms import BANDS_M
+from errand_make.worlds.site import Site, contains, restored
+from errand_make.worlds.wanted import Addition, Wanted
+from plant.worlds.world import WorldError
+from skills.inputs.errors import InputError, listing
+from skills.robot import Pose2D
+
+
+def add(folder: Path, wanted: Wanted) -> str:
+    """Adds a part to the world of a folder; returns a sentence on it.
+
+    Raises InputError when it cannot be added; the files of the world are then as before.
+    """
+    site = Site.open(folder)
+    with restored(folder):
+        return _ADDED.get(wanted.what, _add_furniture)(site, wanted)
+
+
+def _add_furniture(site: Site, wanted: Wanted) -> str:
+    """Adds a piece of furniture; returns a sentence. Raises WorldError."""
+    grid, facts = site.grid(), site.facts
+    rooms = {name: Pose2D(each.pose.x, each.pose.y, each.pose.yaw) for name, each in facts.places.items()}
+    room = site.room(wanted.room)
+    pose = Pose2D(*(wanted.at or (0.0, 0.0, 0.0)))
+    piece = furnish.Furniture(wanted.what.value, wanted.name, wanted.size or furnish.SIZES[wanted.what.value], pose)
+    if not (min(piece.size) >= 0.3 and max(piece.size) <= 3.0 and piece.size[2] <= 1.2):
+        raise WorldError("width and depth are 0.3 to 3 m, and the height is 0.3 to 1.2 m")
+    if wanted.at is None:
+        piece = furnish.place_in(site.world, grid, piece, facts.places[room].polygon, site.doors, rooms)
+    elif (why := furnish.refusal(site.world, grid, piece, rooms)) is not None:
+        raise WorldError(f"{wanted.name} cannot stand at ({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g}): {why}")
+    else:
+        room = next((name for name, each in facts.places.items() if contains(each.polygon, (pose.x_m, pose.y_m))), room)
+    grids = {name: site.grid(name) for name in BANDS_M if (site.folder / "map" / f"{name}.yaml").is_file()}
+    furnish.add_furniture(site.folder, piece, room, grids)
+    at = f"({piece.pose.x_m:.2f}, {piece.pose.y_m:.2f}, {piece.pose.yaw_rad:.2f})"
+    return f"{wanted.name} in the {room} at {at}, {piece.size[2]:g} m high"
+
+
+def _add_object(site: Site, wanted: Wanted) -> str:
+    surfaces = site.facts.surfaces
+    found = site.facts.place(wanted.surface or "")
+    if found not in surfaces:
+        what = f"there is no surface '{wanted.surface}'" if wanted.surface else "an object lies on a surface"
+        raise InputError(what, hint=f"name it by --on: {listing(surfaces)}" if surfaces else "add a table first")
+    furnish.add_object(site.folder, wanted.name, wanted.name, str(found))
+    return f"{wanted.name} on the {found}"
+
+
+def _add_person(site: Site, wanted: Wanted) -> str:
+    if wanted.room is not None or wanted.at is not None:
+        raise InputError("a person stands beside the robot's start", hint="leave --in and --at out")
+    furnish.add_person(site.folder, site.world, site.grid(), wanted.name, site.room(None))
+    return f"{wanted.name} stands beside the robot's start"
+
+
+def _add_dock(site: Site, wanted: Wanted) -> str:
+    pose = Pose2D(*wanted.at) if wanted.at else furnish.dock_pose(site.world, site.grid(), site.doors)
+    furnish.add_dock(site.folder, pose)
+    return f"a dock at ({pose.x_m:.2f}, {pose.y_m:.2f}, {pose.yaw_rad:.2f})"
+
+
+def _name_room(site: Site, wanted: Wanted) -> str:
+    if wanted.room is None:
+        raise InputError("the former name is missing", hint=f"name it by --in: {listing(site.facts.places)}")
+    if site.facts.place(wanted.name) is not None:
+        raise InputError(f"there is a '{wanted.name}' already", hint="choose another name", file=site.folder)
+    former, file = site.room(wanted.room), site.folder / "knowledge.yaml"
+    file.write_text(furnish.with_room_name(file, former, wanted.name), encoding="utf-8")
+    return f"{former} is now {wanted.name}"
+
+
+_ADDED: Final[Mapping[Addition, Callable[[Site, Wanted], str]]] = {
+    Addition.OBJECT: _add_object,
+    Addition.PERSON: _add_person,
+    Addition.DOCK: _add_dock,
+    Addition.ROOM: _name_room,
+}
+"""Additions other than furniture."""

@@ -1,0 +1,7 @@
+"""The robot rover: its URDF, and robot.yaml, which names its parts."""
+
+from pathlib import Path
+
+from plant.robots.urdf_robot.kind import urdf_kind
+
+KIND = urdf_kind(Path(__file__).with_name("robot.yaml"))

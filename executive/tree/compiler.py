@@ -27,9 +27,8 @@ from executive.words.command import START, Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import UseMission
 from executive.words.mission import Mission
-from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
-from executive.words.step import Step
+from executive.words.step import OnFailure, Policy, Step
 from skills.api import Surface, Tag, Zone
 from skills.doorway import Doorway
 from skills.inputs.errors import InputError, suggestion, with_article

@@ -15,8 +15,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from skills.durations import seconds_in
 from skills.faults.fault_kinds import STANDARD_FAULTS, Call, Effect, FaultKind
+from skills.quantities import seconds_in
 from skills.robot import Clock, Robot
 from skills.robot_wrapper import AnswerT, RobotWrapper
 

@@ -21,8 +21,6 @@ from executive.words.step import OnFailure, Policy, Step
 from executive.words.steps import Group
 from skills.inputs.errors import InputError, Problems, SourceLine
 
-__all__ = ["PYTHON_TYPES", "Assembler", "Flow", "Named", "StepPlan", "StepPlans", "step_name"]
-
 PYTHON_TYPES: Final[Mapping[Kind, type]] = {Kind.NUMBER: float, Kind.TEXT: str, Kind.TRUTH: bool}
 
 

@@ -20,8 +20,6 @@ from skills.quantities import seconds_in
 from skills.robot import Clock, Robot
 from skills.robot_wrapper import AnswerT, RobotWrapper
 
-__all__ = ["Fault", "parse_fault", "random_faults"]
-
 _NUMBER: Final = r"\d+(?:\.\d+)?"
 _WHEN: Final = re.compile(
     r"(?P<what>.+?)"

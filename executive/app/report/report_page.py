@@ -17,8 +17,9 @@ from executive.app.report.run_report import Ending, ReportedAnswer, ReportedObje
 from executive.record.history import Event, seen_objects
 from executive.record.schemas import TRANSITIONS
 from executive.run.outcome import Finding, RunResult, Said
-from executive.tree.compiler import CompiledTree, StepPart
+from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView
+from executive.tree.plan import StepPart
 from executive.view.formats import to_svg
 from executive.view.html import render
 from executive.view.map_picture import map_picture

@@ -17,7 +17,6 @@ from pydantic import BaseModel
 from errand_spot.server.calls import service_calls
 from errand_spot.server.server import LISTED, MOTIONS, SERVICES
 from executive.app.prepare.scenarios import ScenarioFile
-from executive.mission.json_schema import mission_json_schema
 from executive.testing.skill_test import SkillTestFile
 from executive.tree.port_values import describe_type, field_types
 from executive.tree.registry import built_in_skills
@@ -25,13 +24,14 @@ from executive.words.knowledge import Knowledge
 from executive.words.mission import Mission
 from plant.worlds.world import SeedRules
 from skills.api import Skill
-from skills.durations import DURATION_PATTERN
 from skills.faults.fault_kinds import STANDARD_FAULTS
+from skills.quantities import DURATION_PATTERN
 from skills.stack import SLOTS, components, skill_options, stack_schema
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from make_api import api_page
 from mission_constructs import constructs_text
+from mission_schema import mission_json_schema
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "reference"

@@ -9,8 +9,6 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["NO_DETECTOR", "Detection", "Detector", "DetectorWrapper", "NoDetector", "NoDetectorError", "box_overlap"]
-
 
 @dataclass(frozen=True)
 class Detection:

@@ -415,7 +415,7 @@ class PoseArmInputs:
 class PoseArmPorts(Skill[PoseArmInputs]):
     """Moves the arm on a free path to joint angles, then the gripper to an opening."""
 
-    done_by: ClassVar[str] = "skills.manipulation.pose_arm:PoseArm"
+    done_by: ClassVar[str] = "skills.manipulation.posture:PoseArm"
     name = "pose_arm"
     Inputs = PoseArmInputs
     uses: ClassVar[frozenset[Part]] = frozenset({Part.ARM})
@@ -436,7 +436,7 @@ class StowInputs:
 class StowPorts(Skill[StowInputs]):
     """Brings the arm near the body, and the body to its usual height. An arm that is near the body stays there."""
 
-    done_by: ClassVar[str] = "skills.manipulation.stow:Stow"
+    done_by: ClassVar[str] = "skills.manipulation.posture:Stow"
     name = "stow"
     Inputs = StowInputs
     uses: ClassVar[frozenset[Part]] = frozenset({Part.ARM})

@@ -17,29 +17,49 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, get_args, get_origin
 
 from annotated_types import GroupedMetadata
 
-from skills.durations import DURATION_FORM, DURATION_PATTERN, seconds_in
-
 if TYPE_CHECKING:
     from pydantic_core.core_schema import CoreSchema
 
-__all__ = [
-    "Quantity",
-    "QuantityError",
-    "base_type",
-    "bounds",
-    "clock_text",
-    "display_text",
-    "in_range",
-    "number_in",
-    "number_of",
-    "quantity_of",
-    "range_text",
-    "unit_hint",
-    "unitless_name",
-]
-
 MOST_DIGITS: Final = 100
 LARGEST: Final = 10**300
+DURATION_FORM: Final = 'seconds, or as in "2 min", "1 h 30 min" or "PT5M"'
+DURATION_PATTERN: Final = r"^(\d+(\.\d+)?[ ]?[a-z]+,?[ ]?(and )?)+$|^P[0-9.DTHMS]+$"
+"""Pattern of a duration that is a text, for editors."""
+_MOST_LETTERS: Final = 60
+_UNIT_WORDS: Final = {
+    0.001: ("ms", "millisecond", "milliseconds"),
+    1.0: ("s", "sec", "secs", "second", "seconds"),
+    60.0: ("m", "min", "mins", "minute", "minutes"),
+    3600.0: ("h", "hr", "hrs", "hour", "hours"),
+    86400.0: ("d", "day", "days"),
+}
+_UNITS_S: Final[Mapping[str, float]] = MappingProxyType({word: s for s, words in _UNIT_WORDS.items() for word in words})
+_DIGITS: Final = r"\d+(?:\.\d+)?"
+_SEVERAL: Final = re.compile(rf"(?:{_DIGITS}\s*[a-z]+(?:\s*,?\s*(?:and\s+)?))+")
+_ONE: Final = re.compile(rf"({_DIGITS})\s*([a-z]+)")
+_PLAIN: Final = re.compile(rf"[+-]?{_DIGITS}(?:e[+-]?\d+)?")
+_ISO: Final = re.compile(
+    rf"p(?=[\dt])(?:(?P<d>{_DIGITS})d)?(?:t(?=\d)(?:(?P<h>{_DIGITS})h)?(?:(?P<m>{_DIGITS})m)?(?:(?P<s>{_DIGITS})s)?)?"
+)
+
+
+def seconds_in(text: str) -> float | None:
+    """Returns the seconds of a text; None where it is no duration. Each unit may stand once."""
+    words = " ".join(text.split()).lower()
+    if not words or len(words) > _MOST_LETTERS:
+        return None
+    if _PLAIN.fullmatch(words) and not re.match(r"[+-]?0\d", words):
+        return float(words)
+    if (iso := _ISO.fullmatch(words)) is not None:
+        return sum(float(number) * _UNITS_S[unit] for unit, number in iso.groupdict(default="0").items())
+    if not _SEVERAL.fullmatch(words):
+        return None
+    parts = _ONE.findall(words)
+    units = [_UNITS_S.get(unit) for _, unit in parts]
+    if len(set(units)) < len(units):
+        return None
+    found = [float(number) * unit for (number, _), unit in zip(parts, units, strict=True) if unit is not None]
+    return sum(found) if len(found) == len(parts) else None
 
 
 class QuantityError(ValueError):

@@ -39,22 +39,6 @@ if TYPE_CHECKING:
     from skills.navigate.zone_map import ZoneMap
     from skills.world_model import Costmap, FreeSpace, Localiser, WorkCounter
 
-__all__ = [
-    "BACKENDS",
-    "DEFAULT_FILE",
-    "DOORS",
-    "SLOTS",
-    "RobotStack",
-    "StackError",
-    "default_component",
-    "default_stack",
-    "door_opener",
-    "robot_backend",
-    "stack_data",
-    "stack_of",
-    "stack_schema",
-]
-
 SLOTS: Final[Mapping[str, str]] = {
     "localiser": "errand.localisers",
     "costmap": "errand.costmaps",

@@ -23,7 +23,7 @@ from make_api import public_names
 Check = Callable[[str, str], list[str]]
 Graph = Mapping[str, frozenset[str]]
 WORDS_MAY = (
-    *("executive.words", "skills.api", "skills.inputs", "skills.quantities", "skills.durations", "skills.robot"),
+    *("executive.words", "skills.api", "skills.inputs", "skills.quantities", "skills.quantities", "skills.robot"),
     *("skills.world_model", "skills.perception.class_forms"),
 )
 """All that the words import: what things are, how files are read, and which numbers a quantity may have."""

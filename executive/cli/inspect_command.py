@@ -23,8 +23,7 @@ from executive.record.history import Entry, History, read_history, timeline
 from executive.record.schemas import ERRORS
 from executive.tree.node_view import NodeView, node_view, to_json
 from executive.view.formats import to_btcpp, to_mermaid, to_svg
-from executive.view.styles import style_of
-from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, printable, readable, to_text
+from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, printable, readable, style_of, to_text
 from skills.inputs.errors import InputError
 from skills.inputs.outside import is_file, writing
 from skills.quantities import Count, Delay, Port, Tries, Wait

@@ -35,8 +35,7 @@ from skills.inputs.errors import InputError, count_text
 from skills.quantities import Delay, Port, Seed
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack
-from skills.teleop.driver import Teleop, TeleopOptions
-from skills.teleop.keys import KEYS, axis_values, read_axis_values
+from skills.teleop.driver import KEYS, Teleop, TeleopOptions, axis_values, read_axis_values
 
 HOLDER: Final = "teleop"
 SAVE_KEY: Final = "p"

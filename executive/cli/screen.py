@@ -32,8 +32,7 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeState, Snapshot
 from executive.tree.node_view import NodeView, node_view
 from executive.view.foxglove import LiveServer
-from executive.view.styles import Styles, style_of
-from executive.view.text import printable, to_rich
+from executive.view.text import Styles, printable, style_of, to_rich
 
 SILENCE: Final = Silence()
 

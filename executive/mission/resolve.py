@@ -23,8 +23,7 @@ from executive.words.forms import Strict
 from executive.words.knowledge import ANYBODY, Knowledge
 from executive.words.leaf_steps import CallSkill, Do, Say, Set, UseMission
 from executive.words.mission import Mission, Parameter, QuestionPolicy
-from executive.words.policy import Policy
-from executive.words.step import Step
+from executive.words.step import Policy, Step
 from executive.words.steps import ForEach, Group, Steps
 from executive.words.zone import ZoneFacts
 from skills.inputs.errors import InputError, Problems, listing, suggestion

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from datetime import UTC, date, datetime, time, timedelta, tzinfo
 from typing import Final
 
-from skills.durations import seconds_in
 from skills.inputs.errors import InputError, listing, suggestion
+from skills.quantities import seconds_in
 
 FULL: Final = 0.95
 NOISE: Final = 0.01

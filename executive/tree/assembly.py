@@ -16,13 +16,10 @@ from executive.words.condition import RANGES, READINGS
 from executive.words.expression import Expression, ExpressionError, Kind, Template, kind_of
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import CallSkill, UseMission
-from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
-from executive.words.step import Step
+from executive.words.step import OnFailure, Policy, Step
 from executive.words.steps import Group
 from skills.inputs.errors import InputError, Problems, SourceLine
-
-__all__ = ["PYTHON_TYPES", "Assembler", "Flow", "Named", "StepPlan", "StepPlans", "step_name"]
 
 PYTHON_TYPES: Final[Mapping[Kind, type]] = {Kind.NUMBER: float, Kind.TEXT: str, Kind.TRUTH: bool}
 

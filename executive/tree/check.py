@@ -27,8 +27,6 @@ from skills.world_model import zones_sentence
 if TYPE_CHECKING:
     from skills.navigate.zone_map import ZoneMap
 
-__all__ = ["Abilities", "Checked", "PlannedRoutes", "check_tree"]
-
 
 Fault = tuple[str, str]
 """Error in a part of a mission, and a hint."""

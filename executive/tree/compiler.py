@@ -27,14 +27,11 @@ from executive.words.command import START, Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import UseMission
 from executive.words.mission import Mission
-from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
-from executive.words.step import Step
+from executive.words.step import OnFailure, Policy, Step
 from skills.api import Surface, Tag, Zone
 from skills.doorway import Doorway
 from skills.inputs.errors import InputError, suggestion, with_article
-
-__all__ = ["CompiledTree", "StepPart", "compile_mission"]
 
 
 @dataclass(frozen=True)
@@ -190,8 +187,6 @@ def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) 
 def _error(node: NodeSpec, message: str, hint: str) -> InputError:
     return InputError.at(node.source, f"{node.path_id}: {message}", hint=hint)
 
-
-__all__ = ["KINDS", "PLANS", "build", "writes"]
 
 _PAGES: Final = tuple(import_module(f"{nodes.__name__}.{page.name}") for page in iter_modules(nodes.__path__))
 KINDS: Final[Mapping[str, type[ExplainedNode]]] = {

@@ -22,8 +22,6 @@ from skills.inputs.schema import validate
 from skills.inputs.yaml_source import read_yaml
 from skills.robot import Pose2D
 
-__all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "expected_children", "load_estimates"]
-
 _Mark = tuple[Pose2D, Mapping[str, Pose2D], float]
 Positive = Annotated[float, Field(gt=0.0)]
 _DRIVES: Final = frozenset({"navigate", "guide_person"})

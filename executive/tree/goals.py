@@ -9,15 +9,6 @@ from executive.words.goal import GoalCondition, GoalKind, Region, When
 from executive.words.knowledge import ANYBODY, Knowledge, Pose
 from skills.api import ObjectKind
 
-__all__ = [
-    "clearing_goals",
-    "command_goal",
-    "door_goal",
-    "square_region",
-    "surface_region",
-    "surfaces_to_search",
-]
-
 BELOW_TOP_M: Final = 0.05
 ABOVE_TOP_M: Final = 0.30
 FLOOR_M: Final = (-0.05, 0.30)

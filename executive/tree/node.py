@@ -17,8 +17,6 @@ from executive.tree.behaviour import Explained
 from skills.api import Cause
 from skills.inputs.errors import SourceLine
 
-__all__ = ["Change", "NodeSpec", "NodeState", "Snapshot", "TreeObserver"]
-
 
 @dataclass(frozen=True)
 class NodeSpec:

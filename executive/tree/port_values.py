@@ -89,8 +89,6 @@ def field_types(record: type) -> Mapping[str, Any]:
     return types.MappingProxyType(typing.get_type_hints(record, include_extras=True))
 
 
-__all__ = ["FROM_KEY", "PortValueError", "assign_ports", "port_value"]
-
 FROM_KEY: Final = "from"
 Path = tuple[str | int, ...]
 

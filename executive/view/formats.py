@@ -11,8 +11,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from executive.tree.node_view import NodeView, Port
 from executive.view.html import render
-from executive.view.styles import NodeStyle, Styles, style_of
-from executive.view.text import note_of, printable
+from executive.view.text import NodeStyle, Styles, note_of, printable, style_of
 
 BOX_W: Final = 430
 BOX_H: Final = 40

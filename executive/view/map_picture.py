@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from executive.record.history import Event
 from executive.record.schemas import DOORS, MAP, NAVIGATION, PATH, POSE, RESERVED_PATH, TREE
-from executive.view.styles import ROBOT_COLOURS, rgb_of
+from executive.view.text import ROBOT_COLOURS, rgb_of
 from skills.inputs.errors import InputError
 from skills.map_drawing import ZONE_COLOURS, Names, draw_zone, with_legend
 

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
-from skills.durations import seconds_in
 from skills.inputs.errors import suggestion
-from skills.quantities import QuantityError, clock_text
+from skills.quantities import QuantityError, clock_text, seconds_in
 
 Value = bool | int | float | str
 MOST_LETTERS: Final = 500

@@ -11,9 +11,8 @@ from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, StrictBool
 from executive.words.command import Command
 from executive.words.forms import Strict
 from executive.words.outlines import Corner
-from executive.words.policy import OnFailure, OperatorQuestion, Policy
 from executive.words.robot_config import RobotsFile
-from executive.words.step import Given, Placed, Scalar, Step
+from executive.words.step import Given, OnFailure, OperatorQuestion, Placed, Policy, Scalar, Step
 from executive.words.steps import Branch, Group, Handler, Steps, While
 from executive.words.zone import ZONES, ZoneFacts, Zones
 from skills.inputs.errors import SourceLine

@@ -1,16 +1,33 @@
-"""Findings of the referee, and the times, places and distances that all judges use."""
+"""Findings of the referee, what all judges use, and the judges of company: who was followed, guided and greeted."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
-from executive.words.goal import GoalCondition, Region, When
-from plant.referee.object_history import Truth
+from executive.words.goal import GoalCondition, GoalKind, Region, When
+from plant.referee.object_history import TimedPath, Truth
 from skills.inputs.errors import definite
 from skills.robot import FloatArray
 
 NAMED_REGIONS = 3
+NEAR_M: Final[Mapping[GoalKind, float]] = MappingProxyType(
+    {
+        GoalKind.WENT: 2.0,
+        GoalKind.MET: 2.0,
+        GoalKind.FOLLOWED: 3.0,
+        GoalKind.GUIDED: 3.0,
+        GoalKind.GREETED: 2.5,
+    }
+)
+"""Greatest distance of the robot's body from the person for each kind."""
+LOST_M: Final = 5.0
+LONGEST_LOSS_S: Final = 10.0
+"""A robot that was farther than this from the person, for longer than this, has lost the person."""
+_SAMPLE_S: Final = 0.1
 
 
 @dataclass(frozen=True)
@@ -50,3 +67,86 @@ def where(regions: Sequence[Region]) -> str:
     """Names of regions if there are few, else their number."""
     names = tuple(dict.fromkeys(the(region.name) for region in regions))
     return " or ".join(names) if len(names) <= NAMED_REGIONS else f"any of {len(names)} places"
+
+
+def judge_company(condition: GoalCondition, truth: Truth) -> Finding:
+    """Judges whether a robot was near a person where the person should be, and, if it followed, never lost them."""
+    people = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}
+    if not people:
+        return Finding(False, f"there is no person {condition.person or ''}".rstrip() + " to go to.")
+    findings = [
+        _judge_pair(condition, robot, name, truth)
+        for robot in truth.robots
+        if condition.robot in (None, robot)
+        for name in sorted(people, key=lambda name: _apart_m(condition, truth.robots[robot], people[name], truth))
+    ]
+    missing = Finding(False, f"there is no robot {condition.robot}.")
+    return next((each for each in findings if each.holds), findings[0] if findings else missing)
+
+
+def lost_s(robot: TimedPath, person: TimedPath, from_s: float, until_s: float) -> float:
+    """Longest time (s) for which a robot was farther from a person than `LOST_M`."""
+    times = np.arange(max(from_s, person.points[0, 3]), until_s, _SAMPLE_S)
+    far = np.hypot(*(robot.positions_at(times) - person.positions_at(times))[:, :2].T) > LOST_M
+    longest = run = 0
+    for each in far:
+        run = run + 1 if each else 0
+        longest = max(longest, run)
+    return _SAMPLE_S * longest
+
+
+def _judge_pair(condition: GoalCondition, robot: str, person: str, truth: Truth) -> Finding:
+    """Judges one robot with one person."""
+    path, other, until_s = truth.robots[robot], truth.persons[person], step_end_s(condition, truth)
+    apart_m, verb = _apart_m(condition, path, other, truth), "was" if is_past(condition) else "is"
+    sentence = f"{robot} {verb} {apart_m:.1f} m from {person}"
+    if condition.kind is GoalKind.FOLLOWED and (gone_s := lost_s(path, other, condition.from_s, until_s)):
+        sentence += f", and was over {LOST_M:g} m away for {gone_s:.0f} s"
+        if gone_s > LONGEST_LOSS_S:
+            return Finding(False, f"{sentence}.")
+    goal = condition.goal if condition.kind is not GoalKind.WENT else ()
+    if goal and region_at(goal, other.position_at(until_s)) is None:
+        x, y, _ = other.position_at(until_s)
+        return Finding(False, f"{sentence}, who stood at ({x:.2f}, {y:.2f}), not in {where(goal)}.")
+    there = f" in {region_at(goal, other.position_at(until_s))}" if goal else ""
+    return Finding(apart_m <= NEAR_M[condition.kind], f"{sentence}{there}.")
+
+
+def _apart_m(condition: GoalCondition, robot: TimedPath, person: TimedPath, truth: Truth) -> float:
+    """Distance between a robot and a person at the time that counts for a condition, in metres."""
+    until_s = step_end_s(condition, truth)
+    at_W = person.position_at(until_s)
+    if condition.when is When.SOME_TIME:
+        return min(distance_m(p_W, at_W) for p_W in robot.positions_between(condition.from_s, until_s))
+    return distance_m(robot.position_at(until_s), at_W)
+
+
+def judge_greeted(condition: GoalCondition, truth: Truth) -> Finding:
+    """Judges whether the robot spoke beside each person who stayed in the region, and once for each.
+
+    A person who came or left during the step may be greeted or not.
+    """
+    from_s, until_s = condition.from_s, step_end_s(condition, truth)
+    robots = [path for name, path in truth.robots.items() if condition.robot in (None, name)]
+    among = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}
+    inside = {name: list(_inside(condition, path, from_s, until_s)) for name, path in among.items()}
+    stayed = [name for name, ins in inside.items() if all(ins)]
+    present = [name for name in among if any(inside[name])]
+    times_s = condition.spoken_s
+    near = np.array([[_spoke_near(condition, robots, among[name], t_s) for t_s in times_s] for name in stayed])
+    greeted = near.size and int(near[linear_sum_assignment(near, maximize=True)].sum())
+    said, there = len(times_s), " and ".join(stayed) or "nobody"
+    sentence = f"{there} stood in {where(condition.goal)}, and {greeted} of {len(stayed)} heard one of {said} greetings"
+    return Finding(greeted == len(stayed) and said <= max(1, len(present)), f"{sentence}.")
+
+
+def _inside(condition: GoalCondition, person: TimedPath, from_s: float, until_s: float) -> Iterator[bool]:
+    """Yields for each position of a person in an interval whether it lies in the regions of a condition."""
+    for p_W in person.positions_between(from_s, until_s):
+        yield not condition.goal or region_at(condition.goal, p_W) is not None
+
+
+def _spoke_near(condition: GoalCondition, robots: list[TimedPath], person: TimedPath, time_s: float) -> bool:
+    """Returns whether a robot was near a person at a time."""
+    p_W: FloatArray = person.position_at(time_s)
+    return any(distance_m(robot.position_at(time_s), p_W) <= NEAR_M[condition.kind] for robot in robots)

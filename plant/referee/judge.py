@@ -3,9 +3,18 @@
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 from executive.words.goal import GoalCondition, GoalKind, RefereeReport, Region, When
-from plant.referee.company import judge_company, judge_greeted
 from plant.referee.entities import Collision
-from plant.referee.findings import Finding, distance_m, is_past, region_at, step_end_s, the, where
+from plant.referee.findings import (
+    Finding,
+    distance_m,
+    is_past,
+    judge_company,
+    judge_greeted,
+    region_at,
+    step_end_s,
+    the,
+    where,
+)
 from plant.referee.object_history import ON_TRAY_GAP_S, SETTLE_S, Lift, ObjectHistory, TimedPath, Truth
 from skills.inputs.errors import definite, listing
 from skills.robot import FloatArray

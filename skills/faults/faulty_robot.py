@@ -15,12 +15,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from skills.durations import seconds_in
 from skills.faults.fault_kinds import STANDARD_FAULTS, Call, Effect, FaultKind
+from skills.quantities import seconds_in
 from skills.robot import Clock, Robot
 from skills.robot_wrapper import AnswerT, RobotWrapper
-
-__all__ = ["Fault", "parse_fault", "random_faults"]
 
 _NUMBER: Final = r"\d+(?:\.\d+)?"
 _WHEN: Final = re.compile(

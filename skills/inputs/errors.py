@@ -9,22 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-__all__ = [
-    "InputError",
-    "Problems",
-    "SourceLine",
-    "count_text",
-    "definite",
-    "disk_is_full",
-    "known_names",
-    "listing",
-    "nearest_name",
-    "one_line",
-    "short_list",
-    "suggestion",
-    "with_article",
-]
-
 NEAREST: Final = 3
 FEW: Final = 5
 MOST_LISTED: Final = 8

@@ -12,8 +12,6 @@ from typing import Any, Final
 
 from skills.inputs.errors import InputError
 
-__all__ = ["file_beside", "is_file", "is_folder", "is_there", "plain_file", "read_bytes", "read_text", "writing"]
-
 TEXT_BYTES: Final = 1_000_000
 """Most bytes of a text, unless a reader sets another limit."""
 _LARGE_FILE: Final = b"version https://git-lfs.github.com/spec/"
@@ -145,8 +143,6 @@ def _unreadable(file: Path, error: Exception, hint: str) -> InputError:
     why = error.strerror if isinstance(error, OSError) else "its name is no name of a file"
     return InputError(f"cannot read it ({why})", hint=hint, file=file)
 
-
-__all__ = ["LONGEST_ANSWER", "LONGEST_TEXT", "json_object", "plain_text"]
 
 LONGEST_TEXT: Final = 2000
 LONGEST_ANSWER: Final = 300

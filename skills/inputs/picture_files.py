@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from skills.inputs.errors import InputError
 from skills.inputs.outside import read_bytes
 
-__all__ = ["MOST_PIXELS", "Brightness", "check_picture", "read_brightness", "read_pixels"]
-
 MOST_PIXELS: Final = 64_000_000
 """Limit that keeps a picture from filling the memory; `executive.cli` sets the same limit in OpenCV."""
 MOST_BYTES: Final = 200_000_000

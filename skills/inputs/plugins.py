@@ -14,20 +14,6 @@ from typing import Any, Final, TypeVar
 
 from skills.inputs.errors import InputError
 
-__all__ = [
-    "CLASSES",
-    "KERNELS",
-    "LIMIT_S",
-    "OURS",
-    "PluginDefect",
-    "class_entries",
-    "class_tables",
-    "distribution_of",
-    "installed_plugins",
-    "run_in_thread",
-    "run_plugin",
-]
-
 CLASSES: Final = "errand.classes"
 """Group of the packages with classes of objects; the value names the package, whose code does not run."""
 

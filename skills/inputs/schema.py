@@ -14,8 +14,6 @@ from skills.inputs.errors import MOST_LISTED, InputError, listing, nearest_name,
 from skills.inputs.yaml_source import KeyPath, YamlSource, quoted_key
 from skills.quantities import QuantityError, base_type, display_text
 
-__all__ = ["Name", "Text", "first_error", "validate"]
-
 _FIRST = r"[^\s\x00-\x1f\x7f\u200b-\u200f\u2060\ufeff]"
 Text = Annotated[str, Field(min_length=1, pattern=rf"^\s*{_FIRST}[^\x00-\x08\x0b\x0c\x0e-\x1f\x7f]*$")]
 """A text in a file: not blank, without control characters."""

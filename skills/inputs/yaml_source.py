@@ -17,8 +17,6 @@ import yaml
 from skills.inputs.errors import InputError, with_article
 from skills.inputs.outside import read_text
 
-__all__ = ["KeyPath", "YamlSource", "parse_yaml", "quoted_key", "read_yaml", "scalar_of", "yaml_of"]
-
 KeyPath = tuple[str | int, ...]
 MOST_DIGITS: Final = 100
 MOST_NESTED: Final = 80

@@ -18,10 +18,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from skills.inputs.errors import InputError
 from skills.inputs.outside import plain_file, read_text
 from skills.inputs.schema import first_error
-from skills.mapping.keyframe import Keyframe
 from skills.mapping.mapper import Mapper, MapperOptions, Submap
 from skills.mapping.occupancy import BANDS_M, LayeredOccupancy
-from skills.mapping.pose_graph import Edge, PoseGraph
+from skills.mapping.pose_graph import Edge, Keyframe, PoseGraph
 from skills.navigate.footprint import pose_array
 from skills.robot import Pose2D
 

@@ -21,8 +21,7 @@ from skills.estimate.localiser import moved_covariance
 from skills.estimate.matching import Match, MatchOptions, match
 from skills.estimate.scan_points import SelfFilter, has_moved
 from skills.geometry import compose, inverse, relative_pose
-from skills.mapping.keyframe import Keyframe, matching_points
-from skills.mapping.pose_graph import Edge, PoseGraph
+from skills.mapping.pose_graph import Edge, Keyframe, PoseGraph, matching_points
 from skills.mapping.submap_matching import Distributions, Window, find_pose
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 

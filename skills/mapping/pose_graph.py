@@ -1,16 +1,107 @@
-"""The pose graph of the keyframes and the measurements between pairs of them, solved by GTSAM."""
+"""Keyframes (thinned LiDAR revolutions), and the pose graph of measurements between them, solved by GTSAM."""
+
+from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from skills.estimate.compiled import compiled
+from skills.estimate.scan_points import SelfFilter, scan_points, sensor_pose
 from skills.geometry import relative_pose
-from skills.robot import FloatArray, Pose2D
+from skills.robot import FloatArray, Pose2D, Robot, Scan, unit_rays
 
 _HUBER_SIGMAS = 1.5
 """Residual, in standard deviations, above which a closure loses weight."""
+BAND_M = (0.5, 1.6)
+"""Band of heights (m) of the points that scans are matched by."""
+_NEIGHBOURS: Final = 32
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """A stored scan and its pose by odometry.
+
+    `ranges_m` is (rings, azimuths) float32 with NaN for no return; `rotation` (3, 3) and `translation` (3,) are the
+    LiDAR's pose in the levelled body frame F; `points_F` (N, 3) are the points that scans are matched by: x, y, and
+    the direction (rad) in which the surface faces.
+    """
+
+    stamp_s: float
+    X_OF: Pose2D
+    ranges_m: NDArray[np.float32]
+    elevations_rad: FloatArray
+    azimuths_rad: FloatArray
+    rotation: FloatArray
+    translation: FloatArray
+    points_F: FloatArray
+
+    @staticmethod
+    def of(scan: Scan, points_F: FloatArray, own: SelfFilter, robot: Robot, *, stride: int = 2) -> Keyframe:
+        """Creates a keyframe of every `stride`-th column of a scan, without returns from the robot itself."""
+        rotation, translation = sensor_pose(scan)
+        ranges, azimuths = scan.ranges_m[:, ::stride].copy(), scan.azimuths_rad[::stride]
+        rays = unit_rays(scan.elevations_rad, azimuths) * np.nan_to_num(ranges, nan=0.0)[..., None]
+        hits_F = rays.reshape(-1, 3) @ rotation.T + translation
+        near = np.flatnonzero(np.hypot(hits_F[:, 0], hits_F[:, 1]) < 1.5)
+        ranges.reshape(-1)[near[~own.foreign(hits_F[near], own.arm_F(robot, scan))]] = np.nan
+        return Keyframe(
+            stamp_s=scan.stamp_s,
+            X_OF=Pose2D.from_transform(scan.X_OB),
+            ranges_m=ranges,
+            elevations_rad=scan.elevations_rad,
+            azimuths_rad=azimuths,
+            rotation=rotation,
+            translation=translation,
+            points_F=points_F,
+        )
+
+
+def matching_points(scan: Scan, *, azimuths: int, most: int, max_range_m: float) -> FloatArray:
+    """At most `most` points of a scan in the band that scans are matched by, as in `Keyframe.points_F`."""
+    points = scan_points(scan, azimuths=azimuths, heights_m=BAND_M, max_range_m=max_range_m)
+    chosen = np.arange(len(points))
+    if len(points) > most:
+        chosen = np.linspace(0, len(points) - 1, most).astype(np.int64)
+    facing = _facing(points, chosen)
+    known = np.isfinite(facing)
+    return np.column_stack([points[chosen[known], :2], facing[known]])
+
+
+@compiled
+def _facing(points: FloatArray, chosen: NDArray[np.int64]) -> FloatArray:
+    """Direction (rad) in which the surface at each chosen point faces: across the points about it, towards the sensor.
+
+    The points are ordered by azimuth. NaN where the points about one make no line, or are of one column only, so that
+    their spread is the noise of the range.
+    """
+    count = points.shape[0]
+    facing = np.empty(chosen.shape[0])
+    for m in range(chosen.shape[0]):
+        n = chosen[m]
+        x, y = points[n, 0], points[n, 1]
+        reach = 0.15 + 0.03 * math.hypot(x, y)
+        first, last = 1e9, -1e9
+        near, u, v, xx, xy, yy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(n - _NEIGHBOURS, n + _NEIGHBOURS + 1):
+            dx, dy = points[k % count, 0] - x, points[k % count, 1] - y
+            if dx * dx + dy * dy < reach * reach:
+                near += 1
+                first, last = min(first, points[k % count, 4]), max(last, points[k % count, 4])
+                u, v, xx, xy, yy = u + dx, v + dy, xx + dx * dx, xy + dx * dy, yy + dy * dy
+        u, v = u / near, v / near
+        xx, xy, yy = xx / near - u * u, xy / near - u * v, yy / near - v * v
+        middle, spread = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
+        if near < 4 or last == first or middle + spread < 2.0 * (middle - spread):
+            facing[m] = math.nan
+            continue
+        angle = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
+        away = math.cos(angle) * x + math.sin(angle) * y > 0.0
+        facing[m] = angle + math.pi if away else angle
+    return facing
 
 
 class MappingExtraMissingError(ImportError):

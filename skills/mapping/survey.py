@@ -13,9 +13,8 @@ from skills.api import PlanningError
 from skills.estimate.costmap import CostmapOptions, LayeredCostmap
 from skills.estimate.grid_map import BoolGrid, GridMap
 from skills.geometry import relative_pose
-from skills.mapping.frontiers import Frontier, Ground
 from skills.mapping.mapper import Mapper
-from skills.mapping.occupancy import LayeredOccupancy
+from skills.mapping.occupancy import Frontier, Ground, LayeredOccupancy
 from skills.navigate.follower import FollowerOptions, PathFollower
 from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.navigate.planner import LatticePlanner

@@ -17,8 +17,6 @@ from skills.robot import Pose2D
 from skills.routine import Patience, SkillFailure
 from skills.world_model import zones_sentence
 
-__all__ = ["TripPlanning", "place_text"]
-
 
 @dataclass
 class _Presence:

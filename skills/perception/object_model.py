@@ -1,4 +1,4 @@
-"""Models of own objects in files, as `errand object import` writes them beside each object's simulation model."""
+"""Models of own objects, as `errand object import` writes them, and the detector that knows them beside its classes."""
 
 from __future__ import annotations
 
@@ -108,3 +108,27 @@ class _HasModels(Protocol):
 def models_of(detector: Any) -> Mapping[str, ObjectModel]:
     """Models of own objects that a detector has, by name."""
     return detector.models if isinstance(detector, _HasModels) else MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Cascade:
+    """Cascade of networks in an ONNX `file`; Errand's own unless one is named.
+
+    With `views`, a picture of the hand camera that leaves doubts is judged in several views (test-time augmentation).
+    `objects` are folders of `errand object import`: own objects, which are recognised by their models.
+    """
+
+    file: str | None = None
+    views: bool = True
+    objects: tuple[str, ...] = ()
+
+    def build(self) -> Detector:
+        """Loads the detector. Raises ModelFileError or InputError when a file cannot be used."""
+        from skills.perception.detector.augmentation import AugmentedDetector
+        from skills.perception.detector.model_files import MODEL_FILE
+        from skills.perception.detector.onnx_detector import load_detector
+
+        single = load_detector(MODEL_FILE if self.file is None else Path(self.file))
+        networks = AugmentedDetector(single) if self.views else single
+        models = [read_model(Path(folder)) for folder in self.objects]
+        return ModelDetector(networks, models) if models else networks

@@ -17,7 +17,7 @@ import numpy as np
 from executive.record.schemas import SPEECH
 from executive.words.knowledge import load_knowledge
 from executive.words.mission import Distraction, Route
-from plant.referee.company import lost_s
+from plant.referee.findings import lost_s
 from plant.referee.object_history import TimedPath
 from plant.worlds.world import load_world
 from tests.benchmarks.harness import benchmark, for_each, totals

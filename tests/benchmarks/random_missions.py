@@ -36,11 +36,11 @@ from executive.words.command import parse_command
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
 from executive.words.leaf_steps import Awaited, CallSkill, Charging, Check, Do, Dock, Say, Set, Speak, UseMission, Wait
 from executive.words.mission import Mission
-from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
+from executive.words.step import Guards, OnFailure, OperatorQuestion, Policy
 from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Together, Try, While
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectKind, ObjectObservation, Part, Running, Skill, Succeeded
 from skills.inputs.errors import InputError
-from skills.small.check_door import CheckDoorInputs
+from skills.small.doors import CheckDoorInputs
 from tests.benchmarks.harness import command
 from tests.benchmarks.scripted_world import WORLD, Clock, ScriptedWorld, expected
 from tests.executive.conftest import GRIPPER, PORTS, EmptyCostmap, Script, StandingRobot, StillLocaliser, VirtualClock

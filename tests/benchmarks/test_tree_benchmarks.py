@@ -29,7 +29,7 @@ from executive.words.condition import AllOf, ButtonPressed, Not, ValueIs
 from executive.words.knowledge import Knowledge, load_knowledge
 from executive.words.leaf_steps import Awaited, CallSkill, Do, Set, Wait
 from executive.words.mission import Mission
-from executive.words.policy import Policy
+from executive.words.step import Policy
 from executive.words.steps import Choose, Group, Handler, Loop, Repeat, Together, Try, While
 from tests.benchmarks.tick_time import TICK_S, fetch, ticks_of_a_run
 from tests.executive import conftest as scripted

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from executive.cli.entry import app
 from executive.words.condition import Condition
+from executive.words.mission import Mission
 from executive.words.steps import BLOCKS
 from tests.docs.documents import DOCS, blocks
 
@@ -18,7 +19,7 @@ assert SPEC is not None
 make_reference = importlib.util.module_from_spec(SPEC)
 sys.modules["make_reference"] = make_reference
 SPEC.loader.exec_module(make_reference)
-mission_constructs = sys.modules["mission_constructs"]
+mission_constructs, mission_schema = (sys.modules[name] for name in ("mission_constructs", "mission_schema"))
 PAGES = make_reference.pages()
 
 
@@ -84,3 +85,18 @@ def test_the_examples_pass_the_check(texts, count, tmp_path):
         (tmp_path / f"{number}.yaml").write_text(text, encoding="utf-8")
     result = CliRunner().invoke(app, ["check", *map(str, tmp_path.iterdir())])
     assert (result.exit_code, len(texts)) == (0, count), result.output
+
+
+def test_the_json_schema_names_every_key_with_a_description():
+    schema = mission_schema.mission_json_schema()
+    steps = [schema["$defs"][ref["$ref"].rpartition("/")[2]] for ref in schema["$defs"]["AnyStep"]["anyOf"]]
+    keys = {key: facts for step in steps for key, facts in step["properties"].items()}
+    assert set(schema["properties"]) == {field.alias or name for name, field in Mission.model_fields.items()}
+    assert {"say", "take", "to", "do", "object", "skill", "use", "with", "gives", "timeout"} <= set(keys)
+    assert all("description" in facts for facts in (*schema["properties"].values(), *keys.values()))
+    assert not any(each["additionalProperties"] for each in (schema, *steps))
+
+
+def test_parameter_may_replace_a_number():
+    timeout = mission_schema.mission_json_schema()["$defs"]["Do"]["properties"]["timeout"]
+    assert '"pattern"' in json.dumps(timeout)

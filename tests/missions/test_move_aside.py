@@ -19,7 +19,7 @@ from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.policy import Policy
+from executive.words.step import Policy
 from plant import simulation
 from plant.worlds.seeding import place_objects
 from plant.worlds.world import load_world

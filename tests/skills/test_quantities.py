@@ -1,11 +1,25 @@
-"""Tests of quantities: ranges of numbers in files and options, and their messages."""
+"""Quantities: ranges of numbers in files and options, their messages, and durations as people write them."""
+
+import re
 
 import pytest
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from skills import quantities
 from skills.inputs.schema import first_error
-from skills.quantities import Count, Delay, Duration, Number, QuantityError, Share, clock_text, number_in, number_of
+from skills.quantities import (
+    DURATION_PATTERN,
+    Count,
+    Delay,
+    Duration,
+    Number,
+    QuantityError,
+    Share,
+    clock_text,
+    number_in,
+    number_of,
+    seconds_in,
+)
 from tests.tables import table
 
 
@@ -73,3 +87,18 @@ def test_the_json_schema_of_a_quantity_has_its_range_and_the_form_of_a_duration(
     assert TypeAdapter(Share).json_schema() == {"type": "number", "minimum": 0.0, "maximum": 1.0}
     kinds = [option["type"] for option in TypeAdapter(Duration).json_schema()["anyOf"]]
     assert kinds == ["number", "string"]
+
+
+@pytest.mark.parametrize(*table(__file__, "durations"))
+def test_a_duration_is_read(text, seconds):
+    assert seconds_in(text) == pytest.approx(seconds)
+
+
+@pytest.mark.parametrize(*table(__file__, "no_durations"))
+def test_a_text_without_a_duration_gives_none(text):
+    assert seconds_in(text) is None
+
+
+@pytest.mark.parametrize("text", ["2 min", "1 h 30 min", "90 s", "PT5M", "1 hour and 30 minutes"])
+def test_an_editor_takes_the_usual_forms(text):
+    assert re.search(DURATION_PATTERN, text)

@@ -17,7 +17,7 @@ from executive.run.visitor import RunVisitor
 from executive.store.resuming import is_from_before
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.view.map_picture import newest_zones
-from executive.view.styles import ROBOT_COLOURS, rgb_of
+from executive.view.text import ROBOT_COLOURS, rgb_of
 from executive.words.slug import slug
 from plant.scene_pictures import PATH_COLOUR, best_view, draw_detection, draw_map, render_view, save_png, top_view
 from plant.simulation import Simulation

@@ -17,13 +17,13 @@ from executive.app.report.run_report import Ending, ReportedAnswer, ReportedObje
 from executive.record.history import Event, seen_objects
 from executive.record.schemas import TRANSITIONS
 from executive.run.outcome import Finding, RunResult, Said
-from executive.tree.compiler import CompiledTree, StepPart
+from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView
+from executive.tree.plan import StepPart
 from executive.view.formats import to_svg
 from executive.view.html import render
 from executive.view.map_picture import map_picture
-from executive.view.styles import ROBOT_COLOURS, NodeStyle, Styles, style_of
-from executive.view.text import DRAWN_NODES, executed_tree, readable
+from executive.view.text import DRAWN_NODES, ROBOT_COLOURS, NodeStyle, Styles, executed_tree, readable, style_of
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import inside
 from skills.api import ObjectObservation

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from executive.run.mission_history import is_speech
 from executive.run.outcome import Execution, Outcome, RobotResult
 from executive.tree.board import FromBoard
-from executive.tree.compiler import CompiledTree, StepPart
+from executive.tree.compiler import CompiledTree
+from executive.tree.plan import StepPart
 from executive.words.expression import Expression, Template
 from executive.words.goal import GoalCondition, GoalKind, RefereeReport, When
 from skills.inputs.errors import listing

@@ -37,8 +37,7 @@ from executive.language.structure.requests import Done, escape_braces, parse_spe
 from executive.words.command import Task
 from executive.words.condition import ValueIs
 from executive.words.leaf_steps import Awaited, Do, Speak, Wait, steps_of_commands
-from executive.words.policy import OnFailure
-from executive.words.step import Step
+from executive.words.step import OnFailure, Step
 from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, Try
 
 

@@ -15,7 +15,7 @@ from py_trees.common import Status
 
 from executive.tree.behaviour import ExplainedDecorator, suspend
 from executive.tree.context import RunContext
-from executive.words.policy import StaleData
+from executive.words.step import StaleData
 from skills.api import Cause, Failed, ObjectKind
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.perception.class_forms import ANY_OBJECT

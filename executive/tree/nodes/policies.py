@@ -24,7 +24,7 @@ from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import BatteryAtLeast, Condition, KnowsPlace, NotAfter
 from executive.tree.plan import PlanBuilder
-from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
+from executive.words.step import Guards, OnFailure, OperatorQuestion, Policy
 from skills.api import Asked, Cause, Failed, Question
 from skills.robot import Clock, Pose2D
 

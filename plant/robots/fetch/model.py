@@ -1,10 +1,15 @@
-"""Fetch in a MultibodyPlant: its model on its own wheels, the gains of its servos, and the indices of its joints."""
+"""Fetch in a MultibodyPlant: its model, the servos and odometry of its wheels, gains, and indices of its joints."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
+import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
+from plant.robots.command_table import Velocity
 from plant.robots.fetch.description import (
     BASE_LINK,
     FINGERS,
@@ -14,10 +19,11 @@ from plant.robots.fetch.description import (
     fetch_facts,
     fetch_urdf,
 )
-from plant.robots.fetch.wheels import WheelLimits
 from plant.robots.jointed_robot import FINGER_GAINS, JointIndex
-from plant.robots.robot_kind import PlacedRobot, RobotBody
-from skills.robot import GripperKind, Pose2D
+from plant.robots.robot_kind import LocomotionLimits, PlacedRobot, RobotBody
+from plant.robots.servos import clip
+from plant.saved_state import Stateful
+from skills.robot import FloatArray, GripperKind, Pose2D, quantities
 
 _GAINS = {
     **dict.fromkeys(WHEELS, (20.0, 15.0)),
@@ -32,6 +38,84 @@ _GAINS = {
     "wrist_roll": (100.0, 4.0),
     **dict.fromkeys(FINGERS, FINGER_GAINS[GripperKind.PARALLEL]),
 }
+_MEAN_AHEAD = 0.75
+"""Mean share of a control period's distance at the ends of its two plant steps."""
+
+
+@dataclass(frozen=True)
+class WheelLimits(LocomotionLimits):
+    """Limits of two driven wheels that bear a base; the motors alone could accelerate it by 2.6 m/s^2.
+
+    `lead_rad` is the greatest distance of a wheel's set point from a wheel that cannot follow.
+    """
+
+    speed_m_s: quantities.Speed = 1.0
+    turn_rate_rad_s: quantities.TurnRate = 1.8
+    acceleration_m_s2: quantities.Acceleration = 1.0
+    turn_acceleration_rad_s2: quantities.TurnAcceleration = 2.5
+    stop_deceleration_m_s2: quantities.Acceleration = 2.0
+    stop_turn_deceleration_rad_s2: quantities.TurnAcceleration = 6.0
+    lead_rad: quantities.Angle = 0.15
+
+
+@dataclass(frozen=True)
+class Axle:
+    """Two wheels of a radius at y = +- `half_track_m`, the left one first."""
+
+    radius_m: float
+    half_track_m: float
+
+    def rates(self, speed_m_s: float, turn_rate_rad_s: float) -> FloatArray:
+        """Wheel rates (2,), rad/s, for a speed ahead and a turn rate of the base."""
+        across = self.half_track_m * turn_rate_rad_s
+        return np.array([speed_m_s - across, speed_m_s + across]) / self.radius_m
+
+    def travel(self, turned_rad: FloatArray) -> tuple[float, float]:
+        """Distance ahead (m) and turn (rad) of the base for turns (rad) of the wheels (2,) without slip."""
+        left_m, right_m = (self.radius_m * turned_rad).tolist()
+        return (left_m + right_m) / 2.0, (right_m - left_m) / (2.0 * self.half_track_m)
+
+
+class WheelServos(Stateful, saved=("_speed", "_turn_rate", "_due_rad")):
+    """Servos of the wheels: set points for a wanted velocity; at rest they hold the wheels."""
+
+    def __init__(self, axle: Axle, now_rad: FloatArray, limits: WheelLimits) -> None:
+        """The wheels (2,) stand at `now_rad`."""
+        self._axle, self._limits = axle, limits
+        self._speed = self._turn_rate = 0.0
+        self.goal_rad, self.rate_rad_s, self._due_rad = now_rad.copy(), np.zeros(2), now_rad.copy()
+
+    def follow(self, wanted: Velocity, now_rad: FloatArray, dt_s: float, *, stopping: bool) -> None:
+        """Sets the wheels for the next dt_s: ramps to the wanted speed ahead and turn rate, faster when `stopping`."""
+        limits = self._limits
+        most = limits.stop_deceleration_m_s2 if stopping else limits.acceleration_m_s2
+        turn = limits.stop_turn_deceleration_rad_s2 if stopping else limits.turn_acceleration_rad_s2
+        self._speed += clip(clip(wanted.vx, limits.speed_m_s) - self._speed, most * dt_s)
+        self._turn_rate += clip(clip(wanted.wz, limits.turn_rate_rad_s) - self._turn_rate, turn * dt_s)
+        self.rate_rad_s = self._axle.rates(self._speed, self._turn_rate)
+        self._due_rad = now_rad + np.clip(self._due_rad - now_rad, -limits.lead_rad, limits.lead_rad)
+        self.goal_rad = self._due_rad + _MEAN_AHEAD * self.rate_rad_s * dt_s
+        self._due_rad = self._due_rad + self.rate_rad_s * dt_s
+
+
+class WheelOdometer(Stateful, saved=("pose", "_last_rad")):
+    """Odometer: pose of the base since the beginning, by the wheel encoders, which do not notice slip."""
+
+    def __init__(self, axle: Axle, now_rad: FloatArray) -> None:
+        """The wheels (2,) stand at `now_rad`, the base at the origin."""
+        self._axle, self._last_rad = axle, now_rad.copy()
+        self.pose = Pose2D(0.0, 0.0, 0.0)
+
+    def count(self, now_rad: FloatArray) -> None:
+        """Adds the arc that the base has driven since the last count; the wheels (2,) stand at `now_rad`."""
+        ahead_m, turn_rad = self._axle.travel(now_rad - self._last_rad)
+        self._last_rad = now_rad.copy()
+        middle = self.pose.yaw_rad + turn_rad / 2.0
+        self.pose = Pose2D(
+            self.pose.x_m + ahead_m * math.cos(middle),
+            self.pose.y_m + ahead_m * math.sin(middle),
+            math.remainder(self.pose.yaw_rad + turn_rad, math.tau),
+        )
 
 
 class FetchModel(RobotBody):

@@ -10,8 +10,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.robots.command_table import Part, Velocity
 from plant.robots.fetch.description import HEAD_CAMERA, LIFT_JOINT, fetch_facts, head_camera
-from plant.robots.fetch.model import FetchJoints, FetchModel
-from plant.robots.fetch.wheels import Axle, WheelOdometer, WheelServos
+from plant.robots.fetch.model import Axle, FetchJoints, FetchModel, WheelOdometer, WheelServos
 from plant.robots.jointed_robot import JointedRobot, JointedSensors, gripper_noise
 from plant.robots.robot_kind import SensorOptions
 from plant.robots.sensor_suite import LidarMount

@@ -25,7 +25,6 @@ from skills.robot import FloatArray, GripperKind
 
 BODY: Final = "body"
 _STRAIGHT: Final = 1e-4
-_OFF_AXIS_M: Final = 0.01
 _PAD_RADIUS_M: Final = 0.005
 _PAD_PROUD_M: Final = 0.001
 _PAD_STEP_M: Final = 0.006

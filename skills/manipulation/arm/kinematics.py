@@ -2,8 +2,8 @@
 
 All poses are in the body frame B; the hand frame H is the last arm link's, x along the fingers, z along their closing.
 The inverse of two families is solved in closed form, every branch and no seeds: one has a shoulder yaw, two parallel
-pitch joints and a spherical roll-pitch-roll wrist; the other seven joints (see `seven_joints`). That of other arms is
-iterated (see `any_joints`), or solved by the solver of the robot's capabilities.
+pitch joints and a spherical roll-pitch-roll wrist; the other seven joints (see `SevenJoints`). That of other arms is
+iterated (see `AnyJoints`), or solved by the solver of the robot's capabilities.
 """
 
 from __future__ import annotations
@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.geometry import wrap
-from skills.manipulation.arm.any_joints import AnyJoints
 from skills.manipulation.arm.clearance import place_links
-from skills.manipulation.arm.seven_joints import AXES, JOINTS, SevenJoints
+from skills.manipulation.arm.inverse_kinematics import AXES, JOINTS, AnyJoints, SevenJoints
 from skills.robot import Capabilities, FloatArray, InverseKinematics
 
 _EXPECTED_AXES = ((0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0))

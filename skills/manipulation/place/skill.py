@@ -23,14 +23,18 @@ from skills.manipulation.arm.poses import UP_B, tucked_configuration
 from skills.manipulation.arm.solid_cells import cell_centres
 from skills.manipulation.grasp.reach import body_heights_m
 from skills.manipulation.place.free_spots import (
+    PrePlacePose,
     SpotSearch,
+    above_goal,
+    clear_heights,
     free_area,
+    hold_on_path,
     longest_edge_rad,
     objects_W,
+    reaches,
     spaced_spots,
     unseen_view,
 )
-from skills.manipulation.place.placement import PrePlacePose, above_goal, clear_heights, hold_on_path, reaches
 from skills.manipulation.place.verification import PlaceVerification
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.perception.surface_segmentation import SurfaceView, segment_surface

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.detection import Detection, box_overlap
-from skills.perception.detector.letterbox import PADDING, Letterbox, check_picture
+from skills.perception.detector.boxes import PADDING, Candidates, Letterbox, check_picture, detections_from
 from skills.perception.detector.onnx_detector import OnnxDetector
-from skills.perception.detector.suppression import Candidates, detections_from
 from skills.robot import Picture
 
 Box = tuple[float, float, float, float]

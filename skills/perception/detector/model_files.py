@@ -29,7 +29,7 @@ import numpy as np
 
 from skills.inputs.errors import InputError
 from skills.inputs.outside import read_bytes
-from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX
+from skills.perception.detector.boxes import HEIGHT_PX, WIDTH_PX
 
 if TYPE_CHECKING:
     import onnxruntime

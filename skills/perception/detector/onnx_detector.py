@@ -19,16 +19,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.detection import Detection
-from skills.perception.detector.letterbox import Letterbox, Scales, halve, letterbox
-from skills.perception.detector.model_files import CROP_PX, MODEL_FILE, DetectorModel, load_model
-from skills.perception.detector.suppression import (
+from skills.perception.detector.boxes import (
     Floats,
+    Letterbox,
+    Scales,
     SuppressionOptions,
     are_sound,
     detections_from,
+    halve,
+    letterbox,
     select_candidates,
     select_distinct,
 )
+from skills.perception.detector.model_files import CROP_PX, MODEL_FILE, DetectorModel, load_model
 from skills.robot import Picture
 
 if TYPE_CHECKING:

@@ -73,10 +73,7 @@ def test_a_command_imports_no_heavy_library_that_it_does_not_use(call_in_process
 def test_a_check_imports_nothing_that_understands_sentences_and_no_skill_that_declares_its_ports(call_in_process):
     language, skills = (line.split() for line in call_in_process([CHECK])[0][-2:])
     assert language == ["executive.language.parser", "executive.language.questions"]
-    assert skills == [
-        f"skills.small.{name}"
-        for name in ("charge", "check_door", "clear_costmap", "locate_dock", "open_door", "speak")
-    ]
+    assert skills == [f"skills.small.{name}" for name in ("charging", "clear_costmap", "doors", "speak")]
 
 
 @pytest.mark.parametrize(("arguments", "code"), [(["--help"], 0), (["parse"], 2)])

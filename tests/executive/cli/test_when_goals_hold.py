@@ -14,7 +14,7 @@ from executive.words.leaf_steps import Awaited, CallSkill, Check, Do, DoorToOpen
 from executive.words.mission import Mission
 from executive.words.steps import Choose, Group, Loop, Repeat, Try, While
 from skills.api import Cause, Failed, Succeeded
-from skills.small.check_door import CheckDoorInputs
+from skills.small.doors import CheckDoorInputs
 from skills.small.speak import Speak
 from tests.executive.conftest import KNOWLEDGE, scripted_skill
 from tests.tables import yaml_beside

@@ -7,7 +7,7 @@ from py_trees.common import Status
 
 from executive.record.history import Event, read_history, timeline
 from executive.tree.node_view import node_view, to_json
-from executive.view.styles import style_of
+from executive.view.text import style_of
 from skills.api import Cause, Failed
 from skills.inputs.errors import InputError
 

@@ -21,7 +21,7 @@ from executive.tree.registry import installed_skills
 from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.policy import Policy
+from executive.words.step import Policy
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Running, Succeeded, Surface
 from skills.quantities import Coordinate, Length
 

@@ -13,8 +13,7 @@ from executive.words.command import parse_command
 from executive.words.condition import Look
 from executive.words.leaf_steps import Awaited, CallSkill, Do, Wait
 from executive.words.mission import Mission
-from executive.words.policy import Policy
-from executive.words.step import Place
+from executive.words.step import Place, Policy
 from executive.words.steps import Group, Loop, Repeat, Together
 from executive.words.zone import ZoneFacts
 from skills.estimate.costmap import LayeredCostmap

@@ -21,7 +21,7 @@ from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
 from skills.inputs.errors import InputError
 from skills.inputs.yaml_source import YamlSource
 from skills.robot import Pose2D
-from skills.small.locate_dock import LocateDock
+from skills.small.charging import LocateDock
 from tests.tables import yaml_beside
 
 LEAVES, IMPOSSIBLE = (yaml_beside(__file__, f"{name}.yaml") for name in ("leaves_of_a_fetch", "impossible_commands"))

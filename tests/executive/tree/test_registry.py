@@ -197,8 +197,8 @@ def test_a_class_that_only_declares_gives_the_skill_when_it_is_called(declared, 
 
 def test_ports_that_name_a_class_of_another_skill_are_refused(declared):
     (found,) = skills_of([declared]).values()
-    found.done_by = "skills.manipulation.stow:Stow"
-    with pytest.raises(TypeError, match=r"skills\.manipulation\.stow:Stow does not derive from WavePorts"):
+    found.done_by = "skills.manipulation.posture:Stow"
+    with pytest.raises(TypeError, match=r"skills\.manipulation\.posture:Stow does not derive from WavePorts"):
         found.loaded()
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from executive.record.history import Event
 from executive.view.map_picture import WIDTH_PX, map_picture
-from executive.view.styles import ROBOT_COLOURS, rgb_of
+from executive.view.text import ROBOT_COLOURS, rgb_of
 from skills.inputs.errors import InputError
 from skills.map_drawing import ZONE_COLOURS, draw_zone
 from skills.navigate.zone_map import zone_messages

@@ -27,7 +27,7 @@ from executive.view.feed import Feed
 from executive.view.html import feed_of, log_page, render
 from executive.view.page_control import SEND_LIMIT_S, ControlWatch, RefusedError, asked_json, control_actions
 from executive.view.server import PageContent, PageServer
-from executive.view.styles import Styles
+from executive.view.text import Styles
 from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission

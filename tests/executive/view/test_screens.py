@@ -16,8 +16,7 @@ from executive.view.feed import Feed
 from executive.view.formats import to_svg
 from executive.view.html import render
 from executive.view.server import PageContent, PageServer
-from executive.view.styles import Styles
-from executive.view.text import readable
+from executive.view.text import Styles, readable
 from executive.words.goal import RefereeReport
 from executive.words.knowledge import Pose
 from executive.words.mission import Mission

@@ -9,8 +9,7 @@ from py_trees.common import Status
 from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, logged_view, node_view, to_json
 from executive.view.formats import to_svg
-from executive.view.styles import Styles, style_of
-from executive.view.text import to_rich, to_text
+from executive.view.text import Styles, style_of, to_rich, to_text
 from skills.api import Cause, Failed
 
 

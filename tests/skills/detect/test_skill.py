@@ -9,7 +9,7 @@ from table_scene import BLUE, COKE, GREY, PINK, RED, TABLE, Can
 
 from skills.api import Cause, ObjectKind, ObjectObservation, Succeeded, Surface
 from skills.detect.skill import Detect, DetectInputs
-from skills.manipulation.stow import Stow, StowInputs
+from skills.manipulation.posture import Stow, StowInputs
 
 FAR = Surface("shelf", ((8.0, -0.6), (8.4, -0.6), (8.4, 0.6), (8.0, 0.6)), 0.75)
 SECOND = Can(1.1, 0.25, 0.033, 0.115, RED)

@@ -10,13 +10,15 @@ from table_scene import BLUE, RED, TABLE, Can, scene
 
 from skills.api import LocalisationEstimate
 from skills.perception.class_forms import ANY_OBJECT
-from skills.perception.model_matching import identified
+from skills.perception.model_matching import identified, likeness
+from skills.perception.object_model import view_of
 from skills.perception.surface_segmentation import loose_clusters, segment_surface
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
 TIN = Can(1.0, -0.1, 0.04, 0.12, RED)
 MODEL = can_model("tin", 0.04, 0.12, RED)
 PHOTOGRAPHED = photographed_can("tin", 0.04, 0.12, RED)
+RED_PLATE, BLUE_PLATE, WHITE = (190, 40, 35), (40, 60, 190), (230, 230, 230)
 by_mesh_and_by_photographs = pytest.mark.parametrize("model", [MODEL, PHOTOGRAPHED], ids=["mesh", "photographs"])
 
 
@@ -76,3 +78,35 @@ def test_no_model_is_aligned_with_segments_of_another_size(monkeypatch):
     monkeypatch.setattr("skills.perception.model_matching._refined", None)
     (found,) = seen([Can(1.0, -0.1, 0.04, 0.25, RED)], [MODEL])
     assert found.class_name == ANY_OBJECT
+
+
+def drawn(colour=RED_PLATE, size=(60, 90), label=None, label_rows=(30, 60)):
+    """View of a plate of one colour with a label across it."""
+    width, height = size
+    rgba = np.full((height, width, 4), 255, np.uint8)
+    rgba[..., :3] = colour
+    if label is not None:
+        rgba[label_rows[0] : label_rows[1], :, :3] = label
+    return view_of(rgba)
+
+
+def test_a_view_is_like_itself_among_others():
+    views = np.array([drawn(BLUE_PLATE), drawn(label=WHITE), drawn(size=(90, 60))])
+    assert likeness(drawn(label=WHITE), views) == pytest.approx(1.0)
+
+
+def test_a_darker_picture_is_still_alike():
+    darker = drawn(tuple(round(0.75 * each) for each in RED_PLATE), label=tuple(round(0.75 * each) for each in WHITE))
+    assert likeness(darker, drawn(label=WHITE)[None]) > 0.7
+
+
+def test_a_view_keeps_the_proportions_and_the_middle():
+    rows, columns = np.nonzero(drawn(size=(40, 80))[..., 3] > 127)
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (0, 23, 6, 17)
+
+
+@pytest.mark.parametrize(
+    "other", [drawn(BLUE_PLATE), drawn(size=(90, 45)), drawn(label=WHITE)], ids=["colour", "outline", "edges"]
+)
+def test_one_difference_is_enough_to_be_unlike(other):
+    assert likeness(other, drawn()[None]) < 0.35

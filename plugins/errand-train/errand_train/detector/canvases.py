@@ -18,7 +18,7 @@ from errand_train.detector.labels import Labels, TrainingPicture
 from errand_train.detector.photometry import change_photometry
 from errand_train.detector.placing import Cell, Targets, join_targets, place_labels, similarity_map
 from errand_train.detector.store import PictureStore
-from skills.perception.detector.letterbox import HEIGHT_PX, PADDING, WIDTH_PX
+from skills.perception.detector.boxes import HEIGHT_PX, PADDING, WIDTH_PX
 
 Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from errand_train.detector.coco import CocoFile, CocoImage, CocoLabel, coco_file
-from skills.perception.detector.letterbox import Letterbox
+from skills.perception.detector.boxes import Letterbox
 
 Floats = NDArray[np.float32]
 LEAST_SEEN: Final = 0.25

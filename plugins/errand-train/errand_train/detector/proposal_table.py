@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pycocotools import mask as coco_mask
 
 from errand_train.detector.labels import Labels
-from skills.perception.detector.letterbox import Scales
+from skills.perception.detector.boxes import Scales
 from skills.perception.detector.model_files import DetectorModel
 from skills.perception.detector.onnx_detector import ProposalOptions, Proposals, refine, select_proposals
 

@@ -32,7 +32,7 @@ from errand_train.detector.onnx_files import QUANTISED, facts_of, write_sealed
 from errand_train.detector.proposal_table import propose, refine_proposals
 from errand_train.detector.store import read_picture
 from errand_train.detector.validate import examination
-from skills.perception.detector.letterbox import Scales, halve, letterbox
+from skills.perception.detector.boxes import Scales, halve, letterbox
 from skills.perception.detector.model_files import ModelFileError, Network, classifier_file, load_model, refinement_file
 from skills.perception.detector.onnx_detector import (
     CLASSIFIER_PROPOSALS,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from errand_train.detector.labels import TrainingDataError, TrainingPicture
-from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX, Scales, fill_letterbox, halve
+from skills.perception.detector.boxes import HEIGHT_PX, WIDTH_PX, Scales, fill_letterbox, halve
 
 Picture = NDArray[np.uint8]
 _FULL: Final = "full.u8"

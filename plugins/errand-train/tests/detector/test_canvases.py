@@ -7,7 +7,7 @@ import pytest
 from errand_train.detector.canvases import CanvasMaker, CanvasOptions
 from errand_train.detector.labels import Labels, TrainingPicture
 from errand_train.detector.store import PictureStore
-from skills.perception.detector.letterbox import HEIGHT_PX, PADDING, WIDTH_PX
+from skills.perception.detector.boxes import HEIGHT_PX, PADDING, WIDTH_PX
 
 SEEDS = range(12)
 BOX = (200, 120, 320, 300)

@@ -18,7 +18,7 @@ from errand_train.detector.labels import TrainingDataError  # noqa: E402
 from errand_train.detector.learner import CropLearner  # noqa: E402
 from errand_train.detector.proposal_table import refined_proposals  # noqa: E402
 from errand_train.detector.quantisation import quantise  # noqa: E402
-from skills.perception.detector.letterbox import Scales, halve  # noqa: E402
+from skills.perception.detector.boxes import Scales, halve  # noqa: E402
 from skills.perception.detector.model_files import (  # noqa: E402
     CLASSIFIER,
     load_model,

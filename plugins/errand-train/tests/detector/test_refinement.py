@@ -22,7 +22,7 @@ from errand_train.detector.network import Residual  # noqa: E402
 from errand_train.detector.proposal_table import ProposalTable, build_table, first_proposals  # noqa: E402
 from errand_train.detector.refinement_network import RefinementNetwork, best_cell_about  # noqa: E402
 from errand_train.detector.store import PictureStore  # noqa: E402
-from skills.perception.detector.letterbox import Scales, halve  # noqa: E402
+from skills.perception.detector.boxes import Scales, halve  # noqa: E402
 from skills.perception.detector.model_files import load_model, refinement_file  # noqa: E402
 from skills.perception.detector.onnx_detector import CROP_PX  # noqa: E402
 

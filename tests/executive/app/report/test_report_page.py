@@ -23,7 +23,7 @@ from executive.run.visitor import RunEntry
 from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView
 from executive.view.html import render
-from executive.view.styles import Styles
+from executive.view.text import Styles
 from executive.words.goal import RefereeReport
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause

@@ -11,7 +11,7 @@ from executive.words.command import parse_command
 from executive.words.goal import GoalKind, RefereeReport, When
 from executive.words.leaf_steps import CallSkill, Do, Speak, UseMission
 from executive.words.mission import Mission
-from executive.words.policy import OnFailure, Policy
+from executive.words.step import OnFailure, Policy
 from executive.words.steps import Loop, Repeat
 from skills.small.speak import Speak as SpeakSkill
 from tests.tables import yaml_beside

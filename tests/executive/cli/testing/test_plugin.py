@@ -10,7 +10,7 @@ import pytest
 
 from skills.api import ObjectObservation, Surface
 from skills.detect.skill import Detect, DetectInputs
-from skills.manipulation.stow import Stow, StowInputs
+from skills.manipulation.posture import Stow, StowInputs
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 

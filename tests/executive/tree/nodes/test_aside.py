@@ -12,7 +12,7 @@ from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.policy import Policy
+from executive.words.step import Policy
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded, Surface
 from skills.quantities import Coordinate, Length
 from skills.robot import Pose2D

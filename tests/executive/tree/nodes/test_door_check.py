@@ -15,9 +15,8 @@ from skills.navigate.door_openers import HttpDoor
 from skills.navigate.skill import Navigate
 from skills.robot import Pose2D
 from skills.small.back_off import BackOff
-from skills.small.check_door import CheckDoor
 from skills.small.clear_costmap import ClearCostmap
-from skills.small.open_door import OpenDoor
+from skills.small.doors import CheckDoor, OpenDoor
 from tests.executive.tree.scripted import Leaf
 
 SKILLS = {skill.name: skill for skill in (Navigate, CheckDoor, ClearCostmap, BackOff)}

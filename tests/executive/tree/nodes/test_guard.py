@@ -16,7 +16,7 @@ from executive.tree.nodes.guard import (
     OwnLease,
     Waiting,
 )
-from executive.words.policy import StaleData
+from executive.words.step import StaleData
 from skills.api import Cause, Failed, ObjectKind
 from skills.robot import Lease, Pose2D
 from tests.executive.tree.scripted import F, Leaf, N, R, S, Switch, tick

@@ -8,7 +8,7 @@ from executive.tree.compiler import compile_mission
 from executive.words.command import Command, parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
+from executive.words.step import Guards, OnFailure, OperatorQuestion, Policy
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.robot import Battery
 

@@ -9,8 +9,8 @@ from pydrake.multibody.math import SpatialVelocity
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.fetch.model import Axle, WheelOdometer
 from plant.robots.fetch.robot import lidar_spec
-from plant.robots.fetch.wheels import Axle, WheelOdometer
 from plant.robots.robot_kind import PlacedRobot
 from skills.robot import ArmTrajectory, BaseKind, CommandState, LeaseError, Mount, Pose2D
 from tests.plant.boxes import fixed_box

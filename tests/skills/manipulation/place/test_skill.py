@@ -12,8 +12,7 @@ from table_scene import TABLE as TOP
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Running, Succeeded, Surface
 from skills.manipulation.arm.kinematics import arm_model
-from skills.manipulation.place.free_spots import SpotSearch
-from skills.manipulation.place.placement import HeldObject
+from skills.manipulation.place.free_spots import HeldObject, SpotSearch
 from skills.manipulation.place.skill import Place, PlaceInputs
 from skills.robot import Pose2D
 

@@ -1,4 +1,4 @@
-"""Doors that a plug-in opens: the call, the wait for the door, and failures by name."""
+"""Skills of doors: a plug-in opens one, the wait for it, a person who leaves the doorway, and failures by name."""
 
 import dataclasses
 import math
@@ -10,19 +10,23 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import pytest
 from planar_robot import Bench, Box
 
-from skills.api import Cause, Failed, Succeeded
+from executive.testing.bench import scripted_bench
+from skills.api import Cause, Failed, Running, Succeeded
 from skills.doorway import Doorway
 from skills.navigate.door_openers import ArmDoor, HttpDoor
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import CommandCause, CommandId, CommandState, CommandStatus, Pose2D
-from skills.small.check_door import CheckDoorInputs
-from skills.small.open_door import OpenDoor
+from skills.small.doors import CheckDoor, CheckDoorInputs, OpenDoor
 from skills.stack import StackError, door_opener
+from skills.testing.blocks import Block
+from skills.testing.robot import BASE_ONLY
 from tests.tables import table
 
 PANEL = Box(7.0, 4.03, 7.9, 4.07, 0.0, 2.0)
 INPUTS = CheckDoorInputs((7.45, 4.05), 0.9, math.pi / 2, "door between corridor and kitchen")
 BEFORE, KITCHEN = Pose2D(6.8, 5.4, 0.0), Pose2D(8.5, 2.0, -1.57)
+WALL = (Block(1.45, 0.45, 1.55, 2.5), Block(1.45, -2.5, 1.55, -0.45), Block(4.0, -3.0, 4.1, 3.0))
+SOMEBODY = Block(1.35, -0.2, 1.65, 0.2, 0.0, 1.7)
 
 
 @contextmanager
@@ -162,3 +166,21 @@ def test_a_robot_with_an_arm_opens_the_door_itself(state, cause, ends):
     _, step = run(OpenDoor, INPUTS, ArmDoor((7.8, 4.05, 1.0), -math.pi / 2), bench)
     assert handles[0].pull is False
     assert getattr(step, "cause", None) is ends, step
+
+
+def test_it_looks_again_once_somebody_has_gone_on():
+    bench, robot = scripted_bench(BASE_ONLY, blocks=(*WALL, SOMEBODY))
+    said = []
+    skill = CheckDoor(bench.context())
+    skill.begin(CheckDoorInputs((1.5, 0.0), 0.9, 0.0, "kitchen door"))
+    while isinstance(step := skill.step(), Running):
+        bench.clock.advance(0.1)
+        said.append(step.message)
+        if "waiting" in step.message and SOMEBODY in robot.blocks:
+            robot.blocks.remove(SOMEBODY)
+    skill.end()
+    assert isinstance(step, Succeeded)
+    assert step.outputs["open"] is True
+    assert step.outputs["free_m"] == pytest.approx(0.9, abs=0.1)
+    assert "waiting until more is seen of the kitchen door" in said
+    assert robot.moving_parts == ()

@@ -1,4 +1,4 @@
-"""The stow skill: stowed when empty, near the body when holding."""
+"""Skills of the arm alone: stowed when empty, near the body when holding; saved joint angles."""
 
 from dataclasses import replace
 
@@ -7,10 +7,11 @@ import pytest
 from table_robot import MODEL, TableRobot, context_of, failed, outcome
 
 from skills.api import Cause, Succeeded
-from skills.manipulation.stow import Stow, StowInputs
+from skills.manipulation.posture import PoseArm, PoseArmInputs, Stow, StowInputs
 from skills.robot import CommandState, CommandStatus
 
 OUT = np.array([0.4, -1.6, 1.6, 0.0, 0.4, 0.0])
+POSE = (0.1, -1.6, 1.8, 0.0, 0.4, 0.0)
 
 
 def test_a_stowed_arm_is_left_alone():
@@ -93,3 +94,31 @@ def test_walls_at_the_arm_by_a_small_error_of_the_pose_do_not_block_it():
     context = replace(context_of(robot), walls=wall(x - 0.04, y - 0.6, x + 0.08, y + 0.6))
     assert isinstance(outcome(Stow(context), StowInputs()), Succeeded)
     assert np.allclose(robot.q_rad, MODEL.stowed_rad, atol=1e-6)
+
+
+def test_the_arm_takes_the_pose_and_the_gripper_opens():
+    robot = TableRobot()
+    assert isinstance(outcome(PoseArm(context_of(robot)), PoseArmInputs(POSE, 0.5)), Succeeded)
+    assert robot.q_rad == pytest.approx(POSE)
+    assert robot.opening == pytest.approx(0.5)
+
+
+def test_an_arm_in_the_pose_is_not_moved():
+    robot = TableRobot(np.array(POSE))
+    assert isinstance(outcome(PoseArm(context_of(robot)), PoseArmInputs(POSE)), Succeeded)
+    assert not robot.arm_commands
+
+
+def test_a_held_object_stays_held():
+    robot = TableRobot(holding=True, opening=0.3)
+    outcome(PoseArm(context_of(robot)), PoseArmInputs(POSE, 1.0))
+    assert robot.opening == 0.3
+
+
+def test_a_pose_of_another_arm_is_refused():
+    failed(PoseArm(context_of(TableRobot())), PoseArmInputs((0.0, 0.1)), Cause.PRECONDITION, "2 joint angles")
+
+
+def test_a_pose_beyond_the_joints_limits_is_refused():
+    beyond = tuple(MODEL.upper_rad + 0.5)
+    failed(PoseArm(context_of(TableRobot())), PoseArmInputs(beyond), Cause.PRECONDITION, "beyond the limits")

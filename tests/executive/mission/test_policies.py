@@ -1,13 +1,9 @@
-"""Schema of mission files: policies of steps, and the JSON Schema for editors."""
-
-import json
+"""Policies of steps in mission files."""
 
 import pytest
 
-from executive.mission.json_schema import mission_json_schema
 from executive.mission.load import load_mission
-from executive.words.mission import Mission
-from executive.words.policy import Guards, OnFailure, OperatorQuestion, StaleData
+from executive.words.step import Guards, OnFailure, OperatorQuestion, StaleData
 from skills.inputs.errors import InputError
 
 GOOD = """\
@@ -57,18 +53,3 @@ def test_all_errors_are_reported_together(load):
     with pytest.raises(InputError) as error:
         load("name: 3\ntimeout: 0\nsteps:\n  - {too: hall}\n  - {do: juggle, object: coke}\n")
     assert [one.line for one in (error.value, *error.value.others)] == [4, 1, 2, 5]
-
-
-def test_the_json_schema_names_every_key_with_a_description():
-    schema = mission_json_schema()
-    steps = [schema["$defs"][ref["$ref"].rpartition("/")[2]] for ref in schema["$defs"]["AnyStep"]["anyOf"]]
-    keys = {key: facts for step in steps for key, facts in step["properties"].items()}
-    assert set(schema["properties"]) == {field.alias or name for name, field in Mission.model_fields.items()}
-    assert {"say", "take", "to", "do", "object", "skill", "use", "with", "gives", "timeout"} <= set(keys)
-    assert all("description" in facts for facts in (*schema["properties"].values(), *keys.values()))
-    assert not any(each["additionalProperties"] for each in (schema, *steps))
-
-
-def test_parameter_may_replace_a_number():
-    timeout = mission_json_schema()["$defs"]["Do"]["properties"]["timeout"]
-    assert '"pattern"' in json.dumps(timeout)

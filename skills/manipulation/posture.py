@@ -1,9 +1,11 @@
-"""The stow skill: folds the arm onto the body, or holds an object in the gripper near the body."""
+"""Skills of the arm alone: stow folds it onto the body, pose_arm moves it to joint angles such as teleop saves."""
 
-from skills.api import Succeeded
-from skills.manipulation.arm.arm_skill import ArmSkill
-from skills.ports import StowInputs, StowPorts
-from skills.routine import Routine, planning_failure
+import numpy as np
+
+from skills.api import Cause, Succeeded
+from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
+from skills.ports import PoseArmInputs, PoseArmPorts, StowInputs, StowPorts
+from skills.routine import Routine, SkillFailure, planning_failure
 
 _NEAR_X_M = 0.05
 """Distance ahead of the carrying positions within which the hand is near the body."""
@@ -13,6 +15,8 @@ _NEAR_Z_M = 0.06
 """Height above the carrying positions within which the hand is near the body."""
 _RAISED_M = 0.05
 """Height above the usual one from which on the body counts as raised."""
+_THERE_RAD = 0.05
+"""Largest difference of a joint angle at which the arm counts as there."""
 
 
 class Stow(StowPorts, ArmSkill[StowInputs]):
@@ -43,3 +47,25 @@ class Stow(StowPorts, ArmSkill[StowInputs]):
         far = x_m > max(arm.carry_x_m) + _NEAR_X_M or z_m > max(arm.carry_z_m) + _NEAR_Z_M
         if far or abs(y_m) > _NEAR_Y_M:
             yield from self.carry(X_BH.rotation(), "drawing in the arm")
+
+
+class PoseArm(PoseArmPorts, ArmSkill[PoseArmInputs]):
+    """Implementation of `PoseArmPorts`."""
+
+    def run(self, inputs: PoseArmInputs) -> Routine[Succeeded]:
+        """Moves the arm, then the gripper."""
+        goal = np.array(inputs.joints_rad)
+        if len(goal) != len(self.model.names):
+            text = f"the pose has {len(goal)} joint angles, the arm has {len(self.model.names)} joints"
+            raise SkillFailure(Cause.PRECONDITION, text)
+        if not self.model.within_limits(goal, -1e-3):
+            raise SkillFailure(Cause.PRECONDITION, "the pose is beyond the limits of the arm's joints")
+        yield from self.feel_arm("moving the arm to the pose")
+        opens = inputs.opening is not None and not self.context.robot.gripper().holding
+        if np.max(np.abs(self.q_rad() - goal)) > _THERE_RAD:
+            yield from self.move_to(lambda scene, q: goal, "moving the arm to the pose")
+        if opens and inputs.opening is not None:
+            opening = min(inputs.opening, self.gripper.widest)
+            yield from self.move_gripper(opening, GRIPPER_FORCE_N, "moving the gripper")
+        yield from self.feel_arm("moving the arm to the pose")
+        return Succeeded("the arm is in the pose")

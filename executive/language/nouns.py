@@ -20,8 +20,9 @@ from executive.language.lexicon import read_table
 
 FloatArray = npt.NDArray[np.float64]
 VectorOf = Callable[[str], FloatArray | None]
-
+"""Maps a word to its vector; None for an unknown word."""
 WEIGHTS_FILE: Final = "noun_weights.npz"
+"""Weights that ship with this module."""
 _MODIFIER_WEIGHT: Final = 0.3
 _MARGIN: Final = 2.0
 

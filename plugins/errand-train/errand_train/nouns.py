@@ -16,8 +16,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from executive.language.nouns import WEIGHTS_FILE, FloatArray, NounKind, NounKinds, VectorOf, noun_examples
+from executive.language.nouns import WEIGHTS_FILE, NounKind, NounKinds, VectorOf, noun_examples
 from executive.language.parser import load_parser
+from skills.robot import FloatArray
 
 __all__ = ["learn_nouns"]
 

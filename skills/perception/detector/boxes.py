@@ -14,8 +14,11 @@ from skills.detection import Detection
 from skills.robot import Picture
 
 WIDTH_PX: Final = 640
+"""Width of the picture that the proposal network gets."""
 HEIGHT_PX: Final = 480
+"""Height of that picture."""
 PADDING: Final = 114
+"""Grey of what lies beyond a picture."""
 _HALF_BELOW: Final = 0.7
 """Scale of a crop below which it is sampled from the halved picture, against aliasing."""
 

@@ -35,7 +35,9 @@ if TYPE_CHECKING:
     import onnxruntime
 
 MODEL_FILE: Final = Path(__file__).with_name("model") / "errand_detector.onnx"
+"""The shipped proposal network; the files of the other two stand beside it."""
 CROP_PX: Final = 128
+"""Side of the square crops of the refinement and classifier networks."""
 LOG_FATAL_ONLY: Final = 4
 MOST_BYTES: Final = 2_000_000_000
 _SEAL_KEY: Final = b"sha256"
@@ -89,18 +91,21 @@ PROPOSAL: Final = NetworkKind(
     lambda _classes: {"images": ("uint8", (HEIGHT_PX, WIDTH_PX, 3))},
     _box_outputs,
 )
+"""Proposes regions in a whole picture."""
 REFINEMENT: Final = NetworkKind(
     "errand-regions-1",
     "remove it, or make a new one: errand dataset refine --data DIR --out DIR",
     _crop_inputs,
     _box_outputs,
 )
+"""Refines boxes and scores of regions."""
 CLASSIFIER: Final = NetworkKind(
     "errand-third-1",
     "remove it, or make a new one: errand dataset refine --classifier --data DIR --out DIR",
     _crop_inputs,
     _box_outputs,
 )
+"""Classifies the refined regions."""
 
 
 @dataclass(frozen=True)

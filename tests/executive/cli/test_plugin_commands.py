@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from executive.cli import entry
 from executive.cli.entry import PLUGIN_COMMANDS
 from tests.executive.cli.calls import done, errand
 from tests.executive.distribution import write_distribution
@@ -112,6 +113,8 @@ def test_a_command_of_errand_is_not_replaced_by_one_of_its_name(install):
 def nothing_installed(monkeypatch):
     monkeypatch.setattr("skills.inputs.plugins.installed_plugins", lambda _group: ())
     monkeypatch.setattr("executive.cli.entry._text", lambda _file: "")
+    kept = entry.shipped_command  # by conftest.py, with the commands that another test has loaded
+    monkeypatch.setattr(entry, "shipped_command", getattr(kept, "__wrapped__", kept))
 
 
 @pytest.mark.parametrize(

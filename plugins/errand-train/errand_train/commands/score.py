@@ -22,7 +22,7 @@ from errand_train.libraries import check_libraries
 from executive.app.report.pictures import open_detector, read_picture, write_picture
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json
-from skills.detection import Detection
+from skills.api import Detection
 from skills.inputs.errors import InputError
 from skills.inputs.outside import read_text
 from skills.perception.detector.augmentation import AugmentedDetector

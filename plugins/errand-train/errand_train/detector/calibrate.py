@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from errand_train.detector.matching import Evaluation, evaluate
 from errand_train.detector.scoring_labels import LabelledPicture
-from skills.detection import Detection
+from skills.api import Detection
 
 Floats = NDArray[np.float64]
 FEWEST_LABELS: Final = 20

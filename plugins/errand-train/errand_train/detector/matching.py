@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from errand_train.detector.scoring_labels import Label, LabelledPicture, large_enough
-from skills.detection import Detection
+from skills.api import Detection
 
 MOST_DETECTIONS: Final = 100
 _COUNTING: Final = (0.5, 1.5)

@@ -15,7 +15,7 @@ import numpy as np
 
 from errand_train.detector.matching import Evaluation, evaluate
 from errand_train.detector.scoring_labels import Label, LabelledPicture, long_side_px
-from skills.detection import Detection
+from skills.api import Detection
 
 SURE_SCORE: Final = 0.5
 HAND: Final = "hand"

@@ -13,7 +13,7 @@ from errand_train.detector.labels import TrainingDataError
 from errand_train.detector.scoring import Score, score
 from errand_train.detector.scoring_labels import LabelledPicture, pictures_of_coco
 from errand_train.detector.store import read_picture
-from skills.detection import Detection
+from skills.api import Detection
 from skills.perception.detector.model_files import load_model
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector
 

@@ -5,7 +5,7 @@ import pytest
 
 from errand_train.detector.calibrate import best_threshold, score_offsets
 from errand_train.detector.scoring_labels import Label, LabelledPicture
-from skills.detection import Detection
+from skills.api import Detection
 
 BOX = (10.0, 10.0, 60.0, 60.0)
 AWAY = (200.0, 10.0, 260.0, 60.0)

@@ -5,7 +5,7 @@ import pytest
 
 from errand_train.detector.scoring import by_camera, judge_picture, picture_errors, score
 from errand_train.detector.scoring_labels import Label, LabelledPicture
-from skills.detection import Detection
+from skills.api import Detection
 
 
 def thing(x, name="hammer", size=50, **more):

@@ -25,9 +25,9 @@ LINES = {
     "executive/app": 8095,
     "executive/cli": 3810,
     "skills": 29932,
-    "plant": 11415,
+    "plant": 11172,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 429, 64, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 426, 64, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

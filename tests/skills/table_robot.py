@@ -5,7 +5,7 @@ from table_scene import BLUE, RED, taken
 from table_scene import LENS as TABLE_LENS
 
 from executive.run.worker import LockStepWorker
-from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.fetch.kind import FETCH
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Failed, Running, SkillContext
 from skills.manipulation.arm.kinematics import arm_model
@@ -13,7 +13,7 @@ from skills.robot import CommandState, FrameTree, Image, Intrinsics
 from skills.testing.estimators import BlockCostmap, KnownPlace, PlainColours
 from skills.testing.robot import ScriptedRobot, Start
 
-CAPABILITIES, HEAD_CAPABILITIES = spot_capabilities(), fetch_capabilities()
+CAPABILITIES, HEAD_CAPABILITIES = spot_capabilities(), FETCH.capabilities()
 MODEL, HEAD_MODEL = arm_model(CAPABILITIES), arm_model(HEAD_CAPABILITIES)
 GRIPPER = CAPABILITIES.gripper
 LENS = Intrinsics(64, 48, 55.2, 55.2, 32.0, 24.0)

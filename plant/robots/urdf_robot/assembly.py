@@ -1,7 +1,8 @@
 """URDF text of a robot as the plant and the planner of arm motions need it: few links, joined by the driven joints.
 
-All links that no driven joint moves are one link `body`, whose frame is B. The arm's frames are parallel to B at zero
-where the axes allow; the last is the hand frame H.
+All links that no driven joint moves are one link `body`, whose frame is B. Below a lift, they are a link with the name
+of the root, whose frame is on the floor below B. The arm's frames are parallel to B at zero where the axes allow; the
+last is the hand frame H.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from plant.models import urdf as urdf_text
-from plant.robots.urdf_robot.robot_file import GripperFile, HandFile, RobotFile
+from plant.robots.urdf_robot.robot_file import DIGITS, GripperFile, HandFile, PadsFile, RobotFile
 from plant.robots.urdf_robot.urdf_file import UrdfFile, UrdfJoint
 from skills.inputs.errors import InputError, suggestion
 from skills.inputs.yaml_source import KeyPath
@@ -25,8 +26,9 @@ from skills.robot import FloatArray, GripperKind
 
 BODY: Final = "body"
 _STRAIGHT: Final = 1e-4
+_OFF_AXLE_M: Final = 0.01
+_CONTACT: Final = "drake:proximity_properties"
 _PAD_RADIUS_M: Final = 0.005
-_PAD_PROUD_M: Final = 0.001
 _PAD_STEP_M: Final = 0.006
 _PAD_FRICTION: Final = 1.0
 _PAD_STIFFNESS_N_M: Final = 8000.0
@@ -55,18 +57,28 @@ class Assembly:
         X_RL = self.urdf.poses(self._zero)
         X_BR = X_RL[file.base.link].inverse()
         self.X_BL = {link: X_BR @ X for link, X in X_RL.items()}
-        self.joints = {joint.child: joint for joint in self.urdf.order if joint.name in file.moving}
-        self._carrier = {self.urdf.root: BODY}
+        moving = set(file.moving)
+        self.casters = () if file.base.wheels is None else file.base.wheels.casters
+        self.joints = {
+            each.child: each for each in self.urdf.joints.values() if each.name in moving or each.child in self.casters
+        }
+        self.root = BODY if file.lift is None else self._name(self.urdf.root)
+        self._carrier = {self.urdf.root: self.root}
         for joint in self.urdf.order:
-            driven = joint.child in self.joints
-            self._carrier[joint.child] = self._name(joint.child) if driven else self._carrier[joint.parent]
-        self._X_BC = {BODY: RigidTransform()}
+            own = joint.child in self.joints
+            self._carrier[joint.child] = self._name(joint.child) if own else self._carrier[joint.parent]
+        self._X_BC = {self.root: RigidTransform([0.0, 0.0, self.base_height_m - file.base.height])}
         for joint in self.joints.values():
             X_BF = self.X_BL[joint.parent] @ joint.X_PF
             self._X_BC[self._name(joint.child)] = RigidTransform(self._rotation(joint, X_BF), X_BF.translation())
+        self._X_BC[BODY] = RigidTransform()
+        self._check_lift()
         self._check_hand()
 
     def _name(self, link: str) -> str:
+        lift = None if self.file.lift is None else self.urdf.joints[self.file.lift.joint].child
+        if link == lift:
+            return BODY
         return f"{link}_link" if link == BODY else link
 
     def carrier(self, link: str) -> str:
@@ -75,13 +87,30 @@ class Assembly:
 
     def X_CL(self, link: str) -> RigidTransform:
         """Pose of a link of the file in its carrier."""
-        return self._X_BC[self.carrier(link)].inverse() @ self.X_BL[link]
+        X = self._X_BC[self.carrier(link)].inverse() @ self.X_BL[link]
+        clean = RigidTransform(X.rotation(), np.round(X.translation(), DIGITS) + 0.0)
+        return RigidTransform() if clean.IsNearlyIdentity(1e-12) else clean
+
+    @property
+    def base_height_m(self) -> float:
+        """Height over the floor of the frame of the link `root`."""
+        return self.file.base.height if self.file.lift is None else 0.0
 
     @property
     def hand_link(self) -> str | None:
         """The arm's last link, whose frame is H; None without an arm."""
         arm = self.file.arm
         return None if arm is None else self._name(self.urdf.joints[arm.joints[-1]].child)
+
+    def axle(self) -> tuple[float, float]:
+        """Radius of the driven wheels, and half the distance between them. Raises InputError unless B is between."""
+        wheels = self.file.base.wheels
+        assert wheels is not None
+        left, right = (self.X_BL[self.urdf.joints[name].child].translation() for name in wheels.joints)
+        if left[1] <= 0.0 or np.max(np.abs((left + right)[:2])) > _OFF_AXLE_M:
+            what = f"the middle of the axle is not below the origin of {self.file.base.link}"
+            raise self.error(("base", "wheels", "joints"), what, "name the left wheel first, and a link between them")
+        return wheels.radius, float(left[1])
 
     # -- checks ---------------------------------------------------------------------------------------------------
 
@@ -94,6 +123,11 @@ class Assembly:
         links: list[tuple[KeyPath, str]] = [(("base", "link"), file.base.link), (("lidar", "link"), file.lidar.link)]
         links += [(("cameras", name, "link"), camera.link) for name, camera in file.cameras.items()]
         joints: list[tuple[KeyPath, str]] = [(("head", k), name) for k, name in enumerate(file.head or ())]
+        if file.base.wheels is not None:
+            links += [(("base", "wheels", "casters", k), name) for k, name in enumerate(file.base.wheels.casters)]
+            joints += [(("base", "wheels", "joints", k), name) for k, name in enumerate(file.base.wheels.joints)]
+        if file.lift is not None:
+            joints.append((("lift", "joint"), file.lift.joint))
         if file.arm is not None:
             links.append((("arm", "hand", "link"), file.arm.hand.link))
             joints += [(("arm", "joints", k), name) for k, name in enumerate(file.arm.joints)]
@@ -105,6 +139,21 @@ class Assembly:
                     hint = suggestion(name, known)
                     raise self.error(path, f"there is no {what} '{name}' in {file.urdf}", hint)
         self.urdf.need_limits(file.moving)
+
+    def _check_lift(self) -> None:
+        lift = self.file.lift
+        if lift is None:
+            return
+        joint = self.urdf.joints[lift.joint]
+        axis_B = (self.X_BL[joint.parent] @ joint.X_PF).rotation() @ joint.axis
+        if joint.kind != "prismatic" or float(axis_B[2]) < 1.0 - _STRAIGHT:
+            raise self.error(("lift", "joint"), f"joint {joint.name} does not slide upwards", "hold it by `held`")
+        if self.carrier(self.file.base.link) != BODY:
+            what = f"the lift does not carry link {self.file.base.link}"
+            raise self.error(("base", "link"), what, f"name a link behind joint {joint.name}")
+        if not joint.lower <= lift.travelling <= joint.upper:
+            what = f"the joint moves from {joint.lower} to {joint.upper} m"
+            raise self.error(("lift", "travelling"), what, "write a position between them")
 
     def _check_hand(self) -> None:
         arm = self.file.arm
@@ -126,6 +175,8 @@ class Assembly:
 
     def _rotation(self, joint: UrdfJoint, X_BF: RigidTransform) -> RotationMatrix:
         """Rotation of a carrier's frame in B: that of the hand for the hand and behind it, else B's where it can be."""
+        if joint.name not in self.file.moving:
+            return RotationMatrix()
         arm = self.file.arm
         behind = {each.name for each in self.urdf.chain(joint.child)}
         if arm is not None and arm.joints[-1] in behind:
@@ -142,31 +193,47 @@ class Assembly:
 
     # -- text -----------------------------------------------------------------------------------------------------
 
-    def text(self, *, pads: bool = False, meshes: bool = True) -> str:
-        """URDF text; without `meshes` their boxes are the collision shapes, and nothing is drawn."""
+    def text(self) -> str:
+        """URDF text of the robot in a plant."""
+        return self._text(planned=False)
+
+    def planned_text(self) -> str:
+        """URDF text for planners: its root is `body`; it has no visuals and no pads, and boxes for meshes."""
+        return self._text(planned=True)
+
+    def _text(self, *, planned: bool) -> str:
         robot = Element("robot", name=self.file.name)
+        gripper = self.file.gripper
         for carrier, X_BC in self._X_BC.items():
-            members = [link for link, own in self._carrier.items() if own == carrier]
+            members = [link for link in self.urdf.links if self._carrier[link] == carrier]
             element = ElementTree.SubElement(robot, "link", name=carrier)
             self._add_inertial(element, carrier, members)
             for link in members:
-                self._add_shapes(element, link, meshes=meshes)
-            if pads and self.file.gripper is not None and self.file.gripper.pads:
-                self._add_pads(element, carrier, X_BC, self.file.gripper)
+                self._add_shapes(element, link, planned=planned)
+            if not planned and gripper is not None and gripper.pads:
+                pads = self._pads(gripper) if gripper.pads is True else gripper.pads
+                self._add_pads(element, carrier, X_BC, gripper, pads)
         for joint in self.joints.values():
-            self._add_joint(robot, joint)
+            self._add_joint(robot, joint, from_body=planned)
         ElementTree.indent(robot)
         return ElementTree.tostring(robot, encoding="unicode")
 
-    def _add_joint(self, robot: Element, joint: UrdfJoint) -> None:
+    def _add_joint(self, robot: Element, joint: UrdfJoint, *, from_body: bool) -> None:
+        """Adds a joint; `from_body`, that of the lift carries what is below it, and still reads the same."""
         parent, child = self.carrier(joint.parent), self._name(joint.child)
+        if joint.name not in self.file.moving:
+            X_PC = self._X_BC[parent].inverse() @ self._X_BC[child]
+            urdf_text.add_fixed(robot, joint.name, parent, child, np.round(X_PC.translation(), DIGITS) + 0.0)
+            return
+        axis_B = (self.X_BL[joint.parent] @ joint.X_PF).rotation() @ joint.axis
+        if child == BODY and from_body:
+            parent, child, axis_B = child, parent, -axis_B
         X_PF = self._X_BC[parent].inverse() @ self._X_BC[child]
-        axis_C = self._X_BC[child].rotation().inverse() @ (self.X_BL[joint.parent] @ joint.X_PF).rotation() @ joint.axis
         zero = self._zero[joint.name] if self._closes(joint) else 0.0
         part = {
-            "offset": X_PF.translation(),
-            "rpy": RollPitchYaw(X_PF.rotation()).vector(),
-            "axis": np.round(axis_C, 9) + 0.0,
+            "offset": np.round(X_PF.translation(), DIGITS) + 0.0,
+            "rpy": np.round(RollPitchYaw(X_PF.rotation()).vector(), DIGITS) + 0.0,
+            "axis": np.round(self._X_BC[child].rotation().inverse() @ axis_B, DIGITS) + 0.0,
             "range": (joint.lower - zero, joint.upper - zero),
             "effort": joint.effort,
         }
@@ -175,20 +242,25 @@ class Assembly:
     def _closes(self, joint: UrdfJoint) -> bool:
         return self.file.gripper is not None and joint.name in self.file.gripper.joints
 
-    def _add_shapes(self, element: Element, link: str, *, meshes: bool) -> None:
+    def _add_shapes(self, element: Element, link: str, *, planned: bool) -> None:
         X_CL = self.X_CL(link)
-        for role in ("visual", "collision") if meshes else ("collision",):
+        for role in ("collision",) if planned else ("visual", "collision"):
             for shape in self.urdf.shapes(link, role):
-                copied = ElementTree.SubElement(element, role, name=f"{link}_{role}_{len(element)}")
-                geometry, X_CS = shape.find("geometry"), X_CL @ self.urdf.origin(shape)
+                geometry, contact, X_CS = shape.find("geometry"), shape.find(_CONTACT), X_CL @ self.urdf.origin(shape)
                 assert geometry is not None
-                mesh = geometry.find("mesh")
-                if mesh is not None and not meshes:
+                copied = ElementTree.SubElement(element, role, name=f"{link}_{role}_{len(element)}")
+                mesh, origin = geometry.find("mesh"), shape.find("origin")
+                if mesh is not None and planned:
                     geometry, X_CS = self._box_of(mesh, X_CS)
-                _add_origin(copied, X_CS)
+                elif origin is not None and X_CL.IsExactlyIdentity():
+                    copied.append(origin)
+                if copied.find("origin") is None:
+                    _add_origin(copied, X_CS)
                 copied.append(geometry)
                 if (material := shape.find("material")) is not None:
                     copied.append(self._with_colour(material))
+                if contact is not None:
+                    copied.append(contact)
 
     def _with_colour(self, material: Element) -> Element:
         """A material with its colour, which may stand at the top of the file."""
@@ -203,20 +275,27 @@ class Assembly:
         ElementTree.SubElement(geometry, "box", size=urdf_text.text(np.maximum(high - low, 1e-3)))
         return geometry, X_CS @ RigidTransform((low + high) / 2.0)
 
-    def _add_pads(self, element: Element, carrier: str, X_BC: RigidTransform, gripper: GripperFile) -> None:
+    def _pads(self, gripper: GripperFile) -> PadsFile:
+        """Rubber on the ends of fingers of which only the geometry is known."""
+        first = max(gripper.palm_x, gripper.tip_x - _PAD_LENGTH_M) + _PAD_RADIUS_M
+        rows = np.arange(first, gripper.tip_x - _PAD_RADIUS_M + 1e-9, _PAD_STEP_M)
+        half = max(0.0, gripper.half_breadth - _PAD_RADIUS_M)
+        return PadsFile(x=tuple(rows.tolist()), y=(-half, 0.0, half))
+
+    def _add_pads(
+        self, element: Element, carrier: str, X_BC: RigidTransform, gripper: GripperFile, pads: PadsFile
+    ) -> None:
         """Adds rubber pads to the inner face of a finger that slides: spheres that stand a little proud of it."""
         joint = next((each for each in self.joints.values() if self._name(each.child) == carrier), None)
         if joint is None or joint.name not in gripper.joints or gripper.kind is not GripperKind.PARALLEL:
             return
         assert self.hand_link is not None
-        p_HC = (self._X_BC[self.hand_link].inverse() @ X_BC).translation()
+        p_HC = (self._X_BC[self.hand_link].inverse() @ X_BC).translation().round(DIGITS)
         opens_C = X_BC.rotation().inverse() @ (self.X_BL[joint.parent] @ joint.X_PF).rotation() @ joint.axis
         side = math.copysign(1.0, float(opens_C[2]) * gripper.joints[joint.name])
-        z = gripper.closing_z - float(p_HC[2]) + side * (_PAD_RADIUS_M - _PAD_PROUD_M)
-        first = max(gripper.palm_x, gripper.tip_x - _PAD_LENGTH_M) + _PAD_RADIUS_M
-        rows = np.arange(first, gripper.tip_x - _PAD_RADIUS_M + 1e-9, _PAD_STEP_M) - float(p_HC[0])
-        half = max(0.0, gripper.half_breadth - _PAD_RADIUS_M)
-        grid = {"radius": _PAD_RADIUS_M, "xz": [(x, z) for x in rows], "y": np.array([-half, 0.0, half]) - p_HC[1]}
+        z = gripper.closing_z - float(p_HC[2]) + side * (_PAD_RADIUS_M - pads.proud)
+        xz, y = [(x - p_HC[0], z) for x in pads.x], np.array(pads.y) - p_HC[1]
+        grid = {"radius": _PAD_RADIUS_M, "xz": np.round(xz, DIGITS) + 0.0, "y": np.round(y, DIGITS) + 0.0}
         for k, (shape, contact) in enumerate(urdf_text.pad_shapes([grid], _PAD_FRICTION, _PAD_STIFFNESS_N_M)):
             urdf_text.add_collision(element, f"{carrier}_pad_{k}", shape, contact)
 
@@ -226,14 +305,16 @@ class Assembly:
         whole = _joined([mass for link in members if (mass := self._mass(link)) is not None])
         line = int(self.urdf.links[members[0]].get("line", "1"))
         if whole is None:
+            if carrier in self.casters:
+                return
             hint = "write <inertial> with mass and inertia into it"
             raise self.urdf.error(line, f"link {carrier} moves and has no mass", hint)
         inertial = ElementTree.SubElement(element, "inertial")
         ElementTree.SubElement(inertial, "origin", xyz=urdf_text.text(whole.com))
-        ElementTree.SubElement(inertial, "mass", value=f"{whole.mass_kg:.9g}")
+        ElementTree.SubElement(inertial, "mass", value=str(whole.mass_kg))
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = whole.moments
         moments = {"ixx": xx, "iyy": yy, "izz": zz, "ixy": xy, "ixz": xz, "iyz": yz}
-        ElementTree.SubElement(inertial, "inertia", {key: f"{value:.9g}" for key, value in moments.items()})
+        ElementTree.SubElement(inertial, "inertia", {key: str(value) for key, value in moments.items()})
 
     def _mass(self, link: str) -> _Mass | None:
         """Mass of a link in its carrier's frame; None without one. Raises InputError when no body can have it."""
@@ -262,6 +343,8 @@ class Assembly:
 
 def _joined(masses: list[_Mass]) -> _Mass | None:
     """Mass of several bodies that are one; None when there is none."""
+    if len(masses) == 1:
+        return masses[0]
     total = sum(each.mass_kg for each in masses)
     if not total:
         return None

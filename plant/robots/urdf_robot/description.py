@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant.robots.urdf_robot.robot_file import CameraFile, RobotFile, read_robot_file
+from plant.robots.urdf_robot.robot_file import DIGITS, CameraFile, RobotFile, read_robot_file
 from skills.robot import (
     ArmCapabilities,
     CameraCapabilities,
@@ -29,6 +30,8 @@ _MOST_OF_OPENING = 0.9
 _BEYOND_TIP_M = 0.04
 """Length beyond the fingertips by which a grasped object ends."""
 _STRAIGHT = 1e-3
+_CORNERS = 12
+"""Corners of the polygon that stands for a round footprint."""
 
 
 class Description:
@@ -60,6 +63,20 @@ class Description:
         return (assembly.hand_link, *map(assembly.carrier, fingers))
 
     @cached_property
+    def wheel_links(self) -> tuple[str, ...]:
+        """Links of wheels and casters that stand on the floor, none on a floating base."""
+        assembly, wheels = self.assembly, self.file.base.wheels
+        if wheels is None:
+            return ()
+        driven = (assembly.urdf.joints[name].child for name in wheels.joints)
+        return tuple(map(assembly.carrier, (*driven, *wheels.casters)))
+
+    @cached_property
+    def trunk_links(self) -> tuple[str, ...]:
+        """Links of body and head, and the link below a lift."""
+        return tuple(dict.fromkeys((self.assembly.root, "body", *self.head_links)))
+
+    @cached_property
     def head_links(self) -> tuple[str, ...]:
         """Links of pan and tilt, none without a head."""
         return tuple(self.assembly.carrier(self.assembly.urdf.joints[name].child) for name in self.file.head or ())
@@ -67,59 +84,70 @@ class Description:
     @cached_property
     def capabilities(self) -> Capabilities:
         """Capabilities of the robot. Raises InputError for parts that no skill can use."""
-        base, assembly = self.file.base, self.assembly
-        arm, gripper = self.file.arm, self.file.gripper
+        base, lift, assembly = self.file.base, self.file.lift, self.assembly
+        down_m, up_m = (0.0, 0.0)
+        if lift is not None:
+            down_m, up_m = assembly.urdf.joints[lift.joint].lower, assembly.urdf.joints[lift.joint].upper
         return Capabilities(
-            footprint_m=base.footprint,
+            footprint_m=base.footprint if isinstance(base.footprint, tuple) else _round(base.footprint),
             max_speed_m_s=base.max_speed,
             max_turn_rate_rad_s=base.max_turn_rate,
-            standing_height_m=base.height,
-            height_range_m=(base.height, base.height),
+            standing_height_m=base.height + (0.0 if lift is None else lift.travelling),
+            height_range_m=(base.height + down_m, base.height + up_m),
             pitch_range_rad=(0.0, 0.0),
-            arm=None
-            if arm is None
-            else ArmCapabilities(
-                arm.joints,
-                arm.max_reach,
-                arm.stowed,
-                arm.max_payload,
-                standing_m=arm.standing,
-                nearer_m=arm.nearer,
-                carry_x_m=arm.carry_x,
-                carry_z_m=arm.carry_z,
-                carry_best_x_m=arm.carry_x[0],
-                tuck_x_m=arm.tuck_x,
-            ),
-            gripper=None
-            if gripper is None
-            else GripperCapabilities(
-                finger_joints=tuple(gripper.joints.items()),
-                widest=gripper.widest,
-                max_opening_m=gripper.max_opening,
-                max_force_n=gripper.max_force,
-                depth_m=gripper.tip_x - gripper.palm_x,
-                palm_x_m=gripper.palm_x,
-                tip_x_m=gripper.tip_x,
-                fixed_tip_x_m=gripper.tip_x,
-                fixed_z_m=gripper.closing_z,
-                half_breadth_m=gripper.half_breadth,
-                tip_thickness_m=gripper.tip_thickness,
-                grip_x_m=(gripper.palm_x + gripper.tip_x) / 2.0,
-                max_grasp_m=_MOST_OF_OPENING * gripper.max_opening,
-                length_m=gripper.tip_x + _BEYOND_TIP_M,
-                kind=gripper.kind,
-            ),
+            arm=self._arm(),
+            gripper=self._gripper(),
             cameras=tuple(self._camera(name) for name in self.file.cameras),
-            description=assembly.text(meshes=False),
+            description=assembly.planned_text(),
             base_kind=base.motion,
-            lidar_height_m=base.height + float(self.X_BL().translation()[2]),
+            lift_joint=None if lift is None else lift.joint,
+            lidar_height_m=assembly.base_height_m + float(self.X_BaseL().translation()[2]),
             head=self._head(),
         )
 
-    def X_BL(self) -> RigidTransform:
-        """Pose of the LiDAR in the body frame. Raises InputError when a driven joint moves it."""
+    def _arm(self) -> ArmCapabilities | None:
+        arm = self.file.arm
+        if arm is None:
+            return None
+        return ArmCapabilities(
+            arm.joints,
+            arm.max_reach,
+            arm.stowed,
+            arm.max_payload,
+            standing_m=arm.standing,
+            nearer_m=arm.nearer,
+            carry_x_m=arm.carry_x,
+            carry_z_m=arm.carry_z,
+            carry_best_x_m=arm.carry_x[0] if arm.carry_best_x is None else arm.carry_best_x,
+            tuck_x_m=arm.tuck_x,
+        )
+
+    def _gripper(self) -> GripperCapabilities | None:
+        gripper = self.file.gripper
+        if gripper is None:
+            return None
+        return GripperCapabilities(
+            finger_joints=tuple(gripper.joints.items()),
+            widest=gripper.widest,
+            max_opening_m=gripper.max_opening,
+            max_force_n=gripper.max_force,
+            depth_m=gripper.depth or gripper.tip_x - gripper.palm_x,
+            palm_x_m=gripper.palm_x,
+            tip_x_m=gripper.tip_x,
+            fixed_tip_x_m=gripper.tip_x,
+            fixed_z_m=gripper.closing_z,
+            half_breadth_m=gripper.half_breadth,
+            tip_thickness_m=gripper.tip_thickness,
+            grip_x_m=round((gripper.palm_x + gripper.tip_x) / 2.0, DIGITS),
+            max_grasp_m=round(_MOST_OF_OPENING * gripper.max_opening, DIGITS),
+            length_m=gripper.length or gripper.tip_x + _BEYOND_TIP_M,
+            kind=gripper.kind,
+        )
+
+    def X_BaseL(self) -> RigidTransform:
+        """Pose of the LiDAR in the link that stands on the floor. Raises InputError when a driven joint moves it."""
         link = self.file.lidar.link
-        if self.assembly.carrier(link) != "body":
+        if self.assembly.carrier(link) != self.assembly.root:
             hint = "name a link that is fixed to the base"
             raise self.assembly.error(("lidar", "link"), "a driven joint moves the LiDAR", hint)
         return self.assembly.X_CL(link)
@@ -178,8 +206,15 @@ class Description:
         p_BT = (assembly.X_BL[tilt.parent] @ tilt.X_PF).translation()
         return HeadCapabilities(
             (pan.name, tilt.name),
-            tuple(p_BP.tolist()),
-            tuple((p_BT - p_BP).tolist()),
+            tuple(p_BP.round(DIGITS).tolist()),
+            tuple((p_BT - p_BP).round(DIGITS).tolist()),
             (pan.lower, pan.upper),
             (tilt.lower, tilt.upper),
         )
+
+
+def _round(radius_m: float) -> tuple[tuple[float, float], ...]:
+    """Polygon that circumscribes a circle, counter-clockwise."""
+    out_m = radius_m / math.cos(math.pi / _CORNERS)
+    angles = [(k + 0.5) * math.tau / _CORNERS for k in range(_CORNERS)]
+    return tuple((out_m * math.cos(a), out_m * math.sin(a)) for a in angles)

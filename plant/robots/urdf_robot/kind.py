@@ -17,22 +17,27 @@ def urdf_kind(path: Path) -> RobotKind:
     description = Description(path)
 
     def add(plant: MultibodyPlant, robot: PlacedRobot, visuals: bool) -> RobotBody:
-        from plant.robots.urdf_robot.robot import UrdfBody
+        from plant.robots.urdf_robot.robot import FloatingBody
+        from plant.robots.urdf_robot.wheeled import WheeledBody
 
-        return UrdfBody(plant, robot, description)
+        rolls = description.file.base.wheels is not None
+        return (WheeledBody if rolls else FloatingBody)(plant, robot, description)
 
     def drive(body: RobotBody, options: SensorOptions) -> PlantRobot:
-        from plant.robots.urdf_robot.robot import UrdfBody, UrdfRobot
+        from plant.robots.urdf_robot.robot import FloatingBody, FloatingRobot
+        from plant.robots.urdf_robot.wheeled import WheeledBody, WheeledRobot
 
-        assert isinstance(body, UrdfBody)
-        return UrdfRobot(body, options)
+        if isinstance(body, WheeledBody):
+            return WheeledRobot(body, options)
+        assert isinstance(body, FloatingBody)
+        return FloatingRobot(body, options)
 
     stack = path.with_name("stack.yaml")
     return RobotKind(
         name=description.file.name,
         gripper_links=description.gripper_links,
-        trunk_links=("body", *description.head_links),
-        leg_links=(),
+        trunk_links=description.trunk_links,
+        leg_links=description.wheel_links,
         facts=path,
         capabilities=lambda: description.capabilities,
         add=add,

@@ -3,32 +3,55 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
+from skills.inputs.errors import suggestion
 from skills.inputs.schema import Name, validate
 from skills.inputs.yaml_source import YamlSource, read_yaml
 from skills.robot import BaseKind, GripperKind, quantities
 
+DIGITS: Final = 9
+"""Digits after the point of what is added up from a robot's files: beyond them is the error of sums."""
 FieldOfView = Annotated[float, quantities.Quantity(gt=0.0, le=6.2832, unit="rad")]
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+Outline = Annotated[tuple[tuple[quantities.Coordinate, quantities.Coordinate], ...], Field(min_length=3)]
 
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
+class WheelsFile(_Strict):
+    """Driven wheels that roll on the floor: their joints, the left one first, and the links of casters that glide."""
+
+    joints: tuple[Name, Name]
+    radius: quantities.Length
+    casters: tuple[Name, ...] = ()
+
+
 class BaseFile(_Strict):
-    """Base: its link, whose origin is the body frame B (x ahead, z up), and how it drives."""
+    """Base: its link, whose origin is the body frame B (x ahead, z up), and how it drives.
+
+    Without `wheels`, a planar floating base moves it.
+    """
 
     link: Name
     motion: BaseKind = BaseKind.DIFFERENTIAL
-    height: quantities.Height = Field(description="of the link's origin over the floor")
-    footprint: Annotated[tuple[tuple[quantities.Coordinate, quantities.Coordinate], ...], Field(min_length=3)]
+    wheels: WheelsFile | None = None
+    height: quantities.Height = Field(description="of the link's origin over the floor, with a lift at 0")
+    footprint: quantities.Length | Outline = Field(description="outline from above, or the radius of a round base")
     max_speed: quantities.Speed = 0.6
     max_turn_rate: quantities.TurnRate = 1.0
     runtime: quantities.Duration = 7200.0
+
+
+class LiftFile(_Strict):
+    """Lift: the joint that raises the base's link from the wheels, and its position while the robot drives."""
+
+    joint: Name
+    travelling: quantities.Coordinate = 0.0
 
 
 class LidarFile(_Strict):
@@ -78,7 +101,16 @@ class ArmFile(_Strict):
     )
     carry_x: tuple[quantities.Coordinate, ...] = Field(min_length=1)
     carry_z: tuple[quantities.Coordinate, ...] = Field(min_length=1)
+    carry_best_x: quantities.Coordinate | None = Field(None, description="the first of carry_x unless said")
     tuck_x: tuple[quantities.Coordinate, ...] = ()
+
+
+class PadsFile(_Strict):
+    """Rubber on sliding fingers: its balls along x and y of the hand frame, and how far they pass the closing plane."""
+
+    x: Annotated[tuple[quantities.Coordinate, ...], Field(min_length=1)]
+    y: Annotated[tuple[quantities.Coordinate, ...], Field(min_length=1)]
+    proud: quantities.Coordinate = 0.001
 
 
 class GripperFile(_Strict):
@@ -95,7 +127,9 @@ class GripperFile(_Strict):
     closing_z: quantities.Coordinate = 0.0
     half_breadth: quantities.Length
     tip_thickness: quantities.Length
-    pads: bool = True
+    depth: quantities.Length | None = Field(None, description="from palm_x to tip_x unless said")
+    length: quantities.Length | None = Field(None, description="4 cm beyond tip_x unless said")
+    pads: PadsFile | bool = True
 
 
 class RobotFile(_Strict):
@@ -107,12 +141,16 @@ class RobotFile(_Strict):
     name: Name
     urdf: Name = "robot.urdf"
     base: BaseFile
+    lift: LiftFile | None = None
     lidar: LidarFile
     cameras: dict[Name, CameraFile] = {}
     head: tuple[Name, Name] | None = Field(None, description="joints of pan and tilt")
     arm: ArmFile | None = None
     gripper: GripperFile | None = None
     held: dict[Name, quantities.Number] = {}
+    gains: dict[Name, tuple[quantities.Number, quantities.Number]] = Field(
+        {}, description="stiffness and damping of joints' servos; by the limit of effort unless said"
+    )
     _source: YamlSource = PrivateAttr()
 
     @property
@@ -122,9 +160,12 @@ class RobotFile(_Strict):
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """Joints that are driven: of head, arm and gripper."""
+        """Joints that are driven: of lift, wheels, head, arm and gripper."""
+        lift = () if self.lift is None else (self.lift.joint,)
+        wheels = () if self.base.wheels is None else self.base.wheels.joints
         arm = () if self.arm is None else self.arm.joints
-        return (*(self.head or ()), *arm, *(self.gripper.joints if self.gripper is not None else ()))
+        fingers = () if self.gripper is None else tuple(self.gripper.joints)
+        return (*lift, *wheels, *(self.head or ()), *arm, *fingers)
 
 
 def read_robot_file(path: Path) -> RobotFile:
@@ -134,6 +175,11 @@ def read_robot_file(path: Path) -> RobotFile:
     found._source = source
     if found.gripper is not None and found.arm is None:
         raise source.error(("gripper",), "there is a gripper without an arm", "name the arm, or leave the gripper out")
+    for name in found.gains:
+        if name not in found.moving:
+            raise source.error(("gains", name), f"no part drives joint '{name}'", suggestion(name, found.moving))
+    if found.base.wheels is not None and found.base.motion is not BaseKind.DIFFERENTIAL:
+        raise source.error(("base", "wheels"), "two wheels drive no omnidirectional base", "leave the wheels out")
     if found.arm is not None and len(found.arm.stowed) != len(found.arm.joints):
         what = f"stowed has {len(found.arm.stowed)} angles, and the arm {len(found.arm.joints)} joints"
         raise source.error(("arm", "stowed"), what, "give one angle for each joint")

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from plant.robots.fetch.description import HEAD_CAMERA
-from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.fetch.kind import FETCH
 from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError, Pose2D
 from skills.testing.blocks import ROOM, TABLE_CAN, Block, can_at
 from skills.testing.clock import VirtualClock
@@ -208,13 +207,13 @@ def test_the_robot_starts_at_its_start_pose(clock):
 
 
 def test_a_head_turns_its_camera(clock):
-    robot = ScriptedRobot(clock, capabilities=fetch_capabilities(), blocks=ROOM)
+    robot = ScriptedRobot(clock, capabilities=FETCH.capabilities(), blocks=ROOM)
     lease = robot.acquire_lease("test")
-    ahead = robot.image(HEAD_CAMERA)
+    ahead = robot.image("head")
     command = robot.point_head(0.5, 0.3, until_s=2.0, lease=lease)
     clock.advance(0.1)
     assert robot.command_status(command).state is CommandState.DONE
-    turned = robot.image(HEAD_CAMERA)
+    turned = robot.image("head")
     axes = [each.frames.pose(each.camera_frame).rotation().matrix()[:, 2] for each in (ahead, turned)]
     assert axes[0] == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
     assert math.atan2(axes[1][1], axes[1][0]) == pytest.approx(0.5)
@@ -222,7 +221,7 @@ def test_a_head_turns_its_camera(clock):
 
 
 def test_a_head_command_beyond_the_range_or_without_a_head_is_refused(clock, robot):
-    head = ScriptedRobot(clock, capabilities=fetch_capabilities())
+    head = ScriptedRobot(clock, capabilities=FETCH.capabilities())
     refused = head.point_head(3.0, 0.0, until_s=2.0, lease=head.acquire_lease("test"))
     assert "cannot turn to pan 3.00" in head.command_status(refused).reason
     assert head.head_rad == (0.0, 0.0)

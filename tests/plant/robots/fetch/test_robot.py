@@ -8,18 +8,9 @@ from pydrake.multibody.math import SpatialVelocity
 
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
-from plant.robots.fetch.kind import fetch_capabilities
-from plant.robots.fetch.model import Axle, WheelOdometer
-from plant.robots.fetch.robot import lidar_spec
 from plant.robots.robot_kind import PlacedRobot
-from skills.robot import ArmTrajectory, BaseKind, CommandState, LeaseError, Mount, Pose2D
+from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
 from tests.plant.boxes import fixed_box
-
-
-def test_the_lidar_sees_220_degrees_in_662_points():
-    azimuths = np.degrees(lidar_spec().azimuths_rad()[lidar_spec().visible_columns()])
-    assert (len(azimuths), azimuths[-1] - azimuths[0]) == (662, pytest.approx(220.0, abs=0.1))
-    assert azimuths[0] + azimuths[-1] == pytest.approx(0.0, abs=0.5)
 
 
 def test_the_scan_measures_the_distance_of_a_wall(floor, tmp_path):
@@ -31,14 +22,6 @@ def test_the_scan_measures_the_distance_of_a_wall(floor, tmp_path):
     assert (float(np.median(ahead[:, 0])), scan.ranges_m.shape) == (pytest.approx(2.9, abs=0.02), (1, 662))
 
 
-def test_equal_wheel_turns_count_as_straight_and_opposite_ones_as_a_turn():
-    """Radius 0.05 m, half track 0.2 m: 10 rad each are 0.5 m; -4 and 4 rad are 1 rad."""
-    odometer = WheelOdometer(Axle(0.05, 0.2), np.zeros(2))
-    odometer.count(np.array([10.0, 10.0]))
-    odometer.count(np.array([6.0, 14.0]))
-    assert (odometer.pose.x_m, odometer.pose.y_m, odometer.pose.yaw_rad) == pytest.approx((0.5, 0.0, 1.0))
-
-
 def test_odometry_follows_a_driven_arc(engine, fetch, lease):
     """2 s at 0.4 m/s and 0.5 rad/s; encoders err by 1 or 2 percent."""
     fetch.drive(0.4, 0.0, 0.5, until_s=2.0, lease=lease)
@@ -48,13 +31,6 @@ def test_odometry_follows_a_driven_arc(engine, fetch, lease):
     read = fetch.odometry().pose
     assert (read.x_m + 0.5, read.y_m + 0.2) == pytest.approx((true.x_m, true.y_m), abs=0.04)
     assert read.yaw_rad == pytest.approx(true.yaw_rad, abs=0.03)
-
-
-def test_capabilities_describe_a_wheeled_robot():
-    known = fetch_capabilities()
-    assert (known.base_kind, known.pitch_range_rad) == (BaseKind.DIFFERENTIAL, (0.0, 0.0))
-    assert [camera.mount for camera in known.cameras] == [Mount.HEAD]
-    assert (known.lidar_height_m, len(known.arm.joint_names)) == (pytest.approx(0.288, abs=0.001), 7)
 
 
 def test_the_head_pose_of_the_capabilities_equals_the_plants(engine, fetch, lease):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.fetch.kind import FETCH
 from plant.robots.spot.kind import spot_capabilities
 from skills.manipulation.arm.collision import AROUND, ArmScene, Box, gaps_m
 from skills.manipulation.arm.kinematics import arm_model
@@ -73,7 +73,7 @@ def test_checks_of_a_scene_do_not_depend_on_those_before(scene):
 
 
 def test_a_pose_free_with_the_torso_up_may_touch_once_it_is_down():
-    fetch = fetch_capabilities()
+    fetch = FETCH.capabilities()
     raised_m = fetch.height_range_m[1] - fetch.standing_height_m
     usual_lift_m = fetch.standing_height_m - fetch.height_range_m[0]
     model = arm_model(fetch)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.fetch.kind import FETCH
 from skills.manipulation.arm.hold import Grip, HoldWatch, firmer_n, grip_again, hold_watch
 from skills.robot import Gripper
 from skills.testing.clock import VirtualClock
@@ -36,7 +36,7 @@ def test_a_gripper_that_opens_lets_go_on_purpose_even_when_it_closes_again():
 
 
 def test_two_fingers_that_open_by_a_few_millimetres_let_go():
-    watch = hold_watch(fetch_capabilities())
+    watch = hold_watch(FETCH.capabilities())
     assert judged((0.06, 40.0, True), (0.068, 0.0, False), watch=watch)[-1] is Grip.RELEASED
 
 
@@ -86,7 +86,7 @@ def test_gripping_again_closes_more_firmly(spot):
 # by how much (m) two fingers close about what they hold -> a slip: that of Spot's finger is 0.05 rad of 1.57
 @pytest.mark.parametrize(("closed_m", "grip"), [(0.002, Grip.HELD), (0.004, Grip.SLIPPING)])
 def test_two_fingers_that_slide_slip_by_millimetres(closed_m, grip):
-    watch = hold_watch(fetch_capabilities())
+    watch = hold_watch(FETCH.capabilities())
     assert judged((0.06, 40.0, True), (0.06 - closed_m, 40.0, True), watch=watch)[-1] is grip
 
 

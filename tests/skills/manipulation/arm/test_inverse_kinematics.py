@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.fetch.kind import FETCH
 from skills.manipulation.arm.kinematics import ArmModel, ChainJoint, arm_model
 
-MODEL = arm_model(fetch_capabilities())
+MODEL = arm_model(FETCH.capabilities())
 LOWER, UPPER = (np.clip(limits, -np.pi, np.pi) for limits in (MODEL.lower_rad, MODEL.upper_rad))
 _ROWS = (
     ((0.2, 0.0, 0.4), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),

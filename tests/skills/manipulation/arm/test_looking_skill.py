@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.fetch.kind import FETCH
 from skills.api import PlanningError
 from skills.manipulation.arm.looking_skill import head_angles, mask_arm
 from skills.robot import FrameTree, Image, Intrinsics
 
-CAPABILITIES = fetch_capabilities()
+CAPABILITIES = FETCH.capabilities()
 HEAD, CAMERA = CAPABILITIES.head, CAPABILITIES.object_camera
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.fetch.kind import FETCH
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import PlanningError
 from skills.manipulation.arm.collision import ArmScene, Box
@@ -142,7 +142,7 @@ def test_a_start_in_contact_is_left_without_touching_anything_else(scene):
 def test_a_stretched_arm_leaves_the_object_that_it_has_put_down():
     # a Fetch put a screwdriver down on a workbench, the hand pointing down
     q = np.array([-0.191, -0.163, -5.484, 0.295, 5.498, 1.515, 1.754])
-    model = arm_model(fetch_capabilities())
+    model = arm_model(FETCH.capabilities())
     X_BH = model.X_BH(q)
     free = []
     for shift_B in retreats_B(X_BH, model.p_BS):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.fetch.kind import FETCH
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import PlanningError
 from skills.manipulation.arm.collision import ArmScene, Box
@@ -18,8 +18,11 @@ from skills.manipulation.arm.poses import (
 )
 
 SHOULDER, TARGET = np.array([0.0, 0.0, 0.5]), np.array([1.0, 0.0, 0.3])
-FETCH = fetch_capabilities()
-FETCH_MODEL, LIFT = arm_model(FETCH), {FETCH.lift_joint: FETCH.standing_height_m - FETCH.height_range_m[0]}
+CAPABILITIES = FETCH.capabilities()
+FETCH_MODEL, LIFT = (
+    arm_model(CAPABILITIES),
+    {CAPABILITIES.lift_joint: CAPABILITIES.standing_height_m - CAPABILITIES.height_range_m[0]},
+)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
@@ -40,10 +43,10 @@ def test_places_beside_another_are_six_centimetres_from_it_across_the_view():
 # how the hand was tilted as it took what it carries (rad below level)
 @pytest.mark.parametrize("tilt_rad", [0.0, 0.35])
 def test_an_object_that_sticks_out_is_drawn_in_beside_the_body_as_upright_as_before(tilt_rad):
-    scene = ArmScene(FETCH, FETCH_MODEL, LIFT)
-    ahead = carry_configuration(scene, FETCH.arm, hand_rotation(tilt_rad, 0.0, 1.0), FETCH_MODEL.stowed_rad)
-    drawn_in = tucked_configuration(scene, FETCH.arm, FETCH_MODEL.X_BH(ahead).rotation(), ahead)
-    tips_m = [FETCH_MODEL.X_BH(q) @ np.array([FETCH.gripper.tip_x_m, 0.0, 0.0]) for q in (ahead, drawn_in)]
+    scene = ArmScene(CAPABILITIES, FETCH_MODEL, LIFT)
+    ahead = carry_configuration(scene, CAPABILITIES.arm, hand_rotation(tilt_rad, 0.0, 1.0), FETCH_MODEL.stowed_rad)
+    drawn_in = tucked_configuration(scene, CAPABILITIES.arm, FETCH_MODEL.X_BH(ahead).rotation(), ahead)
+    tips_m = [FETCH_MODEL.X_BH(q) @ np.array([CAPABILITIES.gripper.tip_x_m, 0.0, 0.0]) for q in (ahead, drawn_in)]
     assert tips_m[0][0] > 0.65
     assert np.hypot(*tips_m[1][:2]) < 0.42
     assert scene.beyond_body_m(drawn_in)[0] < 0.1
@@ -55,8 +58,8 @@ def test_an_object_that_sticks_out_is_drawn_in_beside_the_body_as_upright_as_bef
 # how the hand was tilted as it took what it carries (rad below level)
 @pytest.mark.parametrize("tilt_rad", [0.0, 0.35, 0.7])
 def test_an_arm_that_carries_keeps_its_elbow_near_the_body(tilt_rad):
-    scene = ArmScene(FETCH, FETCH_MODEL, LIFT)
-    q = carry_configuration(scene, FETCH.arm, hand_rotation(tilt_rad, 0.0, 1.0), FETCH_MODEL.stowed_rad)
+    scene = ArmScene(CAPABILITIES, FETCH_MODEL, LIFT)
+    q = carry_configuration(scene, CAPABILITIES.arm, hand_rotation(tilt_rad, 0.0, 1.0), FETCH_MODEL.stowed_rad)
     assert scene.beyond_body_m(q)[1] < 0.04  # 0.14 where nothing is said about it
 
 
@@ -73,10 +76,10 @@ def test_an_object_that_hangs_below_the_fingers_is_carried_hanging(tilt_rad):
 
 
 def test_an_object_that_cannot_be_drawn_in_is_refused():
-    scene = ArmScene(FETCH, FETCH_MODEL, {})
+    scene = ArmScene(CAPABILITIES, FETCH_MODEL, {})
     scene.set_boxes([Box(RigidTransform([0.4, 0.0, 0.6]), (0.3, 1.5, 0.8))])
     with pytest.raises(PlanningError, match="cannot be drawn in"):
-        tucked_configuration(scene, FETCH.arm, hand_rotation(0.0, 0.0, 1.0), FETCH_MODEL.stowed_rad)
+        tucked_configuration(scene, CAPABILITIES.arm, hand_rotation(0.0, 0.0, 1.0), FETCH_MODEL.stowed_rad)
 
 
 def test_a_tall_object_is_seen_from_further_back_first():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.fetch.kind import FETCH
 from plant.robots.spot.kind import spot_capabilities
 from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.grasp.candidates import grasp_candidates
@@ -11,7 +11,7 @@ from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.planning import within_reach
 
 MODEL, GRIPPER = arm_model(spot_capabilities()), spot_capabilities().gripper
-TWO_FINGERS = fetch_capabilities().gripper
+TWO_FINGERS = FETCH.capabilities().gripper
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -183,7 +183,7 @@ def test_a_can_ahead_is_within_reach_and_one_across_the_room_is_not():
 
 
 def _by_two_fingers(target):
-    return grasp_candidates(target, arm_model(fetch_capabilities()).p_BS, TWO_FINGERS)
+    return grasp_candidates(target, arm_model(FETCH.capabilities()).p_BS, TWO_FINGERS)
 
 
 def test_two_fingers_close_about_the_middle_of_a_can():

@@ -1,43 +1,23 @@
-"""Fetch in a MultibodyPlant: its model, the servos and odometry of its wheels, gains, and indices of its joints."""
+"""A robot from a URDF that stands on wheels: two roll and drive it, casters glide."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from plant.robots.command_table import Velocity
-from plant.robots.fetch.description import (
-    BASE_LINK,
-    FINGERS,
-    HEAD_JOINTS,
-    LIFT_JOINT,
-    WHEELS,
-    fetch_facts,
-    fetch_urdf,
-)
-from plant.robots.jointed_robot import FINGER_GAINS, JointIndex
-from plant.robots.robot_kind import LocomotionLimits, PlacedRobot, RobotBody
+from plant.robots.robot_kind import LocomotionLimits, PlacedRobot, SensorOptions
 from plant.robots.servos import clip
+from plant.robots.urdf_robot.description import Description
+from plant.robots.urdf_robot.robot import UrdfBody, UrdfIndex, UrdfRobot, UrdfSensors
 from plant.saved_state import Stateful
-from skills.robot import FloatArray, GripperKind, Pose2D, quantities
+from skills.robot import FloatArray, Pose2D, quantities
 
-_GAINS = {
-    **dict.fromkeys(WHEELS, (20.0, 15.0)),
-    LIFT_JOINT: (4e4, 3e3),
-    **dict.fromkeys(HEAD_JOINTS, (20.0, 1.5)),
-    "shoulder_pan": (900.0, 45.0),
-    "shoulder_lift": (1500.0, 75.0),
-    "upperarm_roll": (900.0, 45.0),
-    "elbow_flex": (900.0, 45.0),
-    "forearm_roll": (300.0, 12.0),
-    "wrist_flex": (300.0, 12.0),
-    "wrist_roll": (100.0, 4.0),
-    **dict.fromkeys(FINGERS, FINGER_GAINS[GripperKind.PARALLEL]),
-}
 _MEAN_AHEAD = 0.75
 """Mean share of a control period's distance at the ends of its two plant steps."""
 
@@ -118,35 +98,72 @@ class WheelOdometer(Stateful, saved=("pose", "_last_rad")):
         )
 
 
-class FetchModel(RobotBody):
-    """Bodies and joints of Fetch in a plant; it stands on wheels and casters, and its fingers are coupled."""
+class WheeledBody(UrdfBody):
+    """Bodies and joints of a robot that stands on wheels and casters."""
 
-    def __init__(self, plant: MultibodyPlant, robot: PlacedRobot) -> None:
+    def __init__(self, plant: MultibodyPlant, robot: PlacedRobot, description: Description) -> None:
         """Adds the robot to `plant` (before Finalize)."""
-        super().__init__(plant, robot, fetch_urdf(), _GAINS)
-        self.limits = robot.locomotion if isinstance(robot.locomotion, WheelLimits) else WheelLimits()
-        self.base = plant.GetBodyByName(BASE_LINK, self.instance)
-        left, right = (plant.GetJointByName(finger, self.instance) for finger in FINGERS)
-        plant.AddCouplerConstraint(left, right, 1.0)
+        super().__init__(plant, robot, description)
+        can, self.axle = description.capabilities, Axle(*description.assembly.axle())
+        limits = robot.locomotion if isinstance(robot.locomotion, WheelLimits) else WheelLimits()
+        self.limits = replace(
+            limits,
+            speed_m_s=min(limits.speed_m_s, can.max_speed_m_s),
+            turn_rate_rad_s=min(limits.turn_rate_rad_s, can.max_turn_rate_rad_s),
+        )
 
-    def opening(self, context: Context) -> float:
-        """Distance between the fingers (m)."""
-        positions = self.plant.GetPositions(context)
-        joints = (self.plant.GetJointByName(finger, self.instance) for finger in FINGERS)
-        return sum(float(positions[joint.position_start()]) for joint in joints)
-
-    def place(self, context: Context, pose: Pose2D | None = None) -> None:
-        """Sets the robot on its wheels, the torso at its height for travelling and the arm stowed."""
-        facts = fetch_facts()
-        self.set_joints(context, {**facts["stowed"], LIFT_JOINT: facts["capabilities"]["travelling_lift"]})
-        self.plant.SetFreeBodyPose(context, self.base, (pose or self.robot.start).transform())
+    def _place_base(self, context: Context, pose: Pose2D, height_m: float) -> None:
+        self.plant.SetFreeBodyPose(context, self.base, pose.transform(height_m))
 
 
-class FetchJoints(JointIndex):
-    """Joints of Fetch: those of head, arm and fingers, the wheels, and the lift."""
+class WheeledIndex(UrdfIndex):
+    """Joints of a robot with wheels; `wheels` are the driven ones, the left one first."""
 
-    def __init__(self, body: RobotBody) -> None:
-        facts = fetch_facts()
-        speeds = {part["link"]: part["velocity"] for part in (*facts["arm"], *facts["head"])}
-        super().__init__(body, {**speeds, **dict.fromkeys(FINGERS, facts["finger"]["velocity"])})
-        self.wheels, self.lift = self.numbers(WHEELS), self.names.index(LIFT_JOINT)
+    def __init__(self, body: WheeledBody) -> None:
+        super().__init__(body)
+        wheels = body.description.file.base.wheels
+        assert wheels is not None
+        self.wheels = self.numbers(wheels.joints)
+
+
+class WheeledSensors(UrdfSensors, saved=("_odometer",)):
+    """Sensors of a robot with wheels, whose encoders measure the odometry."""
+
+    def __init__(self, body: WheeledBody, joints: WheeledIndex, options: SensorOptions) -> None:
+        """Mounts the sensors on `body`."""
+        self._joints = joints
+        wheels_rad = body.plant.GetPositions(options.context)[joints.positions[joints.wheels]]
+        self._odometer = WheelOdometer(body.axle, np.asarray(wheels_rad, dtype=np.float64))
+        super().__init__(body, joints, options)
+
+    def count_wheels(self, wheels_rad: FloatArray) -> None:
+        """Counts the turns of the wheels (2,) in each control period, more often than readings are taken."""
+        self._odometer.count(wheels_rad)
+
+    def _reckoned(self, X_WB: RigidTransform) -> RigidTransform:
+        """Pose by the wheel encoders, at the height of the lift, with the true tilt of the body."""
+        positions = np.asarray(self._body.plant.GetPositions(self._context)[self._joints.positions])
+        self._odometer.count(positions[self._joints.wheels])
+        pose, rpy = self._odometer.pose, RollPitchYaw(X_WB.rotation())
+        height_m = self._file.base.height + float(positions[self._joints.lift].sum())
+        tilted = RollPitchYaw(rpy.roll_angle(), rpy.pitch_angle(), pose.yaw_rad)
+        return RigidTransform(tilted, np.array([pose.x_m, pose.y_m, height_m]))
+
+
+class WheeledRobot(UrdfRobot, saved=("_wheels",)):
+    """Robot whose wheels drive it."""
+
+    _index: WheeledIndex
+
+    def __init__(self, body: WheeledBody, options: SensorOptions) -> None:
+        """Takes over the robot at the state of `options.context`, at time 0."""
+        index = WheeledIndex(body)
+        self._encoders = WheeledSensors(body, index, options)
+        super().__init__(body, index, self._encoders, options)
+        self._wheels = WheelServos(body.axle, self._joints()[index.wheels], body.limits)
+
+    def _drive(self, wanted: Velocity | None, joints: FloatArray, desired: FloatArray, dt_s: float) -> None:
+        index, wheels = self._index, self._wheels
+        self._encoders.count_wheels(joints[index.wheels])
+        wheels.follow(wanted or Velocity(), joints[index.wheels], dt_s, stopping=wanted is None)
+        desired[index.wheels], desired[index.rates_of(index.wheels)] = wheels.goal_rad, wheels.rate_rad_s

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained
+from executive.tree.behaviour import Explained, Hook
 from skills.api import Cause
 from skills.inputs.errors import SourceLine
 
@@ -97,17 +97,15 @@ class TreeObserver:
     costs nothing for the others.
     """
 
-    def __init__(self, root: Behaviour) -> None:
+    def __init__(self, root: Behaviour, hook: Hook) -> None:
+        """`hook` is that of the tree's nodes."""
         self.nodes: tuple[Behaviour, ...] = tuple(_walk(root))
         self._explained = tuple(node for node in self.nodes if isinstance(node, Explained))
         self._last = [_state(node) for node in self._explained]
         named = zip(self._explained, self._last, strict=True)
         self.states: Snapshot = {node.path_id: state for node, state in named}
         self._index: Mapping[Behaviour, int] = {node: index for index, node in enumerate(self._explained)}
-        self._touched: set[Behaviour] = set()
-        self._stopped: set[Behaviour] = set()
-        for node in self._index:
-            vars(node)["stop"] = self._noting_stop(node)
+        self._touched, self._stopped = hook.touched, hook.stopped
 
     def tick(self, node: Behaviour, visited: Visited = lambda node, stopped: None) -> None:
         """Ticks the tree, or a part of it, and calls `visited` for each node, after those below it."""
@@ -132,19 +130,6 @@ class TreeObserver:
         if found:
             self.states = {**self.states, **{change.path_id: change.after for change in found}}
         return found
-
-    def _noting_stop(self, node: Behaviour) -> Callable[[Status], None]:
-        """Wraps the node's `stop` so that the observer notes each call, and whether it came from outside."""
-        stop = node.stop
-
-        def noted_stop(new_status: Status = Status.INVALID) -> None:
-            """Stops the node."""
-            self._touched.add(node)
-            if new_status == Status.INVALID:
-                self._stopped.add(node)
-            stop(new_status)
-
-        return noted_stop
 
 
 def _walk(root: Behaviour) -> Iterator[Behaviour]:

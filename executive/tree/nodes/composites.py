@@ -13,7 +13,7 @@ from py_trees.common import Status
 
 from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans
-from executive.tree.behaviour import Conditional, MemoryComposite, cause_of, failed_for_good, message_of
+from executive.tree.behaviour import MemoryComposite, applies, cause_of, failed_for_good, message_of
 from executive.tree.board import Board
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import decide_plan
@@ -67,7 +67,7 @@ class MemorySelector(MemoryComposite):
     def _passes_over(self, child: Behaviour) -> bool:
         if self.one_goal and child.status != Status.RUNNING and any(map(failed_for_good, self.children)):
             return True
-        return child.status != Status.RUNNING and isinstance(child, Conditional) and not child.applies()
+        return child.status != Status.RUNNING and not applies(child)
 
     def _explanation(self, child: Behaviour) -> tuple[Cause, str]:
         failed = [one for one in self.children if one.status == Status.FAILURE]
@@ -195,7 +195,7 @@ class Together(MemoryComposite):
     _failed: list[Behaviour] = field(default_factory=list, init=False)
     _done: list[Behaviour] = field(default_factory=list, init=False)
 
-    def tick(self) -> Iterator[Behaviour]:
+    def _tick(self) -> Iterator[Behaviour]:
         """Ticks the children that have not ended."""
         if self.status != Status.RUNNING:
             self._restart()

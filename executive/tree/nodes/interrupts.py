@@ -154,7 +154,7 @@ class Interrupts(MemoryComposite):
 
     kind = "interrupts"
 
-    def tick(self) -> Iterator[Behaviour]:
+    def _tick(self) -> Iterator[Behaviour]:
         """Ticks monitors and called interrupts in order, then the mission."""
         watches: list[Any] = self.children[:-1]
         mission = self.children[-1]

@@ -16,7 +16,7 @@ from py_trees.common import Status
 from executive.run.mission_history import history_keys
 from executive.store.recollection import Memory, Recollection, StepRecord
 from executive.tree.behaviour import Conditional, ExplainedDecorator, ExplainedNode, MemoryComposite
-from executive.tree.compiler import KINDS, CompiledTree, build, writes
+from executive.tree.compiler import CompiledTree, build, writes
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.skill_leaf import Remembered, SkillLeaf
@@ -50,7 +50,7 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     Interrupts are not restored; their conditions call them again. A decision keeps its result without its looks.
     """
     nodes = {node.path_id: node for node in tree.mission.walk()}
-    afresh = {path for node in nodes.values() if KINDS[node.kind].afresh for path in _paths(node)}
+    afresh = {path for node in nodes.values() if node.behaviour.afresh for path in _paths(node)}
     settled = (node for node in nodes.values() if _is_settled(node, memory))
     over = afresh.union(path for node in settled for path in _paths(node) if path != node.path_id)
     specs = {path: node for path, node in nodes.items() if path not in afresh}
@@ -58,7 +58,7 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     usable = [
         path
         for path, leaf in nodes.items()
-        if leaf.kind == SkillLeaf.kind and path not in over
+        if leaf.skill is not None and path not in over
         if path in by_status[Status.FAILURE] or all(key in memory.board for key in leaf.options["outputs"].values())
     ]
     recollection = Recollection(tree.path_ids, memory.steps).restrict(usable)
@@ -109,14 +109,14 @@ def _paths(node: NodeSpec) -> Iterator[str]:
 
 def _is_settled(node: NodeSpec, memory: Memory) -> bool:
     step = memory.steps.get(node.path_id)
-    return KINDS[node.kind].settled and step is not None and step.status is Status.SUCCESS
+    return node.behaviour.settled and step is not None and step.status is Status.SUCCESS
 
 
 def _with_resumed_skills(
     spec: NodeSpec, restored: Container[str], memory: Memory, recollection: Recollection
 ) -> NodeSpec:
     """Returns the spec with skills that repeat their results from before the restart, or do their work."""
-    if spec.kind != SkillLeaf.kind or spec.path_id not in restored:
+    if spec.skill is None or spec.path_id not in restored:
         children = (_with_resumed_skills(child, restored, memory, recollection) for child in spec.children)
         return dataclasses.replace(spec, children=tuple(children))
     skill, outputs = spec.options["skill"], spec.options["outputs"]

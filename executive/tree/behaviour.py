@@ -112,6 +112,23 @@ class ExplainedNode(_TakesKeywords, Explained):
     """After a restart its success stands, and nothing below it is repeated."""
     afresh: ClassVar[bool] = False
     """After a restart nothing of it is restored, since its condition calls it again."""
+    runs_skill: ClassVar[bool] = False
+    skips: ClassVar[bool] = False
+    """It succeeds although its child fails, and says why the child is skipped."""
+    control: ClassVar[str] = ""
+    """Its name among the control nodes of BehaviorTree.CPP."""
+    plumbing: ClassVar[bool] = False
+    """Displays leave it out while it has no cause."""
+    watches: ClassVar[bool] = False
+    """It stands above a mission, and displays fold it."""
+    container: ClassVar[bool] = False
+    """Its name is no policy of the step in it."""
+    spoken: ClassVar[bool] = False
+    """The row of its step begins with its kind."""
+    counts: ClassVar[bool] = False
+    """Its message is shown without a cause, too."""
+    logged: ClassVar[bool] = False
+    """Its end is a line on the screen."""
     path_id: str
     name: str
     hook: Hook = field(default_factory=Hook)
@@ -129,6 +146,11 @@ class ExplainedNode(_TakesKeywords, Explained):
 
     def _tick(self) -> Iterator[Behaviour]:
         raise NotImplementedError
+
+    @classmethod
+    def signs(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Returns the blackboard keys that show where an object is, and the `executive.tree.board.Sign` of each."""
+        return {}
 
     def restore(self, status: Status, cause: Cause | None, message: str) -> None:
         """Restores the status, cause and message from before a restart."""

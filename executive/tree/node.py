@@ -8,14 +8,32 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from types import ModuleType
 from typing import Any, NamedTuple
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained, Hook
-from skills.api import Cause
+from executive.tree.behaviour import Explained, ExplainedNode, Hook
+from skills.api import Cause, Skill
 from skills.inputs.errors import SourceLine
+
+
+@cache
+def node_pages() -> tuple[ModuleType, ...]:
+    """Imports the pages of `executive.tree.nodes`."""
+    package = import_module("executive.tree.nodes")
+    return tuple(import_module(f"{package.__name__}.{page.name}") for page in iter_modules(package.__path__))
+
+
+@cache
+def node_classes() -> Mapping[str, type[ExplainedNode]]:
+    """Returns the classes of nodes by kind, as the pages define them."""
+    found = (node for page in node_pages() for node in vars(page).values() if isinstance(node, type))
+    return {node.kind: node for node in found if issubclass(node, ExplainedNode) and "kind" in vars(node)}
 
 
 @dataclass(frozen=True)
@@ -32,6 +50,16 @@ class NodeSpec:
     children: tuple[NodeSpec, ...] = ()
     source: SourceLine | None = None
     step: bool = False
+
+    @property
+    def behaviour(self) -> type[ExplainedNode]:
+        """Class of the node, which answers what holds for its kind."""
+        return node_classes()[self.kind]
+
+    @property
+    def skill(self) -> type[Skill[Any]] | None:
+        """Skill that the node runs."""
+        return self.options["skill"] if self.behaviour.runs_skill else None
 
     def walk(self) -> Iterator[NodeSpec]:
         """Iterates over the node and all its descendants, parents first."""

@@ -39,6 +39,8 @@ class MemorySequence(MemoryComposite):
     """
 
     kind = "sequence"
+    control = "Sequence"
+    container = True
 
 
 class MemorySelector(MemoryComposite):
@@ -59,6 +61,8 @@ class MemorySelector(MemoryComposite):
     """
 
     kind = "selector"
+    control = "Fallback"
+    container = True
     goes_on_after: ClassVar[tuple[Status, ...]] = (Status.FAILURE, Status.INVALID)
     exhausted_cause: Cause | None = None
     exhausted_message: str = ""
@@ -98,6 +102,8 @@ class MemoryRound(MemorySelector):
     """
 
     kind = "round"
+    control = ""
+    container = False
     goes_on_after = (Status.SUCCESS, Status.FAILURE, Status.INVALID)
 
     def _take_over(self, child: Behaviour) -> None:
@@ -124,6 +130,7 @@ class Choose(MemoryComposite):
     """
 
     kind = "choose"
+    spoken = True
     branches: Mapping[Value, int]
     key: str
     board: Board

@@ -45,6 +45,7 @@ class Repeat(MemoryComposite):
     """
 
     kind = "repeat"
+    spoken = True
     output_types: ClassVar = {"count": int}
     mode: Literal["until", "while", "times"]
     words: str

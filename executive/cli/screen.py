@@ -173,7 +173,6 @@ BAR_CELLS = 20
 FEWEST_ROWS = 5
 BAR_ROWS: Final = 1
 """Rows that a queue's progress bar takes above the tree."""
-_SHOWN_KINDS = frozenset({"skill", "fallen"})
 _UNDER_WAY = (Styles.IDLE.value, Styles.RUNNING.value)
 PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
 
@@ -268,7 +267,7 @@ def visible_rows(picture: Text, rows: int) -> Text:
 
 def _shown_skills(node: NodeView, above: NodeView | None = None) -> dict[str, str]:
     """Returns the titles of the skills below a node by path id."""
-    if node.kind in _SHOWN_KINDS:
+    if node.behaviour.logged:
         return {node.path_id: node.title(above)}
     return {path_id: title for child in node.children for path_id, title in _shown_skills(child, node).items()}
 

@@ -50,8 +50,7 @@ def history_keys(robot_name: str, mission_name: str) -> HistoryKeys:
 
 def is_speech(node: NodeSpec) -> bool:
     """Returns whether a node is a skill that speaks a text."""
-    says = "text" in node.options.get("inputs", {})
-    return node.kind == "skill" and says and node.options["skill"].uses == {Part.VOICE}
+    return node.skill is not None and "text" in node.options.get("inputs", {}) and node.skill.uses == {Part.VOICE}
 
 
 class Executions:
@@ -67,9 +66,7 @@ class Executions:
         parts = {part.node or part.path_id for part in tree.parts}
         self._parts = frozenset(n.path_id for n in tree.root.walk() if n.path_id in parts or is_speech(n))
         self._below: Mapping[str, frozenset[str]] = _below(tree.root, self._parts)
-        self._base = frozenset(
-            n.path_id for n in tree.root.walk() if n.kind == "skill" and Part.BASE in n.options["skill"].uses
-        )
+        self._base = frozenset(n.path_id for n in tree.root.walk() if n.skill is not None and Part.BASE in n.skill.uses)
         named = {node.path_id: node for node in nodes if isinstance(node, Explained) and isinstance(node, Behaviour)}
         self._nodes = {path: named[path] for path in self._below if path in named}
         self._drivers = {path: named[path] for path in self._base if path in named}

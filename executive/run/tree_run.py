@@ -1,7 +1,7 @@
 """Run of one mission's tree: ticks, suspension, stops, the log of its changes, and its result."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from py_trees.behaviour import Behaviour
@@ -11,7 +11,7 @@ from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.mission_history import Executions, Findings, claim, findings_in_words
 from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
-from executive.tree.behaviour import Explained, message_of, suspend
+from executive.tree.behaviour import Explained, Hook, message_of, suspend
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import Endings, RunContext
 from executive.tree.node import Change, NodeState, Snapshot, TreeObserver
@@ -41,12 +41,13 @@ class TreeRun:
             context,
             publish=lambda topic, message: publish(topic, findings.message(topic, message)),
             endings=Endings(),
+            hook=Hook(),
             zones=tree.zones,
         )
         self.root = tree.build(context)
         self._ended_early = self._suspended = False
         self._endings: list[str] = []
-        self._observed = TreeObserver(self.root)
+        self._observed = TreeObserver(self.root, context.hook)
         self._leaves = tuple(node for node in self._observed.nodes if isinstance(node, SkillLeaf))
         buttons = {node.path_id for node in tree.root.walk() if any(buttons_of(node))}
         waits = (node for node in self._observed.nodes if isinstance(node, WaitFor))
@@ -57,8 +58,6 @@ class TreeRun:
         self._running = {path_id: leaf for path_id, leaf in self._skills.items() if leaf.status is Status.RUNNING}
         self._changes: Sequence[Change] = ()
         self._pose_due_s = -math.inf
-        self._gates: dict[str, Gate] = {}
-        self._breakpoints: frozenset[str] = frozenset()
         for each in visitors:
             each.mission_begun(self._observed.nodes, context)
         self.show()
@@ -82,7 +81,7 @@ class TreeRun:
     @property
     def waiting_at(self) -> str | None:
         """Path id of the breakpoint at which a node waits."""
-        return next((path_id for path_id, gate in self._gates.items() if gate.waiting), None)
+        return next(iter(self.context.hook.waiting), None)
 
     def show(self) -> None:
         """Logs the tree."""
@@ -93,12 +92,7 @@ class TreeRun:
 
     def tick(self, breakpoints: frozenset[str]) -> bool:
         """Ticks once and logs the changes; returns whether anything changed."""
-        self._breakpoints = breakpoints
-        if not breakpoints <= self._gates.keys():
-            for node in self._observed.nodes:
-                path_id = node.path_id if isinstance(node, Explained) else None
-                if path_id in breakpoints and path_id is not None and path_id not in self._gates:
-                    self._gates[path_id] = Gate(node, lambda path_id=path_id: path_id in self._breakpoints)  # type: ignore[misc]
+        self.context.hook.breakpoints = breakpoints
         self._tick()
         self._changes = self.log_changes()
         for path_id, _, after in (change for change in self._changes if change.path_id in self._skills):
@@ -141,7 +135,7 @@ class TreeRun:
                 self._endings.append(f"in the end: {message_of(due)}")
 
     def _visited(self, node: Behaviour, stopped: bool) -> None:
-        if not any(gate.waiting and gate.node is node for gate in self._gates.values()):
+        if node not in self.context.hook.waiting.values():
             self._executions.note_visit(node, stopped)
 
     def end_early(self) -> None:
@@ -228,33 +222,6 @@ class TreeRun:
     def _activity(self, path_id: str, state: NodeState) -> dict[str, object]:
         now_s = round(self.context.clock.now(), 6)
         return {"t": now_s, "robot": self.tree.robot_name, "node": path_id, "message": state.message}
-
-
-class Gate:
-    """Breakpoint before one node. While `closed()`, a tick that would begin the node makes it wait instead, once.
-
-    The next tick lets it pass, so the runner pauses as soon as the gate is `waiting`.
-    """
-
-    def __init__(self, node: Behaviour, closed: Callable[[], bool]) -> None:
-        """Wraps the `tick` of `node`."""
-        self.node, self._closed = node, closed
-        self._pass_on: Callable[[], Iterator[Behaviour]] = node.tick
-        self.waiting = False
-        vars(node)["tick"] = self._tick
-
-    def _tick(self) -> Iterator[Behaviour]:
-        node, waited = self.node, self.waiting and self.node.status == Status.RUNNING
-        self.waiting = False
-        if waited:
-            node.status = Status.INVALID
-        elif node.status != Status.RUNNING and self._closed():
-            self.waiting, node.status = True, Status.RUNNING
-            if isinstance(node, Explained):
-                node.cause, node.message = None, "waits at the breakpoint"
-            yield node
-            return
-        yield from self._pass_on()
 
 
 _OUTCOMES = {Status.SUCCESS: Outcome.SUCCESS, Status.FAILURE: Outcome.FAILURE}

@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any, Final, Generic, TypeVar
 
-from skills.api import Job
+from skills.api import Job, Worker
 from skills.robot import Clock
 
 ResultT = TypeVar("ResultT")
@@ -197,3 +197,21 @@ class ThreadWorker:
     def close(self) -> None:
         """Drops jobs that have not begun; the running one ends by itself."""
         self._thread.close(0.0)
+
+
+@dataclass(frozen=True)
+class TimedWorker:
+    """Worker that submits each job to another one as `timed` wraps it."""
+
+    worker: Worker
+    timed: Callable[[Callable[..., Any]], Callable[..., Any]]
+
+    def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
+        """Submits a job."""
+        return self.worker.submit(self.timed(work), latency_s=latency_s, name=name)
+
+    def sense(
+        self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
+    ) -> Job[ResultT]:
+        """Submits a job on the value of `read`."""
+        return self.worker.sense(read, self.timed(work), latency_s=latency_s, name=name)

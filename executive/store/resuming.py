@@ -16,7 +16,7 @@ from py_trees.common import Status
 from executive.run.mission_history import history_keys
 from executive.store.recollection import Memory, Recollection, StepRecord
 from executive.tree.behaviour import Conditional, ExplainedDecorator, ExplainedNode, MemoryComposite
-from executive.tree.compiler import KINDS, CompiledTree, build, writes
+from executive.tree.compiler import CompiledTree, build, writes
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.skill_leaf import Remembered, SkillLeaf
@@ -50,7 +50,7 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     Interrupts are not restored; their conditions call them again. A decision keeps its result without its looks.
     """
     nodes = {node.path_id: node for node in tree.mission.walk()}
-    afresh = {path for node in nodes.values() if KINDS[node.kind].afresh for path in _paths(node)}
+    afresh = {path for node in nodes.values() if node.behaviour.afresh for path in _paths(node)}
     settled = (node for node in nodes.values() if _is_settled(node, memory))
     over = afresh.union(path for node in settled for path in _paths(node) if path != node.path_id)
     specs = {path: node for path, node in nodes.items() if path not in afresh}
@@ -58,7 +58,7 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     usable = [
         path
         for path, leaf in nodes.items()
-        if leaf.kind == SkillLeaf.kind and path not in over
+        if leaf.skill is not None and path not in over
         if path in by_status[Status.FAILURE] or all(key in memory.board for key in leaf.options["outputs"].values())
     ]
     recollection = Recollection(tree.path_ids, memory.steps).restrict(usable)
@@ -87,7 +87,7 @@ def ended_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recolle
         """Restores a node's last state; the root's in its first tick."""
         step = memory.steps.get(node.path_id)
         if node.path_id == tree.root.path_id:
-            _AsBefore(node, ended)
+            _repeat(node, ended)
         elif step is not None and step.ended:
             node.restore(step.status, step.cause, step.message)
 
@@ -109,14 +109,14 @@ def _paths(node: NodeSpec) -> Iterator[str]:
 
 def _is_settled(node: NodeSpec, memory: Memory) -> bool:
     step = memory.steps.get(node.path_id)
-    return KINDS[node.kind].settled and step is not None and step.status is Status.SUCCESS
+    return node.behaviour.settled and step is not None and step.status is Status.SUCCESS
 
 
 def _with_resumed_skills(
     spec: NodeSpec, restored: Container[str], memory: Memory, recollection: Recollection
 ) -> NodeSpec:
     """Returns the spec with skills that repeat their results from before the restart, or do their work."""
-    if spec.kind != SkillLeaf.kind or spec.path_id not in restored:
+    if spec.skill is None or spec.path_id not in restored:
         children = (_with_resumed_skills(child, restored, memory, recollection) for child in spec.children)
         return dataclasses.replace(spec, children=tuple(children))
     skill, outputs = spec.options["skill"], spec.options["outputs"]
@@ -144,7 +144,7 @@ class _Past:
         if spec is None or isinstance(node, SkillLeaf):
             return
         if isinstance(node, Conditional) and self._was_reached(node):
-            _applies_as_before(node, self._status(node) is not Status.INVALID)
+            node.hook.applied[node.path_id] = self._status(node) is not Status.INVALID
         elif step is None or step.status is Status.INVALID:
             return
         elif isinstance(node, MemoryComposite) and not _is_settled(spec, self.memory):
@@ -152,11 +152,11 @@ class _Past:
         elif step.ended and isinstance(node, ExplainedDecorator):
             if step.status is Status.SUCCESS or self._status(node.decorated) is Status.FAILURE:
                 node.before = step.status
-                _NotHeldBack(node)
+                node.hook.unheld.add(node.path_id)
             else:
-                _AsBefore(node, step)
+                _repeat(node, step)
         elif step.ended and all(key in self.memory.board for key in writes(spec)):
-            _AsBefore(node, step)
+            _repeat(node, step)
 
     def _status(self, node: Any) -> Status:
         step = self.memory.steps.get(node.path_id) if isinstance(node, ExplainedNode) else None
@@ -172,44 +172,9 @@ class _Past:
         return ended or any(self._status(each) is not Status.INVALID for each in later)
 
 
-class _AsBefore:
-    """Wrapper of a node's `tick`: the first tick only restores the state from before the restart."""
-
-    def __init__(self, node: Any, step: StepRecord) -> None:
-        self._node = node
-        self._step: StepRecord | None = step
-        self._pass_on: Callable[[], Iterator[Behaviour]] = node.tick
-        vars(node)["tick"] = self._tick
-
-    def _tick(self) -> Iterator[Behaviour]:
-        node, step, self._step = self._node, self._step, None
-        if step is None:
-            yield from self._pass_on()
-            return
-        node.restore(step.status, step.cause, _before(step.message))
-        yield node
-
-
-class _NotHeldBack:
-    """Wrapper of a decorator that ticks the child in its first run whatever would hold it back."""
-
-    def __init__(self, node: ExplainedDecorator) -> None:
-        self._node, self._begun = node, False
-        vars(node)["_held_back"] = self._held_back
-
-    def _held_back(self) -> Status | None:
-        if self._begun and self._node.status is not Status.RUNNING:
-            del vars(self._node)["_held_back"]
-            return self._node._held_back()
-        self._begun = True
-        return None
-
-
-def _applies_as_before(node: Any, applied: bool) -> None:
-    """Makes the first `applies` of a branch repeat its answer from before the restart, when the board held less."""
-    answers = [applied]
-    asked: Callable[[], bool] = node.applies
-    vars(node)["applies"] = lambda: answers.pop() if answers else asked()
+def _repeat(node: ExplainedNode, step: StepRecord) -> None:
+    """Makes the first tick of a node only restore its state from before the restart."""
+    node.hook.restored[node.path_id] = (step.status, step.cause, _before(step.message))
 
 
 def is_from_before(message: str) -> bool:

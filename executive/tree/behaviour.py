@@ -46,6 +46,54 @@ class Explained:
         self.message = f"stopped while: {self.message}" if self.message else "stopped"
 
 
+class Hook:
+    """What a run adds to its nodes, by path id: they ask it when they are ticked, and report to it when they stop.
+
+    A node at one of the `breakpoints` waits in the tick that would begin it, once; the next tick lets it pass. After a
+    restart, `restored` has the states that nodes take in their first tick, `applied` the first answers of conditions
+    (`Conditional`), and `unheld` the decorators whose first run ticks the child whatever would hold it back.
+    """
+
+    def __init__(self) -> None:
+        self.breakpoints: frozenset[str] = frozenset()
+        self.waiting: dict[str, Behaviour] = {}
+        self.restored: dict[str, tuple[Status, Cause | None, str]] = {}
+        self.applied: dict[str, bool] = {}
+        self.unheld: set[str] = set()
+        self.touched: set[Behaviour] = set()
+        self.stopped: set[Behaviour] = set()
+
+    @property
+    def active(self) -> bool:
+        """Returns whether it may change the tick of a node."""
+        return bool(self.breakpoints or self.waiting or self.restored)
+
+    def tick(self, node: Any) -> Iterator[Behaviour]:
+        """Makes a node wait or take its restored state; else lets it tick."""
+        if self.waiting.pop(node.path_id, None) is not None and node.status == Status.RUNNING:
+            node.status = Status.INVALID
+        elif node.status != Status.RUNNING and node.path_id in self.breakpoints:
+            self.waiting[node.path_id] = node
+            node.say("waits at the breakpoint")
+            node.status = Status.RUNNING
+            yield node
+            return
+        restored = self.restored.pop(node.path_id, None)
+        if restored is None:
+            yield from node._tick()
+            return
+        node.restore(*restored)
+        yield node
+
+    def note_stop(self, node: Any, new_status: Status) -> None:
+        """Notes that a node stops, by itself or from outside (INVALID)."""
+        self.touched.add(node)
+        if new_status == Status.INVALID:
+            self.stopped.add(node)
+        if new_status != Status.INVALID or node.status == Status.RUNNING:
+            self.unheld.discard(node.path_id)
+
+
 @dataclass_transform(kw_only_default=True, eq_default=False, field_specifiers=(field,))
 class _TakesKeywords:
     """Base class whose subclasses become dataclasses of keywords."""
@@ -64,8 +112,26 @@ class ExplainedNode(_TakesKeywords, Explained):
     """After a restart its success stands, and nothing below it is repeated."""
     afresh: ClassVar[bool] = False
     """After a restart nothing of it is restored, since its condition calls it again."""
+    runs_skill: ClassVar[bool] = False
+    skips: ClassVar[bool] = False
+    """It succeeds although its child fails, and says why the child is skipped."""
+    control: ClassVar[str] = ""
+    """Its name among the control nodes of BehaviorTree.CPP."""
+    plumbing: ClassVar[bool] = False
+    """Displays leave it out while it has no cause."""
+    watches: ClassVar[bool] = False
+    """It stands above a mission, and displays fold it."""
+    container: ClassVar[bool] = False
+    """Its name is no policy of the step in it."""
+    spoken: ClassVar[bool] = False
+    """The row of its step begins with its kind."""
+    counts: ClassVar[bool] = False
+    """Its message is shown without a cause, too."""
+    logged: ClassVar[bool] = False
+    """Its end is a line on the screen."""
     path_id: str
     name: str
+    hook: Hook = field(default_factory=Hook)
     cause: Cause | None = field(default=None, init=False)
     message: str = field(default="", init=False)
 
@@ -73,6 +139,18 @@ class ExplainedNode(_TakesKeywords, Explained):
     def writes(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
         """Returns the blackboard keys that a node with these options writes, and the type of each value."""
         return {options[name]: kind for name, kind in cls.output_types.items() if options.get(name)}
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Runs one tick, which the run's hook may replace."""
+        return self.hook.tick(self) if self.hook.active else self._tick()
+
+    def _tick(self) -> Iterator[Behaviour]:
+        raise NotImplementedError
+
+    @classmethod
+    def signs(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Returns the blackboard keys that show where an object is, and the `executive.tree.board.Sign` of each."""
+        return {}
 
     def restore(self, status: Status, cause: Cause | None, message: str) -> None:
         """Restores the status, cause and message from before a restart."""
@@ -95,7 +173,12 @@ class ExplainedLeaf(ExplainedNode, Behaviour):
     def __post_init__(self) -> None:
         Behaviour.__init__(self, self.name)
 
-    def tick(self) -> Iterator[Behaviour]:
+    def stop(self, new_status: Status) -> None:
+        """Stops the node."""
+        self.hook.note_stop(self, new_status)
+        super().stop(new_status)
+
+    def _tick(self) -> Iterator[Behaviour]:
         """Runs one tick, like the method of py_trees, but without its debug texts and type checks."""
         if self.status != Status.RUNNING:
             self.initialise()
@@ -116,11 +199,11 @@ class ExplainedDecorator(ExplainedNode, Decorator):
     def __post_init__(self) -> None:
         Decorator.__init__(self, self.name, self.child)
 
-    def tick(self) -> Iterator[Behaviour]:
+    def _tick(self) -> Iterator[Behaviour]:
         """Ticks the child unless it is held back, then updates; like py_trees, but without its type checks."""
         if self.status != Status.RUNNING:
             self.initialise()
-        status = self._held_back()
+        status = None if self.path_id in self.hook.unheld else self._held_back()
         if status is None:
             yield from self.decorated.tick()
             status = self.update()
@@ -135,6 +218,7 @@ class ExplainedDecorator(ExplainedNode, Decorator):
 
     def stop(self, new_status: Status) -> None:
         """Stops the child; explains an interruption while running, and clears the explanation in a reset."""
+        self.hook.note_stop(self, new_status)
         interrupted = new_status == Status.INVALID and self.status == Status.RUNNING
         super().stop(new_status)
         if interrupted:
@@ -164,7 +248,7 @@ class MemoryComposite(ExplainedNode, Composite):
             raise ValueError(f"{self.path_id}: a {type(self).__name__} needs at least one child")
         Composite.__init__(self, self.name, list(self.children))
 
-    def tick(self) -> Iterator[Behaviour]:
+    def _tick(self) -> Iterator[Behaviour]:
         """Ticks the present child, and the children that follow it in the same tick."""
         if self.status != Status.RUNNING:
             self._restart()
@@ -181,6 +265,7 @@ class MemoryComposite(ExplainedNode, Composite):
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
         """Stops the running children when it is interrupted, and keeps the results of others; else resets all."""
+        self.hook.note_stop(self, new_status)
         if new_status == Status.INVALID:
             interrupted = self.status == Status.RUNNING
             for child in self.children:
@@ -260,6 +345,14 @@ class Conditional(Protocol):
 
     def applies(self) -> bool:
         """Returns whether it may be ticked now."""
+
+
+def applies(node: Behaviour) -> bool:
+    """Returns whether a node may be ticked now: by its answer from before a restart, or by its condition."""
+    if not isinstance(node, Conditional):
+        return True
+    before = node.hook.applied.pop(node.path_id, None) if isinstance(node, ExplainedNode) else None
+    return node.applies() if before is None else before
 
 
 @runtime_checkable

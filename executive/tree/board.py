@@ -1,9 +1,9 @@
 """Blackboard of one run, whose keys begin with the robot's name, and the last known places of objects on it."""
 
 import enum
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, Protocol
+from typing import Any, ClassVar, Protocol
 
 from executive.tree.node import NodeSpec
 from skills.api import ObjectKind, ObjectObservation, Surface
@@ -141,9 +141,6 @@ class Sign(enum.Enum):
     DROPPED = "fell"
 
 
-_PORTS: Final[Mapping[str, Sign]] = {"observation": Sign.SEEN, "released_W": Sign.RELEASED}
-
-
 @dataclass(frozen=True)
 class LastKnown:
     """Last known place of an object, in the world frame (m).
@@ -168,7 +165,9 @@ class LastKnownTracker:
     """Follows the blackboard of a mission; `last` is the object that was seen, let go or dropped last."""
 
     def __init__(self, root: NodeSpec) -> None:
-        self._keys = dict(_keys(root))
+        self._keys: Mapping[str, Sign] = {
+            key: sign for node in root.walk() for key, sign in node.behaviour.signs(node.options).items()
+        }
         self._values: Mapping[str, Any] | None = None
         self._kind: ObjectKind | None = None
         self.last: LastKnown | None = None
@@ -185,13 +184,3 @@ class LastKnownTracker:
             if self._kind is not None and not guess:
                 surface = None if seen is None else seen.surface
                 self.last = LastKnown(self._kind, self._keys[key], seen.position_W if seen else value, pose, surface)
-
-
-def _keys(root: NodeSpec) -> Iterator[tuple[str, Sign]]:
-    """Yields the blackboard keys of a tree that show where an object is."""
-    for node in root.walk():
-        if node.kind == "fallen":
-            yield node.options["spot_key"], Sign.DROPPED
-        elif node.kind == "skill" and node.options["skill"].name != "find_people":
-            outputs = node.options["outputs"]
-            yield from ((outputs[port], sign) for port, sign in _PORTS.items() if port in outputs)

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
 
-from executive.tree import nodes
 from executive.tree.assembly import Assembler, StepPlans
-from executive.tree.behaviour import ExplainedNode
 from executive.tree.board import Binding, Constant, FromBoard, FromBoardOr, LastKnown
 from executive.tree.context import RunContext
-from executive.tree.node import NodeSpec
+from executive.tree.node import NodeSpec, node_pages
 from executive.tree.nodes.decision_nodes import buttons_of
 from executive.tree.nodes.door_check import doorway
-from executive.tree.nodes.group import InZones, mission_plan
+from executive.tree.nodes.group import mission_plan
 from executive.tree.nodes.interrupts import watch_plan
-from executive.tree.nodes.policies import AskOperator, Skip, under_policy
+from executive.tree.nodes.policies import under_policy
 from executive.tree.plan import PICK_UPS, PlanBuilder, Registry, StepPart, start_key
 from executive.tree.port_values import assignable, conforms, describe_type, field_types, required_fields
 from executive.words.command import START, Command
@@ -57,7 +53,7 @@ class CompiledTree:
     @property
     def mission(self) -> NodeSpec:
         """Node of the mission below its monitors and interrupts."""
-        return self.root.children[-1] if self.root.kind == "interrupts" else self.root
+        return self.root.children[-1] if self.root.behaviour.watches else self.root
 
     def build(self, context: RunContext) -> Behaviour:
         """Builds the py_trees tree for one run."""
@@ -71,7 +67,7 @@ class CompiledTree:
     @property
     def all_zones(self) -> tuple[Zone, ...]:
         """Zones of the whole mission, and of its groups."""
-        groups = (node.options["zones"] for node in self.root.walk() if node.kind == InZones.kind)
+        groups = (node.options["zones"] for node in self.root.walk() if "zones" in node.options)
         return tuple(dict.fromkeys((*self.zones, *(zone for zones in groups for zone in zones))))
 
     @property
@@ -129,7 +125,7 @@ def _whole(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec, ...]) 
 
 
 def _may_skip(node: NodeSpec) -> bool:
-    return any(below.kind in (Skip.kind, AskOperator.kind) for below in node.walk())
+    return any(below.behaviour.skips for below in node.walk())
 
 
 def check_wiring(root: NodeSpec) -> None:
@@ -144,7 +140,7 @@ def check_wiring(root: NodeSpec) -> None:
         if node.path_id in seen:
             raise _error(node, "two nodes have this path id", "give the steps different names")
         seen.add(node.path_id)
-        if node.kind == "skill":
+        if node.skill is not None:
             for message, hint in _faults(node, written):
                 raise _error(node, message, hint)
         written.update(writes(node))
@@ -188,23 +184,16 @@ def _error(node: NodeSpec, message: str, hint: str) -> InputError:
     return InputError.at(node.source, f"{node.path_id}: {message}", hint=hint)
 
 
-_PAGES: Final = tuple(import_module(f"{nodes.__name__}.{page.name}") for page in iter_modules(nodes.__path__))
-KINDS: Final[Mapping[str, type[ExplainedNode]]] = {
-    node.kind: node
-    for page in _PAGES
-    for node in vars(page).values()
-    if isinstance(node, type) and issubclass(node, ExplainedNode) and "kind" in vars(node)
-}
-PLANS: Final[StepPlans] = {model: plan for page in _PAGES for model, plan in getattr(page, "PLANS", {}).items()}
+PLANS: Final[StepPlans] = {model: plan for page in node_pages() for model, plan in getattr(page, "PLANS", {}).items()}
 
 
 def build(spec: NodeSpec, context: RunContext) -> Behaviour:
     """Builds the py_trees node of a spec for one run, with all nodes below it."""
-    if spec.kind == InZones.kind:
+    if "zones" in spec.options:
         context = replace(context, zones=tuple(dict.fromkeys((*context.zones, *spec.options["zones"]))))
     children = [build(child, context) for child in spec.children]
     known = {**vars(context), "context": context, "children": children, "child": next(iter(children), None)}
-    make: Any = KINDS[spec.kind]
+    make: Any = spec.behaviour
     used = {each.name: known[each.name] for each in fields(make) if each.init and each.name in known}
     node: Behaviour = make(**{**used, **spec.options, "path_id": spec.path_id, "name": spec.name})
     return node
@@ -212,4 +201,4 @@ def build(spec: NodeSpec, context: RunContext) -> Behaviour:
 
 def writes(spec: NodeSpec) -> Mapping[str, Any]:
     """Returns the blackboard keys that a node writes, and the type of each value."""
-    return KINDS[spec.kind].writes(spec.options)
+    return spec.behaviour.writes(spec.options)

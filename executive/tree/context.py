@@ -8,6 +8,7 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
+from executive.tree.behaviour import Hook
 from executive.tree.board import Board
 from skills.api import ExcludesRobots, Part, Skill, SkillContext
 from skills.robot import Pose2D
@@ -80,6 +81,7 @@ class RunContext(SkillContext):
     presses: Callable[[], Mapping[str, int]] = dict
     day_began_s: float = 0.0
     endings: Endings = field(default_factory=Endings)
+    hook: Hook = field(default_factory=Hook)
     arm_order: ArmOrder = field(default_factory=ArmOrder)
 
     @cached_property

@@ -8,14 +8,32 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from types import ModuleType
 from typing import Any, NamedTuple
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained
-from skills.api import Cause
+from executive.tree.behaviour import Explained, ExplainedNode, Hook
+from skills.api import Cause, Skill
 from skills.inputs.errors import SourceLine
+
+
+@cache
+def node_pages() -> tuple[ModuleType, ...]:
+    """Imports the pages of `executive.tree.nodes`."""
+    package = import_module("executive.tree.nodes")
+    return tuple(import_module(f"{package.__name__}.{page.name}") for page in iter_modules(package.__path__))
+
+
+@cache
+def node_classes() -> Mapping[str, type[ExplainedNode]]:
+    """Returns the classes of nodes by kind, as the pages define them."""
+    found = (node for page in node_pages() for node in vars(page).values() if isinstance(node, type))
+    return {node.kind: node for node in found if issubclass(node, ExplainedNode) and "kind" in vars(node)}
 
 
 @dataclass(frozen=True)
@@ -32,6 +50,16 @@ class NodeSpec:
     children: tuple[NodeSpec, ...] = ()
     source: SourceLine | None = None
     step: bool = False
+
+    @property
+    def behaviour(self) -> type[ExplainedNode]:
+        """Class of the node, which answers what holds for its kind."""
+        return node_classes()[self.kind]
+
+    @property
+    def skill(self) -> type[Skill[Any]] | None:
+        """Skill that the node runs."""
+        return self.options["skill"] if self.behaviour.runs_skill else None
 
     def walk(self) -> Iterator[NodeSpec]:
         """Iterates over the node and all its descendants, parents first."""
@@ -97,17 +125,15 @@ class TreeObserver:
     costs nothing for the others.
     """
 
-    def __init__(self, root: Behaviour) -> None:
+    def __init__(self, root: Behaviour, hook: Hook) -> None:
+        """`hook` is that of the tree's nodes."""
         self.nodes: tuple[Behaviour, ...] = tuple(_walk(root))
         self._explained = tuple(node for node in self.nodes if isinstance(node, Explained))
         self._last = [_state(node) for node in self._explained]
         named = zip(self._explained, self._last, strict=True)
         self.states: Snapshot = {node.path_id: state for node, state in named}
         self._index: Mapping[Behaviour, int] = {node: index for index, node in enumerate(self._explained)}
-        self._touched: set[Behaviour] = set()
-        self._stopped: set[Behaviour] = set()
-        for node in self._index:
-            vars(node)["stop"] = self._noting_stop(node)
+        self._touched, self._stopped = hook.touched, hook.stopped
 
     def tick(self, node: Behaviour, visited: Visited = lambda node, stopped: None) -> None:
         """Ticks the tree, or a part of it, and calls `visited` for each node, after those below it."""
@@ -132,19 +158,6 @@ class TreeObserver:
         if found:
             self.states = {**self.states, **{change.path_id: change.after for change in found}}
         return found
-
-    def _noting_stop(self, node: Behaviour) -> Callable[[Status], None]:
-        """Wraps the node's `stop` so that the observer notes each call, and whether it came from outside."""
-        stop = node.stop
-
-        def noted_stop(new_status: Status = Status.INVALID) -> None:
-            """Stops the node."""
-            self._touched.add(node)
-            if new_status == Status.INVALID:
-                self._stopped.add(node)
-            stop(new_status)
-
-        return noted_stop
 
 
 def _walk(root: Behaviour) -> Iterator[Behaviour]:

@@ -11,8 +11,9 @@ from typing import Any, Final
 
 from py_trees.common import Status
 
+from executive.tree.behaviour import ExplainedNode
 from executive.tree.board import Constant, FromBoard
-from executive.tree.node import NodeSpec, NodeState
+from executive.tree.node import NodeSpec, NodeState, node_classes
 from executive.tree.port_values import describe_type, field_types
 from skills.api import Cause
 from skills.inputs.errors import SourceLine
@@ -29,9 +30,8 @@ class Port:
     on_board: bool = False
 
 
-_NAMED: Final = frozenset({"skill", "step", "mission"})
-_SPOKEN: Final = frozenset({"repeat", "choose"})
-_CONTAINERS: Final = frozenset({"sequence", "selector", "interrupts", "summary"})
+_ROWS: Final = ("mission", "step")
+"""Kinds of rows that are no nodes."""
 _UNNAMED: Final = frozenset({"round", "steps", "group"})
 _LOOKS: Final = frozenset({"detect", "find_people"})
 
@@ -39,7 +39,7 @@ _LOOKS: Final = frozenset({"detect", "find_people"})
 def _ports_of(spec: NodeSpec) -> Iterator[Port]:
     """Iterates over the ports of a skill, or the options of any other node."""
     options = spec.options
-    if spec.kind != "skill":
+    if spec.skill is None:
         parts = spec.path_id.split("/")
         for name, value in options.items():
             text = plain(value)
@@ -129,10 +129,16 @@ class NodeView:
     policy: str = ""
 
     @property
+    def behaviour(self) -> type[ExplainedNode]:
+        """Class of the node; the base class for a row, and for a kind of another version's log."""
+        return node_classes().get(self.kind, ExplainedNode)
+
+    @property
     def label(self) -> str:
         """Kind and name; the name alone for a skill and a row of steps; a row's policy stands behind them."""
         policy = f" ({self.policy})" if self.policy else ""
-        return f"{'' if self.kind in _NAMED else f'{self.kind} '}{self.name}{policy}"
+        alone = self.behaviour.runs_skill or self.kind in _ROWS
+        return f"{'' if alone else f'{self.kind} '}{self.name}{policy}"
 
     @property
     def below(self) -> int:
@@ -150,7 +156,7 @@ class NodeView:
 
         `above` is its parent, whose name has the goal of a drive.
         """
-        if self.kind != "skill":
+        if not self.behaviour.runs_skill:
             return self.name
         if self.name == "navigate" and above is not None and above.name.startswith("go "):
             return above.name
@@ -200,19 +206,23 @@ def _outline_row(node: NodeView, authored: set[str]) -> NodeView:
         chain.append(following)
     within = {each.path_id for each in chain}
     below = [child for each in chain for child in each.children if child.path_id not in within]
-    main = next((each for each in chain if each.step), next((n for n in chain if n.kind == "sequence"), chain[-1]))
+    main = next((each for each in chain if each.step), next(filter(_is_sequence, chain), chain[-1]))
     row = replace(main, path_id=node.path_id, state=node.state, hidden=sum(each.hidden for each in chain))
     row = replace(row, children=tuple(_outline_row(child, authored) for child in below), step=node.path_id in authored)
     if not row.step:
         names = " › ".join((*(each.label for each in chain[:-1]), chain[-1].title()))
         return replace(row, kind=chain[0].kind, name=names.removeprefix(f"{chain[0].kind} "))
-    before = [each.name for each in chain[: chain.index(main)] if each.kind == "sequence"]
+    before = [each.name for each in chain[: chain.index(main)] if _is_sequence(each)]
     parts = [name for name in before if not (name in _UNNAMED or name.startswith("branch "))]
     others = [each for each in chain if each is not main and each.path_id in authored]
-    policy = [each.name for each in others if each.kind not in _CONTAINERS and each.name not in parts]
-    name = ": ".join((*parts, f"{main.kind} {main.name}" if main.kind in _SPOKEN else main.title()))
-    kind = "mission" if main.path_id.count("/") == 1 else "step"
+    policy = [each.name for each in others if not each.behaviour.container and each.name not in parts]
+    name = ": ".join((*parts, f"{main.kind} {main.name}" if main.behaviour.spoken else main.title()))
+    kind = _ROWS[0 if main.path_id.count("/") == 1 else 1]
     return replace(row, kind=kind, name=name, policy=", ".join(policy))
+
+
+def _is_sequence(node: NodeView) -> bool:
+    return node.behaviour.control == "Sequence"
 
 
 def _same_row(chain: Sequence[NodeView], authored: set[str]) -> NodeView | None:
@@ -221,7 +231,7 @@ def _same_row(chain: Sequence[NodeView], authored: set[str]) -> NodeView | None:
     below = [child for child in inner.children if child.path_id in authored]
     if not below:
         below = list(inner.children) if inner.path_id not in authored or inner.step else []
-        return below[0] if len(below) == 1 and inner.kind != "skill" else None
+        return below[0] if len(below) == 1 and not inner.behaviour.runs_skill else None
     if len(below) > 1 or (any(each.step for each in chain) and _leads_to_step(below[0], authored)):
         return None
     return below[0]
@@ -250,11 +260,11 @@ def node_view(spec: NodeSpec, states: Mapping[str, NodeState] | None = None) -> 
 def _with_expected(node: NodeView, inside: bool) -> NodeView:
     """Marks the expected failures; `inside` says that those below the nearest node above may be expected."""
     state, failed = node.state, node.state.status is Status.FAILURE
-    goes_on = state.status is Status.RUNNING and node.kind == "selector"
+    goes_on = state.status is Status.RUNNING and node.behaviour.control == "Fallback"
     inside = state.status is Status.SUCCESS or goes_on or (inside and failed and not node.step)
     children = tuple(_with_expected(child, inside) for child in node.children)
     below = [child.state.expected for child in children if child.state.status is Status.FAILURE]
-    found_none = node.kind == "skill" and node.name in _LOOKS and state.cause is Cause.POSTCONDITION
+    found_none = node.behaviour.runs_skill and node.name in _LOOKS and state.cause is Cause.POSTCONDITION
     expected = failed and inside and (found_none or (bool(below) and all(below)))
     return replace(node, state=state._replace(expected=expected), children=children)
 

@@ -162,8 +162,6 @@ def _class(style: NodeStyle) -> str:
 
 
 FORMAT: Final = "4"
-_BUILT_IN: Final[Mapping[str, str]] = {"sequence": "Sequence", "selector": "Fallback"}
-_CONDITIONS: Final = frozenset({"condition", "monitor"})
 _RESERVED: Final = frozenset({"ID", "name"})
 _BUILT_IN_NAMES: Final = """
     Root BehaviorTree TreeNodesModel SubTree Action Condition Control Decorator
@@ -220,7 +218,7 @@ def _tree(document: Element, tree_id: str, node: NodeView, steps: Mapping[int, s
 
 def _element(node: NodeView, steps: Mapping[int, str]) -> Element:
     category, model = _category(node), _model_id(node)
-    own = {} if node.kind in _BUILT_IN else {"ID": model}
+    own = {} if node.behaviour.control else {"ID": model}
     ports = {name: _value(port) for name, port in _named(node.ports) if port.value} if own else {}
     element = Element(category, {**own, "name": printable(node.name), **ports, "_description": _description(node)})
     for child in node.children:
@@ -234,15 +232,15 @@ def _element(node: NodeView, steps: Mapping[int, str]) -> Element:
 
 def _category(node: NodeView) -> str:
     """Name of a node's element: a built-in control node, or the category for its number of children."""
-    if node.kind in _BUILT_IN and node.children:
-        return _BUILT_IN[node.kind]
+    if node.behaviour.control and node.children:
+        return node.behaviour.control
     if not node.children:
-        return "Condition" if node.kind in _CONDITIONS else "Action"
+        return "Condition" if node.behaviour.watches else "Action"
     return "Decorator" if len(node.children) == 1 else "Control"
 
 
 def _model_id(node: NodeView) -> str:
-    return _identifier(node.name if node.kind == "skill" else node.kind)
+    return _identifier(node.name if node.behaviour.runs_skill else node.kind)
 
 
 def _identifier(text: str, prefix: str = "Errand") -> str:
@@ -283,7 +281,7 @@ def _models(root: NodeView, trees: Sequence[str]) -> Element:
     """Returns a model for each kind of node that is not built in, with all ports of its nodes."""
     models: dict[tuple[str, str], dict[str, Port]] = {}
     for _, node in root.walk():
-        if node.kind not in _BUILT_IN or not node.children:
+        if not node.behaviour.control or not node.children:
             ports = models.setdefault((_category(node), _model_id(node)), {})
             ports.update(_named(node.ports))
     section = Element("TreeNodesModel")

@@ -21,8 +21,6 @@ from skills.api import Cause
 MANY_NODES = 80
 DRAWN_NODES = 40
 _BRANCHES, _ASCII_BRANCHES = ("├─ ", "└─ ", "│  ", "   "), ("|-- ", "`-- ", "|   ", "    ")
-_PLUMBING = frozenset({"monitor", "remember"})
-_GUARDS = _PLUMBING | {"interrupt"}
 
 
 @dataclass(frozen=True)
@@ -116,7 +114,7 @@ def note_of(node: NodeView) -> str:
     """Returns cause and message of a node; the message only if no child has the same."""
     state = node.state
     is_own = state.message and all(state.message != child.state.message for child in node.children)
-    counts = state.cause is not None or not node.children or node.kind == "retry"
+    counts = state.cause is not None or not node.children or node.behaviour.counts
     sentence = state.message if is_own and counts else ""
     return ": ".join(filter(None, (state.cause_text, sentence)))
 
@@ -178,7 +176,8 @@ def _fold_below_steps(row: NodeView, level: int, left: int) -> NodeView:
     """Folds guards, and other closed rows more than `level` levels below their step; `left` of them are left here."""
     shown, hidden = [], row.hidden
     for child in row.children:
-        if not child.step and (left == 0 or child.kind in _GUARDS) and all(is_closed(n) for _, n in child.walk()):
+        guard = child.behaviour.watches or child.behaviour.plumbing
+        if not child.step and (left == 0 or guard) and all(is_closed(n) for _, n in child.walk()):
             hidden += 1 + child.below
         else:
             shown.append(_fold_below_steps(child, level, level if child.step else max(0, left - 1)))
@@ -197,7 +196,7 @@ def executed_tree(node: NodeView, above: NodeView | None = None) -> NodeView:
 
 
 def _is_plumbing(node: NodeView) -> bool:
-    return node.state.cause is None and (node.state.status is Status.INVALID or node.kind in _PLUMBING)
+    return node.state.cause is None and (node.state.status is Status.INVALID or node.behaviour.plumbing)
 
 
 def _folded(node: NodeView, foldable: Callable[[NodeView], bool], level: int, depth: int) -> NodeView:

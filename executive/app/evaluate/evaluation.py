@@ -216,7 +216,7 @@ def steps_of(events: Sequence[Event]) -> dict[str, float]:
     for event in events:
         if event.topic == TREE:
             nodes = (node for _, node in logged_view(event.data["root"], {}).walk())
-            skills |= {node.path_id: node.name for node in nodes if node.kind == "skill"}
+            skills |= {node.path_id: node.name for node in nodes if node.behaviour.runs_skill}
         elif event.topic == TRANSITIONS and (name := skills.get(event.data["node"])) is not None:
             node, t_s = str(event.data["node"]), float(event.data.get("t", event.stamp_s))
             if node in since:

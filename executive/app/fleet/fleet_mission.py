@@ -254,8 +254,8 @@ def progress_of(tree: CompiledTree, statuses: Callable[[str], Status | None]) ->
 
 def is_lost(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> bool:
     """Returns whether a mission ended because its robot could not localise."""
-    watches = (node for node in tree.root.walk() if node.kind == "interrupt")
-    lost = (node.path_id for node in watches if isinstance(node.options["condition"], KnowsPlace))
+    watches = (node for node in tree.root.walk() if node.behaviour.watches)
+    lost = (node.path_id for node in watches if isinstance(node.options.get("condition"), KnowsPlace))
     return any(statuses(path_id) is Status.FAILURE for path_id in lost)
 
 
@@ -263,7 +263,7 @@ def _changing(node: NodeSpec, over: set[str]) -> list[NodeSpec]:
     """Returns the skill nodes below a node that change the world, without those in the `over` parts."""
     if any(node.path_id == path or node.path_id.startswith(f"{path}/") for path in over):
         return []
-    own = [node] if node.kind == "skill" and node.options["skill"].changes_world else []
+    own = [node] if node.skill is not None and node.skill.changes_world else []
     return own + [leaf for child in node.children for leaf in _changing(child, over)]
 
 

@@ -40,7 +40,6 @@ _CAPTIONS: Final = {
 _MAP: Final = "The map, with the path of the robot"
 _MAPS: Final = "The map, with the path of each robot"
 _SKIPPED: Final = "skipped"
-_SKIPS: Final = frozenset({"skip", "ask"})
 
 
 Picture = tuple[str, bytes]
@@ -215,7 +214,7 @@ def _decorated(node: NodeView, parts: frozenset[str]) -> NodeView | None:
     None for a part itself, and for a node with several such children.
     """
     below = () if node.path_id in parts else _steps(node)
-    if len(below) > 1 and node.kind != "sequence":
+    if len(below) > 1 and node.behaviour.control != "Sequence":
         below = tuple(child for child in below if _parts_in(child, parts))
     return below[0] if len(below) == 1 else None
 
@@ -225,13 +224,13 @@ def _parts_in(node: NodeView, parts: frozenset[str]) -> int:
 
 
 def _steps(node: NodeView) -> tuple[NodeView, ...]:
-    return tuple(child for child in node.children if child.kind != "remember")
+    return tuple(child for child in node.children if not child.behaviour.plumbing)
 
 
 def _row(outer: NodeView, within: Sequence[NodeView], spans: Mapping[str, tuple[float, float]], depth: int) -> StepRow:
     inner, state = within[-1], outer.state
     skipped = state.status is Status.SUCCESS and any(
-        above.kind in _SKIPS and below.state.status is Status.FAILURE for above, below in pairwise(within)
+        above.behaviour.skips and below.state.status is Status.FAILURE for above, below in pairwise(within)
     )
     style = Styles.CANCELLED.value if skipped else style_of(state)
     word = _SKIPPED if skipped else f"{style.word} ({state.cause_text})".removesuffix(" ()")

@@ -178,7 +178,7 @@ def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str
     Each utterance counts for one step, in the order of time.
     """
     nodes = list(tree.root.walk())
-    filled = {key: text for node in nodes if node.kind == "set" for key, text in node.options["values"].items()}
+    filled = {key: text for node in nodes for key, text in node.options.get("values", {}).items()}
     texts = {node.path_id: node.options["inputs"]["text"] for node in nodes if is_speech(node)}
     unheard = [said for said in result.said if not said.asked]
     for one in sorted(result.executions, key=lambda one: one.began_s):

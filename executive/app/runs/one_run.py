@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,7 +31,7 @@ from executive.run.control import Control
 from executive.run.outcome import RobotResult, RunResult
 from executive.run.runner import run
 from executive.run.visitor import Progress, RunEntry, RunSettings, RunVisitor
-from executive.run.worker import LockStepWorker, ThreadWorker
+from executive.run.worker import LockStepWorker, ThreadWorker, TimedWorker
 from executive.tree.context import RunContext
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.nodes.skill_leaf import ERROR_TOPIC, SkillLeaf
@@ -80,12 +81,11 @@ def run_request(
     """
     request, scenario, settings = prepared.request, prepared.request.scenario, _settings(prepared.request)
     out, world, kinds = request.out, prepared.world, {name: robot.kind for name, robot in prepared.robots.items()}
-    backend = backend or simulated_backend(prepared)
+    backend, artifacts = backend or simulated_backend(prepared), Artifacts()
     entries = [entry_for(each, backend, durable) for each in prepared.all]
     idle = [name for name in kinds if all(name != entry.tree.robot_name for entry in entries)]
     spare = [backend.entry(replace(prepared.tree, robot_name=name), None) for name in idle]
-    path, artifacts = out / ("log.mcap" if durable is None else durable.log), Artifacts()
-    clock = backend.clock
+    path, clock = out / ("log.mcap" if durable is None else durable.log), backend.clock
     with closing(EventLog(path, clock, apart=prepared.several)) as log:
         if page is not None:
             page.serve(log, backend.show_live())
@@ -103,8 +103,9 @@ def run_request(
             watching.append(RunProfile(profile, backend, (artifacts, log), journals))
         watching += backend.visitors(control := control or Control(pace=None))
         with ended_by_signals(control.cancel), closing(worker or LockStepWorker(clock)) as jobs:
+            at = jobs if profile is None else TimedWorker(jobs, partial(profile.timed, "planning"))
             result = run(
-                entries, clock=clock, worker=jobs, visitors=watching, settings=settings, control=control, spare=spare
+                entries, clock=clock, worker=at, visitors=watching, settings=settings, control=control, spare=spare
             )
         if durable is not None:  # the next mission of the queue begins in the world that this one leaves
             next(iter(durable.journals.values())).keep_world()
@@ -290,14 +291,8 @@ class RunProfile(RunVisitor):
             profile.attach("journal", each, "tick")
 
     def begin(self, settings: RunSettings, worker: Worker) -> None:
-        """Times the backend's subsystems and the worker's jobs."""
+        """Times the backend's subsystems."""
         self._backend.attach(self._profile)
-        submit, timed = worker.submit, self._profile.timed
-
-        def submit_timed(work: Callable[[], Any], *, latency_s: float, name: str) -> Any:
-            return submit(timed("planning", work), latency_s=latency_s, name=name)
-
-        vars(worker)["submit"] = submit_timed
         self._profile.begin()
         self._begun_s = self._profile.enter()
 

@@ -11,13 +11,13 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from py_trees.common import Status
 
 from executive.tree.behaviour import ExplainedLeaf
-from executive.tree.board import BesideBoard, FromBoard
+from executive.tree.board import BesideBoard, FromBoard, Sign
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import floor_square
@@ -172,6 +172,7 @@ class Fallen(ExplainedLeaf):
     """
 
     kind = "fallen"
+    logged = True
     output_types: ClassVar = {
         "pose_key": Pose2D,
         "spot_key": tuple[Coordinate, Coordinate, Height],
@@ -194,6 +195,11 @@ class Fallen(ExplainedLeaf):
     set_down_ahead_m: float = 1.15
     set_down_half_m: float = 0.3
     settle_s: float = 0.3
+
+    @classmethod
+    def signs(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Returns the key of the place where the object fell."""
+        return {options["spot_key"]: Sign.DROPPED}
 
     def initialise(self) -> None:
         """Writes where to look for the object, by the robot's present pose."""

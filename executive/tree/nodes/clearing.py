@@ -69,11 +69,11 @@ class ForEachFound(MemoryComposite):
     _failures: int = field(default=0, init=False)
     _why: str = field(default="", init=False)
 
-    def tick(self) -> Iterator[Behaviour]:
+    def _tick(self) -> Iterator[Behaviour]:
         """Looks again in each round; until then the results of the round before stay visible."""
         if self._index == 0 and self.children[0].status != Status.RUNNING:
             self._reset_children()
-        yield from super().tick()
+        yield from super()._tick()
 
     def _following(self, child: Behaviour) -> int | None:
         found = child.status == Status.SUCCESS and len(self._noted(self.done)) < self.limit

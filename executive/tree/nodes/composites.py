@@ -13,7 +13,7 @@ from py_trees.common import Status
 
 from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans
-from executive.tree.behaviour import Conditional, MemoryComposite, cause_of, failed_for_good, message_of
+from executive.tree.behaviour import MemoryComposite, applies, cause_of, failed_for_good, message_of
 from executive.tree.board import Board
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import decide_plan
@@ -39,6 +39,8 @@ class MemorySequence(MemoryComposite):
     """
 
     kind = "sequence"
+    control = "Sequence"
+    container = True
 
 
 class MemorySelector(MemoryComposite):
@@ -59,6 +61,8 @@ class MemorySelector(MemoryComposite):
     """
 
     kind = "selector"
+    control = "Fallback"
+    container = True
     goes_on_after: ClassVar[tuple[Status, ...]] = (Status.FAILURE, Status.INVALID)
     exhausted_cause: Cause | None = None
     exhausted_message: str = ""
@@ -67,7 +71,7 @@ class MemorySelector(MemoryComposite):
     def _passes_over(self, child: Behaviour) -> bool:
         if self.one_goal and child.status != Status.RUNNING and any(map(failed_for_good, self.children)):
             return True
-        return child.status != Status.RUNNING and isinstance(child, Conditional) and not child.applies()
+        return child.status != Status.RUNNING and not applies(child)
 
     def _explanation(self, child: Behaviour) -> tuple[Cause, str]:
         failed = [one for one in self.children if one.status == Status.FAILURE]
@@ -98,6 +102,8 @@ class MemoryRound(MemorySelector):
     """
 
     kind = "round"
+    control = ""
+    container = False
     goes_on_after = (Status.SUCCESS, Status.FAILURE, Status.INVALID)
 
     def _take_over(self, child: Behaviour) -> None:
@@ -124,6 +130,7 @@ class Choose(MemoryComposite):
     """
 
     kind = "choose"
+    spoken = True
     branches: Mapping[Value, int]
     key: str
     board: Board
@@ -195,7 +202,7 @@ class Together(MemoryComposite):
     _failed: list[Behaviour] = field(default_factory=list, init=False)
     _done: list[Behaviour] = field(default_factory=list, init=False)
 
-    def tick(self) -> Iterator[Behaviour]:
+    def _tick(self) -> Iterator[Behaviour]:
         """Ticks the children that have not ended."""
         if self.status != Status.RUNNING:
             self._restart()

@@ -241,7 +241,7 @@ class Decide(MemoryComposite):
         super().__post_init__()
         self.view = View(self.context)
 
-    def tick(self) -> Iterator[Behaviour]:
+    def _tick(self) -> Iterator[Behaviour]:
         """Decides, or takes the next look."""
         looks = self.status == Status.RUNNING
         if not looks:

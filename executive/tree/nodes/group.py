@@ -49,6 +49,7 @@ class Always(Afterwards):
         if not interrupted and not endings.has(last):
             super().stop(new_status)
             return
+        self.hook.note_stop(self, new_status)
         if not interrupted or first.status == Status.RUNNING:
             first.stop(Status.INVALID)
         if interrupted and not endings.take(last):

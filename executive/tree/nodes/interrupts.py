@@ -43,6 +43,8 @@ class Monitor(ExplainedLeaf):
     """
 
     kind = "monitor"
+    plumbing = True
+    watches = True
     waiting: ClassVar[str] = ""
     condition: Condition
     context: RunContext
@@ -82,6 +84,7 @@ class Interrupt(ExplainedDecorator):
     """
 
     kind = "interrupt"
+    watches = True
     afresh = True
     condition: Condition
     urgent: Condition | None = None
@@ -153,8 +156,10 @@ class Interrupts(MemoryComposite):
     """
 
     kind = "interrupts"
+    watches = True
+    container = True
 
-    def tick(self) -> Iterator[Behaviour]:
+    def _tick(self) -> Iterator[Behaviour]:
         """Ticks monitors and called interrupts in order, then the mission."""
         watches: list[Any] = self.children[:-1]
         mission = self.children[-1]

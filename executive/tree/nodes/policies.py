@@ -81,6 +81,7 @@ class Retry(ExplainedDecorator):
     """
 
     kind = "retry"
+    counts = True
     attempts: int
     causes: frozenset[Cause]
     attempt: int = field(default=1, init=False)
@@ -115,6 +116,7 @@ class Skip(ExplainedDecorator):
     """
 
     kind = "skip"
+    skips = True
     step: str
     skipped: str | None = field(default=None, init=False)
 
@@ -237,6 +239,7 @@ class Summary(ExplainedDecorator):
     """
 
     kind = "summary"
+    container = True
     steps: Sequence[str]
 
     def update(self) -> Status:
@@ -263,6 +266,7 @@ class RememberPose(ExplainedLeaf):
     """
 
     kind = "remember"
+    plumbing = True
     output_types: ClassVar = {"key": Pose2D}
     key: str
     context: RunContext

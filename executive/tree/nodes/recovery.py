@@ -13,7 +13,7 @@ from typing import ClassVar
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import Conditional, Explained, MemoryComposite, cause_of, message_of
+from executive.tree.behaviour import Explained, MemoryComposite, applies, cause_of, message_of
 from executive.tree.board import Board
 from executive.tree.context import RunContext
 from executive.tree.nodes.guard import is_known_as
@@ -160,8 +160,7 @@ class Recover(MemoryComposite):
     def _fits(self, number: int) -> bool:
         """Returns whether a recovery fits the failure of the attempt, applies and is not used up."""
         recovery, node = self.recoveries[number], self.children[number + 1]
-        applies = not isinstance(node, Conditional) or node.applies()
-        return applies and self._uses[number] < recovery.uses and recovery.fits(self.children[0], self.board)
+        return applies(node) and self._uses[number] < recovery.uses and recovery.fits(self.children[0], self.board)
 
     def _next_recovery(self) -> bool:
         """Begins the next queued recovery; returns False when there is none."""

@@ -45,6 +45,7 @@ class Repeat(MemoryComposite):
     """
 
     kind = "repeat"
+    spoken = True
     output_types: ClassVar = {"count": int}
     mode: Literal["until", "while", "times"]
     words: str
@@ -57,7 +58,7 @@ class Repeat(MemoryComposite):
     _phase: Literal["start", "before", "body", "after"] = field(default="start", init=False)
     _due_s: float = field(default=0.0, init=False)
 
-    def tick(self) -> Iterator[Behaviour]:
+    def _tick(self) -> Iterator[Behaviour]:
         """Begins a round, decides, or ticks the body."""
         if self.status != Status.RUNNING:
             self._restart()

@@ -10,7 +10,7 @@ from py_trees.common import Status
 from executive.mission.gripper import UNNAMED
 from executive.tree.assembly import Assembler, Named, StepPlans
 from executive.tree.behaviour import ExplainedLeaf, StoppableTime
-from executive.tree.board import Binding, Constant, FromBoard
+from executive.tree.board import Binding, Constant, FromBoard, Sign
 from executive.tree.context import RunContext
 from executive.tree.goals import POSE_NEAR_M, square_region, surface_region
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
@@ -35,6 +35,7 @@ from skills.robot import Pose2D
 ResultT = TypeVar("ResultT")
 ERROR_TOPIC = "errors"
 _TOLERANCE_S = 1e-6
+_SIGNS: Final = {"observation": Sign.SEEN, "released_W": Sign.RELEASED}
 
 
 class Remembered(Succeeded):
@@ -61,6 +62,8 @@ class SkillLeaf(ExplainedLeaf):
     """
 
     kind = "skill"
+    runs_skill = True
+    logged = True
     skill: type[Skill[Any]]
     limit_s: float
     context: RunContext
@@ -77,6 +80,12 @@ class SkillLeaf(ExplainedLeaf):
     def writes(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
         """Returns the keys of the skill's bound output ports, and their types."""
         return {key: options["skill"].outputs.get(port, Any) for port, key in options.get("outputs", {}).items()}
+
+    @classmethod
+    def signs(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Returns the keys of the skill's ports that show an object; people are none."""
+        keys = {} if options["skill"].name == "find_people" else options["outputs"]
+        return {keys[port]: sign for port, sign in _SIGNS.items() if port in keys}
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -3,7 +3,7 @@
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained, suspend
+from executive.tree.behaviour import Explained, Hook, suspend
 from skills.api import Cause
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
@@ -20,8 +20,9 @@ class Leaf(Explained, Behaviour):
     on. `log` gets "+name" when it begins, "~name" when it is suspended, and "-name" when it is stopped while running.
     """
 
-    def __init__(self, script, name="leaf", log=None, restarts=False, put=None):
+    def __init__(self, script, name="leaf", log=None, restarts=False, put=None, hook=None):
         super().__init__(name)
+        self.hook = hook or Hook()
         self.path_id, self.cause, self.message = f"alice/{name}", None, ""
         self.script, self.log, self.restarts, self.put = script, [] if log is None else log, restarts, put
         self.place = self.ticks = self.begun = 0
@@ -46,6 +47,10 @@ class Leaf(Explained, Behaviour):
 
     def suspend(self):
         self.log.append(f"~{self.name}")
+
+    def stop(self, new_status):
+        self.hook.note_stop(self, new_status)
+        super().stop(new_status)
 
     def terminate(self, new_status):
         if new_status == N and self.status == R:

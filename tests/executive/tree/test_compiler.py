@@ -7,10 +7,10 @@ from executive.run.outcome import Outcome
 from executive.tree import nodes
 from executive.tree.behaviour import ExplainedDecorator, ExplainedNode, MemoryComposite
 from executive.tree.board import FromBoard
-from executive.tree.compiler import KINDS, build, compile_mission, writes
+from executive.tree.compiler import build, compile_mission, writes
 from executive.tree.estimate import expected_children
 from executive.tree.goals import surfaces_to_search
-from executive.tree.node import NodeSpec
+from executive.tree.node import NodeSpec, node_classes
 from executive.tree.nodes.policies import Timeout
 from executive.words.command import parse_command
 from executive.words.knowledge import TagFacts
@@ -283,10 +283,10 @@ def below(node):
 
 def test_each_kind_of_node_has_exactly_one_class():
     named = [node.kind for node in below(ExplainedNode) if node.__module__.startswith(nodes.__name__) and node.kind]
-    assert sorted(named) == sorted(KINDS)
+    assert sorted(named) == sorted(node_classes())
 
 
-@pytest.mark.parametrize("node", KINDS.values(), ids=KINDS)
+@pytest.mark.parametrize("node", node_classes().values(), ids=node_classes())
 def test_each_node_with_children_documents_its_truth_table(node):
     with_children = issubclass(node, ExplainedDecorator | MemoryComposite)
     assert not with_children or "| status |" in node.__doc__ or "status as" in node.__doc__.lower()

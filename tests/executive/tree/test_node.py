@@ -3,6 +3,7 @@
 import pytest
 from py_trees.common import Status
 
+from executive.tree.behaviour import Hook
 from executive.tree.node import Change, NodeState, TreeObserver
 from executive.tree.nodes.composites import MemorySequence
 from tests.executive.tree.scripted import Leaf
@@ -33,8 +34,9 @@ def no_change_is_missed():
 @pytest.fixture
 def walk():
     """A sequence of two leaves, "one" for two ticks and "two" for as long as it is ticked."""
-    leaves = Leaf("RS", "one"), Leaf("R", "two")
-    return MemorySequence(path_id="alice/walk", name="walk", children=leaves)
+    hook = Hook()
+    leaves = Leaf("RS", "one", hook=hook), Leaf("R", "two", hook=hook)
+    return MemorySequence(path_id="alice/walk", name="walk", children=leaves, hook=hook)
 
 
 def changed(observed, **how):
@@ -42,7 +44,7 @@ def changed(observed, **how):
 
 
 def test_only_nodes_that_were_ticked_or_stopped_are_read(walk):
-    observed = TreeObserver(walk)
+    observed = TreeObserver(walk, walk.hook)
     observed.tick(walk)
     assert changed(observed) == {"alice/walk": Status.RUNNING, "alice/one": Status.RUNNING}
     idle = walk.children[1]
@@ -54,7 +56,7 @@ def test_only_nodes_that_were_ticked_or_stopped_are_read(walk):
 
 
 def test_nodes_that_are_stopped_from_outside_are_read(walk):
-    observed = TreeObserver(walk)
+    observed = TreeObserver(walk, walk.hook)
     for _ in range(2):
         observed.tick(walk)
     assert changed(observed)["alice/two"] is Status.RUNNING
@@ -64,13 +66,13 @@ def test_nodes_that_are_stopped_from_outside_are_read(walk):
 
 
 def test_changes_come_in_the_order_of_the_tree(walk):
-    observed = TreeObserver(walk)
+    observed = TreeObserver(walk, walk.hook)
     observed.tick(walk)
     assert [change.path_id for change in observed.changes()] == ["alice/walk", "alice/one"]
 
 
 def test_a_node_that_an_exception_kept_from_its_end_is_found_among_all(walk):
-    observed = TreeObserver(walk)
+    observed = TreeObserver(walk, walk.hook)
     walk.children[0].update = lambda: 1 / 0
     with pytest.raises(ZeroDivisionError):
         observed.tick(walk)

@@ -17,14 +17,14 @@ LINES = {
     "executive/mission": 1577,
     "executive/tree": 8414,
     "executive/run": 3218,
-    "executive/record": 1412,
+    "executive/record": 1404,
     "executive/store": 1666,
     "executive/conversation": 595,
     "executive/view": 1584,
     "executive/testing": 849,
-    "executive/app": 8095,
+    "executive/app": 8085,
     "executive/cli": 3810,
-    "skills": 29932,
+    "skills": 29931,
     "plant": 11415,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 429, 64, 8

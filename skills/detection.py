@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
+from skills.robot import Image, Picture
+
+if TYPE_CHECKING:
+    from skills.perception.object_model import ObjectModel
 
 
 @dataclass(frozen=True)
@@ -23,19 +27,43 @@ class Detection:
     alternatives: tuple[tuple[str, float], ...] = ()
 
 
+Detections = tuple[Detection, ...]
+AnswerT = TypeVar("AnswerT")
+
+
 class Detector(Protocol):
-    """Detects objects of known classes in pictures."""
+    """Detects objects of known classes in pictures.
+
+    A detector of your own inherits from this class, has `class_names` and `detect`, and overrides what it does better.
+    """
+
+    models: Mapping[str, ObjectModel] = MappingProxyType({})
+    """Models of own objects by name, with which the skills compare segments."""
 
     @property
+    @abstractmethod
     def class_names(self) -> tuple[str, ...]:
         """Names of the known classes."""
 
-    def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
+    @abstractmethod
+    def detect(self, pictures: Sequence[Picture]) -> list[Detections]:
         """Returns the detections in each picture, the highest score first.
 
         Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. May take long: call it inside a Worker job. Raises
         ValueError for an array of another shape.
         """
+
+    def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[Detections]:
+        """Returns the detections of one known class in each picture; a detector may have a quick search for it."""
+        return [tuple(one for one in found if one.class_name == class_name) for found in self.detect(pictures)]
+
+    def detect_in_views(self, picture: Picture, least_score: float | None = None) -> Detections:
+        """Returns the detections in one picture; in several views, and from `least_score` on, if the detector can."""
+        return self.detect([picture])[0]
+
+    def detect_with_depth(self, image: Image, found: Detections) -> Detections:
+        """Returns the detections in an image, of which `found` are those in its picture."""
+        return found
 
 
 class NoDetectorError(RuntimeError):
@@ -43,12 +71,12 @@ class NoDetectorError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class NoDetector:
+class NoDetector(Detector):
     """Stand-in where there is no detector: knows no classes, and raises an error when it is used."""
 
     class_names: tuple[str, ...] = ()
 
-    def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
+    def detect(self, pictures: Sequence[Picture]) -> list[Detections]:
         """Raises NoDetectorError."""
         raise NoDetectorError("there is no detector here: put one into the context's field 'detector'")
 
@@ -56,26 +84,56 @@ class NoDetector:
 NO_DETECTOR: Final = NoDetector()
 
 
-class DetectorWrapper:
-    """Detector around another `detector`, whose methods and attributes it has, except for its own."""
+class DetectorWrapper(Detector):
+    """Detector around another one: what judges pictures goes through `_call`; a subclass overrides it, or methods."""
 
     def __init__(self, detector: Detector) -> None:
-        self._detector = detector
+        self._detector = with_defaults(detector)
+        self.models = self._detector.models
+
+    def _call(self, method: str, pictures: int, call: Callable[..., AnswerT], *arguments: Any) -> AnswerT:
+        """Makes a call of a method for a number of pictures: `call` is the wrapped detector's."""
+        return call(*arguments)
 
     @property
     def class_names(self) -> tuple[str, ...]:
         """Classes that the other detector knows."""
         return self._detector.class_names
 
-    def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
+    def detect(self, pictures: Sequence[Picture]) -> list[Detections]:
         """Returns the detections of the other detector."""
-        return self._detector.detect(pictures)
+        return self._call("detect", len(pictures), self._detector.detect, pictures)
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._detector, name)
+    def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[Detections]:
+        """Returns the detections of one class by the other detector."""
+        return self._call("detect_class", len(pictures), self._detector.detect_class, pictures, class_name)
 
-    def __dir__(self) -> Iterable[str]:
-        return {*super().__dir__(), *dir(self._detector)}
+    def detect_in_views(self, picture: Picture, least_score: float | None = None) -> Detections:
+        """Returns the detections of the other detector in one picture."""
+        return self._call("detect_in_views", 1, self._detector.detect_in_views, picture, least_score)
+
+    def detect_with_depth(self, image: Image, found: Detections) -> Detections:
+        """Returns the detections of the other detector in an image."""
+        return self._detector.detect_with_depth(image, found)
+
+
+@dataclass(frozen=True)
+class _PlainDetector(Detector):
+    """Detector that has only `class_names` and `detect` of its own."""
+
+    detector: Detector
+
+    @property
+    def class_names(self) -> tuple[str, ...]:
+        return self.detector.class_names
+
+    def detect(self, pictures: Sequence[Picture]) -> list[Detections]:
+        return self.detector.detect(pictures)
+
+
+def with_defaults(detector: Detector) -> Detector:
+    """Returns the detector itself, or one around it that adds the methods which a detector need not have."""
+    return detector if hasattr(detector, "detect_in_views") else _PlainDetector(detector)
 
 
 def box_overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> float:

@@ -155,7 +155,7 @@ class DetectorComponent(Hashable, Protocol):
     """Loads a detector."""
 
     def build(self) -> Detector:
-        """Loads the detector. Raises ValueError when its model cannot be used."""
+        """Loads the detector. Raises InputError when its model cannot be used."""
 
 
 class RobotBackend(Protocol):

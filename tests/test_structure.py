@@ -17,14 +17,14 @@ LINES = {
     "executive/mission": 1577,
     "executive/tree": 8542,
     "executive/run": 3200,
-    "executive/record": 1412,
+    "executive/record": 1404,
     "executive/store": 1631,
     "executive/conversation": 595,
     "executive/view": 1581,
     "executive/testing": 849,
-    "executive/app": 8089,
+    "executive/app": 8079,
     "executive/cli": 3809,
-    "skills": 29932,
+    "skills": 29931,
     "plant": 11172,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 426, 64, 7

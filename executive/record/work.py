@@ -10,8 +10,9 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
-from skills.api import Detector
-from skills.detection import DetectorWrapper
+from skills.detection import Detector, DetectorWrapper
+
+ResultT = TypeVar("ResultT")
 
 
 class Work:
@@ -34,25 +35,16 @@ class Work:
 
 
 class CountedDetector(DetectorWrapper):
-    """Detector that counts the pictures of another one by method, in `methods`."""
+    """Detector that counts the pictures of another one by method."""
 
     def __init__(self, detector: Detector, work: Work) -> None:
         super().__init__(detector)
-        found = {name: getattr(detector, name) for name in dir(detector) if name.startswith("detect")}
-        self.methods = tuple(name for name, method in found.items() if callable(method))
-        for name in self.methods:
-            setattr(self, name, _counted(found[name], f"{name}_pictures", work))
+        self._work = work
 
+    def _call(self, method: str, pictures: int, call: Callable[..., ResultT], *arguments: Any) -> ResultT:
+        self._work.count(f"{method}_pictures", pictures)
+        return call(*arguments)
 
-def _counted(method: Callable[..., Any], counter: str, work: Work) -> Callable[..., Any]:
-    def detect(pictures: Any, *arguments: Any, **options: Any) -> Any:
-        work.count(counter, len(pictures) if isinstance(pictures, list | tuple) else 1)
-        return method(pictures, *arguments, **options)
-
-    return detect
-
-
-ResultT = TypeVar("ResultT")
 
 START: Final = "before the first tick"
 OTHER: Final = "other threads and the end"

@@ -21,6 +21,7 @@ from executive.tree.context import RunContext
 from executive.tree.nodes.skill_leaf import SkillLeaf
 from executive.words.knowledge import Knowledge
 from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
+from skills.detection import with_defaults
 from skills.doorway import Doorway
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.faulty_robot import Fault, inject_faults, parse_fault
@@ -44,8 +45,7 @@ def write_small_room(folder: Path, *, can: bool = True) -> Path:
     weld = {"add_weld": {"parent": "world", "child": "room::room"}}
     _write_yaml(folder / "world.dmd.yaml", {"directives": [model, weld]})
     _write_yaml(folder / "knowledge.yaml", _facts()["knowledge"])
-    objects = _facts()["objects"]
-    _write_yaml(folder / "objects.yaml", objects if can else {**objects, "objects": []})
+    _write_yaml(folder / "objects.yaml", _facts()["objects"] | ({} if can else {"objects": []}))
     for name, band_m in _BANDS.items():
         _write_map(folder / "map", name, band_m)
     return folder
@@ -154,7 +154,7 @@ class SkillBench:
             publish=lambda topic, message: self.published.append((topic, message)),
             seed=seed,
             board=Board(_PREFIX),
-            detector=detector or PlainColours(),
+            detector=with_defaults(detector or PlainColours()),
             doors=doors,
         )
         self._sense(robot)

@@ -42,7 +42,6 @@ from skills.perception.class_forms import ANY_OBJECT, known_attributes
 from skills.perception.detection_3d import Detection3D, detections_3d, observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image, is_dark
 from skills.perception.model_matching import identified
-from skills.perception.object_model import models_of
 from skills.perception.point_cloud import Coverage, in_plain_view
 from skills.perception.surface_segmentation import Cluster, loose_clusters, segment_3d, segment_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
@@ -80,7 +79,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
 
     def run(self, inputs: DetectInputs) -> Routine[Succeeded]:
         """Searches each surface in turn; an object counts when a view from another side confirms it."""
-        models = models_of(self.context.detector)
+        models = self.context.detector.models
         self._height_m = 0.0 if inputs.seen_before is None else inputs.seen_before.size_m[2]
         self._own = models if any(name in models for name in inputs.classes) else {}
         self._check(inputs)

@@ -18,9 +18,8 @@ import cv2
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.detection import Detection, Detector, DetectorWrapper, box_overlap
+from skills.detection import Detection, Detections, Detector, DetectorWrapper, box_overlap
 from skills.perception.class_forms import class_form
-from skills.perception.detector.camera_images import detect_in_image
 from skills.perception.object_segmentation import Box, Window, groups_in_picture, in_plane, level_planes, window_about
 from skills.robot import FloatArray, Image, Picture
 from skills.routine import Routine, RoutineSkill
@@ -214,9 +213,9 @@ class TagDetector(DetectorWrapper):
         """Classes of the other detector, and those of the tags."""
         return tuple(dict.fromkeys((*self._detector.class_names, *self._classes.values())))
 
-    def detect_with_depth(self, image: Image, least_score: float | None = None) -> tuple[Detection, ...]:
-        """Detects the objects in an image; a tag replaces what the other detector takes its object for."""
-        others, tagged = detect_in_image(self._detector, image, least_score), list[Detection]()
+    def detect_with_depth(self, image: Image, found: Detections) -> Detections:
+        """Adds the objects with tags; a tag replaces what the other detector takes its object for."""
+        others, tagged = super().detect_with_depth(image, found), list[Detection]()
         for seen in find_tags(image, self._sizes_m):
             name = self._classes[seen.id]
             tagged += _unless_same([Detection(name, TAG_SCORE, box_of_carrier(image, seen, name))], tagged)

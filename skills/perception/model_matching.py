@@ -14,6 +14,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import cv2
@@ -22,8 +24,9 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Detection, LocalisationEstimate
+from skills.detection import Detector, DetectorWrapper
 from skills.perception.detection_3d import Detection3D
-from skills.perception.object_model import VIEW_SIDE, ObjectModel, view_of
+from skills.perception.object_model import VIEW_SIDE, ObjectModel, read_model, view_of
 from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, closed_mask, nearest_pixels, project
 from skills.perception.surface_segmentation import Cluster, segment_3d
 from skills.robot import FloatArray, Image
@@ -366,3 +369,17 @@ def _detected(fit: Fit, segment: Detection3D) -> Detection3D:
         size_m=(max(length, width), min(length, width), float(np.ptp(turned[:, 2]))),
         yaw_rad=yaw,
     )
+
+
+def with_models(detector: Detector, folders: Iterable[Path | str]) -> Detector:
+    """Returns a detector that has the models in these folders, too; the same one for none. Raises InputError."""
+    models = [read_model(Path(folder)) for folder in folders]
+    return ModelDetector(detector, models) if models else detector
+
+
+class ModelDetector(DetectorWrapper):
+    """Detector that judges pictures as another one does, and has models of own objects in addition."""
+
+    def __init__(self, detector: Detector, models: Iterable[ObjectModel]) -> None:
+        super().__init__(detector)
+        self.models = MappingProxyType({**self.models, **{model.name: model for model in models}})

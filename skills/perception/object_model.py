@@ -1,18 +1,15 @@
-"""Models of own objects, as `errand object import` writes them, and the detector that knows them beside its classes."""
+"""Models of own objects, as `errand object import` writes them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.detection import Detector, DetectorWrapper
 from skills.inputs.errors import InputError
 from skills.robot import FloatArray
 
@@ -90,45 +87,3 @@ def read_model(folder: Path) -> ObjectModel:
     if wrong or len(points) * len(rests) == 0:
         raise InputError("it is damaged", hint=_AGAIN, file=file)
     return model
-
-
-class ModelDetector(DetectorWrapper):
-    """Networks that judge pictures, and `models`, with which the skills compare segments (`model_matching.py`)."""
-
-    def __init__(self, networks: Detector, models: Iterable[ObjectModel]) -> None:
-        super().__init__(networks)
-        self.models: Mapping[str, ObjectModel] = MappingProxyType({model.name: model for model in models})
-
-
-@runtime_checkable
-class _HasModels(Protocol):
-    models: Mapping[str, ObjectModel]
-
-
-def models_of(detector: Any) -> Mapping[str, ObjectModel]:
-    """Models of own objects that a detector has, by name."""
-    return detector.models if isinstance(detector, _HasModels) else MappingProxyType({})
-
-
-@dataclass(frozen=True)
-class Cascade:
-    """Cascade of networks in an ONNX `file`; Errand's own unless one is named.
-
-    With `views`, a picture of the hand camera that leaves doubts is judged in several views (test-time augmentation).
-    `objects` are folders of `errand object import`: own objects, which are recognised by their models.
-    """
-
-    file: str | None = None
-    views: bool = True
-    objects: tuple[str, ...] = ()
-
-    def build(self) -> Detector:
-        """Loads the detector. Raises ModelFileError or InputError when a file cannot be used."""
-        from skills.perception.detector.augmentation import AugmentedDetector
-        from skills.perception.detector.model_files import MODEL_FILE
-        from skills.perception.detector.onnx_detector import load_detector
-
-        single = load_detector(MODEL_FILE if self.file is None else Path(self.file))
-        networks = AugmentedDetector(single) if self.views else single
-        models = [read_model(Path(folder)) for folder in self.objects]
-        return ModelDetector(networks, models) if models else networks

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import LocalisationEstimate
-from skills.detection import Detection
+from skills.detection import Detection, Detector
 from skills.robot import Pose2D, Robot, Scan
 from skills.testing.blocks import TABLE_CAN, Block, Colour, block_array, distances_from
 
@@ -76,7 +76,7 @@ _FEWEST_PIXELS = 6
 
 
 @dataclass(frozen=True)
-class PlainColours:
+class PlainColours(Detector):
     """Detector that finds an object in every patch of exactly its class's colour; by default red cans are cokes."""
 
     colours: Mapping[str, Colour] = field(default_factory=lambda: MappingProxyType({"coke": TABLE_CAN.colour}))

@@ -30,6 +30,7 @@ from plant.robots.spot.kind import spot_capabilities
 from plant.sensors.noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from skills.api import Surface
 from skills.detect.skill import Detect, DetectInputs
+from skills.detection import Detector
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import load_grid_map
 from skills.estimate.localiser import ScanMatchingLocaliser
@@ -115,7 +116,7 @@ def in_flat(seed, number):
             yield ask("flat", bench, surface, name, places)
 
 
-class TrueBoxes:
+class TrueBoxes(Detector):
     """A perfect detector, to judge all that comes after it: the boxes of what the last picture shows."""
 
     class_names = CLASSES

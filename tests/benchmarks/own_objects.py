@@ -50,7 +50,8 @@ from skills.detect.skill import Detect, DetectInputs
 from skills.detection import NoDetector
 from skills.geometry import inside_polygon
 from skills.inputs.errors import InputError
-from skills.perception.object_model import ModelDetector, ObjectModel, read_model
+from skills.perception.model_matching import ModelDetector
+from skills.perception.object_model import ObjectModel, read_model
 from tests.benchmarks.find_things import room_bench
 from tests.benchmarks.flat_scene import SURFACES, FlatScene, surface_of, viewpoint_of
 from tests.benchmarks.foreign_models import CATALOGUES, OTHERS, entries

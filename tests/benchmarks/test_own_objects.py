@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("trimesh")
 
 from skills.detection import NoDetector
-from skills.perception.object_model import ModelDetector
+from skills.perception.model_matching import ModelDetector
 from tests.benchmarks import own_objects
 from tests.benchmarks.own_objects import ask, by_photographs, generated, imported, scene, summary
 

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 from planar_robot import BODY_HEIGHT_M, LENS, X_BC, Bench, Box
 
-from skills.detection import Detection
+from skills.detection import Detection, Detector
 
 
 def person_at(x_m, y_m):
@@ -35,7 +35,7 @@ class LateAnswer:
 
 
 @dataclass
-class PeopleDetector:
+class PeopleDetector(Detector):
     """Sees each of `people` who is among the boxes of the bench's robot, by true geometry and through walls."""
 
     bench: Bench

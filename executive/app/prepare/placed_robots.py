@@ -182,16 +182,19 @@ def stand_at(world: World, start: Start, seed: int) -> Pose2D:
     return Pose2D(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
 
 
-def shared_detector(stack: RobotStack | None = None) -> Detector:
-    """Returns the detector of a stack, or the default one; loads it once in a process. Raises InputError."""
-    return _built((stack or default_stack()).detector)
-
-
 @cache
 def _built(component: DetectorComponent) -> Detector:
-    from skills.perception.detector.model_files import ModelFileError  # loads the network runtime
+    return component.build()
 
-    try:
-        return component.build()
-    except ModelFileError as error:
-        raise InputError(error.message, hint=error.hint, file=error.file) from error
+
+def shared_detector(stack: RobotStack | None = None, world: World | None = None) -> Detector:
+    """Returns the detector of a stack, or the default one, with the models of a world's own objects.
+
+    Loads the networks once in a process. Raises InputError.
+    """
+    networks = _built((stack or default_stack()).detector)
+    if world is None:
+        return networks
+    from skills.perception.model_matching import with_models
+
+    return with_models(networks, (each.folder for each in world.own_objects.values()))

@@ -10,7 +10,7 @@ import numpy as np
 from skills.detection import Detection
 from skills.inputs.errors import InputError
 from skills.inputs.picture_files import read_pixels
-from skills.perception.detector.model_files import MODEL_FILE, ModelFileError
+from skills.perception.detector.model_files import MODEL_FILE
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector, load_detector
 from skills.robot import Picture
 
@@ -22,10 +22,7 @@ _LINE_PER_PX: Final = 1 / 320
 
 def open_detector(file: Path | None, options: DetectorOptions) -> OnnxDetector:
     """Loads the detector of a file, or the shipped one. Raises InputError if it cannot be used."""
-    try:
-        return load_detector(file or MODEL_FILE, options)
-    except ModelFileError as error:
-        raise InputError(error.message, hint=error.hint, file=error.file) from error
+    return load_detector(file or MODEL_FILE, options)
 
 
 def draw_detections(picture: Picture, found: Sequence[Detection]) -> Picture:

@@ -26,7 +26,7 @@ from executive.record.announce import announce, map_message
 from executive.record.event_log import EventLog
 from executive.record.history import Event, read_events
 from executive.record.schemas import CONTROL, MAP, RUN, WORK
-from executive.record.work import CountedDetector, Profile
+from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.outcome import RobotResult, RunResult
 from executive.run.runner import run
@@ -301,8 +301,7 @@ class RunProfile(RunVisitor):
         attach = self._profile.attach
         attach("localiser", context.localiser, "update")
         attach("costmap", context.costmap, "update", "add_points", "clearance_m")
-        if isinstance(context.detector, CountedDetector):
-            attach("detector", context.detector, *context.detector.methods)
+        attach("detector", context.detector, "detect", "detect_class", "detect_in_views", "detect_with_depth")
         for leaf in nodes:
             if isinstance(leaf, SkillLeaf):
                 attach("skills", leaf, "initialise", "update", "terminate")

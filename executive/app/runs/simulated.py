@@ -29,12 +29,10 @@ from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from plant.snapshot_file import SnapshotError
 from plant.worlds.world import World, WorldError
-from skills.detection import Detector
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from skills.manipulation.arm.solid_cells import wall_columns
 from skills.navigate.lattice import search
-from skills.perception.object_model import ModelDetector, models_of, read_model
 from skills.robot import Clock, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 
@@ -224,17 +222,10 @@ def run_entry(
         robot=robot,
         localiser=localiser,
         costmap=stack.costmap.build(keepout_map),
-        detector=_detector(stack, world),
+        detector=shared_detector(stack, world),
         stack=stack,
         walls=wall_columns(scan_maps, tree.surfaces),
     )
-
-
-def _detector(stack: RobotStack, world: World) -> Detector:
-    """Returns the detector of a stack, with the models of the world's own objects. Raises InputError."""
-    networks = shared_detector(stack)
-    models = [read_model(each.folder) for each in world.own_objects.values()]
-    return ModelDetector(networks, [*models_of(networks).values(), *models]) if models else networks
 
 
 class Bystanders(RunVisitor):

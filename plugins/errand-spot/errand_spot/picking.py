@@ -17,6 +17,7 @@ from executive.run.worker import LockStepWorker
 from skills.api import (
     Cause,
     Detection,
+    Detector,
     Failed,
     LocalisationEstimate,
     ObjectKind,
@@ -103,7 +104,7 @@ class _OpenFloor:
         """Does nothing."""
 
 
-class _KnowsNoClass:
+class _KnowsNoClass(Detector):
     """Detector that knows no class: the object is found by its place alone."""
 
     class_names: tuple[str, ...] = ()

@@ -8,14 +8,14 @@ no doubt.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Final, Protocol, runtime_checkable
+from dataclasses import dataclass, field
+from typing import Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.detection import Detection, box_overlap
+from skills.detection import Detection, Detections, DetectorWrapper, box_overlap
 from skills.perception.detector.boxes import PADDING, Candidates, Letterbox, check_picture, detections_from
 from skills.perception.detector.onnx_detector import OnnxDetector
 from skills.robot import Picture
@@ -65,25 +65,6 @@ VIEWS: Final = (View(), View(mirrored=True), View(scale=0.7), View(True, 0.5), V
 """The detector always uses the first view, and the others where the first leaves doubts."""
 
 
-@runtime_checkable
-class DetectsInViews(Protocol):
-    """A detector with test-time augmentation."""
-
-    def detect_in_views(self, picture: Picture, least_score: float | None = None) -> tuple[Detection, ...]:
-        """Detects the objects in a picture, best first, from the usual threshold or from `least_score` on.
-
-        Raises ValueError for anything but a picture.
-        """
-
-
-@runtime_checkable
-class DetectsClass(Protocol):
-    """A detector with a quick search for one class."""
-
-    def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[tuple[Detection, ...]]:
-        """Detects the objects of a class in each picture, best first. Raises ValueError for anything but pictures."""
-
-
 @dataclass(frozen=True)
 class AugmentationOptions:
     """The views; the first one is enough when no score, of alternatives either, lies between `low` and `high`."""
@@ -93,43 +74,26 @@ class AugmentationOptions:
     high: float = 0.7
 
 
-@dataclass(frozen=True)
-class AugmentedDetector:
+class AugmentedDetector(DetectorWrapper):
     """Detector that uses one view, or several in `detect_in_views`."""
 
-    detector: OnnxDetector
-    options: AugmentationOptions = field(default_factory=AugmentationOptions)
+    def __init__(self, networks: OnnxDetector, options: AugmentationOptions | None = None) -> None:
+        super().__init__(networks)
+        self._networks, self._options = networks, options or AugmentationOptions()
 
-    @property
-    def class_names(self) -> tuple[str, ...]:
-        """Classes of the networks."""
-        return self.detector.class_names
-
-    def detect(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
-        """Detects the objects in one view of each picture."""
-        return self.detector.detect(pictures)
-
-    def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[tuple[Detection, ...]]:
-        """Detects the objects of one class in one view of each picture, quickly."""
-        return self.detector.detect_class(pictures, class_name)
-
-    def detect_in_views(self, picture: Picture, least_score: float | None = None) -> tuple[Detection, ...]:
+    def detect_in_views(self, picture: Picture, least_score: float | None = None) -> Detections:
         """Fuses the detections of the views, from the threshold or from `least_score` on.
 
         Raises ValueError for anything but a picture.
         """
         check_picture(picture)
-        options = self.detector.options
+        options, views = self._networks.options, self._options.views
         threshold = options.threshold if least_score is None else least_score
-        sensitive = OnnxDetector(
-            self.detector.model, replace(options, threshold=_LEAST_SCORE, alternative_threshold=_LEAST_SCORE)
-        )
-        views = self.options.views
-        found = sensitive.detect([views[0].apply(picture)])
+        found = self._networks.detect([views[0].apply(picture)], _LEAST_SCORE)
         if not self._in_doubt(found[0]):
             views = views[:1]
         else:
-            found += sensitive.detect([view.apply(picture) for view in views[1:]])
+            found += self._networks.detect([view.apply(picture) for view in views[1:]], _LEAST_SCORE)
         fused = _fused(views, found, picture.shape, self.class_names)
         return detections_from(
             fused.from_score(min(threshold, options.alternative_threshold)),
@@ -141,7 +105,7 @@ class AugmentedDetector:
     def _in_doubt(self, found: Sequence[Detection]) -> bool:
         """Returns whether the first view leaves doubts."""
         scores = [score for one in found for score in (one.score, *(score for _, score in one.alternatives))]
-        return any(self.options.low < score < self.options.high for score in scores)
+        return any(self._options.low < score < self._options.high for score in scores)
 
 
 def _fused(

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final, Protocol, runtime_checkable
+from typing import Final
 
 import cv2
 import numpy as np
 
-from skills.api import Detection, Detector
-from skills.perception.detector.augmentation import DetectsClass, DetectsInViews
+from skills.detection import Detection, Detections, Detector
 from skills.robot import Image, Picture
 
 LEAST_ROLL_DEG: Final = 120.0
@@ -24,34 +23,16 @@ _DARK_MEAN, _DARK_SPREAD = 6.0, 4.0
 _DIM_MEAN, _BRIGHT_MEAN, _MOST_GAIN = 70.0, 100.0, 8.0
 _DOWN_IS_UP = -float(np.cos(np.radians(LEAST_ROLL_DEG)))
 
-Detections = tuple[Detection, ...]
-
-
-@runtime_checkable
-class DetectsWithDepth(Protocol):
-    """Detector that uses a whole image: its depth and its camera's pose, too."""
-
-    def detect_with_depth(self, image: Image, least_score: float | None = None) -> Detections:
-        """Detects the objects in an image, from `least_score` on, if given."""
-
 
 def detect_in_image(detector: Detector, image: Image, least_score: float | None = None) -> Detections:
     """Detects the objects in an image, in several views if the detector can; then from `least_score` on, if given."""
-    if isinstance(detector, DetectsWithDepth):
-        return detector.detect_with_depth(image, least_score)
     picture = _prepared(image, image.grey if image.colour is None else image.colour)
-    if isinstance(detector, DetectsInViews):
-        return _as_taken(image, detector.detect_in_views(picture, least_score))
-    return _as_taken(image, detector.detect([picture])[0])
+    return detector.detect_with_depth(image, _as_taken(image, detector.detect_in_views(picture, least_score)))
 
 
 def detect_class_in_grey(detector: Detector, images: Sequence[Image], class_name: str) -> list[Detections]:
-    """Detects the objects of one class in each grey image, by a quick search if the detector has one."""
-    pictures = [_prepared(image, image.grey) for image in images]
-    if isinstance(detector, DetectsClass):
-        found = detector.detect_class(pictures, class_name)
-    else:
-        found = [tuple(one for one in ones if one.class_name == class_name) for ones in detector.detect(pictures)]
+    """Detects the objects of one class in each grey image."""
+    found = detector.detect_class([_prepared(image, image.grey) for image in images], class_name)
     return [_as_taken(image, ones) for image, ones in zip(images, found, strict=True)]
 
 

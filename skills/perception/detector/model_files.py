@@ -51,12 +51,8 @@ Inputs = Mapping[str, tuple[str, tuple[int, ...]]]
 Outputs = Mapping[str, tuple[str, int]]
 
 
-class ModelFileError(ValueError):
-    """A model file cannot be used; `message` says why, `hint` what to do."""
-
-    def __init__(self, file: Path, message: str, *, hint: str) -> None:
-        self.file, self.message, self.hint = file, message, hint
-        super().__init__(f"{file}: {message}; {hint}")
+class ModelFileError(InputError):
+    """A model file cannot be used."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +159,7 @@ def load_model(file: Path = MODEL_FILE, *, networks: int = 3) -> DetectorModel:
 def _check_belongs(found: Network, file: Path, key: str, before: Network, source: Path, kind: NetworkKind) -> None:
     """Raises ModelFileError unless the metadata of a network hold the digest of the one `before` it."""
     if found.metadata.get(key) != before.digest or found.class_names != before.class_names:
-        raise ModelFileError(file, f"it belongs to another network than {source.name}", hint=kind.hint)
+        raise ModelFileError(f"it belongs to another network than {source.name}", hint=kind.hint, file=file)
 
 
 def load_network(file: Path, kind: NetworkKind) -> Network:
@@ -198,7 +194,7 @@ class _Reader:
 
     def error(self, message: str) -> ModelFileError:
         """Returns an error of this file."""
-        return ModelFileError(self.file, message, hint=self.kind.hint)
+        return ModelFileError(message, hint=self.kind.hint, file=self.file)
 
     def content(self) -> bytes:
         """Reads the file and checks its seal."""

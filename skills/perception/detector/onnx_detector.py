@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.detection import Detection
+from skills.detection import Detections, Detector
 from skills.perception.detector.boxes import (
     Floats,
     Letterbox,
@@ -81,7 +81,7 @@ class DetectorOptions:
 
 
 @dataclass(frozen=True)
-class OnnxDetector:
+class OnnxDetector(Detector):
     """Detector of loaded networks. Several threads may use it at once."""
 
     model: DetectorModel
@@ -92,14 +92,16 @@ class OnnxDetector:
         """Classes of the networks."""
         return self.model.class_names
 
-    def detect(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
+    def detect(self, pictures: Sequence[Picture], least_score: float | None = None) -> list[Detections]:
         """Detects the objects in each picture, best first; boxes are in the picture's own pixels.
 
-        Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. Raises ValueError for anything else.
+        Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. `least_score` replaces the threshold. Raises
+        ValueError for anything else.
         """
-        return _in_parallel(self._detect, pictures)
+        threshold = self.options.threshold if least_score is None else least_score
+        return _in_parallel(partial(self._detect, threshold=threshold), pictures)
 
-    def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[tuple[Detection, ...]]:
+    def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[Detections]:
         """Detects the objects of one class in each picture, quickly.
 
         The later networks see only the proposals that may be of the class. Raises ValueError for anything but
@@ -109,18 +111,18 @@ class OnnxDetector:
             raise ValueError(f"the detector knows no class {class_name!r}")
         return _in_parallel(partial(self._detect_class, number=self.class_names.index(class_name)), pictures)
 
-    def _detect(self, picture: Picture) -> tuple[Detection, ...]:
+    def _detect(self, picture: Picture, threshold: float) -> Detections:
         image, placed = letterbox(picture)
-        return self._judge(image, placed, *self._propose(image))
+        return self._judge(image, placed, *self._propose(image), threshold)
 
-    def _detect_class(self, picture: Picture, number: int) -> tuple[Detection, ...]:
+    def _detect_class(self, picture: Picture, number: int) -> Detections:
         image, placed = letterbox(picture)
         boxes, scores = self._propose(image)
         rows = _proposal_rows(boxes, scores, self.options.proposals)
         likely = rows[scores[rows, number] >= self.options.quick_score]
         if not len(likely):
             return ()
-        found = self._judge(image, placed, boxes[likely], scores[likely])
+        found = self._judge(image, placed, boxes[likely], scores[likely], self.options.threshold)
         return tuple(one for one in found if one.class_name == self.class_names[number])
 
     def _propose(self, image: Picture) -> tuple[Floats, Floats]:
@@ -128,7 +130,7 @@ class OnnxDetector:
         boxes, scores = self.model.proposal.session.run(["boxes", "scores"], {"images": image[None]})
         return boxes[0], scores[0]
 
-    def _judge(self, image: Picture, placed: Letterbox, boxes: Floats, scores: Floats) -> tuple[Detection, ...]:
+    def _judge(self, image: Picture, placed: Letterbox, boxes: Floats, scores: Floats, threshold: float) -> Detections:
         """Runs the later stages on proposals, boxes (A, 4) and scores (A, K), of a letterbox."""
         model, scales, options = self.model, Scales(image, halve(image)), self.options
         if model.refinement is not None:
@@ -139,10 +141,10 @@ class OnnxDetector:
             boxes[rows], scores[rows] = refine(
                 model.classifier.session, scales, boxes[rows], scores[rows], options.reclassified
             )
-        least = min(options.threshold, options.alternative_threshold)
+        least = min(threshold, options.alternative_threshold)
         found = select_candidates(boxes, scores, least, options.suppression.most_candidates)
         in_picture = replace(found, boxes=placed.to_picture(found.boxes))
-        return detections_from(in_picture, self.class_names, options.threshold, options.suppression)
+        return detections_from(in_picture, self.class_names, threshold, options.suppression)
 
 
 def load_detector(file: Path = MODEL_FILE, options: DetectorOptions | None = None) -> OnnxDetector:
@@ -150,9 +152,7 @@ def load_detector(file: Path = MODEL_FILE, options: DetectorOptions | None = Non
     return OnnxDetector(load_model(file), options or DetectorOptions())
 
 
-def _in_parallel(
-    detect: Callable[[Picture], tuple[Detection, ...]], pictures: Sequence[Picture]
-) -> list[tuple[Detection, ...]]:
+def _in_parallel(detect: Callable[[Picture], Detections], pictures: Sequence[Picture]) -> list[Detections]:
     if len(pictures) < 2:
         return [detect(picture) for picture in pictures]
     with ThreadPoolExecutor(THREADS) as threads:

@@ -34,7 +34,12 @@ def test_a_detectors_pictures_are_counted_by_method():
     grey = np.zeros((4, 4), np.uint8)
     assert (counted.class_names, counted.detect([grey, grey])) == (("cup",), [(), ()])
     assert dict(work.totals()) == {"detect_pictures": 2}
-    assert not hasattr(counted, "detect_with_augmentation")
+    assert (counted.detect_class([grey, grey, grey], "cup"), counted.detect_in_views(grey)) == ([(), (), ()], ())
+    assert dict(work.totals()) == {
+        "detect_class_pictures": 3,
+        "detect_in_views_pictures": 1,
+        "detect_pictures": 2,
+    }
 
 
 def test_a_second_counts_once_for_the_innermost_call():

@@ -6,7 +6,7 @@ from table_scene import BLUE, COKE, GREEN, RED, TABLE, Can
 
 from skills.api import Cause, Succeeded
 from skills.detect.skill import Detect, DetectInputs
-from skills.perception.object_model import ModelDetector
+from skills.perception.model_matching import ModelDetector
 
 TIN = Can(1.1, 0.2, 0.04, 0.12, GREEN)
 MODELS = [can_model("tin", 0.04, 0.12, GREEN), can_model("pot", 0.05, 0.08, RED)]

@@ -1,4 +1,4 @@
-"""Recognition of own objects in analytic scenes."""
+"""Recognition of own objects in analytic scenes, and the detector that has their models."""
 
 from dataclasses import replace
 
@@ -8,11 +8,13 @@ from own_models import can_model, photographed_can
 from pydrake.math import RigidTransform
 from table_scene import BLUE, RED, TABLE, Can, scene
 
+from executive.record.work import CountedDetector, Work
 from skills.api import LocalisationEstimate
 from skills.perception.class_forms import ANY_OBJECT
-from skills.perception.model_matching import identified, likeness
+from skills.perception.model_matching import ModelDetector, identified, likeness, with_models
 from skills.perception.object_model import view_of
 from skills.perception.surface_segmentation import loose_clusters, segment_surface
+from skills.testing.estimators import PlainColours
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
 TIN = Can(1.0, -0.1, 0.04, 0.12, RED)
@@ -110,3 +112,20 @@ def test_a_view_keeps_the_proportions_and_the_middle():
 )
 def test_one_difference_is_enough_to_be_unlike(other):
     assert likeness(other, drawn()[None]) < 0.35
+
+
+def test_detector_with_models_detects_as_its_networks_do():
+    networks = PlainColours()
+    detector = CountedDetector(ModelDetector(networks, [MODEL]), Work())
+    assert list(detector.models) == ["tin"]
+    assert detector.class_names == networks.class_names
+    picture = np.zeros((40, 60, 3), np.uint8)
+    assert detector.detect([picture]) == networks.detect([picture])
+    assert networks.models == {}
+
+
+def test_models_of_two_makers_add_up(tmp_path):
+    can_model("pot", 0.05, 0.08, (20, 160, 30)).write(tmp_path)
+    assert list(with_models(ModelDetector(PlainColours(), [MODEL]), [tmp_path]).models) == ["tin", "pot"]
+    networks = PlainColours()
+    assert with_models(networks, []) is networks

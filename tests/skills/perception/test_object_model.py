@@ -1,13 +1,11 @@
-"""Models of own objects in files, and the detector that has them."""
+"""Models of own objects in files."""
 
 import numpy as np
 import pytest
 from own_models import can_model, photographed_can
 
-from executive.record.work import CountedDetector, Work
 from skills.inputs.errors import InputError
-from skills.perception.object_model import RECOGNITION_FILE, ModelDetector, models_of, read_model
-from skills.testing.estimators import PlainColours
+from skills.perception.object_model import RECOGNITION_FILE, read_model
 
 MODEL = can_model("tin", 0.04, 0.12, (190, 15, 20))
 
@@ -55,13 +53,3 @@ def test_a_model_with_too_few_colours_or_views_of_another_size_is_refused(tmp_pa
     rewritten(tmp_path, **changes)
     with pytest.raises(InputError, match="damaged"):
         read_model(tmp_path)
-
-
-def test_detector_with_models_detects_as_its_networks_do():
-    networks = PlainColours()
-    detector = CountedDetector(ModelDetector(networks, [MODEL]), Work())
-    assert list(models_of(detector)) == ["tin"]
-    assert detector.class_names == networks.class_names
-    picture = np.zeros((40, 60, 3), np.uint8)
-    assert detector.detect([picture]) == networks.detect([picture])
-    assert models_of(networks) == {}

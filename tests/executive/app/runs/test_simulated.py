@@ -17,7 +17,7 @@ from plant.worlds.world import load_world
 from skills.api import Question
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
-from skills.perception.object_model import Cascade
+from skills.perception.detector import Cascade
 from skills.robot import Pose2D
 from skills.stack import default_stack
 

@@ -56,7 +56,7 @@ def newly_compiled() -> int:
 
 
 def kernel_steps() -> Sequence[Callable[[], None]]:
-    """Functions that each run some numeric code for a short time: drives, an arm, a survey, and those of plug-ins.
+    """Functions that run numeric code for a short time: drives, an arm, a survey, and those of plug-ins.
 
     All together take some seconds if the cache holds their code already. A step of a plug-in raises InputError if it
     fails.
@@ -124,7 +124,7 @@ def _map_cells() -> None:
 
 
 def _survey() -> None:
-    """Begins a map, and localises in it and, by scan matching, in the map of a world."""
+    """Begins a map and localises in it; then localises in a world's map by scan matching."""
     from executive.app.runs.simulated import simulate
     from skills.estimate.grid_map import load_grid_map
     from skills.estimate.matching import score_poses

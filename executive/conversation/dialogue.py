@@ -47,14 +47,14 @@ from skills.api import ObjectKind
 from skills.inputs.errors import InputError
 
 REMEMBERED_S: Final = 60.0
-"""Time (robot's clock) for which the last request is remembered, and a question waits for its answer."""
+"""Time (robot's clock) after which the robot forgets the last request and its own open question."""
 
 
 @dataclass(frozen=True)
 class _Spoken:
     """Request: its commands, its memory, its time (s), and the name of its mission.
 
-    `steps` is the whole mission, where the request decides, repeats, waits or the like.
+    `steps` is the whole mission if the request has conditions, loops, waits or other control flow.
     """
 
     commands: tuple[Command, ...]
@@ -252,7 +252,7 @@ class Conversation(RunVisitor):
         return self._begin(changed, when, now_s)
 
     def _named(self, follow_up: FollowUp, now_s: float) -> Amendment | Understanding:
-        """Grounds the few words of a follow-up as in a whole sentence; an Understanding says why that failed."""
+        """Grounds a short follow-up like a whole sentence; returns an Understanding with the reason if that fails."""
         if follow_up.said.lower() in _COUNTS:
             return Amendment(count=_COUNTS[follow_up.said.lower()])
         said = follow_up.said if re.match(_DETERMINED, follow_up.said, re.IGNORECASE) else f"the {follow_up.said}"

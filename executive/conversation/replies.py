@@ -33,7 +33,7 @@ class Speech:
     """Understanding of sentences for one robot.
 
     `understand` takes a sentence without wake phrase and the memory of earlier ones; `compile` makes a mission of
-    steps, with a name that is none of the given ones, and raises InputError.
+    steps, with a name that differs from the given ones, and raises InputError.
     """
 
     knowledge: Knowledge
@@ -97,7 +97,7 @@ _HELD: Final = frozenset({Mode.PAUSED, Mode.STOPPED, Mode.LEASE_LOST})
 class RemarkAnswers:
     """Handler of remarks: stops, pauses, resumes or cancels the robot, and describes its place and work.
 
-    Of several robots, only the one that is addressed. `progress` is the latest of the run.
+    A remark concerns the addressed robot. `progress` is the latest of the run.
     """
 
     def __init__(self, speech: Speech, control: Control) -> None:
@@ -188,7 +188,7 @@ def place_in_words(pose: Pose2D | None, knowledge: Knowledge) -> str:
 
 
 def doing_in_words(progress: Progress | None, state: ControlState, robot_name: str) -> str:
-    """Mission and step of the robot, and why it stands still if it does, in words."""
+    """Mission and step of the robot in words, with the reason if it stands still."""
     if state.mode is Mode.ENDED:
         return "I have nothing to do; the mission is over"
     tree = None if progress is None else progress.trees.get(robot_name)

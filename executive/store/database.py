@@ -1,4 +1,4 @@
-"""SQLite files that Errand writes; every failure to use one becomes one error with a hint."""
+"""SQLite files of Errand; each failure to use one becomes one error with a hint."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ BUSY_S: Final = 2.0
 class FileKind:
     """Kind of a database file: its tables, its identity among databases, and the texts of its errors.
 
-    `name` is its name in messages, `option` the option that names another file. The others are parts of messages:
-    `absent` names the command that writes such a file, `lost` the data that is lost with it, `older` the action for a
-    file of another version, `claimed` the work of the process that has claimed it. `go_on` says how to continue after
-    the disk was full; "{path}" in it stands for the file.
+    `name` is its name in messages, `option` the option for another file. The others are parts of messages: `absent`
+    names the command that writes the file, `lost` the data in it, `older` the action for a file of another version,
+    `claimed` the work of the process that has claimed it. `go_on` says how to continue after the disk was full;
+    "{path}" in it stands for the file.
     """
 
     name: str

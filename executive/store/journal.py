@@ -35,13 +35,13 @@ last_charge = coalesce(:last, last_charge), ended = NULL WHERE id = :id
 class StoreJournal(RunVisitor):
     """Journal of one robot's mission, from tick to tick.
 
-    While another program holds the store, notes wait for a later tick, and the robot works on. `troubles` lists the
-    notes that could not be written. `keep_world` is called before each write, since the stored state of a simulated
-    world must not be older than the journal.
+    While another program locks the store, notes wait for a later tick, and the robot works on. `troubles` lists the
+    notes that could not be written. The journal calls `keep_world` before each write, since the stored state of a
+    simulated world must not be older than the journal.
     """
 
     def __init__(self, connection: sqlite3.Connection, mission: int, robot: str | None, *, main: str) -> None:
-        """`robot` is the one of several robots whose part is stored (None: all); the battery of `main` is noted."""
+        """`robot` names the robot to store among several (None: all); the journal notes the battery of `main`."""
         self._connection, self._mission, self._robot, self._main = connection, mission, robot, main
         self._board: Mapping[str, Any] = {}
         self._written: dict[str, Any] = {}

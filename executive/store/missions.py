@@ -53,9 +53,8 @@ class MissionState(enum.Enum):
 class StoredMission:
     """Mission in the store. `starts` counts its starts; `clock_s` is the time (robot's clock) of the last note.
 
-    `poses` has each robot's last pose (world frame), `instead` the corrected requests of some of several robots, both
-    by the robot's name. `standing` is the number of the standing mission of which it is a copy, `why` the occurrence of
-    the trigger.
+    `poses` has each robot's last pose (world frame), `instead` the corrected requests, both by the robot's name. A copy
+    of a standing mission has its number in `standing`, and the occurrence of the trigger in `why`.
     """
 
     id: int
@@ -181,11 +180,11 @@ class GivenMission:
 
     `robot` is the present or last robot; the mission was passed to another `reassigned` times. The first `done` of its
     commands are done and are not repeated; `blocked` is the reason why the mission cannot restart from its present
-    command. `last_known` is where its robot last knew the object to be. `referee` is the verdict at the end, as JSON
+    command. `last_known` is the place at which its robot last knew the object. `referee` is the final verdict, as JSON
     values.
 
-    A mission that no robot could do alone is split into missions that are `part_of` it; a part that `follows` another
-    begins when that one is done.
+    A mission that no robot could do alone is split into parts, which are `part_of` it; a part begins when the part that
+    it `follows` is done.
     """
 
     robot: str | None = None
@@ -216,11 +215,11 @@ class GivenMissions:
         self._put(mission, replace(known, robot=robot, reassigned=known.reassigned + again, blocked=None))
 
     def progress(self, mission: int, done: int, blocked: str | None) -> None:
-        """Notes how many commands are done, and why the present one cannot be restarted (None: it can)."""
+        """Notes the number of finished commands, and why the present one cannot be restarted (None: it can)."""
         self._put(mission, replace(self._of(mission), done=done, blocked=blocked))
 
     def hand_back(self, mission: int, last_known: LastKnown | None = None) -> None:
-        """Returns the mission, so that it waits for another robot, with what is newly known of its object."""
+        """Returns the mission to the queue for another robot, with the latest known place of its object."""
         known = self._of(mission)
         self._put(mission, replace(known, blocked=None, last_known=last_known or known.last_known))
 

@@ -43,8 +43,8 @@ class Memory:
 class Recollection:
     """Results of skills before the restart, each to be used once.
 
-    A skill with a result returns it instead of repeating its work. Once a skill works itself, the results of skills
-    after it in the tree are dropped, since the new run may differ from there on.
+    A skill with a stored result returns it instead of working. Once a skill works, the results of later skills in the
+    tree are dropped, since the new run may differ from there on.
     """
 
     def __init__(self, order: Sequence[str], steps: Mapping[str, StepRecord]) -> None:
@@ -97,7 +97,7 @@ class Recollection:
         self._checkpoints.pop(path_id, None)
 
     def must_check_first(self, changes_world: bool) -> bool:
-        """Returns whether a skill that begins must first check what is done already.
+        """Returns whether a skill must check at its start for work done before the restart.
 
         That holds until a skill that changes the world has begun, since the journal may miss the last actions.
         """

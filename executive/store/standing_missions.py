@@ -12,16 +12,16 @@ from executive.store.triggers import Every, Missed, OnBatteryFull, Once, Schedul
 from skills.inputs.errors import InputError
 
 LATE: Final = timedelta(seconds=90)
-"""An occurrence that is noticed later than this is missed: the clock was set forward, or the machine slept."""
+"""Latest handling of an occurrence; later ones are missed, as after the clock was set or the machine slept."""
 SET_BACK: Final = timedelta(hours=1)
-"""A clock that is set back by less repeats no occurrence; one that is set back by more does."""
+"""Largest step back of the clock that repeats no occurrence."""
 MOST_WAITING: Final = 100
 _ENDED: Final = "SELECT request, lowest_charge, last_charge, ended FROM mission WHERE ended AND last_charge IS NOT NULL"
 
 
 @dataclass(frozen=True)
 class StandingMission:
-    """Mission that is queued whenever its trigger fires.
+    """Mission that is queued each time its trigger fires.
 
     `anchor` is the time at which it was given, `since` the time up to which its occurrences were handled, both aware.
     """
@@ -76,8 +76,8 @@ class StandingMissions:
     def fire_due(self, *, waiting_since: datetime, serving_since: datetime) -> tuple[StoredMission, ...]:
         """Queues the missions that came due since the last call, by their policies; returns the queued missions.
 
-        Occurrences from before `waiting_since`, when a mission still ran, are missed; so are batteries that became full
-        before `serving_since`. One transaction queues the mission and marks its occurrence as handled.
+        A trigger that fires while a mission runs (before `waiting_since`) is not queued, nor is a full battery before
+        `serving_since`. One transaction queues the mission and marks its occurrence as handled.
         """
         now, numbers = self._store.now(), list[int]()
         ended = self._store.rows(_ENDED)
@@ -116,7 +116,7 @@ class StandingMissions:
         return max((at for at in times if at <= now), default=None)
 
     def _handle(self, each: StandingMission, now: datetime, why: str | None) -> list[int]:
-        """Marks all occurrences up to now as handled, and queues a mission where there is a reason `why`."""
+        """Marks all occurrences up to now as handled, and queues a mission if there is a reason `why`."""
         with self._store.writing() as connection:
             values = (now.isoformat(), each.id)
             still_there = connection.execute("UPDATE mission SET since = ? WHERE id = ?", values).rowcount
@@ -132,7 +132,7 @@ class StandingMissions:
 
 
 class TooManyError(InputError):
-    """Error of a standing mission of which too many copies wait already."""
+    """Error of a standing mission with too many waiting copies."""
 
 
 def _queue(connection: sqlite3.Connection, standing: int, request: Request, why: str) -> int:

@@ -25,9 +25,9 @@ class TriggerSource(Protocol):
     def start(self, topics: Sequence[str], fire: Fire) -> None:
         """Begins to listen, and returns within 10 s; from then on calls `fire` for each message.
 
-        `start` and `stop` are called in a thread of their own, and have 10 s each. `fire` may be called from any
-        thread. When it returns, the mission is in the store, or the reason why not was printed; it raises nothing. With
-        a payload of values it takes a second or more.
+        A separate thread calls `start` and `stop`, which have 10 s each. Any thread may call `fire`. It queues the
+        mission or prints the reason why it cannot, and raises nothing. With a payload of values it takes a second or
+        more.
         """
 
     def stop(self) -> None:

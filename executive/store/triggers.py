@@ -4,9 +4,9 @@
     2026-12-01 09:00                       every 30m
     battery full        battery 80%        call patrol        topic mqtt:home/door
 
-Times of day are local wall time. On the day on which clocks go forward, a skipped time comes as long after midnight as
-on any other day: 02:30 comes when clocks show 03:30. On the day on which they go back, a time that clocks show twice
-comes once, the first time. A period counts elapsed time, whatever clocks show.
+Times of day are local wall time. When clocks go forward, a trigger at a skipped time fires at its usual distance from
+midnight: 02:30 fires when clocks show 03:30. When clocks go back, a trigger at a repeated time fires once, at the first
+one. A period counts elapsed time, unaffected by changes of the clock.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from skills.quantities import seconds_in
 
 FULL: Final = 0.95
 NOISE: Final = 0.01
-"""Charge below the level by more than this counts as lower; less may be noise of a falling charge."""
+"""Difference by which a charge must lie below the level to count as lower; less may be noise."""
 LONGEST: Final = timedelta(days=366)
 _WEEK: Final = 7
 _LONGEST_SKIP: Final = timedelta(hours=3)
@@ -125,7 +125,7 @@ class Every:
 
     def after(self, moment: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
         """Returns the first occurrence after a moment."""
-        start = anchor.astimezone(UTC)  # between two times of one zone, Python counts what clocks show
+        start = anchor.astimezone(UTC)  # between two times of one zone, Python subtracts wall times
         return start + max(1, (moment.astimezone(UTC) - start) // self.period + 1) * self.period
 
     def latest(self, now: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
@@ -137,7 +137,7 @@ class Every:
 
 @dataclass(frozen=True)
 class OnBatteryFull:
-    """Trigger at the end of a mission with this charge (0 to 1) or more, which was lower before by more than NOISE."""
+    """Trigger at the end of a mission whose charge (0 to 1) rose to this level from below it by more than NOISE."""
 
     level: float = FULL
 

@@ -1,7 +1,7 @@
-"""Named pipe beside the store that wakes a process that waits for work; any process may write to it.
+"""Named pipe beside the store that wakes the process that waits for work; any process may write to it.
 
-A wake-up says only that the store, or something in the waiting process, has changed. Threads, signal handlers and other
-processes write in the same way. A wake-up while nobody waits ends the next wait; several count as one.
+A wake-up says only that the store or the state of the waiting process has changed. Threads, signal handlers and other
+processes write in the same way. A wake-up while no process waits ends the next wait; several count as one.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from executive.store.missions import MissionStore
 from skills.inputs.errors import InputError
 
 LONGEST_WAIT: Final = timedelta(minutes=1)
-"""Limit of a wait (elapsed time), since the wall clock may be set meanwhile, or the machine may sleep."""
+"""Longest wait (elapsed time); it is limited because the wall clock may change and the machine may sleep."""
 _MOST_WAKES: Final = 4096
 
 

@@ -161,7 +161,7 @@ def _run_in(folder: Path, spec: RunSpec, checked: bool) -> Case:
 
 
 def _request(spec: RunSpec, folder: Path) -> Request:
-    """Returns the request with the file texts of the evaluation's start; copies them if the files have changed."""
+    """Returns the request with its files as the evaluation began; copies the files if they have changed since."""
     request = spec.request
     if all(_has_text(Path(path), text) for path, text in spec.files.items()):
         return request

@@ -58,7 +58,7 @@ def load_evaluation(path: Path) -> Evaluation:
 
 
 def evaluation_at_seeds(asked: Request, seeds: Sequence[int], *, each_fault: bool) -> Evaluation:
-    """Builds the runs of a request at many seeds; with `each_fault` without faults, then with each fault or scenario.
+    """Builds the runs of a request at many seeds; `each_fault` tries it without faults, then with each one alone.
 
     Raises InputError if there is no fault to try.
     """
@@ -75,7 +75,7 @@ def evaluation_at_seeds(asked: Request, seeds: Sequence[int], *, each_fault: boo
 
 
 def _conditions(asked: Request, *, each_fault: bool) -> Sequence[tuple[str, Request]]:
-    """Returns the request under each condition by name: as it is, or without faults and then with each alone.
+    """Returns the request under each condition by name: unchanged, or without faults and then with each alone.
 
     Raises InputError if there is no fault to try.
     """

@@ -26,8 +26,8 @@ _COUNTERS_OF_THE_MACHINE: Final = ("bytes_logged",)
 class RunSpec:
     """Specification of a run: its request, the name of its `mission`, and the varied values by dimension.
 
-    `files` has the texts of the request's files and of the files that they use, by path, so that a machine without
-    them can run it. A run with a `folder` writes all its files there; without one only a failed run writes files.
+    `files` maps the path of each file of the request to its text, used files included, so that any machine can run it.
+    A run with a `folder` writes all its files there; without one only a failed run writes files.
     """
 
     request: Request
@@ -155,7 +155,7 @@ class Case:
 
 
 class Cases(tuple[Case, ...]):
-    """Results of an evaluation, which show themselves in a notebook as a table."""
+    """Results of an evaluation; a notebook displays them as a table."""
 
     def _repr_html_(self) -> str:
         cells = ((each.run.request.seed, each.asked, each.label, each.why) for each in self)
@@ -217,7 +217,7 @@ class ResultsFile(Database):
     kind = RESULTS_FILE
 
     def begin(self, evaluation: Evaluation, *, code: str) -> None:
-        """Stores the runs of an evaluation and the version of the code, or checks that the file holds the same.
+        """Stores the runs of an evaluation and the code's version, or checks that the file holds the same.
 
         Raises InputError if it holds the results of other runs, or of another version of Errand.
         """
@@ -254,7 +254,7 @@ class ResultsFile(Database):
         return frozenset(run_id for (run_id,) in self.rows("SELECT id FROM result"))
 
     def add(self, case: Case) -> bool:
-        """Stores a result in one transaction; returns False if the run has a result already, which stays.
+        """Stores a result in one transaction; returns False and keeps the old result if the run has one.
 
         Raises InputError if it cannot be written.
         """

@@ -215,7 +215,7 @@ def comparisons_of(here: Sequence[Case], there: Sequence[Case]) -> Sequence[Comp
 
 
 def mcnemar(only_first: int, only_second: int) -> float:
-    """Exact two-sided p of McNemar's test, from the pairs of which only one run succeeded; 1 without such pairs."""
+    """Exact two-sided p of McNemar's test, from the pairs with one success; 1 without such pairs."""
     discordant = only_first + only_second
     return 1.0 if discordant == 0 else float(binomtest(only_first, discordant, 0.5).pvalue)
 

@@ -45,7 +45,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class WorkResult(Generic[Item, Result]):
-    """Item and its result; `result` is None and `lost` says why if each worker with the item has died."""
+    """Item and its result; if each worker with the item died, `result` is None and `lost` is the reason."""
 
     item: Item
     result: Result | None
@@ -64,7 +64,7 @@ class LocalWorkers:
     def map_items(
         self, function: Callable[[Item], Result], items: Sequence[Item]
     ) -> Iterator[WorkResult[Item, Result]]:
-        """Applies the function to each item; yields each result as it ends, and raises what the function raises.
+        """Applies the function to each item and yields each result as it ends; errors of the function pass through.
 
         Closing the iterator ends the processes.
         """

@@ -9,8 +9,8 @@ class Bid:
     """Bid of one robot for one mission.
 
     The robot is free in `ready_s` (s from now), then takes `duration_s`, and has `charge` (0 to 1) left at the end.
-    `problems` are sentences that say why the robot cannot do the mission; a bid with problems never wins. With
-    `charges` the robot charges first; `duration_s` includes this time.
+    `problems` are reasons why the robot cannot do the mission; a bid with problems never wins. With `charges` the robot
+    charges first; `duration_s` includes this time.
     """
 
     mission: int
@@ -89,8 +89,8 @@ class Auction:
     def assign(self, bid: BidOf) -> Round:
         """Runs one round of the auction; busy robots bid as well.
 
-        A mission waits for the next round if it goes to a busy robot or to one that charges first, or if it needs a
-        place where another robot works. Without any robot nothing is refused.
+        A mission waits for the next round if the winner is busy or charges first, or if another robot works at a place
+        that it needs. A round without robots refuses no mission.
         """
         free = [robot for robot in self.robots if robot not in self.under_way and robot not in self.resting]
         taken = self._taken if free else frozenset[str]()
@@ -133,7 +133,7 @@ class Auction:
         self._after = {each: before for each, before in self._after.items() if before != mission}
 
     def drop(self, mission: int) -> Sequence[int]:
-        """Removes the missions that wait for this one, which was not done; returns their numbers."""
+        """Removes the missions that wait for this one, which has failed; returns their numbers."""
         dropped = [each for each, before in self._after.items() if before == mission]
         self.waiting = [each for each in self.waiting if each not in dropped]
         return [*dropped, *(later for each in dropped for later in self.drop(each))]

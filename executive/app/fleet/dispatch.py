@@ -1,4 +1,4 @@
-"""Assigns queued missions to the robots of a fleet by an auction; stores who does each, and how it ended."""
+"""Assigns queued missions to the robots of a fleet by an auction; stores each mission's robot and outcome."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -42,7 +42,7 @@ from skills.inputs.errors import listing
 from skills.robot import Pose2D
 
 LEFT_M: Final = 1.5
-"""Distance from a hand-over table at which a robot has made space for the next one."""
+"""Distance from a hand-over table beyond which a robot leaves space for the next one."""
 
 
 def silence(line: str) -> None:
@@ -219,7 +219,7 @@ class Dispatch(Assigner):
     def _try_another(self, name: str, end: MissionEnd) -> bool:
         """Offers a failed mission to the other robots, once; returns whether one of them can do it.
 
-        The robot's gripper must be empty, and it must not have let anything go.
+        The robot's gripper must be empty, and it must not have released an object.
         """
         number, robot = self._auction.under_way[name], self._robots[name]
         mission, known = self.missions[number], self._robots[name].last_known
@@ -249,7 +249,7 @@ class Dispatch(Assigner):
         self._to_dock.append(name)
 
     def _update_robot(self, robot: FleetRobot, end: MissionEnd) -> str | None:
-        """Updates a robot's state at the end of a mission; returns why it can work no more (None: it can)."""
+        """Updates a robot's state at the end of a mission; returns why it must stop working (None: it need not)."""
         robot.free_at_s = self._now_s
         if end.seen is None:
             return end.gone
@@ -266,7 +266,7 @@ class Dispatch(Assigner):
         return "it does not know where it is" if lost or end.seen.pose is None else None
 
     def close(self) -> None:
-        """Fails the missions that were handed back and that no robot took; the others stay in the queue."""
+        """Fails the returned missions that no other robot took; the others stay in the queue."""
         assigned = self._given.all()
         for number in self._auction.waiting if self._stopped is None else ():
             given = assigned.get(number)

@@ -48,7 +48,7 @@ NOT_GIVEN: Final = GivenMission()
 
 @dataclass(frozen=True)
 class FleetMission:
-    """Mission of the queue, prepared for each robot that may do it: `options` hold the commands that are left.
+    """Queued mission, prepared for each robot that may do it: `options` hold the remaining commands.
 
     It began at `since_s` (s on the robots' clock; None: not yet). `shares` are the parts that other robots did;
     `tried` maps a robot that failed to the reason. The store holds the rest of its state
@@ -70,7 +70,7 @@ def fleet_mission(
     robots: Mapping[str, PlacedRobot],
     given: GivenMission = NOT_GIVEN,
 ) -> FleetMission:
-    """Prepares what is left of a mission of the store for these robots, by how it was given to them before.
+    """Prepares the unfinished part of a stored mission for the robots; its earlier assignment says what is done.
 
     Raises InputError with the mission's number if none of them can do it.
     """
@@ -113,7 +113,7 @@ def _options(
 
 
 def rest_of(prepared: Prepared, done: int, last_known: LastKnown | None) -> Prepared:
-    """Returns a mission of plain commands without the first `done`; the object is searched first where it was known."""
+    """Returns a mission of plain commands without the first `done`; its search begins at the object's known place."""
     if not done and (last_known is None or not is_plain(prepared.tree)):
         return prepared
     return with_commands(replace(prepared, last_known=last_known), prepared.tree.commands[done:])
@@ -138,7 +138,7 @@ def with_commands(prepared: Prepared, commands: Sequence[Command]) -> Prepared:
 
 
 def _patient(knowledge: Knowledge) -> Knowledge:
-    """Lowers the charge at which a robot interrupts its own mission: in a fleet another robot takes it over before."""
+    """Lowers the charge at which a robot interrupts its own mission, because another robot takes it over earlier."""
     battery = knowledge.battery.model_copy(update={"low": URGENT * knowledge.battery.low})
     return knowledge.model_copy(update={"battery": battery})
 
@@ -207,7 +207,7 @@ def _out_of_reach(prepared: Prepared, pose: Pose2D, planner: RoutePlanner) -> It
 
 
 def is_reachable(planner: RoutePlanner, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> bool:
-    """Returns whether a route that minds the zones leads from one pose to another."""
+    """Returns whether a route within the zones leads from one pose to another."""
     try:
         planner.route(start, goal, zones)
     except ValueError:
@@ -219,8 +219,8 @@ def is_reachable(planner: RoutePlanner, start: Pose2D, goal: Pose2D, zones: tupl
 class MissionProgress:
     """Progress of a mission.
 
-    The first `done` commands need not be done again. After them, `begun` says that a skill that changes the world has
-    run or is running, and `put` that such a skill releases an object.
+    The first `done` commands are finished. After them, `begun` is True once a skill that changes the world has begun,
+    and `put` once such a skill releases an object.
     """
 
     done: int
@@ -268,7 +268,7 @@ def _changing(node: NodeSpec, over: set[str]) -> list[NodeSpec]:
 
 
 class ProgressJournal:
-    """Follows the progress of a mission and reports each change of it; `last_known` is where its object is."""
+    """Follows a mission's progress and reports each change; `last_known` is the place of its object."""
 
     def __init__(self, tree: CompiledTree, tell: Callable[[MissionProgress], None]) -> None:
         self._tree, self._tell = tree, tell
@@ -313,7 +313,7 @@ class FleetRobot:
     faults: tuple[str, ...] = ()
 
     def ready_s(self, now_s: float, *, busy: bool) -> float:
-        """Time until it is free (s); a robot that is late is expected to be as late again."""
+        """Time until it is free (s); a robot that is already late is assumed to take as long again."""
         left_s = self.free_at_s - now_s
         return abs(left_s) if busy else max(0.0, left_s)
 
@@ -374,7 +374,7 @@ class Offers:
         return self._robots[name].ready_s(self._now(), busy=busy)
 
     def takes_from(self, name: str, table: SurfaceFacts) -> bool:
-        """Returns whether a robot that has bid before reaches an object that another robot puts on a table.
+        """Returns whether an earlier bidder reaches an object that another robot puts on a table.
 
         The other robot puts the object down at the spot nearest to the table's first viewpoint.
         """
@@ -403,7 +403,7 @@ class EndedMission:
 
 
 def missions_json(store: MissionStore, numbers: Sequence[int]) -> list[dict[str, Any]]:
-    """Returns missions, their parts and the missions that they are part of, with robot and outcome, as JSON values."""
+    """Returns missions with their parts and parents, robots and outcomes, as JSON values."""
     given = GivenMissions(store).all()
     missions = {mission.id: mission for mission in store.missions()}
     wanted = {*numbers, *(whole for number in numbers if (whole := given.get(number, GivenMission()).part_of))}

@@ -57,8 +57,8 @@ def run_fleet(
 ) -> None:
     """Runs until no mission can be assigned any more; writes log, recording and report into the folder `out`.
 
-    `page` shows the run, `live` sends what is logged, and `ended` is called as each mission ends. The log begins with
-    the map of the `first` mission. Raises InputError.
+    `page` shows the run, `live` sends the log's messages, and `ended` is called as each mission ends. The log begins
+    with the map of the `first` mission. Raises InputError.
     """
     backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
     watching = () if ended is None else (_EndedMissions(dispatch.store, (*dispatch.missions,), ended),)
@@ -101,7 +101,7 @@ class _EndedMissions(RunVisitor):
     count: int = 0
 
     def mission_ended(self, end: MissionEnd) -> None:
-        """Counts them; the dispatch, which comes before, has stored the end of the robot's mission."""
+        """Counts the missions; the dispatch has stored the end of the robot's mission before."""
         states = [self.store.mission(number).state.value for number in self.numbers]
         for _ in range(self.count, over := sum(state not in _OPEN for state in states)):
             self.ended()
@@ -121,7 +121,7 @@ def simulated_fleet(
 ) -> Dispatch:
     """Builds a fleet in the plant of a world.
 
-    A mission that cannot be prepared for these robots in this world stays in the queue, with the reason as its message.
+    A mission that these robots cannot do in this world stays in the queue, with the reason as its message.
 
     Args:
         store: the missions and their state.

@@ -52,7 +52,7 @@ class Checked:
 
 
 def prepare_checked(request: Request, *, ask: Answerer | None = None, anyway: bool = False) -> Prepared:
-    """Prepares a request; unless `anyway`, raises InputError with all that `errand check` finds."""
+    """Prepares a request; unless `anyway`, raises InputError with all errors of `errand check`."""
     prepared = prepare(request, ask=ask)
     if not anyway:
         refuse_impossible(prepared)

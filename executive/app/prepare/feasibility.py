@@ -29,8 +29,8 @@ from skills.stack import DEFAULT_FILE, default_component
 class _RoutesOnMap(RoutePlanner):
     """Planner of routes on the robot's map of a world, for the robot's footprint.
 
-    It reads the map at the first route. The costmap and the planner of the robot's stack plan; of the default stack
-    only these two are loaded, and the controller where there are zones.
+    It reads the map at the first route. It loads only the costmap and the planner of the robot's stack, and in a world
+    with zones the controller.
     """
 
     def __init__(self, world: World, robot: PlacedRobot) -> None:
@@ -75,7 +75,7 @@ def route_planner_of(world: World, robot: PlacedRobot, *, cached: bool = True) -
 
 
 def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> Checked:
-    """Checks a prepared request: errors, warnings, and an estimate. `planner` may hold routes that are planned already.
+    """Returns errors, warnings and an estimate of a prepared request. `planner` may hold routes from before.
 
     Raises:
         InputError: the world's map or the request's stack file cannot be used.
@@ -155,8 +155,8 @@ def abilities_of(kind: str) -> Abilities:
 def reached_heights_m(capabilities: Capabilities) -> tuple[float, float]:
     """Lowest and highest surface that the arm reaches, in metres above the floor.
 
-    Counts the arm's length, the range of body heights, and the nearest standing distance. Unlimited without an arm
-    that can be planned for.
+    It depends on the arm's length, the range of body heights, and the nearest standing distance. Unlimited without a
+    plannable arm.
     """
     try:
         model, arm = arm_model(capabilities), capabilities.arm
@@ -188,7 +188,7 @@ class RouteCache(RoutePlanner):
         return {}
 
     def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
-        """Returns a route, planned if the file lacks it; a mask's file may change, so that its routes are planned.
+        """Returns a stored route, or plans it; worlds with masks plan every route, because a mask's file may change.
 
         Raises ValueError with one sentence if there is none.
         """
@@ -215,7 +215,7 @@ class RouteCache(RoutePlanner):
 
 
 def route_cache_of(world: World, planned: RoutePlanner, *robot_files: Path) -> RouteCache:
-    """Returns the route cache of a world; its file name changes with the maps, the planner and the robot's files."""
+    """Returns the route cache of a world; its file name depends on the maps, the planner and the robot's files."""
     planner = (DEFAULT_FILE, *_SKILLS.glob("navigate/*.py"), *_SKILLS.glob("estimate/*.py"), *_SKILLS.glob("*.py"))
     files, content = (*world.keepout_map_path.parent.glob("*"), *planner, *robot_files), hashlib.sha256()
     for file in sorted(path for path in files if path.is_file()):

@@ -48,7 +48,7 @@ def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
 
     Args:
         request: the request.
-        ask: answers the questions that a sentence leaves open, if the request's policy allows it; None: nobody.
+        ask: answers questions about an ambiguous sentence, if the request's policy allows it; None: nobody.
 
     Raises:
         InputError: the mission file, the world or its knowledge is broken, a sentence is not understood, the robots do
@@ -73,7 +73,7 @@ def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
 
 
 def prepare_alone(request: Request) -> Prepared:
-    """Understands and compiles a request for one robot, whatever robots it names. Raises InputError."""
+    """Understands and compiles a request for one robot; ignores the robots that it names. Raises InputError."""
     request, loaded, world, knowledge = _open(replace(request, robots=()))
     return _for_only_robot(_at_start(request, world, knowledge, None), loaded)
 
@@ -82,7 +82,7 @@ def prepare_alone(request: Request) -> Prepared:
 class Setting:
     """Request with its world, knowledge and robots (empty: the world's only robot).
 
-    `ask` answers the questions that a sentence leaves open; None: nobody does.
+    `ask` answers questions about an ambiguous sentence; None: nobody does.
     """
 
     request: Request
@@ -249,7 +249,7 @@ def _for_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
 
 
 def _for_called_robots(setting: Setting) -> Prepared:
-    """Prepares the missions of the robots that a sentence calls, or that commands are for. Raises InputError."""
+    """Prepares the missions of the robots that the sentence or its commands address. Raises InputError."""
     request, robots = setting.request, setting.robots
     if request.sentence is None:
         name = find_robot(request.robot, robots) or next(iter(robots))
@@ -270,7 +270,7 @@ def _for_called_robots(setting: Setting) -> Prepared:
 
 
 def _part_for_each(part: Part, setting: Setting) -> Iterator[Part]:
-    """Yields the part for each robot that it addresses. Raises InputError if any robot may do it and none can."""
+    """Yields each addressed robot's part. Raises InputError if none can do a part for any robot."""
     from executive.language.addressees import RobotChoice
 
     if part.robot is RobotChoice.ALL:
@@ -336,7 +336,7 @@ def _in_parts(setting: Setting, loaded: Mission, parts: Mapping[str, MissionPart
 
 
 def _robot_in(loaded: Mission, at: KeyPath, said: str, robots: Collection[str]) -> str:
-    """Returns the robot that a file names. Raises InputError if it is none of `robots`."""
+    """Returns the robot that a file names. Raises InputError if `robots` lacks it."""
     name = find_robot(said, robots)
     if name is None:
         what = "has no part to wait for" if at[-1] == "after" else "is no robot of this run"

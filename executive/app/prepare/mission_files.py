@@ -39,7 +39,7 @@ def mission_file(named: Path) -> Path:
     """Returns the file itself if it exists, else the shipped mission of that name.
 
     Raises:
-        InputError: a name without a folder that is neither.
+        InputError: neither exists, and the name has no folder.
     """
     if is_there(named) or named.parent not in (Path(), Path(FOLDER.name)):
         return named

@@ -1,4 +1,4 @@
-"""The robots of a run with their starts and docks, which the user gives or which are found on the map."""
+"""The robots of a run with their starts and docks, given by the user or found on the map."""
 
 from __future__ import annotations
 

@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Prepared:
-    """Request that is understood and compiled, with its mission, world and knowledge.
+    """Compiled request with its mission, world and knowledge.
 
     `meant` is the meaning of its sentence, if it has one. `robots` are all robots of the run by their names.
 
     In a run with several robots, `others` are the missions of the other robots. This mission begins when the missions
-    of the robots `after` have ended; the speaker stands at `speaker_W` (None: beside this robot). `last_known` is where
-    another robot last knew the object of the mission to be.
+    of the robots `after` have ended; the speaker stands at `speaker_W` (None: beside this robot). `last_known` is the
+    place of the mission's object, as another robot last knew it.
     """
 
     request: Request

@@ -105,7 +105,7 @@ def _wall_m(grid: GridMap, middle_W: FloatArray, along: FloatArray, width_m: flo
 
 
 def _occupied(grid: GridMap, points_W: FloatArray) -> Any:
-    """Returns for each point (N, 2) whether its cell is occupied; outside the grid it is."""
+    """Returns a mask of the points (N, 2) in occupied cells; cells outside the grid count as occupied."""
     rows, columns = grid.cells(points_W).T
     inside = (rows >= 0) & (rows < grid.occupied.shape[0]) & (columns >= 0) & (columns < grid.occupied.shape[1])
     return ~inside | grid.occupied[np.where(inside, rows, 0), np.where(inside, columns, 0)]
@@ -185,7 +185,7 @@ class ScenarioFile(_Strict):
 
 
 def _check_fault(words: str, cameras: tuple[str, ...], refusal: Callable[[str, str], InputError]) -> None:
-    """Raises the InputError that `refusal` makes of a sentence and a hint if there is no such fault."""
+    """Raises the InputError of `refusal`, from a sentence and a hint, if there is no such fault."""
     try:
         parse_fault(words, cameras=cameras)
     except ValueError as error:
@@ -203,8 +203,8 @@ def read_scenario(
 ) -> Scenario:
     """Reads a scenario file for a world; resolves its places to points.
 
-    `cameras` are the robot's cameras, `objects` maps the world's objects to their classes, and `people` maps its people
-    to whether they walk already.
+    `cameras` are the robot's cameras, `objects` maps the world's objects to their classes, and `people` maps each
+    person to True if the person walks already.
 
     Raises:
         InputError: a key is wrong, or a fault, place, door, object or person is unknown; with the line.

@@ -38,7 +38,7 @@ _EMPTY: Final = 225
 """Grey of the places in a grid of pictures that no picture fills."""
 _MOMENTS: Final[Mapping[str, str]] = MappingProxyType({"hand-over": "hand_over", "place": "place"})
 _AHEAD_M: Final[Mapping[str, float]] = MappingProxyType({"hand_over": 0.4})
-"""Distance of a picture's subject ahead of the hand, which is retracted by then."""
+"""Distance of a picture's subject ahead of the retracted hand."""
 
 
 @dataclass
@@ -136,7 +136,7 @@ def file_name(what: str, robot_name: str, robots: Sequence[str]) -> str:
 def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robots: Sequence[str], folder: Path) -> Sequence[Path]:
     """Writes the pictures of a recorded run into `folder` as PNG; returns their paths.
 
-    Leaves out what happened before a restart, because this process did not record it.
+    Leaves out events before a restart, because this process did not record them.
     """
     pictures = {"map": _map(simulation, robots, newest_zones(artifacts.trees))}
     begun_s = simulation.recorder.frame_at(0.0).time_s if simulation.recorder is not None else 0.0

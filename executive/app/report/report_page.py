@@ -211,7 +211,7 @@ def step_rows(
 def _decorated(node: NodeView, parts: frozenset[str]) -> NodeView | None:
     """Returns a decorator's child: its only child, or its only child with parts of the mission.
 
-    None for a part itself, and for a node with several such children.
+    None for a part itself and for a node with several children of this kind.
     """
     below = () if node.path_id in parts else _steps(node)
     if len(below) > 1 and node.behaviour.control != "Sequence":

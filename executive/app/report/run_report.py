@@ -112,7 +112,7 @@ class Ending:
     def verdicts(self, *, name: str | None = None, counts: bool = False) -> Iterator[Verdict]:
         """Yields the tree's claim, with the robot's `name` if given, and the referee's verdict, perhaps with counts.
 
-        Without a referee it says so.
+        A run without a referee has a verdict that says so.
         """
         cause = f" ({self.cause})" if self.cause else ""
         who = "The tree claims" if name is None else f"{name}'s tree claims"
@@ -137,8 +137,7 @@ class RunReport(Ending):
 
     Times are in seconds. `log` is the path of the event log, and `work` has the work counters by name. `answers` and
     `said` are in the order of time, `seen_objects` are the confirmed objects, and `scenario` lists the faults and
-    events of the run's scenario. `notes` say how a real robot sensed. `zones` are the rules of the zones that the
-    missions minded.
+    events of the run's scenario. `notes` describe a real robot's sensing. `zones` are the rules of the zones in force.
     """
 
     world: str
@@ -207,7 +206,7 @@ class RunReport(Ending):
 
 
 _LONG_TEXT: Final = 100
-"""Characters of a reason that still stand on the line of its verdict."""
+"""Longest reason that fits on the line of its verdict, in characters."""
 _SENTENCE_END: Final = re.compile(r"(?<=[.!?;]) (?=\S)")
 NOT_JUDGED: Final = RefereeReport(None, "there is no referee", 0, 0)
 VERDICTS: Final[Mapping[bool | None, str]] = {True: "fulfilled", False: "not fulfilled", None: "not judged"}

@@ -52,7 +52,7 @@ class Scene(Protocol):
         """Address of the picture."""
 
     def publish(self) -> None:
-        """Refreshes it now. Browsers draw a texture only with the first refresh after it has arrived."""
+        """Refreshes it now. A browser draws a texture at the first refresh after the texture has arrived."""
 
     def refresh_seldom(self) -> None:
         """Refreshes it less often."""
@@ -97,7 +97,7 @@ class Backend(Protocol):
     def judge(
         self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
     ) -> RefereeReport | None:
-        """Returns the referee's report on a mission since `since_s`, with the shares that others did `before`.
+        """Returns the referee's report on a mission since `since_s`, with the other robots' shares `before` it.
 
         None if there is no referee.
         """

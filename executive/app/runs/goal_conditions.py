@@ -19,7 +19,7 @@ _MOVING = frozenset({GoalKind.GRASPED, GoalKind.PLACED, GoalKind.HANDED_OVER, Go
 
 @dataclass(frozen=True)
 class Share:
-    """Share of a mission that another robot did, before or beside this one.
+    """Share of a mission that another robot did, before this robot or at the same time.
 
     The first `done` parts of its tree are judged with the mission; objects that it moved count as moved by the mission.
     """
@@ -52,8 +52,8 @@ def verdict_of(
 ) -> RefereeReport:
     """Returns the verdict on an ended tree; `judge` is the referee, which judges goal conditions.
 
-    A run without success has not fulfilled its mission, whatever holds. A run with success is judged by its goal
-    conditions, answers and speech; the verdict names the steps that leave nothing to judge. The shares of other robots
+    A failed run has not fulfilled its mission, even if its goal conditions hold. A successful run is judged by its goal
+    conditions, answers and speech; the verdict names the steps that cannot be judged. The shares of other robots
     `before` belong to the mission; events before `since_s` (simulated time) do not.
     """
     conditions = conditions_of(tree, result, before=before)

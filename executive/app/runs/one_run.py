@@ -73,9 +73,9 @@ def run_request(
     """Runs a prepared request and writes log, tree, report and pictures into its folder.
 
     The `backend` is by default the plant of the request's world. `visitors` and the log watch the run, `control`
-    pauses, steps and cancels it, `page` shows it, and `live` sends what is logged. `durable` stores its state so that
-    another process can resume it, or resumes an earlier run. `profile` measures the time of the subsystems. The
-    `worker` runs jobs beside the ticks (None: in lock-step with the backend's clock).
+    pauses, steps and cancels it, `page` shows it, and `live` sends the log's messages. `durable` stores its state for
+    another process to resume, or resumes an earlier run. `profile` measures the time of the subsystems. The `worker`
+    runs jobs in parallel to the ticks (None: in lock-step with the backend's clock).
 
     Raises InputError if the world or the stored state cannot be used.
     """
@@ -107,7 +107,7 @@ def run_request(
             result = run(
                 entries, clock=clock, worker=at, visitors=watching, settings=settings, control=control, spare=spare
             )
-        if durable is not None:  # the next mission of the queue begins in the world that this one leaves
+        if durable is not None:  # the next mission of the queue begins in this one's world
             next(iter(durable.journals.values())).keep_world()
             for trouble in durable.troubles:
                 error = {"node": prepared.tree.robot_name, "what": "keep the mission's state", "traceback": trouble}
@@ -269,7 +269,7 @@ def preload(entry: RunEntry) -> None:
     there = Pose2D(here.x_m, here.y_m, here.yaw_rad + 0.5)
     with suppress(PlanningError):
         plan_path(costmap, Footprint.of(robot.capabilities()), here, there)
-    # objects that live as long as the run are excluded from garbage collection; garbage of an earlier run goes first
+    # garbage of an earlier run is collected; then the run's long-lived objects are excluded from collection
     if gc.get_freeze_count():
         gc.unfreeze()
         gc.collect()
@@ -350,8 +350,8 @@ _LIBRARY: Final = ctypes.CDLL(None)
 def return_memory() -> None:
     """Returns freed memory to the system.
 
-    Otherwise a worker would grow by some hundred megabytes with each mission, because the C library keeps freed memory
-    in small pieces. Does nothing if the C library has no `malloc_trim`.
+    The C library keeps freed memory in small pieces; a worker would grow by some hundred megabytes with each mission.
+    Does nothing if the C library has no `malloc_trim`.
     """
     gc.collect()
     with suppress(AttributeError):

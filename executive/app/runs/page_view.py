@@ -107,7 +107,7 @@ class PageView(RunVisitor):
             self.close()
 
     def _refresh(self) -> None:
-        """Refreshes the scene of the ended run, so that a page opened late shows its textures and follows."""
+        """Refreshes the scene of the ended run, for the textures of pages that are opened late."""
         if self._scene is not None:
             self._scene.publish()
 
@@ -120,7 +120,7 @@ class PageView(RunVisitor):
 
 
 def sentence_action(do: Callable[[str, str | None], str]) -> Action:
-    """Returns a page action that calls `do` with the typed sentence and the robot that it is for."""
+    """Returns a page action that calls `do` with the typed sentence and its robot."""
 
     def say(values: Mapping[str, Any]) -> str:
         sentence = text_of(values, "text")

@@ -61,9 +61,9 @@ class Screen(Protocol):
 
 @dataclass(frozen=True)
 class MissionResult:
-    """Result of a mission of the store. A mission that was set aside has no report.
+    """Result of a stored mission. A mission that was set aside has no report.
 
-    `past` has a line for each part that was restored when an interrupted mission was resumed.
+    `past` has a line for each restored part of a resumed mission.
     """
 
     mission: int
@@ -138,7 +138,7 @@ def next_queued(missions: MissionStore) -> StoredMission | None:
 class MissionRuns:
     """Runner of a store's missions, which stores their beginning and their end.
 
-    A mission of a queue begins in the world that the mission before it left, and has a folder of its own.
+    A mission of a queue begins in the world of the mission before it, and has a folder of its own.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class MissionRuns:
     def run(self, mission: StoredMission, prepared: Prepared | None = None) -> MissionResult:
         """Runs a mission from its beginning, or resumes an interrupted or cancelled one, to its end.
 
-        Sets aside a mission of a queue that cannot be run. `prepared` is the mission if it is prepared already.
+        Sets aside a queued mission that cannot be run. `prepared` is the mission if it is prepared already.
 
         Raises:
             StoreError: the store cannot be used, or the disk is full, so that no mission can be run.

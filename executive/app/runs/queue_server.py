@@ -36,7 +36,7 @@ LIMIT_S: Final = 10.0
 _SEE: Final = "see the documentation of that package"
 _HOST: Final = re.compile(r"[A-Za-z0-9.:%_-]{1,253}")
 MOST_STARTS: Final = 3
-"""Starts after which an interrupted mission is set aside, because it may be what ends the process."""
+"""Starts after which an interrupted mission is set aside, because it may crash the process."""
 
 
 class Waiting(Protocol):

@@ -1,4 +1,4 @@
-"""Runs missions with a real robot, which the backend of a plug-in connects. It has no referee."""
+"""Runs missions with a real robot through the backend of a plug-in, without a referee."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _ADDRESS: Final = re.compile(r"(?P<scheme>[a-z][a-z0-9+.-]*)://(?P<place>[^?\s]+
 class RealBackend:
     """Backend with one connected robot in the map of a world.
 
-    `start` is where the robot stands by what the user says; without it it localises on the whole map.
+    `start` is the robot's pose as the user gives it; without it the robot localises on the whole map.
     """
 
     connected: ConnectedRobot
@@ -106,7 +106,7 @@ class RealBackend:
 
 @contextmanager
 def real_runner(prepared: Prepared, address: str) -> Iterator[Callable[..., FinishedRun]]:
-    """Connects to the robot at an address, and yields a function that runs a mission with it, as `run_request` does.
+    """Connects to the robot at an address, and yields a function like `run_request` that runs a mission with it.
 
     The robot localises around the request's start, or without one on the whole map. A signal before the robot is ready
     raises KeyboardInterrupt. Raises InputError if the address names no robot, or the robot is not ready.
@@ -145,5 +145,5 @@ def real_runner(prepared: Prepared, address: str) -> Iterator[Callable[..., Fini
 
 
 def _what(error: StackError) -> str:
-    """Returns what is wrong with an option of an address, with its name."""
+    """Returns the error of an address's option, with its name."""
     return f"{error.path[0]}: {error.message}" if error.path else error.message

@@ -117,7 +117,7 @@ class SimulatedBackend:
         return self._pipeline.events
 
     def visitors(self, control: Control) -> Sequence[RunVisitor]:
-        """Returns the people of the plant, who hear the robots and answer them."""
+        """Returns the people of the plant; they hear the robots and answer."""
         return (Bystanders(self._simulation, self._pipeline, control),)
 
     notes: Sequence[str] = ()
@@ -204,7 +204,7 @@ def run_entry(
 ) -> RunEntry:
     """Returns a robot with the components of its stack and the maps of a world.
 
-    The robot localises around `start`: `surely` there, or in a wide circle; without a start on the whole map.
+    The robot localises at `start` if `surely`, else in a wide circle around it; without a start on the whole map.
 
     Raises:
         InputError: the world's maps or the detector's model cannot be read.
@@ -238,7 +238,7 @@ class Bystanders(RunVisitor):
         self._told = len(pipeline.words)
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Lets the people near a robot hear what it says."""
+        """Passes a robot's speech to the people near it."""
         if topic == SPEECH and not self._simulation.engine.walkers.still:
             self._pipeline.settle()
             self._simulation.engine.walkers.hear(str(message["robot"]))
@@ -254,7 +254,7 @@ class Bystanders(RunVisitor):
             self._hear(each, progress.now_s)
 
     def _hear(self, each: OpenQuestion, now_s: float) -> None:
-        """Notes who hears a new question; later passes on their answer, if it is one."""
+        """Notes the people who hear a new question; later passes on their answer."""
         key, question = (each.id, each.question.text, each.until_s), each.question
         if key not in self._heard:
             self._pipeline.settle()

@@ -5,7 +5,10 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
+from executive.testing.bench import SkillBench
 from skills.detection import Detection, Detector, DetectorWrapper, with_defaults
+from skills.testing.clock import VirtualClock
+from skills.testing.robot import ScriptedRobot
 
 CUP, MUG = Detection("cup", 0.9, (0.0, 0.0, 4.0, 4.0)), Detection("mug", 0.8, (4.0, 0.0, 8.0, 8.0))
 PICTURE = np.zeros((8, 8), np.uint8)
@@ -32,6 +35,12 @@ def test_a_detector_needs_only_its_classes_and_detect(detector):
     assert detector.detect_in_views(PICTURE, 0.1) == (CUP, MUG)
     assert detector.detect_with_depth(None, (CUP,)) == (CUP,)
     assert detector.models == {}
+
+
+def test_a_bench_takes_a_detector_that_has_only_detect():
+    clock = VirtualClock()
+    bench = SkillBench(ScriptedRobot(clock), clock, detector=Plain())
+    assert bench.context().detector.detect_class([PICTURE], "mug") == [(MUG,)]
 
 
 def test_a_detector_that_has_all_methods_stays_itself():

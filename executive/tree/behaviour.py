@@ -129,6 +129,8 @@ class ExplainedNode(_TakesKeywords, Explained):
     """Its message is shown without a cause, too."""
     logged: ClassVar[bool] = False
     """Its end is a line on the screen."""
+    usual: ClassVar[slice] = slice(None)
+    """The children that run without failures."""
     path_id: str
     name: str
     hook: Hook = field(default_factory=Hook)
@@ -151,6 +153,16 @@ class ExplainedNode(_TakesKeywords, Explained):
     def signs(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
         """Returns the blackboard keys that show where an object is, and the `executive.tree.board.Sign` of each."""
         return {}
+
+    @classmethod
+    def usual_children(cls, node: Any) -> Any:
+        """Returns the children of a node's spec that run one after the other without failures."""
+        return node.children[cls.usual]
+
+    @classmethod
+    def estimate(cls, node: Any, walk: Any, first: bool) -> Any:
+        """Estimates a node's spec on a walk (`executive.tree.estimate`); with `first`, raises its first error."""
+        return walk.all_of(node, first)
 
     def restore(self, status: Status, cause: Cause | None, message: str) -> None:
         """Restores the status, cause and message from before a restart."""

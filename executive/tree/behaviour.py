@@ -47,7 +47,7 @@ class Explained:
 
 
 class Hook:
-    """What a run adds to its nodes, by path id: they ask it when they are ticked, and report to it when they stop.
+    """Hook of a run on its nodes, by path id: they ask it when they are ticked, and report to it when they stop.
 
     A node at one of the `breakpoints` waits in the tick that would begin it, once; the next tick lets it pass. After a
     restart, `restored` has the states that nodes take in their first tick, `applied` the first answers of conditions

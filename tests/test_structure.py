@@ -15,7 +15,7 @@ LINES = {
     "executive/language": 8250,
     "executive/speech": 1582,
     "executive/mission": 1577,
-    "executive/tree": 8542,
+    "executive/tree": 8576,
     "executive/run": 3200,
     "executive/record": 1404,
     "executive/store": 1630,

@@ -47,7 +47,7 @@ class Explained:
 
 
 class Hook:
-    """What a run adds to its nodes, by path id: they ask it when they are ticked, and report to it when they stop.
+    """Hook of a run on its nodes, by path id: they ask it when they are ticked, and report to it when they stop.
 
     A node at one of the `breakpoints` waits in the tick that would begin it, once; the next tick lets it pass. After a
     restart, `restored` has the states that nodes take in their first tick, `applied` the first answers of conditions
@@ -129,6 +129,8 @@ class ExplainedNode(_TakesKeywords, Explained):
     """Its message is shown without a cause, too."""
     logged: ClassVar[bool] = False
     """Its end is a line on the screen."""
+    usual: ClassVar[slice] = slice(None)
+    """The children that run without failures."""
     path_id: str
     name: str
     hook: Hook = field(default_factory=Hook)
@@ -151,6 +153,16 @@ class ExplainedNode(_TakesKeywords, Explained):
     def signs(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
         """Returns the blackboard keys that show where an object is, and the `executive.tree.board.Sign` of each."""
         return {}
+
+    @classmethod
+    def usual_children(cls, node: Any) -> Any:
+        """Returns the children of a node's spec that run one after the other without failures."""
+        return node.children[cls.usual]
+
+    @classmethod
+    def estimate(cls, node: Any, walk: Any, first: bool) -> Any:
+        """Estimates a node's spec on a walk (`executive.tree.estimate`); with `first`, raises its first error."""
+        return walk.all_of(node, first)
 
     def restore(self, status: Status, cause: Cause | None, message: str) -> None:
         """Restores the status, cause and message from before a restart."""

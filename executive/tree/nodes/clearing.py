@@ -55,6 +55,8 @@ class ForEachFound(MemoryComposite):
     """
 
     kind = "for each found"
+    usually_found: ClassVar[int] = 3
+    """Assumed number of objects, since their true number is unknown before the run."""
     output_types: ClassVar = {"done": Seen, "missed": Seen}
     key: str
     done: str
@@ -68,6 +70,11 @@ class ForEachFound(MemoryComposite):
     forgets: tuple[str, ...] = ()
     _failures: int = field(default=0, init=False)
     _why: str = field(default="", init=False)
+
+    @classmethod
+    def usual_children(cls, node: NodeSpec) -> tuple[NodeSpec, ...]:
+        """Returns the children for each of several objects."""
+        return node.children * cls.usually_found
 
     def _tick(self) -> Iterator[Behaviour]:
         """Looks again in each round; until then the results of the round before stay visible."""

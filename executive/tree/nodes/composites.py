@@ -15,6 +15,7 @@ from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import MemoryComposite, applies, cause_of, failed_for_good, message_of
 from executive.tree.board import Board
+from executive.tree.estimate import Estimate, Walk
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import decide_plan
 from executive.tree.nodes.policies import FINAL_CAUSES
@@ -68,6 +69,16 @@ class MemorySelector(MemoryComposite):
     exhausted_message: str = ""
     one_goal: bool = False
 
+    @classmethod
+    def usual_children(cls, node: NodeSpec) -> tuple[NodeSpec, ...]:
+        """Returns the branches for an unknown object."""
+        return tuple(child for child in node.children if child.options.get("known_as") is None)
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates the first possible branch."""
+        return walk.first_of(node)
+
     def _passes_over(self, child: Behaviour) -> bool:
         if self.one_goal and child.status != Status.RUNNING and any(map(failed_for_good, self.children)):
             return True
@@ -106,6 +117,11 @@ class MemoryRound(MemorySelector):
     container = False
     goes_on_after = (Status.SUCCESS, Status.FAILURE, Status.INVALID)
 
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates all possible branches."""
+        return walk.all_that_can(node)
+
     def _take_over(self, child: Behaviour) -> None:
         done = [one for one in self.children if one.status == Status.SUCCESS]
         if child.status == Status.RUNNING or not done:
@@ -134,6 +150,19 @@ class Choose(MemoryComposite):
     branches: Mapping[Value, int]
     key: str
     board: Board
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates the decision, then the range from the shortest branch to the longest; a single one may not run."""
+        decides, *branches = node.children
+        begun, here = walk.follow(decides, first=first), walk.mark()
+        taken = [] if len(branches) > 1 else [(Estimate(), here)]
+        taken += walk.each_from_here(branches, first)
+        shortest, _ = min(taken, key=lambda each: each[0].duration_s)
+        longest, end = max(taken, key=lambda each: each[0].duration_s)
+        walk.go_to(end)
+        most_s, why = max(each.most_s for each, _ in taken), (node.name, *longest.reasons)
+        return begun + (shortest if most_s == shortest.most_s else shortest.up_to(most_s, *why))
 
     def _following(self, child: Behaviour) -> int | None:
         decided = self._index == 0 and child.status == Status.SUCCESS
@@ -164,6 +193,11 @@ class Try(MemoryComposite):
     """
 
     kind = "try"
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates the first possible branch."""
+        return walk.first_of(node)
 
     def _following(self, child: Behaviour) -> int | None:
         failed = child.status == Status.FAILURE and cause_of(child) not in FINAL_CAUSES
@@ -201,6 +235,25 @@ class Together(MemoryComposite):
     needed: int
     _failed: list[Behaviour] = field(default_factory=list, init=False)
     _done: list[Behaviour] = field(default_factory=list, init=False)
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates parallel branches, which stop when as many as are needed are done.
+
+        The walk continues where the branch with the longest drive ends.
+        """
+        branches = walk.each_from_here(node.children, first)
+        ends_s = sorted(taken.duration_s for taken, _ in branches)[node.options["needed"] - 1]
+        shares = [min(1.0, ends_s / taken.duration_s) if taken.duration_s else 1.0 for taken, _ in branches]
+        distance_m = sum(share * taken.distance_m for share, (taken, _) in zip(shares, branches, strict=True))
+        charge = sum(share * taken.charge for share, (taken, _) in zip(shares, branches, strict=True))
+        walk.go_to(max(branches, key=lambda each: each[0].distance_m)[1])
+        reasons = tuple(dict.fromkeys(reason for taken, _ in branches for reason in taken.reasons))
+        most_s, needed = max(taken.most_s for taken, _ in branches), node.options["needed"]
+        if needed < len(branches) and most_s > ends_s:
+            done = "the first" if needed == 1 else f"the first {needed}"
+            reasons = (f"until {done} of {len(branches)} steps is done", *reasons)
+        return Estimate(ends_s, distance_m, charge).up_to(most_s, *reasons)
 
     def _tick(self) -> Iterator[Behaviour]:
         """Ticks the children that have not ended."""

@@ -9,6 +9,7 @@ from py_trees.common import Status
 from executive.tree.assembly import PYTHON_TYPES, Assembler, Flow, StepPlans
 from executive.tree.behaviour import ExplainedDecorator, cause_of, message_of
 from executive.tree.context import RunContext
+from executive.tree.estimate import Estimate, Walk
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import MustHold, MustNotBegin, instant_decision
 from executive.tree.nodes.interrupts import HANDLING
@@ -78,6 +79,15 @@ class InZones(ExplainedDecorator):
 
     kind = "zones"
     zones: tuple[Zone, ...]
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates the child, which minds further zones."""
+        outer, walk.zones = walk.zones, tuple(dict.fromkeys((*walk.zones, *node.options["zones"])))
+        try:
+            return walk.all_of(node, first)
+        finally:
+            walk.zones = outer
 
     def update(self) -> Status:
         """Returns the child's status."""

@@ -156,6 +156,7 @@ class Interrupts(MemoryComposite):
     """
 
     kind = "interrupts"
+    usual = slice(-1, None)
     watches = True
     container = True
 

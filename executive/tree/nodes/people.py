@@ -145,6 +145,7 @@ class EachInTurn(ForEachFound):
     """
 
     kind = "each in turn"
+    usually_found = 1
     first: bool
     met: str = ""
     beside: str = ""

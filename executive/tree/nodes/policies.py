@@ -21,6 +21,7 @@ from executive.tree.behaviour import (
 )
 from executive.tree.board import FromBoard
 from executive.tree.context import RunContext
+from executive.tree.estimate import Estimate, Walk
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import BatteryAtLeast, Condition, KnowsPlace, NotAfter
 from executive.tree.plan import PlanBuilder
@@ -51,6 +52,12 @@ class Timeout(ExplainedDecorator):
     limit_s: float
     clock: Clock
     late: str = "not done"
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Limits the estimate to a timeout."""
+        taken, limit_s = walk.all_of(node, first), node.options["limit_s"]
+        return taken if taken.most_s <= limit_s else taken.up_to(limit_s, f"{limit_s:g} s at most")
 
     def initialise(self) -> None:
         """Starts the time."""
@@ -208,6 +215,7 @@ class GoBack(MemoryComposite):
     """
 
     kind = "go back"
+    usual = slice(1)
 
     def _following(self, child: Behaviour) -> int | None:
         return None
@@ -272,6 +280,12 @@ class RememberPose(ExplainedLeaf):
     context: RunContext
     patience_s: float = 5.0
     keep: bool = False
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Notes the pose."""
+        walk.noted[node.options["key"]] = walk.pose
+        return Estimate()
 
     def initialise(self) -> None:
         """Starts the patience."""

@@ -16,6 +16,8 @@ from py_trees.common import Status
 from executive.tree.behaviour import Explained, MemoryComposite, applies, cause_of, message_of
 from executive.tree.board import Board
 from executive.tree.context import RunContext
+from executive.tree.estimate import CannotError, Estimate, Walk
+from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import is_known_as
 from skills.api import Cause, ObjectObservation
 
@@ -115,6 +117,7 @@ class Recover(MemoryComposite):
     """
 
     kind = "recover"
+    usual = slice(1)
     recoveries: Sequence[Recovery]
     attempts: int
     board: Board
@@ -207,6 +210,11 @@ class Afterwards(MemoryComposite):
     kind = "afterwards"
     only_after_failure: bool = False
 
+    @classmethod
+    def usual_children(cls, node: NodeSpec) -> tuple[NodeSpec, ...]:
+        """Returns the work, and what always follows it."""
+        return node.children[:1] if node.options.get("only_after_failure") else node.children
+
     def _following(self, child: Behaviour) -> int | None:
         done = child.status == Status.FAILURE or not self.only_after_failure
         return 1 if self._index == 0 and done else None
@@ -231,6 +239,13 @@ class OnlyIfKnown(MemoryComposite):
     key: str
     board: Board
 
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates a branch that is possible only after an earlier node has written its key."""
+        if node.options["key"] not in walk.written:
+            raise CannotError(None)
+        return walk.follow(node.children[0], first=first)
+
     def applies(self) -> bool:
         """Returns whether the key has a value."""
         return self.key in self.board
@@ -243,6 +258,7 @@ class OnlyIfHolding(MemoryComposite):
     """
 
     kind = "only if holding"
+    usual = slice(0)
     context: RunContext
     known_as: tuple[str, ...] | None = None
     attributes: tuple[str, ...] = ()

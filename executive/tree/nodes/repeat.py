@@ -1,5 +1,6 @@
 """Repetition of steps in rounds: the plan and its node."""
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import field, replace
 from typing import ClassVar, Final, Literal
@@ -11,6 +12,8 @@ from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.board import Board
+from executive.tree.estimate import Estimate, Walk
+from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import Decide, decide_plan
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import steps as model
@@ -57,6 +60,34 @@ class Repeat(MemoryComposite):
     clock: Clock
     _phase: Literal["start", "before", "body", "after"] = field(default="start", init=False)
     _due_s: float = field(default=0.0, init=False)
+
+    @classmethod
+    def _repeated(cls, node: NodeSpec, walk: Walk, first: bool, begun: Estimate, times: int) -> Estimate:
+        """Estimates all rounds, of which the first is `begun`."""
+        if times == 1:
+            return begun
+        again, more = walk.all_of(node, first), times - 1
+        rest = Estimate(more * again.duration_s, more * again.distance_m, more * again.charge, more * again.spare_s)
+        rounds = begun + rest
+        pauses_s = max(0.0, more * node.options["every_s"] - rounds.duration_s * more / times)
+        return rounds + Estimate(pauses_s, 0.0, pauses_s * walk.estimates.battery.standing_per_s)
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates a known number of rounds, else at least one; the second round stands for all later ones."""
+        times, fixed = node.options["times"], node.options["mode"] == "times"
+        begun = walk.all_of(node, first)
+        if fixed and times:
+            return cls._repeated(node, walk, first, begun, times)
+        if not times:
+            endless = "for ever" if fixed else f"{node.options['mode']} {node.options['words']}"
+            return begun.up_to(math.inf, endless)
+        if times == 1:
+            return begun
+        here = walk.mark()
+        most_s = cls._repeated(node, walk, first, begun, times).most_s
+        walk.go_to(here)
+        return begun.up_to(most_s, f"1 to {times} rounds")
 
     def _tick(self) -> Iterator[Behaviour]:
         """Begins a round, decides, or ticks the body."""

@@ -12,7 +12,9 @@ from executive.tree.assembly import Assembler, Named, StepPlans
 from executive.tree.behaviour import ExplainedLeaf, StoppableTime
 from executive.tree.board import Binding, Constant, FromBoard, Sign
 from executive.tree.context import RunContext
+from executive.tree.estimate import CannotError, Estimate, Walk
 from executive.tree.goals import POSE_NEAR_M, square_region, surface_region
+from executive.tree.node import NodeSpec
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.tree.port_values import (
     FROM_KEY,
@@ -29,12 +31,13 @@ from executive.words.knowledge import Knowledge, Pose
 from executive.words.leaf_steps import CallSkill
 from executive.words.slug import slug
 from skills.api import Cause, Failed, Part, Running, Skill, Step, Succeeded, Surface
-from skills.inputs.errors import listing, suggestion
+from skills.inputs.errors import InputError, listing, suggestion
 from skills.robot import Pose2D
 
 ResultT = TypeVar("ResultT")
 ERROR_TOPIC = "errors"
 _TOLERANCE_S = 1e-6
+_DRIVES: Final = frozenset({"navigate", "guide_person"})
 _SIGNS: Final = {"observation": Sign.SEEN, "released_W": Sign.RELEASED}
 
 
@@ -75,6 +78,26 @@ class SkillLeaf(ExplainedLeaf):
     _skill: Skill[Any] | None = field(default=None, init=False)
     _values: Any = field(default=None, init=False)
     _false_start: Failed | None = field(default=None, init=False)
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates a drive by its route, and another skill by its typical duration."""
+        goal = _drive_goal(node, walk)
+        walk.written.update(node.options["outputs"].values())
+        if goal is None:
+            duration_s = walk.estimates.skills.get(node.name, walk.estimates.other_skill_s)
+            return walk.draw(node, Estimate(duration_s, 0.0, duration_s * walk.estimates.battery.standing_per_s))
+        try:
+            route = walk.planner.route(walk.pose, goal, walk.zones)
+        except ValueError as error:
+            hint = f"name another place or pose, or correct the world's map{' or the zones' if walk.zones else ''}"
+            raise CannotError(InputError.at(node.source, str(error).rstrip("."), hint=hint)) from error
+        walk.pose = goal
+        drive = walk.estimates.drive
+        slower_s = sum(max(0.0, part_m / limit_m_s - drive.per_metre_s * part_m) for part_m, limit_m_s in route.limited)
+        duration_s = drive.overhead_s + drive.per_metre_s * route.progress_m + slower_s
+        charge = duration_s * walk.estimates.battery.driving_per_s
+        return walk.draw(node, Estimate(duration_s, route.length_m, charge))
 
     @classmethod
     def writes(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -258,6 +281,14 @@ class SkillLeaf(ExplainedLeaf):
             self.context.publish(ERROR_TOPIC, {"node": self.path_id, "traceback": trace})
             text = str(defect.args[0]) if isinstance(defect, KeyError) and defect.args else str(defect)
             return Failed(Cause.ERROR, f"{self.name} raised {type(defect).__name__}: {text}")
+
+
+def _drive_goal(node: NodeSpec, walk: Walk) -> Pose2D | None:
+    """Goal of a drive, as far as it is known before the run."""
+    binding = node.options["inputs"].get("goal") if node.name in _DRIVES else None
+    if isinstance(binding, FromBoard):
+        return walk.noted.get(binding.key)
+    return binding.value if isinstance(binding, Constant) and isinstance(binding.value, Pose2D) else None
 
 
 def refuse_stale(skill: type[Skill[Any]], success: Succeeded, context: RunContext) -> Succeeded | Failed:

@@ -1,5 +1,6 @@
 """Waiting for a duration, for a time of day, or until a condition holds: the plan and its nodes."""
 
+import math
 from typing import Final
 
 from py_trees.common import Status
@@ -8,6 +9,8 @@ from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import ExplainedDecorator, ExplainedLeaf
 from executive.tree.board import Board
 from executive.tree.context import RunContext
+from executive.tree.estimate import Estimate, Walk
+from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import DAY_S, Decide, decide_plan
 from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import leaf_steps as model
@@ -20,6 +23,11 @@ class Pause(ExplainedLeaf):
     kind = "pause"
     duration_s: float
     clock: Clock
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates the pause."""
+        return Estimate(node.options["duration_s"])
 
     def initialise(self) -> None:
         """Starts the time."""
@@ -50,6 +58,11 @@ class WaitFor(ExplainedDecorator):
     every_s: float
     board: Board
     clock: Clock
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates a wait of unknown length."""
+        return walk.all_of(node, first).up_to(math.inf, f"until {node.options['words']}")
 
     def initialise(self) -> None:
         """Asks for the first decision at once; presses of buttons count from now on."""
@@ -82,6 +95,11 @@ class WaitUntilClock(ExplainedLeaf):
     time_s: float
     words: str
     context: RunContext
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Estimates a wait of at most a day."""
+        return Estimate().up_to(DAY_S, f"until {node.options['words']}")
 
     def initialise(self) -> None:
         """Computes the end of the wait."""

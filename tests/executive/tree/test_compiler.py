@@ -1,5 +1,7 @@
 """From commands to trees: which nodes, which ids, and what is refused."""
 
+import re
+
 import pytest
 from py_trees.common import Status
 
@@ -8,7 +10,6 @@ from executive.tree import nodes
 from executive.tree.behaviour import ExplainedDecorator, ExplainedNode, MemoryComposite
 from executive.tree.board import FromBoard
 from executive.tree.compiler import build, compile_mission, writes
-from executive.tree.estimate import expected_children
 from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec, node_classes
 from executive.tree.nodes.policies import Timeout
@@ -22,6 +23,7 @@ from skills.inputs.errors import InputError
 from skills.inputs.yaml_source import YamlSource
 from skills.robot import Pose2D
 from skills.small.charging import LocateDock
+from tests.sources import modules
 from tests.tables import yaml_beside
 
 LEAVES, IMPOSSIBLE = (yaml_beside(__file__, f"{name}.yaml") for name in ("leaves_of_a_fetch", "impossible_commands"))
@@ -34,7 +36,7 @@ def skills_of(tree):
 
 def followed(node):
     yield node
-    for child in expected_children(node):
+    for child in node.behaviour.usual_children(node):
         yield from followed(child)
 
 
@@ -284,6 +286,15 @@ def below(node):
 def test_each_kind_of_node_has_exactly_one_class():
     named = [node.kind for node in below(ExplainedNode) if node.__module__.startswith(nodes.__name__) and node.kind]
     assert sorted(named) == sorted(node_classes())
+
+
+def test_no_code_outside_the_pages_of_nodes_names_a_kind_of_node():
+    kinds = "|".join(map(re.escape, node_classes()))
+    listed = rf"""(?:[=!]=|(?:not )?in)\s*[({{]?\s*["'](?:{kinds})["']"""
+    compared = re.compile(rf"\.kind\s*{listed}|\b(?:node|spec)\.kind\s*[=!]=")
+    found = [path for path, text in modules("executive", "skills", "plant").items() if compared.search(text)]
+    assert [path for path in found if not path.startswith("executive/tree/nodes/")] == []
+    assert found
 
 
 @pytest.mark.parametrize("node", node_classes().values(), ids=node_classes())

@@ -71,6 +71,24 @@ def test_changes_come_in_the_order_of_the_tree(walk):
     assert [change.path_id for change in observed.changes()] == ["alice/walk", "alice/one"]
 
 
+def test_a_node_waits_once_at_a_breakpoint_before_it_begins(walk):
+    walk.hook.breakpoints = frozenset({"alice/walk"})
+    seen = []
+    for _ in range(2):
+        walk.tick_once()
+        seen.append((walk.message, tuple(walk.hook.waiting), walk.children[0].begun))
+    assert seen == [("waits at the breakpoint", ("alice/walk",), 0), ("one R", (), 1)]
+
+
+def test_a_node_takes_its_restored_state_in_its_first_tick_only(walk):
+    walk.hook.restored["alice/walk"] = (Status.SUCCESS, None, "walked")
+    seen = []
+    for _ in range(2):
+        walk.tick_once()
+        seen.append((walk.status, walk.message, walk.children[0].begun))
+    assert seen == [(Status.SUCCESS, "walked", 0), (Status.RUNNING, "one R", 1)]
+
+
 def test_a_node_that_an_exception_kept_from_its_end_is_found_among_all(walk):
     observed = TreeObserver(walk, walk.hook)
     walk.children[0].update = lambda: 1 / 0

@@ -47,7 +47,7 @@ class JointIndex(ActuatedJoints):
         self.finger_rates = fastest[self.fingers]
 
     def opening(self, joints: FloatArray) -> float:
-        """Opening of the gripper with all joints at positions; or its rate, for rates. 0 without a gripper."""
+        """Opening of the gripper for joint positions, or its rate for joint rates. 0 without a gripper."""
         return float(np.mean(joints[self.fingers] / self.shares)) if len(self.shares) else 0.0
 
 

@@ -1,8 +1,8 @@
 """Builds the Drake Diagram of a world with its robots, people and loose objects.
 
-A link that is welded to the world is still a body for Drake, and costs time in every step. So the directives are read
-into a temporary plant, and the shapes of its welded models, the scenery, are registered on the world body. A model with
-a moving part stays a model.
+A link welded to the world is still a body for Drake, and costs time in every step. So the builder reads the directives
+into a temporary plant, and registers the shapes of its welded models, the scenery, on the world body. A model with a
+moving part stays a model.
 """
 
 import logging
@@ -163,7 +163,7 @@ def _copy_appearance(inspector: SceneGraphInspector, geometry: GeometryId, visua
 
 
 def _moving_models(scratch: MultibodyPlant, directives: Sequence[ModelDirective]) -> set[str]:
-    """Names of the models with a part that is not fixed to the world, and of models welded to them."""
+    """Names of the models with a moving part, and of models welded to them."""
     bodies = (BodyIndex(index) for index in range(scratch.num_bodies()))
     moving = {_model_of(scratch, index) for index in bodies if not scratch.IsAnchored(scratch.get_body(index))}
     for each in reversed(directives):
@@ -214,8 +214,8 @@ X_PT_HOME = RigidTransform(
 class LooseModel:
     """A model put into the world at the beginning: X_WM is the pose of its base.
 
-    A fixed one is welded there. A person who walks has a `route`, and slides upright in x, y and yaw without touching
-    anything that is fixed. A person who takes objects from robots is `receiving` and has a tray.
+    A fixed model is welded there. A walking person has a `route`, slides upright in x, y and yaw, and passes through
+    fixed shapes. A person who takes objects from robots is `receiving` and has a tray.
     """
 
     name: str
@@ -230,8 +230,8 @@ class LooseModel:
 class DiagramConfig:
     """Contents of a Diagram: the directives of a world (None: an empty one), models, robots and doors.
 
-    `visuals` draws robots with meshes where these are installed. `render` makes the scene for cameras, with the light
-    and sky of `renderer_parameters`. `friction` multiplies the friction coefficients of everything that moves.
+    `visuals` draws robots with meshes if these are installed. `render` makes the scene for cameras, with the light and
+    sky of `renderer_parameters`. `friction` multiplies the friction coefficients of all moving bodies.
     """
 
     directives: Path | None = None
@@ -248,8 +248,8 @@ class DiagramConfig:
 class WorldDiagram:
     """The finished Diagram of a `config`, with its parts by name.
 
-    `models` includes the panels of doors. `trays` has the trays of people by the people's names. `scenery` names the
-    model that each collision shape of the world body comes from. `scene` renders the Diagram if the config asks for it.
+    `models` includes the panels of doors. `trays` has the people's trays by name. `scenery` maps each collision shape
+    of the world body to its model's name. `scene` renders the Diagram if the config requests it.
     """
 
     config: DiagramConfig
@@ -266,8 +266,8 @@ class WorldDiagram:
 def build_diagram(config: DiagramConfig, meshcat: Meshcat | None = None) -> WorldDiagram:
     """Builds the Diagram of a world with its models, robots and doors, and shows it in `meshcat`.
 
-    SAP with point contact at `TIME_STEP_S`; sampled outputs, which would double the cost of a step, are off, so that
-    evaluating contact results solves once more. Default positions place the models; the engine places the robots.
+    The plant uses SAP with point contact at `TIME_STEP_S`. Sampled outputs would double the cost of a step and are off,
+    so evaluating contact results solves again. Default positions place the models; the engine places the robots.
     """
     builder = DiagramBuilder()
     plant_config = MultibodyPlantConfig(
@@ -309,7 +309,7 @@ def _filter_collisions(
     robots: Iterable[RobotBody],
     moved: Sequence[ModelInstanceIndex],
 ) -> None:
-    """Applies the filters of the robots; models whose pose is prescribed pass each other and anything fixed."""
+    """Applies the robots' filters; models with a prescribed pose pass through each other and fixed shapes."""
     filters = scene_graph.collision_filter_manager()
     floor = GeometrySet(_floor_geometries(plant, scene_graph))
     for robot in robots:
@@ -406,7 +406,7 @@ _FRICTION: Final = "coulomb_friction"
 
 
 def multiply_friction(plant: MultibodyPlant, scene_graph: SceneGraph, factor: float) -> None:
-    """Multiplies the friction coefficients of all bodies that are not fixed to the world; the plant is finalized."""
+    """Multiplies the friction coefficients of all moving bodies of a finalized plant."""
     inspector, source = scene_graph.model_inspector(), plant.get_source_id()
     for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
         for geometry in () if plant.IsAnchored(body) else plant.GetCollisionGeometriesForBody(body):

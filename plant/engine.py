@@ -1,8 +1,8 @@
 """The engine: steps the Diagram, commands and senses for the robots, and is the only clock.
 
-In a pipeline, the plant steps towards the next tick while the present tick is computed. A command of a tick begins when
-the step under way is done: one period late, as over a radio link. Readings are those of the tick's beginning. The same
-calls give the same run, whether a thread does the steps or `advance` itself.
+In a pipeline, the plant steps towards the next tick while the executive computes the present tick. A tick's command
+begins at the end of the current step: one period late, as over a radio link. Readings are those of the tick's start.
+The same calls give the same run, with a thread for the steps or without.
 """
 
 from collections import Counter
@@ -31,7 +31,7 @@ CONTROL_STEPS = 2
 SLEEP_PERIOD_STEPS = 4
 _SQUARE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 HAND_OUTLINE_M, PERSON_OUTLINE_M = 0.15 * _SQUARE, 0.25 * _SQUARE
-"""Outlines (4, 2) of a hand and a person about their centres, for which doors wait."""
+"""Outlines (4, 2) of a hand and a person about their centres; doors wait for these."""
 
 
 class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
@@ -72,7 +72,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
 
     @property
     def asleep(self) -> frozenset[str]:
-        """Names of the sleeping loose objects, which stay where they are."""
+        """Names of the sleeping loose objects; these do not move."""
         return self._sleepers.asleep
 
     def observe(self, observer: Callable[[float], None], *, every: int = 1) -> None:
@@ -89,7 +89,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         self.sense()
 
     def step(self, dt_s: float) -> None:
-        """Steps the plant by dt_s, rounded to whole steps (at least one); the robots' readings stay as they are."""
+        """Steps the plant by dt_s, rounded to whole steps (at least one); takes no readings."""
         holding = [name for name, robot in self.robots.items() if robot.gripper().holding]
         until = self._steps + max(1, round(dt_s / TIME_STEP_S))
         while self._steps < until:
@@ -116,7 +116,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
             self.moves.before_step(now_s, self._hands_W, holding)
 
     def _only_robots_move(self, holding: Sequence[str]) -> bool:
-        """Returns whether only robots move, so that all steps of one control period can be done at once."""
+        """Returns whether only robots move; then one call can do all steps of a control period."""
         observed = any(every % CONTROL_STEPS for every, _ in self._observers)
         still = self.walkers.still and self.doors.still and self.moves is None and not self.receivers.busy
         return still and not observed and not holding and self._sleepers.all_asleep
@@ -156,7 +156,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         return {**super().state(), "robots": robots, "moves": None if self.moves is None else self.moves.state()}
 
     def resume(self, state: State, world: Mapping[str, FloatArray]) -> None:
-        """Restores a state, and powers the robots up in it. Raises ValueError when it is of another Diagram."""
+        """Restores a state, and powers the robots up in it. Raises ValueError for another Diagram's state."""
         if set(world) != set(self.world_state()):
             raise ValueError("the world has other parts")
         self._sleepers.wake_all()
@@ -206,7 +206,7 @@ class Pipeline:
     """Clock of an engine that steps ahead, with its robots; implements the Clock protocol."""
 
     def __init__(self, engine: Engine, background: Background | None = None) -> None:
-        """`background` does the steps while the ticks are computed; without it `advance` does them."""
+        """`background` does the steps in parallel to the ticks; without it `advance` does them."""
         self._engine, self._background = engine, background or _at_once
         self.robots = {name: PipelinedRobot(robot, self) for name, robot in engine.robots.items()}
         self._now_s: float | None = None
@@ -227,9 +227,9 @@ class Pipeline:
         return self._engine.now() if self._now_s is None else self._now_s
 
     def advance(self, dt_s: float) -> None:
-        """Advances by dt_s: waits for the step under way, takes readings, begins commands and starts the next step.
+        """Advances by dt_s: waits for the current step, takes readings, begins commands and starts the next step.
 
-        Raises the exception of the step under way. Raises ValueError when that step is longer than dt_s.
+        Raises the exception of the current step. Raises ValueError when that step is longer than dt_s.
         """
         until_s = self.now() + dt_s
         self.settle()
@@ -245,7 +245,7 @@ class Pipeline:
         self._under_way = self._background(partial(self._engine.step, dt_s))
 
     def reached_s(self) -> float:
-        """Time (s) that the plant has reached; call it while no step is under way."""
+        """Time (s) of the plant; call it only between steps."""
         return self._engine.now()
 
     def settle(self) -> None:
@@ -257,10 +257,10 @@ class Pipeline:
 
 
 class PipelinedRobot(RobotWrapper):
-    """A robot whose commands begin when the step under way is done, and count as running until then.
+    """A robot whose commands begin at the end of the current step, and count as running until then.
 
-    Verbs of the lease wait for that step, because they are answered at once. The time of an arm's trajectory counts
-    from its command: the arm begins at the point that it should have reached by then.
+    Verbs of the lease wait for this step, because they return a result. The time of an arm's trajectory counts from its
+    command: the arm begins at the trajectory's point for the present time.
     """
 
     def __init__(self, robot: Robot, pipeline: Pipeline) -> None:
@@ -333,7 +333,7 @@ class PipelinedRobot(RobotWrapper):
 
 
 def _remaining(trajectory: ArmTrajectory, late_s: float) -> ArmTrajectory:
-    """Rest of a trajectory that begins late_s after its command, from the point that the arm should have reached."""
+    """Rest of a trajectory that begins late_s after its command."""
     left_s = trajectory.times_s - late_s
     ahead = left_s > _LEAST_S
     here, _ = arm_set_point(trajectory, late_s)

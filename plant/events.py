@@ -1,6 +1,6 @@
-"""Events of a run that need no robot: sliding doors that close and open, and objects that a person moves elsewhere.
+"""Events of a run without a robot's action: sliding doors close and open, and people move objects.
 
-The panel of a door slides on a planar joint, as walking people do: its pose and velocity are set before each step. It
+The panel of a door slides on a planar joint, like a walking person: its pose and velocity are set before each step. It
 touches robots and loose objects, passes through the scenery, and waits while a robot or a person is in the doorway. A
 moved object jumps from one step to the next, because no hand is simulated.
 """
@@ -82,7 +82,7 @@ def _doorway(door: DoorRule) -> tuple[Point, Point]:
 def slide(
     plant: MultibodyPlant, context: Context, instance: ModelInstanceIndex, pose: FloatArray, velocity: FloatArray
 ) -> None:
-    """Sets the pose (x, y, yaw) of a model on a planar joint, and the rates of it, where they differ from now."""
+    """Sets the pose (x, y, yaw) and the rates of a model on a planar joint, if they differ from the present ones."""
     if np.abs(plant.GetPositions(context, instance) - pose).max() > _MOVED:
         plant.SetPositions(context, instance, pose)
     if np.abs(plant.GetVelocities(context, instance) - velocity).max() > _MOVED:
@@ -144,7 +144,7 @@ class Doors(Stateful, saved=("_panels",)):
         return [_doorway(door) for door in ajar]
 
     def call(self, at_W: tuple[float, float]) -> None:
-        """Opens the door nearest to a position (x, y) from the next step on, as its drive would; from any thread."""
+        """Opens the door nearest to a position (x, y) from the next step on, like its drive; from any thread."""
         name = min(self._doors, key=lambda name: math.dist(self._doors[name].at, at_W))
         self._panels[name].called = True
 
@@ -195,7 +195,7 @@ class Moves(Stateful, saved=("_done",)):
         seed: int,
         tell: Callable[[str], None],
     ) -> None:
-        """`placed` are the loose objects; `tell` is called with a sentence for each move, or why it is not done."""
+        """`placed` are the loose objects; `tell` gets a sentence on each move, or the reason why it is not done."""
         self._plant, self._context, self._world, self._seed, self._tell = plant, context, world, seed, tell
         self._forms = {each.name: each.form for each in placed}
         self._bodies = {
@@ -209,7 +209,7 @@ class Moves(Stateful, saved=("_done",)):
         self._listeners.append(listener)
 
     def before_step(self, now_s: float, hands_W: Callable[[], Hands], holding: Sequence[str]) -> None:
-        """Does the moves that are due; `holding` names the robots that hold an object in their `hands_W`."""
+        """Does the due moves; `holding` names the robots with an object in their `hands_W`."""
         for number, move in enumerate(self._world.moves):
             if number not in self._done and now_s >= move.at:
                 self._done |= {number}
@@ -255,7 +255,7 @@ class Moves(Stateful, saved=("_done",)):
         return None
 
     def _candidates(self, surface: SurfaceTop, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
-        """Random centres and yaws: along the fronts of the surface if it has some, else anywhere on it."""
+        """Random centres and yaws: along the fronts of the surface if it has fronts, else anywhere on it."""
         if self._world.seed_rules.fronts.get(surface.name):
             yield from candidates(self._world, surface, rng)
             return

@@ -1,22 +1,22 @@
 """Loose objects between two steps of the plant: objects at rest sleep, and a carried object follows the hand.
 
-**Sleep.** A sleeping object floats in place without weight and contacts, so that neither the solver nor the search for
-contacts spends time on it: its shapes have no proximity role. It wakes when a link or a moving object is about to reach
-it, when it is put elsewhere, and when an object beside it wakes, since it may lie on that one. A person's tray wakes
-nothing. Sleep depends on positions alone, so the same run sleeps and wakes at the same times. Joints are not locked
-for this: beside a locked joint, Drake's SAP crashes on the contact of any other body with the world body. A hand far
-from everything has no proximity role either: its rubber is a grid of spheres, which overlap each other and the jaws.
+**Sleep.** A sleeping object floats in place without weight and contacts. Its shapes have no proximity role, so it costs
+neither the solver nor the search for contacts any time. It wakes when a link or a moving object is about to reach it,
+when it is moved, and when an object close by wakes, since it may lie on that object. A person's tray wakes no object.
+Sleep depends on positions alone, so equal runs sleep and wake at equal times. The joints stay unlocked: next to a
+locked joint, Drake's SAP crashes on the contact of any other body with the world body. A hand far from all objects has
+no proximity role either: its rubber is a grid of spheres, which overlap each other and the jaws.
 
-**Carrying.** The plant steps a free body along its velocity, but the joints of a robot along their arcs. A body at a
-distance r from an axis about which the robot turns at w would creep outwards by w^2 r dt^2 / 2 in each step: 3 mm/s at
-0.75 rad/s, out of the gripper within a minute of walking. So after each step an object that moves with a hand is
-shifted by a dt^2 / 2, where a is the acceleration of the hand's point there at the present rates of all joints. The
-approximation w x v of the hand was off by 6 mm/s in an arm's motion, pressed the object into one finger, and made the
-other lose contact. Forces, velocities and contacts stay those of the plant.
+**Carrying.** The plant steps a free body along its velocity, but the joints of a robot along their arcs. While a robot
+turns at w, a body at a distance r from the axis would creep outwards by w^2 r dt^2 / 2 in each step: 3 mm/s at 0.75
+rad/s, out of the gripper within a minute of walking. So after each step an object that moves with a hand is shifted by
+a dt^2 / 2, where a is the acceleration of the hand's point there at the present rates of all joints. The approximation
+w x v of the hand was off by 6 mm/s in an arm's motion: it pressed the object into one finger, and the other finger lost
+contact. Forces, velocities and contacts stay those of the plant.
 
 **Spin.** The plant's steps cannot follow a fast spin: the gyroscopic torque at the beginning of a step makes a flat
-wrench spin ever faster, and a can that turns by radians in a step penetrates a table and leaves it at 90 m/s. So free
-bodies spin no faster, after any step, than the next step can follow.
+wrench spin ever faster, and a can that turns by radians in a step penetrates a table and leaves it at 90 m/s. So the
+spin of free bodies is limited after each step to a rate that the next step can follow.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -44,7 +44,7 @@ from skills.robot import FloatArray
 
 _EXACT = 1e-9
 _REACH_M = 2.0
-"""Greatest distance from a robot's body at which one of its links can reach an object, margins included."""
+"""Reach of a robot's links from its body, margins included."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,9 @@ class SleepLimits:
     """Limits at which objects fall asleep and wake.
 
     An object is still while its pose (metres, quaternion) changes by less than `still` per second, and falls asleep
-    after `still_s`. It wakes when a bounding sphere comes closer than `margin_m`, which no link crosses between two
-    updates. Objects whose spheres are closer than `beside_m` sleep and wake together. A hand falls asleep at twice the
-    margin.
+    after `still_s`. It wakes when a bounding sphere comes closer than `margin_m`, a distance that no link crosses
+    between two updates. Objects with spheres closer than `beside_m` sleep and wake together. A hand falls asleep at
+    twice the margin.
     """
 
     still: float = 0.004
@@ -92,12 +92,12 @@ class _Spheres:
 
 
 class _Hand:
-    """Hand of one robot: its collision shapes with their properties, and what it may come near."""
+    """Hand of one robot: its collision shapes with their properties, and the objects and shapes that it may touch."""
 
     def __init__(
         self, robot: RobotBody, inspector: SceneGraphInspector, fixed: ShapeArrays, objects: Collection[int]
     ) -> None:
-        """`fixed` are the shapes that never move, `objects` the loose objects, whose places `is_near` is given."""
+        """`fixed` are the immobile shapes, `objects` the loose objects; `is_near` takes the objects' positions."""
         plant, own = robot.plant, set(map(int, robot.instances()))
         links = [plant.GetBodyByName(link, robot.instance) for link in robot.kind.gripper_links]
         found = [shape for link in links for shape in plant.GetCollisionGeometriesForBody(link)]
@@ -169,7 +169,7 @@ class Sleepers:
         return frozenset(each.name for each, asleep in zip(self._objects, self._asleep, strict=True) if asleep)
 
     def update(self, now_s: float) -> None:
-        """Wakes what a link or an object is about to reach; puts still objects and lonely hands to sleep."""
+        """Wakes objects that a link or an object is about to reach; puts still objects and distant hands to sleep."""
         centres_W = self._update_objects(now_s) if self._objects else np.zeros((0, 3))
         for hand in self._hands:
             margin_m = self._limits.margin_m if hand.asleep else 2.0 * self._limits.margin_m
@@ -301,11 +301,11 @@ def _bound(inspector: SceneGraphInspector, shapes: Sequence[GeometryId]) -> tupl
 
 
 WITH_HAND_M_S: Final = 0.02
-"""An object that moves against the hand by less than this moves with the hand."""
+"""Largest relative speed of an object that moves with the hand."""
 FASTEST_SPIN_RAD_S: Final = 25.0
 """A third of a radian in a step of 12.5 ms."""
 _FASTEST_ALONG_RAD_S: Final = FASTEST_SPIN_RAD_S / 3.0**0.5
-"""A body that spins no faster than this about each axis cannot exceed `FASTEST_SPIN_RAD_S`."""
+"""Rate about each axis below which a body's spin cannot exceed `FASTEST_SPIN_RAD_S`."""
 _AT_HAND_M: Final = 0.5
 
 
@@ -347,7 +347,7 @@ class CarriedObjects:
         return np.asarray(bias.translational())
 
     def limit_spin(self) -> None:
-        """Slows the free bodies that spin faster than `FASTEST_SPIN_RAD_S` down to it."""
+        """Limits the spin of the free bodies to `FASTEST_SPIN_RAD_S`."""
         velocities = self._plant.GetVelocities(self._context)
         spins = velocities[self._spins]
         if spins.size and np.abs(spins).max() > _FASTEST_ALONG_RAD_S:
@@ -357,7 +357,7 @@ class CarriedObjects:
 
 
 def arc_m(acceleration_W: FloatArray, dt_s: float) -> FloatArray:
-    """Distance (m) from its tangent, after dt_s, of a point with an acceleration (m/s^2)."""
+    """Distance (m) between an accelerated point (m/s^2) and its tangent after dt_s."""
     return np.asarray(0.5 * dt_s**2 * acceleration_W)
 
 

@@ -34,8 +34,8 @@ class Frame:
 class Recorder:
     """Recorder of the plant's positions at a fixed rate; call it after every step.
 
-    When there are too many frames, it drops the frames that their neighbours interpolate best: few frames remain of the
-    time in which little moves, many of the time in which a robot works.
+    When there are too many frames, it drops the frames that their neighbours interpolate best: few frames remain of
+    times with little motion, many of a robot at work.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class View:
 
     @staticmethod
     def close_up(p_W: FloatArray) -> View:
-        """Returns a view of a point, in which a robot of about a metre fills the picture."""
+        """Returns a view of a point; a robot of about a metre fills the picture."""
         x, y, z = (float(value) for value in p_W)
         dx, dy, dz = BESIDE_M
         return View((x + dx, y + dy, z + dz), (x, y, z))
@@ -120,7 +120,7 @@ def set_camera(meshcat: Meshcat, view: View) -> None:
 
 
 def save_html(world: WorldDiagram, frames: Sequence[Frame], path: Path, view: View | None = None) -> None:
-    """Writes an animation of `frames` as one HTML file that needs no server and opens on `view`."""
+    """Writes an animation of `frames` as one HTML file without a server, which opens on `view`."""
     meshcat = Meshcat()
     prepare_view(meshcat, view)
     shown = build_diagram(replace(world.config, render=False), meshcat)
@@ -162,7 +162,7 @@ class LiveScene:
 
     @property
     def url(self) -> str:
-        """Address of the scene; its other host name makes a browser draw it in a process of its own."""
+        """Address of the scene; its different host name gives it a browser process of its own."""
         return f"http://localhost:{self._meshcat.port()}"
 
     def __call__(self, now_s: float) -> None:

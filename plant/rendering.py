@@ -19,8 +19,7 @@ MESA_THREADS: Final = "LP_NUM_THREADS"
 class Scene:
     """Renderer of a Diagram at any positions, in a context of its own.
 
-    The renderer lives in that context alone: in the context that is stepped it would follow every step, which costs a
-    third of the time.
+    The renderer exists only in this context: in the stepped context it would follow every step, at a third of the time.
     """
 
     def __init__(
@@ -43,7 +42,7 @@ class Scene:
         """Returns the scene with the plant at all its `positions`; it is valid until the next call.
 
         The first call makes the renderer, which loads all meshes. Without a graphics card it draws in the calling
-        thread, unless the environment says otherwise: for small pictures, waking threads costs as much as drawing.
+        thread, unless the environment says otherwise: for small pictures, other threads cost as much as the drawing.
         """
         if not self._rendering:
             self._rendering = True

@@ -13,7 +13,7 @@ State = dict[str, Any]
 class Stateful:
     """A part of the plant whose state is saved and restored by attributes.
 
-    A class names its attributes in `saved`, in addition to those of its bases; a dataclass that names none saves all
+    A class names its attributes in `saved`, in addition to those of its bases; a dataclass without `saved` saves all
     its fields. An attribute may be stateful itself, or a mapping of stateful parts.
     """
 

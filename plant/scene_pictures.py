@@ -1,7 +1,7 @@
 """Pictures of worlds and runs: maps with paths and labels, detections, and views from free cameras.
 
-Pictures are (H, W, 3) uint8 RGB arrays until `save_png` writes them. Drawing is antialiased; text stands on a plate, so
-that it is legible on any ground. All lengths in metres, all poses in the world frame.
+Pictures are (H, W, 3) uint8 RGB arrays. Drawing is antialiased; text has a plate, and is legible on any ground. All
+lengths in metres, all poses in the world frame.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,7 +45,7 @@ _SUBPIXEL_BITS = 4
 
 @dataclass(frozen=True)
 class MapView:
-    """Picture of the world from above with its camera: up in the picture is the world's y, right its x."""
+    """Picture of the world from above with its camera: the world's y points up, its x right."""
 
     picture: Picture
     X_WC: RigidTransform
@@ -162,8 +162,8 @@ def draw_map(
 ) -> Picture:
     """Draws paths (N, 2 or more columns: x, y), labels and marked points on a copy of a map, with a legend below it.
 
-    Each path has the text of its legend and a colour. No name covers another one or a mark. The zones, as
-    `skills.navigate.zone_map.zone_messages` has them, are below all else.
+    Each path has the text of its legend and a colour. No name covers another one or a mark. The zones, in the form of
+    `skills.navigate.zone_map.zone_messages`, are drawn first.
     """
     picture = view.picture.copy()
     for zone in zones:

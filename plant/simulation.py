@@ -28,7 +28,7 @@ SETTLING_S = 1.5
 
 
 class Simulation:
-    """A world with its robots at a seed: clock, robots, referee and, where wanted, a recording."""
+    """A world with its robots at a seed: clock, robots, referee and, on request, a recording."""
 
     def __init__(
         self,
@@ -42,7 +42,7 @@ class Simulation:
         variation: Variation = NO_VARIATION,
         spared: Collection[str] = (),
     ) -> None:
-        """Builds the plant of `world`, with objects and people where the seed puts them.
+        """Builds the plant of `world`; the seed places objects and people.
 
         Without `robots`, Alice the Spot stands at the world's start. `extra_models` are on no map. `variation` changes
         light, clutter (of none of the classes in `spared`) and friction; its people are part of `world` already.
@@ -100,7 +100,7 @@ class Simulation:
     def save_snapshots(self, path: Path, *, label: str = "") -> Callable[[], None]:
         """Writes the whole state to a file now and once a second; the returned function writes it at once.
 
-        `label` names the run that the state belongs to.
+        `label` names the run of the state.
         """
         writer = SnapshotWriter(path, self.engine, self.referee, {**self._facts(), "label": label})
         writer()
@@ -110,8 +110,8 @@ class Simulation:
     def restore(self, path: Path, *, label: str | None = "") -> None:
         """Restores the state in a file, as after a power failure: no command runs, and the robots come to a stop.
 
-        With `label` None the state of any run fits, and the referee judges only what happens from now on. Raises
-        SnapshotError when the file cannot be read, is damaged, or is that of another simulation.
+        With `label` None the state of any run fits, and the referee judges only later events. Raises SnapshotError when
+        the file cannot be read, is damaged, or belongs to another simulation.
         """
         facts = self._facts() if label is None else {**self._facts(), "label": label}
         restore(read_snapshot(path), self.engine, self.referee, facts)
@@ -120,7 +120,7 @@ class Simulation:
         self.engine.advance(SETTLING_S)
 
     def _facts(self) -> State:
-        """Facts that must be equal in the simulation that restores a state."""
+        """Facts that must match in the restoring simulation."""
         plant = self.engine.world.plant
         return {
             "world": self.world.name,
@@ -170,6 +170,6 @@ def _loose(placement: Placement) -> LooseModel:
 
 
 def _person(placement: Placement) -> LooseModel:
-    """The model of a person; one who stands is welded to the world, which costs nothing in a step."""
+    """The model of a person; a standing person is welded to the world, at no cost in a step."""
     route = placement.route
     return replace(_loose(placement), fixed=route is None, route=route, receiving=placement.receiving)

@@ -1,11 +1,11 @@
-"""Snapshots of the plant: its whole state in files, so that a simulated world outlives the process that ran it.
+"""Snapshots of the plant: its whole state in files, so that a simulated world outlives its process.
 
 A snapshot has a first line that identifies it, an increasing number, values as JSON and arrays as they are in memory.
 Only the plant reads it.
 
-Two snapshots are written in turn, each with a checksum: a kill in the middle of a write spoils the older one.
-Overwriting a file takes a tenth of the time of replacing it. Paths only grow, so they are appended as rows to a third
-file; a snapshot names the number of its rows. So the size of a snapshot does not grow with the time of the run.
+Two snapshot files with checksums are overwritten in turn: a kill in the middle of a write spoils only the older one.
+Overwriting a file takes a tenth of the time of replacing it. Paths only grow, so their rows are appended to a third
+file, and a snapshot has the number of its rows: its size does not grow with the time of the run.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _ROW_FILES: Final = (".c", ".d")
 
 
 class SnapshotError(ValueError):
-    """A snapshot that cannot be used; the message says why, and what to do."""
+    """Error of an unusable snapshot, with the reason and a hint."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Rows:
 class Snapshot:
     """State of a plant: values as in JSON, arrays by name, and the rows (N, width) up to then.
 
-    `number` increases from one snapshot to the next; `stored` says where the rows are.
+    `number` increases from one snapshot to the next; `stored` has the place of the rows.
     """
 
     number: int
@@ -69,7 +69,7 @@ def encode(
     arrays: Mapping[str, tuple[tuple[int, ...], bytes]],
     rows: Rows | None = None,
 ) -> bytes:
-    """Returns the content of a snapshot file; each array is given as its shape and its doubles."""
+    """Returns the content of a snapshot file; an array is its shape and its doubles."""
     shapes = [[name, shape] for name, (shape, _) in arrays.items()]
     stored = None if rows is None else astuple(rows)
     head = {"number": number, "values": values, "arrays": shapes, "rows": stored}
@@ -97,7 +97,7 @@ def decode(content: bytes) -> Snapshot:
 
 
 class SnapshotFile:
-    """Writer of snapshots, each in place of the last but one, and of rows of `width` doubles.
+    """Writer of snapshots, each over the last but one, and of rows of `width` doubles.
 
     `rows` describes the rows so far; `bytes_written` counts all bytes.
     """
@@ -229,7 +229,7 @@ def _beside(path: Path, name: str) -> Path:
 
 
 def _try_read(path: Path, slot: str) -> Snapshot | str:
-    """Returns the snapshot in one file with its rows, or the reason why there is none."""
+    """Returns the snapshot in one file with its rows, or the reason for its absence."""
     try:
         snapshot = decode(_beside(path, slot).read_bytes())
         return snapshot if snapshot.stored is None else replace(snapshot, rows=_rows(path, snapshot.stored))

@@ -72,7 +72,7 @@ Parts = Annotated[int, quantities.Quantity(ge=1, le=10_000_000)]
 
 
 class ImportedObject(BaseModel):
-    """One imported object: `class` is the class that a detector finds, by default the object's own name.
+    """One imported object: `class` is its detector class, by default the object's own name.
 
     The origin of its frame is the centre of the bounding box `size_m`, z is up as it rests; `inertia_kg_m2` is xx, yy,
     zz, xy, xz, yz about its centre of mass. With `photographs`, a box stands for the object, which has no mesh.
@@ -98,7 +98,7 @@ class ImportedObject(BaseModel):
         return ModelForm(file=file, half_extents_m=(x / 2, y / 2), rest_height_m=z / 2, round=self.round)
 
     def write(self, folder: Path) -> None:
-        """Writes the facts of the object into a folder, from which `read_imported` reads them."""
+        """Writes the facts of the object into a folder, for `read_imported`."""
         text = yaml_of(self.model_dump(mode="json", by_alias=True))
         (folder / FACTS_FILE).write_text(f"# Made by `errand object import`, don't edit.\n{text}", encoding="utf-8")
 

@@ -8,7 +8,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 Shape = Mapping[str, Any]
-"""A `box`, `cylinder` (radius, length) or `sphere` (radius) with `xyz` and, if it is rotated, `rpy`."""
+"""A `box`, `cylinder` (radius, length) or `sphere` (radius) with `xyz` and, for a rotated shape, `rpy`."""
 
 
 def text(values: Iterable[float]) -> str:

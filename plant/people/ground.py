@@ -1,4 +1,4 @@
-"""Ground where people can walk: a grid of the world's fixed shapes, with shortest paths and free points."""
+"""Walkable ground: a grid of the world's fixed shapes, with shortest paths and free points."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Ground:
         return self._shortened((start_W, *cells, goal_W))
 
     def plan_on(self, start_W: Point, goal_W: Point, *, who: str) -> tuple[Point, ...]:
-        """Plans as `plan_path`, for a person who may stand too close to something now and steps away first."""
+        """Plans like `plan_path`; a person who stands too close to an obstacle steps away first."""
         if self._clear_m(np.array([start_W]))[0] >= LEAST_M:
             return self.plan_path(start_W, goal_W, who=who)
         cells = np.argwhere(self._clearance_m >= SHOULDERS_M)
@@ -87,7 +87,7 @@ class Ground:
     def free_points(
         self, from_W: Point, least_m: float, clear_m: float, rng: np.random.Generator, count: int
     ) -> Iterator[Point]:
-        """Draws up to `count` points with a clearance (m), at least so far from a point, in the part that holds it."""
+        """Draws up to `count` points with a clearance (m), at a least distance from a point, in its connected part."""
         _, parts = cv2.connectedComponents((self._clearance_m >= LEAST_M).astype(np.uint8))
         row, column = self._cell(from_W)
         cells = np.argwhere((parts == parts[row, column]) & (self._clearance_m >= clear_m))

@@ -1,4 +1,4 @@
-"""People who hear robots near them and in sight, and answer their questions; they know the true state."""
+"""People who hear robots near them and in sight, and answer from the true state."""
 
 import math
 import re
@@ -39,7 +39,7 @@ class Listeners:
         self._walls: Ground | None = None
 
     def hearer(self, robot: str) -> str | None:
-        """Returns the nearest person whom a robot faces and who hears it speak now, else the nearest; or None."""
+        """Returns the nearest hearing person ahead of a robot, else the nearest hearing person; or None."""
         world = self._world
         X_WR = world.plant.EvalBodyPoseInWorld(self._context, world.robots[robot].body)
         robot_W = float(X_WR.translation()[0]), float(X_WR.translation()[1])
@@ -57,8 +57,8 @@ class Listeners:
     def answer(self, person: str, question: str, options: Sequence[str] = ()) -> str | None:
         """Returns a person's answer to a question; None when the person has none.
 
-        "Are you Robin?" is answered by the name, other questions by the first of the person's `answers` whose text
-        stands in the question. Of the options of another question, a person who has answers chooses by the seed.
+        The name answers "Are you Robin?". The first of the person's `answers` with a text in the question answers other
+        questions. For any other question with options, a person who has answers chooses one by the seed.
         """
         answers: Mapping[str, str] = self._answers[person]
         who = _WHO.search(question)

@@ -1,9 +1,9 @@
 """People who receive an offered object: each brings a tray below it, pulls at it, and holds the tray still.
 
 A robot offers an object when its hand holds the object still outside the robot's outline, free of other contacts. A
-person knows the true state of the plant. The tray is a free body without weight whose pose and velocity are prescribed;
-it touches robots and loose objects, and is hidden in the torso while unused. The pull is a force on the object, and
-ends as soon as the gripper gives way.
+person knows the true state of the plant. The tray is a weightless free body with prescribed pose and velocity; it
+touches robots and loose objects, and is hidden in the torso while unused. The pull is a force on the object, and ends
+when the gripper gives way.
 """
 
 import enum
@@ -43,7 +43,7 @@ class _Shapes:
         self._radii_m = np.array([half_m[0] for _, half_m, _ in self._balls])
 
     def lowest(self, X_WB: RigidTransform) -> Sequence[Row]:
-        """Rows that may have the lowest point with the body at a pose: the lowest balls, and all other shapes."""
+        """Candidate rows for the lowest point with the body at a pose: the lowest balls, and all other shapes."""
         lows_m = self._centres_B @ X_WB.rotation().matrix()[2] - self._radii_m
         chosen = np.flatnonzero(lows_m <= lows_m.min(initial=np.inf) + _ROUNDING_M)
         return [*self._others, *(self._balls[number] for number in chosen)]
@@ -86,7 +86,7 @@ class Offers(Stateful, saved=("_still_since_s",)):
         self._still_since_s: dict[str, float] = {}
 
     def update(self, now_s: float, holding: Sequence[str]) -> None:
-        """Records which of the robots `holding` an object keep it still for a person, and since when."""
+        """Records the robots of `holding` that keep an object still for a person, and the time since then."""
         offering = [name for name in holding if self._holds_still(name)]
         self._still_since_s = {name: self._still_since_s.get(name, now_s) for name in offering}
 
@@ -122,7 +122,7 @@ class Offers(Stateful, saved=("_still_since_s",)):
         return self._robots[robot].opening(self._context)
 
     def lowest_m(self, offer: Offer) -> float:
-        """Height (m) of the lowest point of an offered object and of the gripper that holds it."""
+        """Height (m) of the lowest point of an offered object and its gripper."""
         bodies = (self.loose[offer.object], *self._links[offer.robot])
         return min(self._low_m(body) for body in bodies)
 
@@ -153,7 +153,7 @@ class Offers(Stateful, saved=("_still_since_s",)):
         return bool(np.any((p_BG[:2] < low - BEYOND_OUTLINE_M) | (p_BG[:2] > high + BEYOND_OUTLINE_M)))
 
     def _free_in(self, robot: str) -> str | None:
-        """Returns the only object that a gripper touches, if that object touches nothing else; else None."""
+        """Returns the only object in contact with a gripper if it has no other contact, else None."""
         links = {int(link.index()) for link in self._links[robot]}
         touching: dict[int, set[int]] = {}
         for each in self._query.Eval(self._context).ComputePointPairPenetration():
@@ -268,7 +268,7 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
             self._go_home(now_s)
 
     def _grip(self, offer: Offer) -> None:
-        """Records the opening and the object's place in the hand, from which the gripper may give way."""
+        """Records the opening and the object's place in the hand, to notice when the gripper gives way."""
         self._opening, self._p_HO = self._offers.opening(offer.robot), self._offers.in_hand(offer)
 
     def _gives(self, offer: Offer, opens_rad: float = GIVES_RAD, moved_m: float = GIVES_M) -> bool:

@@ -1,4 +1,4 @@
-"""Walk of one person: the legs of a route, changes of pace, distractions, and paths that somebody plans meanwhile."""
+"""Walk of one person: the legs of a route, changes of pace, distractions, and paths from elsewhere."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ class Walk(
 ):
     """A person on the legs of a route, or on paths given by `take_path`, who faces along the path.
 
-    Call `advance` once a step. `held_s` is the time for which the person has waited for a robot, a door or a person,
-    `walked_m` the whole path so far. `lapsed` says that a lapse of attention has begun, until somebody resets it.
+    Call `advance` once a step. `held_s` is the person's waiting time for a robot, a door or a person, `walked_m` the
+    whole path so far. `lapsed` is True once a lapse of attention has begun, until the caller resets it.
     """
 
     def __init__(
@@ -127,12 +127,12 @@ class Walk(
         self._wait_s = 0.0
 
     def take_detour(self, corners_W: tuple[Point, ...], *, passing: bool = True) -> None:
-        """Replaces the rest of the path by another to its end, `passing` close by what is in the way."""
+        """Replaces the rest of the path by another to its end, which may lead close by an obstacle (`passing`)."""
         pause_s = (self._detour[0] if self._detour is not None else self._legs[self._leg]).pause_s
         self.take_path(corners_W, pause_s, passing=passing)
 
     def take_path(self, corners_W: tuple[Point, ...], pause_s: float = 0.0, *, passing: bool = False) -> None:
-        """Replaces the present path by another, perhaps `passing` close by what is in the way."""
+        """Replaces the present path by another, which may lead close by an obstacle (`passing`)."""
         leg = Leg(corners_W, pause_s)
         self._detour, self._done_m = (leg, leg.lengths_m()), 0.0
         self._asides, self._passing = (), passing
@@ -156,7 +156,7 @@ class Walk(
 
     @property
     def on_detour(self) -> bool:
-        """Returns whether the person walks close by something that was in the way."""
+        """Returns whether the person walks close by an obstacle on a detour."""
         return self._passing
 
     def ahead_W(self, length_m: float) -> tuple[Point, ...]:
@@ -199,7 +199,7 @@ class Walk(
             self._begin(self._lapses[self._lapse])
 
     def arrive(self) -> None:
-        """Ends the present path here, near enough to its end, with the pause there."""
+        """Ends the present path here, close to its end, and begins the pause of its end."""
         self._wait_s = (self._detour[0] if self._detour is not None else self._legs[self._leg]).pause_s
         self._done_m, self._leg, self._detour = 0.0, self._leg + 1, None
         self._asides, self._passing = (), False

@@ -1,10 +1,10 @@
 """People who walk: before each step of the plant, each person is moved along a planned path.
 
 The body of a walking person slides on a planar joint. Its pose and velocity are prescribed; it touches robots and loose
-objects, and passes through the scenery. Shortest paths on a grid of the world's collision shapes lead around that, and
-closed doors stop people. The pose of a standing person is set only if something has pushed the person.
+objects, and passes through the scenery. Shortest paths on a grid of the world's collision shapes avoid the scenery, and
+closed doors stop people. The pose of a standing person is set only after a push.
 
-What a person does depends on the seed, the robots and the doors alone.
+A person's behaviour depends only on the seed, the robots and the doors.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ PATIENCE_S = 4.0
 PASS_M = 0.26
 """On a detour, a person stops only for an outline nearer than this."""
 APART_M, PASS_APART_M = 0.8, 0.42
-"""People who keep apart stop where the path so far ahead comes nearer than the second to the centre of a person."""
+"""Look-ahead on the path, and distance to a person's centre at which people who keep apart stop."""
 STEPS_M = 0.15
 MEET_M, WAY_M = 1.6, 3.0
 """People nearer than this meet, and one makes way for the other: leaves this length of the other's path free."""
@@ -55,9 +55,9 @@ DOOR_M = 0.6
 HEARS_M = 3.0
 """People hear a robot within this distance, and a robot hears them."""
 BEHIND_M, SETS_OFF_M = 1.5, 1.9
-"""Length of the path to the robot at which a person behind it stops, and distance from which on the person follows."""
+"""Length of the path to the robot at which a follower stops, and distance at which the follower walks again."""
 NEAR_M = 2.0
-"""A robot nearer than this ends the lapse of a person who follows it."""
+"""Distance of a robot that ends its follower's lapse of attention."""
 PLAN_S = 0.7
 """Time between two paths of a person who follows a robot."""
 WANDERS_M, WANDERER_CLEAR_M, PAUSES_S = 2.0, 0.45, (0.5, 4.0)
@@ -113,13 +113,13 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         yield from (walk.place_W for walk in self._walks.values())
 
     def hear(self, robot: str) -> None:
-        """Lets the people near a robot hear it speak: who follows robots follows this one from now on."""
+        """Passes a robot's speech to the people near it; those who follow robots follow this one from now on."""
         for name, route in self._routes.items():
             if route.follows in (robot, ANY_ROBOT) and self._away_m(robot, self._walks[name]) <= HEARS_M:
                 self._leaders[name], self._walks[name].lapsed = robot, False
 
     def before_step(self, dt_s: float, standing: Collection[str] = (), barriers: Barriers = ()) -> None:
-        """Sets the pose of each person, and the velocity that leads to the next pose within dt_s.
+        """Sets each person's pose, and the velocity to the next pose within dt_s.
 
         The people in `standing` stay where they are; nobody passes the `barriers`.
         """
@@ -239,7 +239,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
             self._step_aside(name, walk, first, near)
 
     def _is_taken(self, name: str, walk: Walk) -> bool:
-        """Returns whether somebody stands where a person close by wants to stop."""
+        """Returns whether another person stands at the goal of a person close by."""
         others = (there for other, there in self._walks.items() if other != name and not there.walks)
         taken = any(math.dist(there.place_W, walk.next_stop_W) < PASS_APART_M for there in others)
         return taken and math.dist(walk.place_W, walk.next_stop_W) < APART_M + PASS_APART_M
@@ -260,7 +260,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
                 walk.step_aside(ground.plan_on(walk.place_W, place_W, who=name), ASIDE_S)
 
     def _with_right_of_way(self, name: str, walk: Walk) -> Iterator[Walk]:
-        """People close by who walk and for whom a person makes way: those who come later by name."""
+        """Walking people close by with right of way over a person: those with a later name."""
         for other, there in self._walks.items() if self._routes[name].apart else ():
             if other > name and there.walks and math.dist(there.place_W, walk.place_W) < MEET_M:
                 yield there

@@ -80,7 +80,7 @@ class Entities:
         persons: Sequence[str],
         scenery: Mapping[GeometryId, str],
     ) -> Entities:
-        """Reads the entities of a finalized plant. Raises ValueError with the name that the plant does not have.
+        """Reads the entities of a finalized plant. Raises ValueError with a name that the plant lacks.
 
         `scenery` names the piece of furniture of each collision shape of the world body.
         """
@@ -146,7 +146,7 @@ Pair = tuple[int, int]
 
 FLOOR_Z_M = 0.04
 MOVES_M_S = 0.05
-"""A robot that was faster than this just before a contact with a person has caused the contact."""
+"""Speed just before a contact with a person above which the robot has caused the contact."""
 
 
 def contact_heights(
@@ -182,7 +182,7 @@ class CollisionCounter(Stateful, saved=("_last_touched_s", "collisions")):
     """Counter of new contacts between robots and scenery, people or other robots.
 
     A pair that parts for less than `debounce_s` is still the same collision. Contacts of the first update do not count.
-    All contacts of a robot with the same person or the same other robot are one pair, whichever parts touch.
+    All contacts of a robot with the same person or the same other robot are one pair.
     """
 
     def __init__(self, entities: Mapping[int, Entity], debounce_s: float = 0.5) -> None:
@@ -206,7 +206,7 @@ class CollisionCounter(Stateful, saved=("_last_touched_s", "collisions")):
             self._last_touched_s[counted] = time_s
 
     def _counted_as(self, pair: Pair) -> Pair:
-        """Pair that stands for a contact: whole robots with people and other robots, else the pair itself."""
+        """Pair of a contact for the count: whole robots with people and other robots, else the pair itself."""
         a, b = (self._entities[number] for number in pair)
         whole = Kind.PERSON in (a.kind, b.kind) or (a.kind in ROBOT_KINDS and b.kind in ROBOT_KINDS)
         return (self._first_of[a.owner], self._first_of[b.owner]) if whole else pair

@@ -1,4 +1,4 @@
-"""Findings of the referee, what all judges use, and the judges of company: who was followed, guided and greeted."""
+"""Findings of the referee, helpers of all judges, and the judges of following, guiding and greeting."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ _SAMPLE_S: Final = 0.1
 
 @dataclass(frozen=True)
 class Finding:
-    """Finding on one condition: whether it holds, and a sentence that says why."""
+    """Finding on one condition: whether it holds, and the reason as a sentence."""
 
     holds: bool
     sentence: str
@@ -70,7 +70,7 @@ def where(regions: Sequence[Region]) -> str:
 
 
 def judge_company(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges whether a robot was near a person where the person should be, and, if it followed, never lost them."""
+    """Judges whether a robot was near a person at the person's goal, and, if it followed, never lost them."""
     people = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}
     if not people:
         return Finding(False, f"there is no person {condition.person or ''}".rstrip() + " to go to.")
@@ -122,7 +122,7 @@ def _apart_m(condition: GoalCondition, robot: TimedPath, person: TimedPath, trut
 
 
 def judge_greeted(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges whether the robot spoke beside each person who stayed in the region, and once for each.
+    """Judges whether the robot spoke near each person who stayed in the region, once for each.
 
     A person who came or left during the step may be greeted or not.
     """

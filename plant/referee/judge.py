@@ -74,7 +74,7 @@ def _judge_grasped(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _is_held(history: ObjectHistory, condition: GoalCondition, until_s: float) -> bool:
-    """Returns whether a robot holds an object at the times at which it must."""
+    """Returns whether a robot holds an object at the required times."""
 
     def own(robot: str | None) -> bool:
         return robot is not None and condition.robot in (None, robot)
@@ -111,7 +111,7 @@ def _judge_handed_over(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _was_given(history: ObjectHistory, people: Collection[str], condition: GoalCondition, truth: Truth) -> bool:
-    """Returns whether an object came to rest on the tray of a person, and stayed at the times at which it must."""
+    """Returns whether an object came to rest on a person's tray, and was there at the required times."""
     until_s = step_end_s(condition, truth)
     for person in people:
         for first_s, last_s in truth.given.get((history.name, person), ()):
@@ -157,7 +157,7 @@ def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> str:
-    """Clause that says where an object is that does not, or did not, rest in the goal in time."""
+    """Clause on the place of an object that did not rest in the goal in time."""
     now = _rest_in(history, condition.goal)
     if now is not None and not history.placed_by_person:
         return f"{definite(history.name)} was not on {where(condition.goal)} at the end of its step"
@@ -167,7 +167,7 @@ def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth)
 
 
 def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> FloatArray | None:
-    """Place in the goal where a robot put an object; None if it was not there at the times at which it must be."""
+    """Place in the goal where a robot put an object; None if the object was not there at the required times."""
     until_s = step_end_s(condition, truth)
     if condition.when is When.SOME_TIME:
         rests = history.own_rests_W(condition.from_s, until_s + SETTLE_S)
@@ -184,7 +184,7 @@ def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> F
 
 
 def _judge_went(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges whether the robot's body was in the goal at the times at which it must be."""
+    """Judges whether the robot's body was in the goal at the required times."""
     robots = [name for name in truth.robots if condition.robot in (None, name)]
     if not robots:
         return Finding(False, f"There is no robot {condition.robot}.")
@@ -246,7 +246,7 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges an answer by the state of the door while the robot looked; while it moved, both answers are right."""
+    """Judges an answer by the state of the door while the robot looked; for a moving door, both answers are right."""
     was = _door_state(condition, truth, truth.now_s if condition.answered_s is None else condition.answered_s)
     right = condition.answer is not None and was in ("moving", "open" if condition.answer else "closed")
     said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
@@ -260,7 +260,7 @@ def _judge_opened(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _door_state(condition: GoalCondition, truth: Truth, then_s: float) -> str:
-    """State of a door in the time before `then_s` in which a robot looks at it: open, closed or moving."""
+    """State of a door during a robot's look before `then_s`: open, closed or moving."""
     (doorway,) = condition.source
     changes = next((each for (x, y), each in truth.doors.items() if doorway.contains((x, y, 0.0))), ())
     before = [share for begun_s, share in changes if begun_s <= then_s - DOOR_LOOK_S]
@@ -344,7 +344,7 @@ def _lift(history: ObjectHistory, condition: GoalCondition, from_s: float, until
 
 
 def _rest_in(history: ObjectHistory, goal: Sequence[Region]) -> FloatArray | None:
-    """Position of an object that rests in the goal now; None when it does not."""
+    """Position of an object at rest in the goal now, else None."""
     return history.last.p_WO if history.resting and region_at(goal, history.last.p_WO) is not None else None
 
 

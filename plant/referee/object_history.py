@@ -1,4 +1,4 @@
-"""The record that the referee judges by: histories of loose objects and paths of robots and people.
+"""The referee's record: histories of loose objects and paths of robots and people.
 
 An object's history has its resting places, lifts and drops; a path also gives the error of a trajectory.
 """
@@ -23,7 +23,7 @@ REST_S = 0.2
 FLICKER_S = 0.15
 SETTLE_S = 1.0
 SET_DOWN_S = 0.3
-"""An object that touched the floor this shortly before the gripper left it was set down, not dropped."""
+"""Longest time from contact with the floor to the release of an object that was set down, not dropped."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class ObjectHistory(Stateful):
 
     @property
     def holder(self) -> str | None:
-        """Robot whose gripper holds the object, or held it a moment ago."""
+        """Robot that holds the object, or held it a moment ago."""
         return self._grip_robot if self.last.time_s - self._grip_s <= FLICKER_S else None
 
     @property
@@ -146,7 +146,7 @@ class ObjectHistory(Stateful):
     def rest_at(self, time_s: float) -> tuple[float, FloatArray] | None:
         """Time and place of the rest at a time, or of a rest that began within SETTLE_S after it; None without a rest.
 
-        The first place of the object and places where a person put it do not count.
+        The object's first place and placements by people do not count.
         """
         lifted_s = max((lift.time_s for lift in self.lifts if lift.time_s <= time_s), default=-math.inf)
         again_s = min((lift.time_s for lift in self.lifts if lift.time_s > time_s), default=math.inf)
@@ -214,7 +214,7 @@ class ObjectHistory(Stateful):
         self._supported_s = time_s
 
     def record_move(self, p_WO: FloatArray, time_s: float) -> None:
-        """Records that a person has moved the object to p_WO; that is no drop and no placement by a robot."""
+        """Records a person's move of the object to p_WO, neither a drop nor a placement by a robot."""
         self._last = replace(self.last, time_s=time_s, p_WO=p_WO, gripper=None, X_WH=None, tray_of=None)
         self._grip_s = self._tray_s = float("-inf")
         self._carried, self._left_z_m, self._dropped, self._still_since_s = False, None, False, None
@@ -239,7 +239,7 @@ class ObjectHistory(Stateful):
         return float(np.linalg.norm(slip)) / (sample.time_s - last.time_s) < WITH_HAND_M_S
 
     def _note_lift(self, sample: ObjectSample, with_hand: bool) -> None:
-        """Begins a carry once the gripper has raised the object off its place, or moved it well away from there."""
+        """Begins a carry once the gripper has raised the object or moved it well away from its place."""
         if sample.gripper is None or sample.supported or not with_hand:
             return
         moved_W = sample.p_WO - self.rests_W[-1]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 PATH_VALUES = 4
 BEFORE_SAMPLES = 3
 MOST_POINTS = 20_000
-"""Most points of a person's path, so that a long run with a crowd needs a bounded memory."""
+"""Most points of a person's path, to bound the memory of a long run with a crowd."""
 
 
 DoorHistories = Callable[[], Mapping[tuple[float, float], Sequence[tuple[float, float]]]]
@@ -36,7 +36,7 @@ DoorHistories = Callable[[], Mapping[tuple[float, float], Sequence[tuple[float, 
 class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_bases", "_persons")):
     """Referee of one plant: call `observe` at about 20 Hz while it runs, and `judge` at any time.
 
-    Its saved state is the whole record without the paths, which only grow: `points` returns them by name.
+    Its saved state is the whole record without the paths; `points` returns these growing arrays by name.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         """`plant` is finalized; `scenery` names the piece of furniture of each collision shape of the world body.
 
         `placements` are the loose objects and the people; `persons` names the people. `robots` has the kind of each
-        robot by the name of its model instance. Raises ValueError with the name that the plant does not have.
+        robot by the name of its model instance. Raises ValueError with a name that the plant lacks.
         """
         self._plant, self._geometry = plant, plant.get_geometry_query_input_port()
         self._entities = Entities.from_plant(plant, placements, robots, persons, scenery)
@@ -149,7 +149,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
             self._path(name)[:] = path
 
     def forget_past(self) -> None:
-        """Forgets the record, so that the next mission is judged by what happens from now on."""
+        """Clears the record, so that only later events count for the next mission."""
         self._counter.collisions, self._given = [], {}
         self._paths = {name: [] for name in self._paths}
         self._person_paths = {name: [] for name in self._person_paths}
@@ -157,7 +157,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
             history.forget_past()
 
     def record_move(self, name: str, plant_context: Context, time_s: float) -> None:
-        """Records that a person has moved an object to its present pose. Raises KeyError for an unknown object."""
+        """Records a person's move of an object to its present pose. Raises KeyError for an unknown object."""
         self._histories[name].record_move(self._position(plant_context, self._entities.objects[name]), time_s)
 
     @property
@@ -166,9 +166,9 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         return (*sorted(self._paths), *sorted(self._person_paths))
 
     def points(self, name: str) -> Sequence[FloatArray]:
-        """Points of the path of a robot or a person, each with its time (s); must not be changed. Raises KeyError.
+        """Points of a robot's or person's path with their times (s); do not change them. Raises KeyError.
 
-        A robot's only grows; a person's loses some of its older points when it has many.
+        A robot's path only grows; a long path of a person loses some of its older points.
         """
         return self._path(name)
 

@@ -82,9 +82,9 @@ class LeaseManager:
 
 
 class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
-    """Simulated robot that senses, and runs the commands of the holder of its lease.
+    """Simulated robot that senses, and runs the commands of the lease holder.
 
-    Its saved state is that of servos and sensors; commands and leases end with its computer.
+    Its saved state is that of servos and sensors; commands and leases end with the robot's computer.
     """
 
     def __init__(
@@ -265,7 +265,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         return {**super().state(), "arm_moves": self._commands.running(Part.ARM) is not None}
 
     def restore(self, state: State) -> None:
-        """Restores a state: an arm that was moving holds its position, and the gripper keeps its force."""
+        """Restores a state: a moving arm holds its position, and the gripper keeps its force."""
         super().restore(state)
         if state["arm_moves"]:
             self._arm.hold(self._joints())
@@ -288,7 +288,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
 
     @abstractmethod
     def _desired(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> FloatArray:
-        """Desired positions and velocities of all joints after dt_s; the caller fills in those of the arm."""
+        """Desired positions and velocities of all joints after dt_s; the caller adds those of the arm."""
 
     def _hold_still(self, part: Part) -> None:
         """Sets the goal of a part to its present position; a gripper that clamps an object keeps its force."""

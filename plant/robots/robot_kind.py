@@ -39,9 +39,9 @@ class LocomotionLimits:
 class PlacedRobot:
     """One robot of a run: its kind, and its poses at the start and at its dock (world frame).
 
-    Without an `own_stack` file it uses the stack of its kind. `start_known` says whether the localiser is given the
-    start. `locomotion` of another class than the kind's counts as none: then the kind's own limits apply. The battery
-    begins at `charge` (0 to 1).
+    Without an `own_stack` file it uses the stack of its kind. `start_known` says whether the localiser gets the start.
+    `locomotion` of another kind's class is ignored, and the kind's own limits apply. The battery begins at `charge` (0
+    to 1).
     """
 
     name: str
@@ -60,7 +60,7 @@ class PlacedRobot:
 
     @property
     def stack_file(self) -> Path | None:
-        """File of the robot's stack; None for the stack that comes with Errand."""
+        """File of the robot's stack; None for Errand's default stack."""
         return self.own_stack or robot_kind(self.kind).stack
 
 
@@ -109,7 +109,7 @@ class RobotBody(ABC):
         return (self.instance,)
 
     def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
-        """Filters collisions between links of this robot, and between the floor and links that never stand on it."""
+        """Filters collisions between links of this robot, and between the floor and all links but feet or wheels."""
         from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 
         filters.Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(self.geometries())))
@@ -173,10 +173,9 @@ class SensorOptions:
 class RobotKind:
     """A kind of robot: its capabilities, and how it is built and driven in a plant.
 
-    `gripper_links` are the hand and the fingers; `trunk_links` and `leg_links` those of the body and of legs or wheels:
-    all others are the arm's. `facts` is the file of its numbers, `stack` that of its stack (None: the default stack).
-    `add` puts a robot into a plant before Finalize, with visual meshes or without; `drive` makes its controllers and
-    sensors.
+    `gripper_links` are the hand and the fingers; `trunk_links` the body, `leg_links` legs or wheels: all others belong
+    to the arm. `facts` is the file of its numbers, `stack` that of its stack (None: the default stack). `add` puts a
+    robot into a plant before Finalize, with visual meshes or without; `drive` makes its controllers and sensors.
     """
 
     name: str
@@ -197,7 +196,7 @@ class RobotKind:
 
 @cache
 def robot_kinds() -> Mapping[str, EntryPoint]:
-    """Entry points of the installed kinds by name; a kind is loaded when it is first used."""
+    """Entry points of the installed kinds by name; a kind is loaded at first use."""
     return {entry.name: entry for entry in sorted(installed_plugins(GROUP))}
 
 

@@ -82,7 +82,7 @@ class Camera(NoisySensor):
     ) -> Image:
         """Takes a picture, its depth, or both; `frames` is the robot's frame tree at the same time.
 
-        The array of the part that is not taken is empty.
+        The array of a skipped part is empty.
         """
         colour = self._picture.colour(self._render(query_object, self._colour_camera)) if visual else None
         grey = _NO_PICTURE if colour is None else _grey(colour)
@@ -99,7 +99,7 @@ class Camera(NoisySensor):
         )
 
     def _take_depth(self, query_object: QueryObject, grey: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Renders noisy depth; without a picture, a small one shows the spots that are too dark or too shiny."""
+        """Renders noisy depth; without a picture, renders a small one for the too dark and too shiny spots."""
         lens = self.spec.depth_intrinsics()
         seen = grey if grey.size else _grey(self._render(query_object, self._faint_camera))
         small = seen if seen.shape == (lens.height, lens.width) else cv2.resize(seen, (lens.width, lens.height))
@@ -216,7 +216,7 @@ class SensorSuite(
 
     @property
     def scan(self) -> Scan | None:
-        """Latest revolution of the LiDAR, computed when it is first read; the plant may have stepped since."""
+        """Latest revolution of the LiDAR, computed at the first read; the plant may have stepped since."""
         if self._revolution is not None:
             self._scan, self._revolution = self._revolution(), None
         return self._scan
@@ -235,7 +235,7 @@ class SensorSuite(
 
     @cached_property
     def _chains(self) -> Mapping[str, tuple[str, tuple[str, ...]]]:
-        """Links of hand and head, each with the name of its frame and the joints that move it."""
+        """Links of hand and head, each with its frame's name and its joints."""
         can, plant, instance = self._body.kind.capabilities(), self._body.plant, self._body.instance
         chains = {"hand": can.arm.joint_names if can.arm else (), "head": can.head.joint_names if can.head else ()}
         moved = {frame: joints for frame, joints in chains.items() if joints}
@@ -249,7 +249,7 @@ class SensorSuite(
         return {link: (frame, X_BF) for (link, (frame, _)), X_BF in poses}
 
     def _efforts(self, positions: FloatArray, rates: FloatArray) -> FloatArray:
-        """Efforts of the motors: the servo law with limits, as the solver applies it at the end of a step."""
+        """Efforts of the motors: the servo law with limits, like the solver's at the end of a step."""
         plant, instance = self._body.plant, self._body.instance
         servos = plant.get_desired_state_input_port(instance)
         if not servos.HasValue(self._context):

@@ -61,7 +61,7 @@ class ActuatedJoints:
 
 @dataclass(frozen=True)
 class GripperGoal:
-    """Opening that a gripper reaches (0 closed, in the unit of its kind) with at most `force_n` at the tip."""
+    """Target opening of a gripper (0 closed, in the unit of its kind) with at most `force_n` at the tip."""
 
     opening: float
     force_n: float
@@ -69,7 +69,7 @@ class GripperGoal:
 
 @dataclass(frozen=True)
 class GripperTolerances:
-    """Limits at which an opening is reached, and fingers count as blocked by an object (units of the opening, s)."""
+    """Limits for a reached opening, and for fingers blocked by an object (units of the opening, s)."""
 
     arrived: float
     stall_rate: float
@@ -106,7 +106,7 @@ class GripperServo(Stateful, saved=("goal", "_before", "_still_s")):
         return Closing.BLOCKED if self._still_s > self._tolerances.stall_s else Closing.MOVING
 
     def halt(self, opening: float, rate: float) -> None:
-        """Stops a moving gripper where it is; a gripper that holds an object keeps its force, or its previous goal."""
+        """Stops a moving gripper at its opening; a gripper with an object keeps its force, or its previous goal."""
         if rate >= self._tolerances.stall_rate:
             self.goal = GripperGoal(opening, self.goal.force_n)
         elif self.goal.opening > opening:
@@ -119,7 +119,7 @@ def clip(value: float, most: float) -> float:
 
 
 def gripper_set_point(goal: float, now: float, lead: float) -> float:
-    """Set point with which a servo pushes with at most its gain times `lead`."""
+    """Set point that limits a servo's push to its gain times `lead`."""
     return min(max(goal, now - lead), now + lead)
 
 

@@ -1,9 +1,8 @@
 """A spinning 16-beam LiDAR: rays against the scene's collision shapes, with range noise and lost returns.
 
-The casting of rays is compiled, one call per revolution. Shapes are tried nearest first, and only on the columns
-(azimuths) that their bounding boxes span. A column is skipped when all its rings already end nearer than the shape
-begins: indoors walls hide most of the rest. Ranges are along the ray; `NO_RETURN_M` stands for no hit (finite, because
-the kernels use fast arithmetic).
+The ray casting is compiled, one call per revolution. It tries shapes nearest first, and only on the columns (azimuths)
+of their bounding boxes. It skips a column when all its rings end nearer than the shape begins: indoors walls hide most
+of the rest. Ranges are along the ray; `NO_RETURN_M` means no hit (finite, because the kernels use fast arithmetic).
 """
 
 from collections import Counter
@@ -101,7 +100,7 @@ def _box_distance(R_WG: FloatArray, p_WG: FloatArray, half: FloatArray, p_W: Flo
 
 @_compiled
 def _columns_spanned(R_LG: FloatArray, p_LG: FloatArray, half: FloatArray, azimuths: FloatArray) -> tuple[int, int]:
-    """First column and number of columns whose vertical plane may meet the box; all of them around the axis."""
+    """First column and number of columns with a vertical plane that may meet the box; all columns around the axis."""
     columns = len(azimuths)
     centre = np.arctan2(p_LG[1], p_LG[0])
     low, high = 0.0, 0.0
@@ -204,8 +203,8 @@ def _cast_capsule(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatAr
 class LidarSpec:
     """Beams and noise. The defaults are those of a Velodyne VLP-16 at 20 revolutions a second.
 
-    Elevations are even over +- `half_fov_rad`; `dropout` is the share of returns lost at random. A LiDAR with less
-    than a full turn has `columns` around straight ahead.
+    Elevations are even over +- `half_fov_rad`; `dropout` is the share of returns lost at random. The `columns` of a
+    LiDAR with less than a full turn are centred ahead.
     """
 
     rings: int = 16
@@ -267,7 +266,7 @@ class Lidar(NoisySensor):
     ) -> Scan:
         """Takes one revolution at the context's state. `X_OB` is the odometry at the same time.
 
-        `X_BL` is the pose of the lidar in the body frame as the robot knows it, by default its mounted pose.
+        `X_BL` is the robot's belief of the LiDAR's pose in the body frame, by default the mounted pose.
         """
         return self.revolution(plant_context, stamp_s, X_OB, X_BL)()
 

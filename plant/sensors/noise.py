@@ -1,7 +1,7 @@
 """Noise of sensors: a random generator for each sensor, and the degradation of clean pictures and depth images.
 
-Grain comes from tiles that are drawn once from the seed and cropped at random, because a million normals for every
-picture would cost more than rendering it.
+Grain comes from random crops of tiles that are drawn once from the seed, because a million normals for every picture
+would cost more than rendering it.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from skills.robot import Intrinsics
 
 
 class NoisySensor(Stateful, saved=("noise",)):
-    """A sensor with a random generator of its own, whose state is saved."""
+    """A sensor with its own random generator; the generator's state is saved."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
@@ -86,7 +86,7 @@ class PictureDegrader:
     """Degrades clean colour pictures of one size: blur, vignette and grain."""
 
     def __init__(self, rng: np.random.Generator, height: int, width: int, noise: PictureNoise, shrink: int = 1) -> None:
-        """`shrink` is the factor by which the picture is smaller than the sensor's; it divides the blur."""
+        """`shrink` is the ratio of the sensor's size to the picture's; it divides the blur."""
         self._noise, self._sigma = noise, noise.blur_px / shrink
         self._grain = NoiseTile(rng, height, width, 3)
         y, x = np.mgrid[0:height, 0:width].astype(np.float32)
@@ -128,7 +128,7 @@ class DepthDegrader:
         return np.where(keep, np.round(noisy, 3), np.float32(0.0)).astype(np.float32)
 
     def _edge(self, z: DepthArray) -> NDArray[np.bool_]:
-        """Mask of the pixels beside steps in depth that are steeper than any visible surface and exceed the noise."""
+        """Mask of the pixels at steps in depth that are steeper than any visible surface and exceed the noise."""
         kernel = np.ones((3, 3), dtype=np.uint8)
         step = cv2.dilate(z, kernel) - cv2.erode(z, kernel)
         steepest = 2.0 / (self._intrinsics.fx * self._noise.grazing)

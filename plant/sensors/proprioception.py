@@ -93,8 +93,8 @@ class ImuModel(NoisySensor, saved=("_last",)):
 class BatterySpec:
     """Battery data: `runtime_s` from full to empty at load 1, the share `idle_share` of that drain at load 0.
 
-    The gauge errs by `sigma`. A dock charges from empty to full in `charge_s`: fast, so that missions need not wait for
-    an hour.
+    The gauge errs by `sigma`. A dock charges from empty to full in `charge_s`, which is short so that no mission waits
+    for an hour.
     """
 
     runtime_s: float = 5400.0
@@ -240,8 +240,8 @@ _TOLERANCE_S = 1e-6
 class GripperNoise:
     """Noise of the readings, and the limits of the belief that the gripper holds an object.
 
-    The belief begins when the force is at least `holding_force_n` and the opening above `closed` for `holding_after_s`
-    without a break, and ends when one of these fails for that time. The defaults are for a hinged gripper (rad).
+    The belief begins once the force is at least `holding_force_n` and the opening above `closed` for `holding_after_s`
+    without a break, and ends once one of the two fails for this time. The defaults are for a hinged gripper (rad).
     """
 
     opening: float = 0.003

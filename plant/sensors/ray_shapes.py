@@ -38,7 +38,7 @@ HALF_SPACE_HALF_WIDTH_M = 500.0
 
 
 class ShapeKind(enum.IntEnum):
-    """Kind of a shape, which decides how rays are intersected with it."""
+    """Kind of a shape, which determines the ray intersection."""
 
     BOX = 0
     CYLINDER = 1

@@ -1,7 +1,7 @@
 """Checks the files of a world's geometry before Drake reads them: directives, models, meshes and textures.
 
-Drake opens every file that another file names: a pipe, an address, the same file again. So all files of a user's world
-are checked first. Files of the plant itself are trusted.
+Drake opens every file that another file names, even a pipe, an address or the same file again. So all files of a user's
+world are checked first. Files of the plant itself are trusted.
 """
 
 import json
@@ -50,7 +50,7 @@ def check_directives(file: Path, home: Path) -> None:
     """Checks Drake model directives and all files that they name, in the folder `home`.
 
     Raises:
-        InputError: with file and line: a file is missing, no plain file, too large, outside, broken, or names itself.
+        InputError: a file is missing, no plain file, too large, outside, broken, or names itself; with file and line.
     """
     _Walk(home.resolve()).directives(file, ())
 
@@ -58,14 +58,14 @@ def check_directives(file: Path, home: Path) -> None:
 def check_model(file: Path, home: Path, lacking: list[str] | None = None) -> None:
     """Checks the file of a model and all files that it names, in the folder `home`; raises like `check_directives`.
 
-    With a list `lacking`, names of missing files are added to it instead.
+    With a list `lacking`, adds the names of missing files to it instead.
     """
     _Walk(home.resolve(), lacking).model(file, ())
 
 
 @dataclass
 class _Walk:
-    """Walk from file to file; each file is checked once, directives as often as they are named."""
+    """Recursive check of files: each file once, directives each time that they are named."""
 
     home: Path
     lacking: list[str] | None = None

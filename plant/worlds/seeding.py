@@ -39,9 +39,9 @@ class Lapse:
 class PointRoute:
     """Route of a walking person: begins at `start_s`, and goes back from the last stop to the first if it `loops`.
 
-    A person who `yields` stops for a robot that is close ahead, one who keeps `apart` for people as well. `pace` is the
-    share by which the speed changes. Who `follows` a robot does so once it has spoken; who `wanders` draws further
-    stops. The person `says` something at the end of the route. `stream` seeds what is drawn meanwhile.
+    A person who `yields` stops for a robot close ahead, a person who keeps `apart` for people as well. `pace` is the
+    share by which the speed changes. A person who `follows` robots begins once one has spoken; a person who `wanders`
+    draws further stops. `says` is the person's text at the end of the route. `stream` seeds all draws on the way.
     """
 
     stops: tuple[PointStop, ...]
@@ -92,7 +92,7 @@ def point_route(route: Route, standing: Mapping[str, Point], stream: Sequence[in
 
 
 def _lapses(route: Route, rng: np.random.Generator) -> tuple[Lapse, ...]:
-    """Distractions of a route: as given, or as many as the route asks for, one every few metres."""
+    """Distractions of a route: as given, or a requested number, one every few metres."""
     if not isinstance(route.distractions, int):
         return tuple(Lapse(each.after, each.stop, each.back) for each in route.distractions)
     after_m = np.cumsum(rng.uniform(*_LAPSE_EVERY_M, size=route.distractions))
@@ -111,7 +111,7 @@ _OBJECT_STREAM, _PEOPLE_STREAM, _FORM_STREAM, _WALK_STREAM = 1, 2, 3, 13
 
 @dataclass(frozen=True)
 class Receiving:
-    """Manner in which a person takes an offered object: pull (N), and the time it must be still first (s)."""
+    """Pull (N) of a person at an offered object, and the time for which the object must be still before (s)."""
 
     pull_n: float = 15.0
     reaction_s: float = 1.0
@@ -121,8 +121,8 @@ class Receiving:
 class Placement:
     """A model in the world: X_WO is its pose at the start.
 
-    A loose object rests on `surface`. A person is welded to the world unless there is a `route`, and takes offered
-    objects as `receiving` says. `answers` are the person's, by a part of the question.
+    A loose object rests on `surface`. A person without a `route` is welded to the world; `receiving` is the person's
+    way of taking objects. `answers` maps parts of questions to the person's answers.
     """
 
     name: str
@@ -143,8 +143,8 @@ class Placement:
 def place_objects(world: World, seed: int) -> tuple[Placement, ...]:
     """Places the world's loose objects at rest on its surfaces. Raises WorldError when they do not fit.
 
-    Form, surface and pose vary with the seed. Each object has random streams of its own, so that one more or one less
-    in the world moves only the objects that it touches.
+    Form, surface and pose vary with the seed. Each object has its own random streams: adding or removing one moves only
+    the objects that it touches.
     """
     catalogue, outlines, placed = load_catalogue(), list[FloatArray](), list[Placement]()
     for index, rule in enumerate(world.seed_rules.objects):
@@ -248,7 +248,7 @@ def _before_start(
 
 
 def standing_points_W(world: World) -> FloatArray:
-    """Points (N, 2) where people may stand at first for some seed: a grid over the range of each person."""
+    """Points (N, 2) of people's possible starts over all seeds: a grid over each person's range."""
     places = list[tuple[float, float]]()
     for rule in world.seed_rules.people:
         if rule.ranges is not None:
@@ -298,7 +298,7 @@ def place_clutter(
 ) -> tuple[Placement, ...]:
     """Places up to `count` more objects beside the placed ones, of none of the `spared` classes.
 
-    Each rests on a surface that the rules allow; an object without a free spot is left out.
+    Each rests on a surface that the rules allow; objects without a free spot are omitted.
     """
     surfaces = tuple(sorted(name for name, fronts in world.seed_rules.fronts.items() if fronts))
     classes = [name for name in load_catalogue() if name not in _NEVER and name not in spared]
@@ -337,7 +337,7 @@ def add_passers_by(world: World, count: int, seed: int) -> World:
 
 
 def add_crowd(world: World, count: int, seed: int) -> World:
-    """Adds `count` people who wander about; the seed chooses where they stand at first, far from the robot's start.
+    """Adds `count` wandering people; the seed chooses their starts, far from the robot's start.
 
     Raises WorldError when the world has too few places.
     """

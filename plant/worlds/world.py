@@ -1,4 +1,4 @@
-"""Loads a world: a folder with directives, knowledge, maps, and the rules by which the seed places objects."""
+"""Loads a world: a folder with directives, knowledge, maps, and rules for placing objects by the seed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ DIRECTIVES: Final = "world.dmd.yaml"
 ROBOTS: Final = "map"
 """Folder of the grids that robots use."""
 TRUTH: Final = "truth"
-"""Folder of the surveyed grids of a world whose robot has made a map of its own."""
+"""Folder of a world's surveyed grids, if the robot has made its own map."""
 
 Point = tuple[quantities.Coordinate, quantities.Coordinate]
 Polygon = tuple[Point, ...]
@@ -71,7 +71,7 @@ class ObjectRule(_Strict):
 
 
 class PersonRule(_Strict):
-    """A person who walks on a route, or stands before the robot's start pose within three ranges.
+    """A person who walks on a route, or stands within three ranges before the robot's start pose.
 
     With both, the person walks to the waypoints from a pose within the ranges.
     """
@@ -107,7 +107,7 @@ _MANNERS: Final = ("receives", "pull_n", "reaction_s", "answers")
 class DoorRule(_Strict):
     """A doorway with a sliding door that opens into the wall; metres in the world frame, seconds.
 
-    It is open until `closes`, and closed until `opens`; the earlier of both decides its state at the beginning.
+    It is open until `closes`, and closed until `opens`; the earlier one determines the state at the beginning.
     """
 
     name: str
@@ -168,10 +168,9 @@ class Import:
 class World:
     """A world: its files, and the facts that the plant uses. Lengths in metres, world frame.
 
-    Only its geometry and a start are necessary: dock, rooms, surfaces and seed rules may be missing. `standing` has the
-    point where a person or robot stands in each room or at each surface. `maps` is the folder of the robot's grids
-    (None: the world's own `map`). `imports` are the models outside the catalogue, by name. `doors` and `moves` are its
-    events.
+    Only its geometry and a start are necessary: dock, rooms, surfaces and seed rules may be missing. `standing` maps
+    each room and surface to the point for a person or robot there. `maps` is the folder of the robot's grids (None: the
+    world's own `map`). `imports` are the models outside the catalogue, by name. `doors` and `moves` are its events.
     """
 
     name: str
@@ -201,9 +200,9 @@ class World:
         return {name: each for name, each in self.imports.items() if each.object.class_name == name}
 
     def with_routes(self, routes: Mapping[str, Route]) -> World:
-        """Returns the world with people on these routes by name, whether they are in the world already or not.
+        """Returns the world with people on these routes by name; adds unknown people.
 
-        Raises WorldError when a name is that of an object, or a waypoint is unknown.
+        Raises WorldError when an object has one of the names, or a waypoint is unknown.
         """
         rules = self.seed_rules
         before = {rule.name: rule for rule in rules.people}
@@ -214,9 +213,9 @@ class World:
         return replace(self, seed_rules=changed)
 
     def with_walks(self, walks: Mapping[str, Route]) -> World:
-        """Returns the world with walking people: known people set off from where they stand, others at a waypoint.
+        """Returns the world with walking people: known people start at their places, others at a waypoint.
 
-        Raises WorldError when a person walks already, a name is that of an object, or a waypoint is unknown.
+        Raises WorldError when a person walks already, an object has one of the names, or a waypoint is unknown.
         """
         before = {rule.name: rule for rule in self.seed_rules.people}
         for name in walks:
@@ -290,7 +289,7 @@ class World:
         return tuple(sorted(self._maps.glob("*scan.yaml")))
 
     def scan_map_seen_from(self, height_m: float | None) -> Path:
-        """Path of the grid whose band is nearest to the height of a LiDAR, the narrowest of several around it."""
+        """Path of the grid with the band nearest to a LiDAR's height, the narrowest of several around it."""
         bands = {path: _band_m(path) for path in self.scan_map_paths}
         if height_m is None or all(low > high for low, high in bands.values()):
             return self.scan_map_path
@@ -316,7 +315,7 @@ def _band_m(path: Path) -> tuple[float, float]:
 
 
 def add_package(package_map: PackageMap) -> None:
-    """Adds the package `errand`, the plant's folder, which worlds and models name as `package://errand/`."""
+    """Adds the package `errand` (`package://errand/` in worlds and models), the plant's folder."""
     package_map.Add(PACKAGE_NAME, WORLDS_FOLDER.parent)
 
 
@@ -329,7 +328,7 @@ def load_world(name_or_path: str | Path) -> World:
     """Loads a world by its name, or by the path of its folder.
 
     Raises:
-        InputError: with file and line: there is no such world, or one of its files or a file that they name is wrong.
+        InputError: there is no such world, or one of its files or a file that they name is wrong; with file and line.
     """
     folder = _find_folder(name_or_path)
     check_directives(folder / DIRECTIVES, folder)

@@ -1,1 +1,1 @@
-"""Manipulation: the skills that use the arm, and the arm's motion, collisions, poses and forces that they share."""
+"""Manipulation: the skills that use the arm, and their shared motions, collisions, poses and forces."""

@@ -1,4 +1,4 @@
-"""Skills of the arm alone: stow folds it onto the body, pose_arm moves it to joint angles such as teleop saves."""
+"""Skills of the arm alone: stow folds it onto the body, pose_arm moves it to joint angles, as saved by teleop."""
 
 import numpy as np
 
@@ -14,9 +14,9 @@ _NEAR_Y_M = 0.3
 _NEAR_Z_M = 0.06
 """Height above the carrying positions within which the hand is near the body."""
 _RAISED_M = 0.05
-"""Height above the usual one from which on the body counts as raised."""
+"""Height above the usual one beyond which the body counts as raised."""
 _THERE_RAD = 0.05
-"""Largest difference of a joint angle at which the arm counts as there."""
+"""Largest error of a joint angle at which the arm has reached its pose."""
 
 
 class Stow(StowPorts, ArmSkill[StowInputs]):
@@ -25,7 +25,7 @@ class Stow(StowPorts, ArmSkill[StowInputs]):
     def run(self, inputs: StowInputs) -> Routine[Succeeded]:
         """Stows or carries.
 
-        The arm of a raised body comes near first, because while the body sinks it would press on what is below.
+        The arm of a raised body comes near first, because it would press on obstacles below while the body sinks.
         """
         yield from self.feel_arm("stowing the arm")
         usual_m = self.context.robot.capabilities().standing_height_m

@@ -15,7 +15,7 @@ LINK_RADIUS_M = 0.06
 _APART_M = 0.06
 """Distance between the discs along a link."""
 _TOLERANCE_M = 0.02
-"""Discs that stick out less than this count as part of the body."""
+"""Largest overhang of discs that still count as part of the body."""
 _CHANGED_M = 0.05
 """Growth from which on a path must be planned again."""
 
@@ -23,8 +23,8 @@ _CHANGED_M = 0.05
 class ArmFootprint:
     """The body's footprint, extended by discs where the arm or the held object sticks out of it.
 
-    The stowed arm counts as part of the body. Heights are ignored, so an arm above an obstacle counts as in collision,
-    except where the robot stands already: there, discs end before the obstacles of the costmap.
+    The stowed arm counts as part of the body. Heights are ignored, so an arm above an obstacle counts as in collision.
+    At the robot's present pose, discs end before the obstacles of the costmap.
     """
 
     def __init__(self, context: SkillContext) -> None:
@@ -69,7 +69,7 @@ class ArmFootprint:
         return _link_discs(self._model, q_rad, self._tip_m)
 
     def _held_discs(self) -> FloatArray:
-        """The held object from above; the largest that the gripper can hold where its size is unknown."""
+        """Discs of the held object from above; an unknown size counts as the largest that the gripper can hold."""
         q_rad = self._q_rad()
         if self._model is None or self._gripper is None or q_rad is None or not self._context.robot.gripper().holding:
             return np.empty((0, 3))
@@ -93,7 +93,7 @@ class ArmFootprint:
         return np.asarray(discs[out])
 
     def _clipped(self, discs: FloatArray) -> FloatArray:
-        """The discs, shrunk to the clearance that the costmap shows where the robot stands."""
+        """The discs, shrunk to the costmap's clearance at the robot's pose."""
         if len(discs) == 0:
             return discs
         pose = self._context.pose()

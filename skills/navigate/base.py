@@ -64,7 +64,7 @@ class Base:
         return None
 
     def ask_again(self) -> bool:
-        """Asks a robot that refused again, by a command to stand; False when patience or the lease is gone."""
+        """Repeats a refused request as a command to stand; False when patience or the lease has ended."""
         if self._cause is CommandCause.NO_LEASE or not self.patience.is_left():
             return False
         self.drive((0.0, 0.0, 0.0))

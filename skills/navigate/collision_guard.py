@@ -1,6 +1,6 @@
-"""Collision guard: stops the robot before moving obstacles, and before obstacles that no costmap knows yet.
+"""Collision guard: stops the robot before moving obstacles, and before obstacles that no costmap has yet.
 
-The guard uses the last LiDAR revolution only, and stops as hard as the robot can.
+The guard uses only the last LiDAR revolution, and brakes at full deceleration.
 """
 
 import math
@@ -25,10 +25,10 @@ class GuardOptions:
     """Collision guard: the robot stands while a moving obstacle would come within `margin_m` in the next `horizon_s`.
 
     The guard assumes that the robot drives on along its path and accelerates at `acceleration_m_s2` up to its limit, or
-    keeps its velocity for `coasting_s`. Obstacles slower than `slow_m_s` do not count, nor those that follow: from
-    behind, in the robot's direction within `follows_rad`. Unexplained returns stop the robot where `least_points` of
-    them lie within `touch_m` of the ground that it covers until it stands: after `reaction_s`, at `stop_m_s2`. The
-    robot goes on once its path has been clear for `clear_s`.
+    keeps its velocity for `coasting_s`. It ignores obstacles slower than `slow_m_s`, and followers: obstacles behind
+    the robot that move in its direction within `follows_rad`. It also stops for `least_points` unexplained returns
+    within `touch_m` of the braking path: after `reaction_s`, at `stop_m_s2`. The robot goes on once its path has been
+    clear for `clear_s`.
     """
 
     horizon_s: Duration = 1.3
@@ -57,7 +57,7 @@ class CollisionGuard:
         self._costmap = context.costmap if isinstance(context.costmap, ReturnsView) else None
 
     def danger(self, here: Pose2D, follower: LocalController, most_m_s: float) -> Place | None:
-        """Position (x, y) of the obstacle that the robot would hit at most_m_s at most; None when it may go on."""
+        """Position (x, y) of the obstacle that the robot would hit at up to most_m_s; None when it may go on."""
         if self._costmap is None:
             return None
         now_s, (stamp_s, returns_W) = self._context.clock.now(), self._costmap.unexplained_returns()
@@ -68,9 +68,9 @@ class CollisionGuard:
         return self._place_W if now_s - self._danger_s < self._options.clear_s else None
 
     def _suddenly_ahead(self, here: Pose2D, returns_W: FloatArray) -> Place | None:
-        """Position of unexplained returns on the ground that the robot covers until it stands, None without any.
+        """Position of unexplained returns on the braking path, None without any.
 
-        The speed is that of the fastest point of the outline, so that a robot which turns in place stops too.
+        The speed is that of the outline's fastest point, so that a robot that turns on the spot stops too.
         """
         velocity, options = self._velocity_W(here), self._options
         speed = float(np.linalg.norm(velocity[:2])) + abs(float(velocity[2])) * self.footprint.circumscribed_m
@@ -106,7 +106,7 @@ class CollisionGuard:
         return None
 
     def _follows(self, one: Moving, here: Pose2D, on_path: FloatArray) -> bool:
-        """Returns whether a moving obstacle follows the robot from behind, so that standing would not help."""
+        """Returns whether a moving obstacle follows the robot from behind; a stop would not help."""
         shift = on_path[-1, :2] - on_path[0, :2]
         if float(np.linalg.norm(shift)) < 0.05:
             return False

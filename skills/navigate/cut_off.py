@@ -20,7 +20,7 @@ _CELL_M = 0.05
 _AROUND_M = 8.0
 """Margin of the ground that is examined about robot and goals."""
 _DOOR_M = 2.0
-"""Margin of the ground that is examined about the doors, through which a detour may lead."""
+"""Margin of the examined ground about the doors, for detours."""
 _NEAR_M = 0.3
 """Radius within which a blocked robot looks for its region."""
 _BESIDE_M = (0.4, 0.55, 0.7, 0.9)
@@ -29,7 +29,7 @@ _FEW_RAYS = 50
 _PANEL_M = 0.05
 """Half the thickness of a closed door."""
 _JUDGED_M = 1.5
-"""Distance from which a doorway is seen well enough to trust the obstacles in it."""
+"""Largest distance at which the obstacles in a doorway are trusted."""
 _JAMB_M = 0.3
 _THROUGH_M = 0.6
 """Length of free ground to both sides of an open door."""
@@ -40,11 +40,10 @@ _PERSON_M = np.stack(np.meshgrid(*2 * [np.arange(-0.5, 0.51, _CELL_M)]), axis=-1
 class DoorOptions:
     """Detection of closed doors on the map while the robot drives.
 
-    A scan shows a door from `reach_m` at most, and from `flattest_rad` at most off the direct view. The door is closed
-    while all its gaps are narrower than `closed_m`. Where closed doors leave no path, the robot looks again every
-    `look_s`, for `patience_s`. Plans avoid a door that was seen closed up to `trust_s` before the trip; where none
-    does, and it was seen more than `sure_s` before, the robot goes there and looks. A door with a plug-in opens within
-    `opens_s` of its call, or not.
+    A scan shows a door up to `reach_m` away, at up to `flattest_rad` off the direct view. The door is closed while all
+    its gaps are narrower than `closed_m`. When closed doors leave no path, the robot looks again every `look_s`, for
+    `patience_s`. Plans avoid a door that was closed up to `trust_s` before the trip. If none exists, the robot drives
+    to a door last seen more than `sure_s` before and looks. A door with a plug-in opens within `opens_s` of its call.
     """
 
     reach_m: Length = 4.0
@@ -58,7 +57,7 @@ class DoorOptions:
 
 
 class DoorWatch:
-    """The doors in view, and those of the robot's memory that count as closed on one trip."""
+    """The doors in view, and the remembered doors that count as closed on one trip."""
 
     def __init__(self, context: SkillContext, options: DoorOptions | None = None) -> None:
         self._context, self.options = context, options or DoorOptions()
@@ -69,7 +68,7 @@ class DoorWatch:
 
     @property
     def closed(self) -> tuple[Doorway, ...]:
-        """The doors that the robot saw closed on this trip or not long before, unless it doubts that."""
+        """The doors that the robot saw closed on this trip or shortly before, without doubtful ones."""
         return tuple(door for door in self._context.doors if self._counts_as_closed(door))
 
     def _counts_as_closed(self, door: Doorway) -> bool:
@@ -97,7 +96,7 @@ class DoorWatch:
                 memory.note(door, DoorState.UNKNOWN, scan.stamp_s)
 
     def doubt(self, doors: Sequence[Doorway]) -> bool:
-        """Lets plans lead to those `doors` that the robot has not seen lately, so that it looks at them again.
+        """Allows plans to the `doors` that the robot has not seen lately, so that it looks at them again.
 
         Returns whether there are any.
         """
@@ -118,14 +117,14 @@ class DoorWatch:
     def forget_distant(self, here: Pose2D) -> bool:
         """Clears the costmap in distant doorways once another door is closed; returns whether a cell was cleared.
 
-        A door that is seen in part, through another door, may leave a gap that looks too narrow.
+        A partly visible door, seen through another door, may seem to have too narrow a gap.
         """
         closed, place = self.closed, (here.x_m, here.y_m)
         far = [door for door in self._context.doors if door.distance_m(place) > _JUDGED_M and door not in closed]
         return bool(closed) and self._clear(far)
 
     def detour_margin_m(self, start: Pose2D, goal: Pose2D) -> float:
-        """Margin about start and goal within which all doors lie (m), for a plan that leads through others."""
+        """Margin about start and goal that contains all doors (m), for a plan through other doors."""
         places = np.array([[start.x_m, start.y_m], [goal.x_m, goal.y_m]])
         doors_W = np.array([door.middle_W for door in self._context.doors])
         out_m = np.maximum(places.min(axis=0) - doors_W, doors_W - places.max(axis=0))
@@ -164,7 +163,7 @@ class DoorWatch:
         return regions.doors_between(self.closed) if regions.cut_off else ()
 
     def doors_on_path(self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D]) -> tuple[Doorway, ...]:
-        """The closed doors through which a path would lead to the goals; others may lead there, too."""
+        """The closed doors on possible paths to the goals; other doors may lead there, too."""
         doors, free = self._context.doors, self._context.free_space()
         doors_W = np.array([door.middle_W for door in doors]).reshape(-1, 2)
         regions = Regions(self.costmap(free, doors), footprint, here, goals, np.empty((0, 2)), doors_W)
@@ -174,8 +173,8 @@ class DoorWatch:
 class Regions:
     """The connected regions of the ground in which a disc as wide as the robot can move.
 
-    A goal outside the robot's region is certainly out of reach; one inside may still be, since the robot is longer. The
-    points `free_W` (N, 2) count as free in any case. The ground about the doors at `doors_W` (N, 2) belongs to it.
+    A goal outside the robot's region is certainly out of reach; a goal inside may be, since the robot is longer than
+    wide. The points `free_W` (N, 2) always count as free. The ground about the doors at `doors_W` (N, 2) is included.
     """
 
     def __init__(
@@ -207,7 +206,7 @@ class Regions:
         return bool(here) and not any(here & self._at((goal.x_m, goal.y_m)) for goal in self._goals)
 
     def doors_between(self, doors: Sequence[Doorway]) -> tuple[Doorway, ...]:
-        """The doors on a path that leads to a goal through `doors`; none where there is no such path."""
+        """The doors on a path to a goal through `doors`; none without a path."""
         begin = self._near((self._here.x_m, self._here.y_m))
         ends = set[int]().union(*(self._at((goal.x_m, goal.y_m)) for goal in self._goals))
         joins = {door: sides for door in doors if len(sides := self._sides(door)) == 2}
@@ -244,7 +243,7 @@ class Regions:
 
 
 def _on_a_path(joins: dict[Doorway, frozenset[int]], ends: set[int]) -> dict[Doorway, frozenset[int]]:
-    """The doors that remain once those that lead to dead ends are removed."""
+    """The doors without those to dead ends."""
     left = dict(joins)
     while True:
         sides = [side for each in left.values() for side in each]

@@ -14,7 +14,7 @@ from skills.navigate.path import clearances
 from skills.robot import FloatArray
 
 CELL_SHARE = 0.5
-"""Size of the lattice's cells as a share of the usual one, since the base cannot shift to the middle of a door."""
+"""Cell size as a share of the usual one; cells are small because the base cannot shift to a door's middle."""
 _LONG_STEPS = 4
 """Cells of a long move for each of a short one."""
 _LEGS_M = np.arange(0.2, 2.1, 0.2)
@@ -40,13 +40,13 @@ def courses() -> tuple[FloatArray, NDArray[np.int64]]:
 
 
 Links = dict[int, tuple[float, tuple[FloatArray, ...]]]
-"""Cost between each lattice state, by index, and a pose off the lattice, with the poses between them."""
+"""Cost between each lattice state, by index, and a pose off the lattice, and the poses between them."""
 
 
 def links(space: Space, lattice: Lattice, pose: FloatArray, *, to_pose: bool) -> Links:
     """The links from a pose to states of the lattice, or back from them to the pose.
 
-    From the pose the robot goes straight as far as it likes, since it may have no clearance to turn where it stands.
+    From the pose the robot goes straight over any distance, since it may lack the clearance to turn on the spot.
     """
     found: Links = {}
     for cost, via in _straights(space, pose):
@@ -59,7 +59,7 @@ def links(space: Space, lattice: Lattice, pose: FloatArray, *, to_pose: bool) ->
 
 
 def _straights(space: Space, pose: FloatArray) -> Iterator[tuple[float, FloatArray]]:
-    """The pose itself, then poses straight ahead and behind as far as they are free, each with the cost to it."""
+    """The pose itself, then free poses straight ahead and behind, each with the cost to it."""
     yield 0.0, pose
     ahead = np.array([math.cos(pose[2]), math.sin(pose[2]), 0.0])
     for sign in (1.0, -1.0):
@@ -136,7 +136,7 @@ def _legs(space: Space, knots: FloatArray) -> list[_Leg]:
 
 
 def _rounded(space: Space, first: _Leg, second: _Leg, free_m: float) -> list[FloatArray] | None:
-    """The widest free arc from one straight to the next, None where they turn back or no arc is free."""
+    """The widest free arc from one straight to the next; None if they turn back or no arc is free."""
     (_, corner, yaw), (_, _, yaw_after) = first, second
     turn = yaw_after - yaw
     towards = [np.subtract(leg[1], leg[0]) @ (math.cos(leg[2]), math.sin(leg[2])) for leg in (first, second)]

@@ -30,7 +30,7 @@ class ArmDoor:
         raise RuntimeError("the robot opens it with its arm, in the step 'open'")
 
     def handle_from(self, body: Pose2D, body_m: float, middle_W: tuple[float, float]) -> DoorHandle:
-        """The handle as a robot at a pose sees it, its body `body_m` above the floor; `middle_W` is the doorway's."""
+        """The handle relative to a robot at a pose, its body `body_m` above the floor; `middle_W` is the doorway's."""
         x, y, height_m = self.handle
         off = relative_pose(body, Pose2D(x, y, 0.0))
         before = (body.x_m - middle_W[0], body.y_m - middle_W[1])
@@ -73,7 +73,7 @@ class DoorCalls:
         self._until_s: dict[Doorway, float] = {}
 
     def may_open(self, doors: Sequence[Doorway]) -> bool:
-        """Calls the plug-ins of `doors` that were not called yet; returns whether one of these doors may still open."""
+        """Calls each plug-in of `doors` once; returns whether one of these doors may still open."""
         for door in doors:
             if door.opener is not None and door not in self._calls:
                 self._calls[door] = self._call(door, door.opener)

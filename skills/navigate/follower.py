@@ -32,9 +32,9 @@ _RESERVE_M = 0.1
 class FollowerOptions:
     """Path follower with brakes for obstacles: speeds (m/s, rad/s), accelerations (m/s^2, rad/s^2), gain (1/s).
 
-    A mission may ask for less than `max_speed_m_s`, and not for more. `lead_s` compensates the base's lag. An obstacle
-    closer than `touch_m` to the outline within the next `look_m` blocks the path. Between `wide_m` and `near_m` of
-    clearance the speed falls from full to near_speed_m_s.
+    A mission may lower `max_speed_m_s`, but not raise it. `lead_s` compensates the base's lag. An obstacle closer than
+    `touch_m` to the outline within the next `look_m` blocks the path. Between `wide_m` and `near_m` of clearance the
+    speed falls from full to near_speed_m_s.
     """
 
     max_speed_m_s: Speed = 0.8
@@ -166,7 +166,7 @@ class PathFollower:
     def _free_distance(self, costmap: FreeSpace, now_m: float) -> tuple[float, tuple[float, float] | None]:
         """Free distance (m) ahead, less a reserve, and the position of the first obstacle in it.
 
-        A robot with a clearance of only now_m blocks itself only where the clearance gets smaller.
+        At a clearance of only now_m, the path counts as blocked only if the clearance falls.
         """
         options = self._options
         end = int(np.searchsorted(self._progress, self._progress[self._index] + options.look_m))
@@ -182,9 +182,9 @@ class PathFollower:
         return max(0.0, float(free_m) - _RESERVE_M), (float(centres[worst, 0]), float(centres[worst, 1]))
 
     def _brake(self, velocity: FloatArray, here: FloatArray, costmap: FreeSpace) -> FloatArray:
-        """The velocity, or the part of it with which the outline touches no obstacle within the next half second.
+        """The velocity, or the part of it that keeps the outline off obstacles for the next half second.
 
-        Tries half of it, then only sideways motion and turns, then standing still.
+        Tries half of the velocity, then only sideways motion and turns, then a stop.
         """
         shares = np.array([[1.0, 1.0, 1.0], [0.5, 0.5, 0.5], [0.0, 1.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         tried = velocity * shares

@@ -25,8 +25,8 @@ SAFE_MARGIN_M = 0.06
 class Footprint:
     """Outline of the robot in the body frame, as discs: rows of x, y, radius (m), with the kind of base.
 
-    The discs lie inside of the outline, radius 0 at the corners, so the clearance of all of them is that of the
-    rectangle, within about a centimetre. More discs cover what sticks out of the rectangle, which `beyond` names.
+    The discs lie inside the outline, radius 0 at the corners, so their common clearance is that of the rectangle,
+    within about a centimetre. More discs cover the parts beyond the rectangle, which `beyond` names.
     """
 
     discs: FloatArray
@@ -157,7 +157,7 @@ _FAR_M = 1.5
 
 @dataclass(frozen=True)
 class WithObstacles:
-    """A costmap with more obstacles; `distance_m` returns the distance of points (N, 2) from the nearest of them."""
+    """A costmap with more obstacles; `distance_m` returns the distance of points (N, 2) from the nearest one."""
 
     costmap: FreeSpace
     distance_m: Callable[[FloatArray], FloatArray]

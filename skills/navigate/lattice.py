@@ -34,7 +34,7 @@ class Lattice(NamedTuple):
 def lattice_moves(headings: int) -> IntArray:
     """Moves (headings, M, 3) from each heading, as changes of column, row and heading.
 
-    They are sixteen directions, each also with a turn to either side, and turns.
+    They are sixteen directions, each also with a turn to either side, and turns on the spot.
     """
     flat = [(1, 0), (1, 1), (2, 1), (1, 2)]
     steps = {(sx * a, sy * b) for dx, dy in flat for a, b in ((dx, dy), (dy, dx)) for sx in (1, -1) for sy in (1, -1)}

@@ -11,7 +11,7 @@ from skills.navigate.footprint import ClearanceField, clearance_at
 from skills.robot import FloatArray
 
 TURNING_RADIUS_M = 0.6
-"""Distance (m) that the outline moves in a turn of one radian, at least."""
+"""Least distance (m) that the outline moves in a turn of one radian."""
 _PLAIN_STEP_M = 0.06
 _LONGEST_STEP_M = 0.3
 _ZONE_STEP_M = 0.1
@@ -19,7 +19,7 @@ _ZONE_STEP_M = 0.1
 _BACK_SHARE = -0.02
 """Cosine between a motion and a one-way direction below which the motion goes against it."""
 _SLOWER_SHARE = 0.3
-"""Share of the shorter of shift and turn by which doing both at once takes longer."""
+"""Extra time of a combined shift and turn, as a share of the shorter of the two."""
 
 
 class Weights(NamedTuple):
@@ -45,7 +45,7 @@ class Needs(NamedTuple):
 
 
 class ZoneCosts(NamedTuple):
-    """Costs of zones at the points of a clearance field; arrays without rows where there are none.
+    """Costs of zones at the points of a clearance field; arrays without rows in a world without costs.
 
     `factor`, 1 or more, raises the cost of a motion; motions do not go against `course` (rad; NaN is any direction).
     `least` is the least factor about each point.
@@ -124,8 +124,8 @@ def mean_zone_factor(space: Space, x: float, y: float, dx: float, dy: float) -> 
 def segment_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> float:
     """Cost of a straight motion from pose a to pose b with an even turn; infinite where clearance falls below need.
 
-    The yaws must differ by the meant turn (no wrapping here). Steps are as long as the clearance to spare, since no
-    point of the outline moves farther than that; at least 6 cm.
+    The yaws must differ by the intended turn (no wrapping here). A step is as long as the spare clearance, since no
+    point of the outline moves farther than a step; at least 6 cm.
     """
     dx, dy, dyaw = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length = max(1e-9, math.hypot(dx, dy) + space.weights.turning_radius_m * abs(dyaw))
@@ -149,8 +149,8 @@ def segment_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> flo
 def drive_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> tuple[float, float]:
     """Cost of a turn on the spot, a straight and a turn from pose a to pose b, and the yaw on the straight.
 
-    Ahead or back, whichever is cheaper; infinite, with the nearer yaw, where neither is free. The yaw differs from a's
-    by the meant turn.
+    It drives ahead or back, at the lower cost; the cost is infinite, with the nearer yaw, if neither is free. The yaw
+    differs from a's by the intended turn.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     moved = math.hypot(dx, dy) > 1e-6

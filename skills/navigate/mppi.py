@@ -27,17 +27,17 @@ _NOISES = 8
 """Sets of noise, used in turn."""
 _NEAR_GOAL_M = 0.3
 _CORNER_M_S = 0.15
-"""Slower than this a base that cannot go sideways is at a corner of its path."""
+"""Speed below which a base that cannot go sideways is at a corner of its path."""
 
 
 @dataclass(frozen=True)
 class MppiOptions(FollowerOptions):
     """Model-predictive path integral control: follows a path by sampled rollouts, within the path follower's limits.
 
-    Of `samples` rollouts, `steps` times `step_s` long, those of low cost weigh more, the more so the lower the
-    `temperature`. The cost is the squared distance from the path's pose at that time (a radian counting `yaw_m`),
-    clearance below `near_m` with `clearance_weight`, and change of velocity with `change_weight`. Near the goal, while
-    an obstacle blocks the path, and at the corners of a base that cannot go sideways, the path follower drives.
+    The weights of `samples` rollouts, `steps` times `step_s` long, fall with their cost, more steeply at a low
+    `temperature`. The cost is the squared distance from the path's pose at that time (a radian counts as `yaw_m`),
+    clearance below `near_m` with `clearance_weight`, and change of velocity with `change_weight`. The path follower
+    drives near the goal, while an obstacle blocks the path, and at the corners of a base that cannot go sideways.
     """
 
     samples: Count = 200
@@ -72,7 +72,7 @@ class MppiController(PathFollower):
         costmap: FreeSpace,
         most_m_s: float = math.inf,
     ) -> Drive:
-        """See `PathFollower.command`; the velocity is that of the weighted rollouts where the path ahead is free."""
+        """See `PathFollower.command`; on a free path the velocity comes from the weighted rollouts."""
         plain = super().command(pose, velocity, last, costmap, most_m_s)
         if plain.remaining_m < _NEAR_GOAL_M or plain.blocked_at is not None or not any(plain.velocity):
             self._plan = None

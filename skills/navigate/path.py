@@ -61,7 +61,7 @@ def path_length(path: Path) -> float:
 
 @compiled
 def shortcut(space: Space, poses: FloatArray, window: int, sideways: bool) -> FloatArray:
-    """The cheapest subset of poses (N, 3) to join by straight lines, each skipping at most `window` poses.
+    """The cheapest subset of poses (N, 3) to join by straight lines; each line skips at most `window` poses.
 
     The first and the last pose stay; yaws must be continuous. A base that cannot go sideways turns to each line first.
     """

@@ -29,7 +29,7 @@ _RELAX_ROUNDS = 60
 _RELAX_CLEARANCE_M = 0.25
 """Clearance below which the relaxation pushes poses off obstacles."""
 _NOISE_M = 0.015
-"""Loss of clearance that a plan from a blocked start may bring."""
+"""Largest loss of clearance on a plan from a blocked start."""
 
 
 class NoPathError(PlanningError):
@@ -40,11 +40,11 @@ class NoPathError(PlanningError):
 class LatticePlanner:
     """A lattice over position and heading, searched for the whole footprint, then smoothed.
 
-    Speeds (m/s, rad/s) set the cost of each motion. Poses keep `margin_m`, or `least_margin_m` where no path keeps
-    more; nearer than `soft_m` to an obstacle the cost grows up to (1 + soft_weight) fold. A path may leave a start that
-    noise blocks, through poses that are no worse, within `escape_m`. The search covers the box about start and goal,
-    `around_m` wider to all sides. A base that cannot go sideways gets a path of straights, arcs and turns on the spot,
-    on cells half of `cell_m` wide; `lateral_m_s` and `headings` have no effect on it.
+    Speeds (m/s, rad/s) set the cost of each motion. The clearance is `margin_m`, or `least_margin_m` if no path has
+    more; nearer than `soft_m` to an obstacle the cost grows up to (1 + soft_weight) fold. From a start that noise
+    blocks, a path may lead through poses of the same clearance within `escape_m`. The search covers the box about start
+    and goal, `around_m` wider to all sides. A base that cannot go sideways gets a path of straights, arcs and turns on
+    the spot, on cells half of `cell_m` wide; `lateral_m_s` and `headings` have no effect on it.
     """
 
     forward_m_s: Speed = 0.8
@@ -150,7 +150,7 @@ def _used(best: NDArray[np.float32]) -> slice:
 
 
 def solve(problem: Problem) -> Path:
-    """Plans with the wanted margin, or the least one where that fails. Raises PlanningError when both fail."""
+    """Plans with the wanted margin, else with the least one. Raises PlanningError when both fail."""
     options = problem.options
     try:
         return _solve(problem)
@@ -161,7 +161,7 @@ def solve(problem: Problem) -> Path:
 
 
 def _solve_with_zones(problem: Problem, zones: ZoneMap) -> Path:
-    """Plans as `solve` does, and minds the costs and directions of zones, which a start inside may leave."""
+    """Plans like `solve`, within the costs and directions of zones; a path may leave the zones of its start."""
     field, start = problem.field, problem.start
     xs, ys = (
         c0 + field.cell_m * np.arange(n)
@@ -192,7 +192,7 @@ def _solve(problem: Problem) -> Path:
 
 
 def _because(footprint: Footprint) -> str:
-    """Clause on what makes the robot larger than its body, empty when nothing does."""
+    """Clause on the parts beyond the robot's body, empty without any."""
     length, width = footprint.extent_m
     return f": {footprint.beyond} makes it {length:.2f} m long and {width:.2f} m wide" if footprint.beyond else ""
 
@@ -256,7 +256,7 @@ def _seeds(space: Space, lattice: Lattice, start: FloatArray) -> Links:
 
 
 def _final_turns(space: Space, lattice: Lattice, goal: FloatArray, goal_cell: int) -> Links:
-    """Turns at the goal from each heading to the goal's, by one heading's width at most."""
+    """Turns at the goal from each heading to the goal's, at most one heading's width."""
     turn = 2.0 * math.pi / lattice.headings
     turns: Links = {}
     for k in range(lattice.headings):
@@ -269,7 +269,7 @@ def _final_turns(space: Space, lattice: Lattice, goal: FloatArray, goal_cell: in
 
 @lru_cache(maxsize=4)
 def _courses(headings: int | None) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Yaws and moves of a lattice with so many headings; None for a base that cannot go sideways."""
+    """Yaws and moves of a lattice with a number of headings; None for a base that cannot go sideways."""
     if headings is None:
         return courses()
     return np.asarray(np.arange(headings) * (2.0 * math.pi / headings)), lattice_moves(headings)

@@ -13,10 +13,10 @@ from skills.robot import FloatArray, Image, NoImageError, Scan
 
 @dataclass(frozen=True)
 class WatchOptions:
-    """Low obstacles: the front cameras take pictures in turn, one each `period_s`, which arrives after `latency_s`.
+    """Low obstacles: the front cameras take turns; every `period_s` a picture, which arrives after `latency_s`.
 
-    About `columns` pixels of each row are used, and points between the heights above the floor and within `reach_m` of
-    the camera.
+    The watch uses about `columns` pixels of each row, and points between the heights above the floor and within
+    `reach_m` of the camera.
     """
 
     period_s: Duration = 0.35
@@ -40,7 +40,7 @@ class LowObstacleWatch:
         self._X_WO = RigidTransform()
 
     def step(self) -> None:
-        """Takes in a picture that has arrived, and asks for the next one when that is due. Never blocks."""
+        """Processes a new picture, and requests the next one when it is due. Never blocks."""
         if self._job is not None:
             if self._job.done():
                 job, self._job = self._job, None
@@ -83,7 +83,7 @@ def low_points(image: Image, options: WatchOptions) -> FloatArray:
 class ScanHealthOptions:
     """Health of the LiDAR: a scan may be `old_s` old, and at least `least_valid` of its ranges must be valid.
 
-    A scan that repeats the last one, noise included, is as old as that one.
+    A scan that repeats the last one, noise included, keeps its age.
     """
 
     old_s: Delay = 0.5
@@ -99,7 +99,7 @@ class ScanHealth:
         self._last: Scan | None = None
 
     def trouble(self) -> str | None:
-        """Sentence on what is wrong with the LiDAR, None when nothing is."""
+        """Sentence on the LiDAR's fault, None without one."""
         if not self._needed:
             return None
         scan, now_s = self._context.robot.scan(), self._context.clock.now()

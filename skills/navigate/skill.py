@@ -42,9 +42,9 @@ class _OnReservedPath(Exception):  # noqa: N818 - no program error
 
 @dataclass
 class _Progress:
-    """Progress along the path: the shortest rest of it so far (m), and when that was reached (s).
+    """Progress along the path: the shortest remaining length so far (m), and its time (s).
 
-    Time in which the robot stands for a reason does not count against it.
+    The time of a wait with a reason does not count as a lack of progress.
     """
 
     best_s: float
@@ -75,7 +75,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
     def __init__(
         self, context: SkillContext, options: NavigateOptions | None = None, company: Company | None = None
     ) -> None:
-        """With `company` the robot goes with a person, for whom it does not wait."""
+        """With `company` the robot goes with a person, and does not wait for that person to clear the path."""
         super().__init__(context, options)
         self._base, self._company = Base(context), company
 
@@ -116,7 +116,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         self.begin(inputs)
 
     def undone(self, inputs: NavigateInputs) -> str | None:
-        """Uses the robot's pose; within 1 m it counts as there, because later skills may have moved it a little."""
+        """Checks that the robot's pose lies within 1 m of the goal, because later skills may have moved it a little."""
         pose, goal = self.context.pose(), inputs.goal
         off_m = math.hypot(goal.x_m - pose.x_m, goal.y_m - pose.y_m)
         return None if off_m < _STILL_THERE_M else f"the robot is {off_m:.1f} m from where it went"
@@ -270,7 +270,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return self._plan
 
     def _settle(self) -> Routine[_Stage | Succeeded]:
-        """Stops, then checks that the robot stands at the goal. Raises SkillFailure when it does not."""
+        """Stops and checks the pose against the goal. Raises SkillFailure when the robot is not there."""
         goal = self._inputs.goal
         until_s, still = self._now() + self.options.settle_s, False
         while not still and self._now() < until_s:
@@ -395,7 +395,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return f"{why} Planning another path."
 
     def _pose_then(self) -> Pose2D | None:
-        """The pose on the path where a plan that is requested now will arrive; None when the robot is off the path."""
+        """The robot's pose on the path when a plan requested now arrives; None when the robot is off the path."""
         vx, vy, _ = self.context.robot.odometry().velocity
         then = self._follower.pose_after(math.hypot(vx, vy) * self.options.planning_latency_s)
         off = relative_pose(self.context.pose(), then)

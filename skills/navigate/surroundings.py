@@ -29,10 +29,10 @@ from skills.world_model import Zone, ZoneKind
 class SpaceOptions:
     """Speeds near people, and distances from the robot's outline to a person's upright axis.
 
-    From `far_m` to `near_m` the speed falls from full to near_m_s, less so where the path leads away by `away_m`. Where
-    the path comes nearer than `stop_m`, and the goal does not, the robot waits for `patience_s`, then passes at
-    `pass_m_s`; the patience starts again after `forget_s` without anybody near. Plans keep `room_m` where start and
-    goal leave so much, and `least_room_m` where no other path exists.
+    From `far_m` to `near_m` the speed falls from full to near_m_s, less on a path that leads away by `away_m`. If the
+    path comes nearer than `stop_m` but the goal does not, the robot waits for `patience_s`, then passes at `pass_m_s`;
+    the patience starts again after `forget_s` without people near. Plans have a clearance of `room_m` if start and goal
+    allow it, and of `least_room_m` if no other path exists.
     """
 
     far_m: Length = 2.5
@@ -77,7 +77,7 @@ def with_people(
 class Pace:
     """Speed limit (m/s) because of a person, and that person.
 
-    `waiting` while the robot stands for the person; `overdue` once it should plan another path.
+    `waiting` is True while the robot stands for the person; `overdue` once it should plan another path.
     """
 
     most_m_s: float = math.inf
@@ -99,9 +99,9 @@ class PaceManager:
     def pace(
         self, now_s: float, here: Pose2D, ahead: FloatArray, people: Sequence[SeenPerson], most_m_s: float, goal: Pose2D
     ) -> Pace:
-        """The pace of a robot `here` with the path `ahead` (N, 3), most_m_s when nobody is near.
+        """The pace of a robot at `here` with the path `ahead` (N, 3); most_m_s without people near.
 
-        The robot does not wait for people who are as near to the `goal` as to the path.
+        The robot does not wait for people as near to the `goal` as to the path.
         """
         if not people:
             return self._nobody(now_s)
@@ -148,9 +148,9 @@ class PaceManager:
 class NavigateOptions:
     """Patience and bounds of the skill, times in seconds of the robot's clock.
 
-    Every `review_s` the robot checks its path `review_m` ahead, and plans again, while driving, where it is blocked.
-    While people are near, and for `after_person_s` (longer than a costmap remembers them), failed plans do not count,
-    up to person_patience_s.
+    Every `review_s` the robot checks its path `review_m` ahead, and plans again while driving if it is blocked. Failed
+    plans do not count while people are near and for `after_person_s` (longer than a costmap remembers them), up to
+    person_patience_s.
     """
 
     planning_latency_s: Delay = 0.3
@@ -183,9 +183,9 @@ _WALKED_M = 0.5
 
 @dataclass
 class Company:
-    """The person with whom the robot goes: no person to keep away from or to wait for.
+    """The person with whom the robot goes; the robot neither avoids the person nor waits for them.
 
-    Somebody else steps the `watch`. `track` is the person's number (0: nobody), `most_m_s` the speed limit that keeps
+    Another skill steps the `watch`. `track` is the person's number (0: nobody), `most_m_s` the speed limit that keeps
     the distance.
     """
 
@@ -194,7 +194,7 @@ class Company:
     most_m_s: float = math.inf
 
     def others(self) -> tuple[SeenPerson, ...]:
-        """All other people: those in pictures, and those who walk."""
+        """All other people: those in pictures and walking ones."""
         sure = {one.track for one in self.watch.people()}
         tracks = (one for one in self.watch.tracks() if one.track in sure or one.moved_m > _WALKED_M)
         return tuple(one for one in tracks if one.track != self.track)
@@ -258,7 +258,7 @@ class Surroundings:
         return True
 
     def free_space(self) -> FreeSpace:
-        """The costmap with keep-out zones; one in which the robot stands, as far as it may."""
+        """The costmap with keep-out zones, without the part of a zone through which the robot may leave it."""
         if self._keep_out is None:
             return self._context.costmap
         return self._keep_out.space(self._context.costmap, self.footprint, self._context.pose())
@@ -272,7 +272,7 @@ class Surroundings:
         return () if self._zones is None else self._zones.names_at(ZoneKind.KEEP_OUT, goal, self.footprint)
 
     def zones_between(self, goals: Sequence[Pose2D]) -> tuple[str, ...]:
-        """Names of the keep-out zones that cut all goals off: one that does alone, else all of them."""
+        """Names of the keep-out zones that cut all goals off: one that suffices, else all zones."""
         zones = [zone for zone in self._context.zones if zone.kind is ZoneKind.KEEP_OUT]
 
         def opens(left_out: Sequence[Zone]) -> bool:
@@ -285,7 +285,7 @@ class Surroundings:
         return next(((zone.name,) for zone in zones if opens([zone])), tuple(zone.name for zone in zones))
 
     def costmap(self, here: Pose2D, goal: Pose2D, avoided: Avoided = Avoided.BODIES) -> FreeSpace:
-        """The costmap with zones, closed doors, robots, and people as far from them as `here` and the goal allow."""
+        """The costmap with zones, closed doors, robots, and discs about people, as large as `here` and goal allow."""
         costmap = self.robots.costmap(self.doors.costmap(self.free_space()), avoided)
         return with_people(costmap, self.footprint, (here, goal), self.persons(), self.room_m)
 
@@ -307,7 +307,7 @@ class Surroundings:
         return replace(pace, most_m_s=min(pace.most_m_s, self._zones.speed_m_s(self.footprint, poses, ahead_m)))
 
     def closed_doors(self, goals: Sequence[Pose2D], *, on_path: bool = False) -> tuple[Doorway, ...]:
-        """The closed doors that leave no path to any of the goals, or (`on_path`) that a path would lead through."""
+        """The closed doors that block every path to the goals, or (`on_path`) those on a possible path."""
         here = self._context.pose()
         if on_path and self.doors.closed:
             return self.doors.doors_on_path(self.footprint, here, goals)

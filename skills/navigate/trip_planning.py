@@ -1,4 +1,4 @@
-"""Path planning of one trip: requests plans, and decides what to try after a plan failed."""
+"""Path planning of one trip: requests plans, and chooses the next attempt after a failed plan."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from skills.world_model import zones_sentence
 
 @dataclass
 class _Presence:
-    """Recent presence of people or robots that may leave: near within the last `gap_s`, and not for too long."""
+    """Recent presence of people or robots that may leave: near in the last `gap_s`, but not for too long."""
 
     gap_s: float
     last_s: float = -math.inf
@@ -39,8 +39,8 @@ class _Presence:
 class TripPlanning:
     """Requests the plans of one trip.
 
-    `aside` is the waiting pose to which the robot goes while others pass, None when it goes to the goal. `avoided` says
-    what plans avoid of other robots, `obstacle_W` the last blocked point (x, y). No plan is requested before
+    `aside` is the robot's waiting pose while others pass, None on the way to the goal. `avoided` are the parts of other
+    robots that plans avoid, `obstacle_W` is the last blocked point (x, y). The trip requests no plan before
     `wait_until_s`.
     """
 
@@ -148,9 +148,9 @@ class TripPlanning:
         return False
 
     def go_aside(self, first: Sequence[str], *, forget: bool = False) -> None:
-        """Plans to the nearest waiting pose; where none is left to try, lets the robots `first` clear the path instead.
+        """Plans to the nearest untried waiting pose; without one, lets the robots `first` clear the path instead.
 
-        With `forget` the waiting poses that were tried before count again.
+        With `forget` all waiting poses count as untried.
         """
         context, robots = self._context, self._around.robots
         self._tried = () if forget else self._tried
@@ -170,7 +170,7 @@ class TripPlanning:
         self.ask()
 
     def robots_blocked(self) -> Sequence[str]:
-        """Names of the robots on whose reserved path this one stands; none for a while after it failed to go aside."""
+        """Names of the robots whose reserved path this one blocks; none for a while after it failed to go aside."""
         if self._now() < self._asked_due_s:
             return ()
         return self._around.robots.blocked_robots(self._context.pose(), self._around.footprint)
@@ -185,7 +185,7 @@ class TripPlanning:
         return (goal, *(compose(goal, Pose2D(*offset, 0.0)) for offset in self._inputs.nearby_m))
 
     def _asks_for_less(self) -> bool:
-        """Requests a plan that avoids less of other robots, or leads to another waiting pose, where there is one."""
+        """Requests a plan that avoids less of other robots, or a plan to another waiting pose."""
         robots = self._around.robots
         if self.aside is not None:
             self._tried = (*self._tried, self.aside)
@@ -223,7 +223,7 @@ class TripPlanning:
             self.ask(map_alone=True)
 
     def _waits_for_doors(self, may_go: bool) -> bool:
-        """Returns whether to go to closed doors that leave no path, or to wait for them; calls their plug-ins.
+        """Returns whether the robot goes to the blocking doors or waits for them; calls the doors' plug-ins.
 
         Raises SkillFailure once patience is over.
         """
@@ -242,7 +242,7 @@ class TripPlanning:
         return True
 
     def _plans_detour(self) -> bool:
-        """Requests plans that lead far round closed doors from now on; False when there are none, or it did before."""
+        """Requests plans with a wide detour around closed doors from now on; False without doors or if done before."""
         if self._detours or not self._around.doors.closed:
             return False
         self._detours = True
@@ -250,7 +250,7 @@ class TripPlanning:
         return True
 
     def _looks_again(self) -> bool:
-        """Clears the costmap's obstacle layer once before the goal counts as cut off; whether that removed anything."""
+        """Clears the costmap's obstacle layer once before the goal counts as cut off; returns whether cells changed."""
         if self._looked_again or not self._around.cut_off(self._goals):
             return False
         self._looked_again = True
@@ -260,7 +260,7 @@ class TripPlanning:
         return True
 
     def _people_may_go(self) -> bool:
-        """Returns whether people who are or were near may block the path only for now."""
+        """Returns whether people near the path may block it only for a short time."""
         if self._around.persons():
             self._people.note(self._now())
         return self._people.may_go(self._now(), self._options.person_patience_s)

@@ -1,6 +1,6 @@
 """Zones drawn on a grid of the ground: keep-out, speed limits, costs and directions of motion, silence.
 
-A robot that stands in a keep-out zone may leave it: the part that lies deeper, by the path out, stays an obstacle.
+A robot that starts in a keep-out zone may leave it; the part deeper than the robot stays an obstacle.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _AROUND_M = 1.0
 """Ground about the zones that belongs to the grid."""
 _SUBPIXEL_BITS: Final = 6
 _PREFERENCE = 3.0
-"""Factor on the cost of a motion outside of all preferred zones, and of one through a mask's dearest cell."""
+"""Factor on the cost of a motion outside all preferred zones, and through a mask's most expensive cell."""
 _LEAVING = 10.0
 """Factor on the cost of a motion in a zone that the robot has to leave."""
 _BACK_M = 0.01
@@ -38,7 +38,7 @@ _UNSURE_M = 0.08
 """Growth of the body at which speed limits are looked up, for the errors of pose and map."""
 _NEVER: Final = 2**30
 _BESIDE: Final = 4
-"""Cells about the body's origin in which a path out of a zone may begin."""
+"""Radius about the body's origin within which a path out of a zone may begin, in cells."""
 _EARLY_M = 0.25
 """Distance before a limit at which the robot is as slow."""
 _BRAKING_M_S2 = 0.4
@@ -49,12 +49,12 @@ Floats = NDArray[np.float32]
 
 @lru_cache(maxsize=16)
 def zone_map(zones: tuple[Zone, ...], full_m_s: float) -> ZoneMap:
-    """The map of some zones for a robot with that full speed. Raises InputError for a mask that cannot be read."""
+    """The map of zones for a robot with this full speed. Raises InputError for an unreadable mask."""
     return ZoneMap(zones, full_m_s)
 
 
 class ZoneMap:
-    """Zones on a grid; off it there are none. It never changes, so that a plan may use it in a thread."""
+    """Zones on a grid, and none outside. It is immutable, so that a plan may use it in a thread."""
 
     def __init__(self, zones: Sequence[Zone], full_m_s: float) -> None:
         self._zones, self._full_m_s = tuple(zones), full_m_s
@@ -82,7 +82,7 @@ class ZoneMap:
         return row[on], column[on], on
 
     def _values(self, zone: Zone) -> NDArray[np.float64]:
-        """Values of a zone's mask in all cells, NaN where it says nothing: base + multiplier * percent."""
+        """Values of a zone's mask in all cells, base + multiplier * percent; NaN in unknown cells."""
         assert zone.mask is not None
         x, y = np.meshgrid(*self.axes)
         percent = (
@@ -91,7 +91,7 @@ class ZoneMap:
         return np.where(percent < 0, np.nan, zone.mask.base + zone.mask.multiplier * percent)
 
     def ground(self, zone: Zone) -> BoolGrid:
-        """The cells of a zone, those on its edge too."""
+        """The cells of a zone, edge included."""
         if zone.mask is not None:
             values = self._values(zone)
             return values >= _MOST_PERCENT if zone.kind is ZoneKind.KEEP_OUT else np.isfinite(values)
@@ -127,7 +127,7 @@ class ZoneMap:
         return max(1.0, self._full_m_s / float(self._limits_m_s.min()))
 
     def speed_m_s(self, footprint: Footprint, poses: FloatArray, ahead_m: FloatArray) -> float:
-        """The speed limit of a robot that reaches `poses` (N, 3) after `ahead_m` (N,), with time to brake."""
+        """Speed limit of a robot that reaches `poses` (N, 3) after `ahead_m` (N,), with braking distance."""
         if not self._of(ZoneKind.SPEED_LIMIT):
             return math.inf
         limits = np.full(len(poses), np.inf)
@@ -141,7 +141,7 @@ class ZoneMap:
         return _EARLY_M + speed_m_s**2 / (2.0 * _BRAKING_M_S2)
 
     def names_at(self, kind: ZoneKind, pose: Pose2D, footprint: Footprint | None = None) -> tuple[str, ...]:
-        """Names of the zones of a kind in which the body's origin is, or that a footprint at a pose comes near to."""
+        """Names of the zones of a kind at the body's origin, or near a footprint at a pose."""
         points = np.zeros((1, 2)) if footprint is None else _body_points(footprint, SAFE_MARGIN_M)
         row, column, _ = self.cells(disc_centres(points, _row(pose))[0])
         return tuple(zone.name for zone in self._of(kind) if self.ground(zone)[row, column].any())
@@ -169,7 +169,7 @@ class ZoneMap:
     def costs(self, xs: FloatArray, ys: FloatArray, forward_m_s: float, leave: Pose2D | None = None) -> ZoneCosts:
         """Costs at the points of a grid with these x and y; `forward_m_s` is the speed without a limit.
 
-        Motions that `leave` a start take any direction in its one-way zones.
+        Motions that `leave` a start may take any direction in its one-way zones.
         """
         factor = np.full((len(ys), len(xs)), _PREFERENCE if self._of(ZoneKind.PREFERRED) else 1.0, dtype=np.float32)
         course = np.full(factor.shape, np.nan, dtype=np.float32)
@@ -200,7 +200,7 @@ class ZoneMap:
 class KeepOut:
     """Keep-out zones as obstacles, for one robot.
 
-    While the body touches a zone, what lies no deeper by the path out than the body is free, so that it may leave.
+    While the body touches a zone, cells no deeper than the body are free, so that the robot may leave.
     """
 
     def __init__(self, zones: ZoneMap) -> None:
@@ -248,9 +248,9 @@ class KeepOut:
 
 
 def _steps_out(zones: ZoneMap, costmap: FreeSpace, footprint: Footprint) -> NDArray[np.int32]:
-    """Cells from each cell of the keep-out zones to the free ground outside, where a disc of the body's width moves.
+    """Distance in cells from each cell of the keep-out zones to free ground, for a disc of the body's width.
 
-    0 outside, _NEVER where no path leads out.
+    It is 0 outside, and _NEVER in cells without a path out.
     """
     clear_m = clearance_on_grid(costmap, *zones.axes)
     free = clear_m > footprint.inscribed_m - 2.0 * zones.cell_m

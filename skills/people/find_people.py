@@ -31,9 +31,9 @@ _SCAN_AGE_S = 1.0
 _AHEAD_RAD = 0.2
 _SIZE_M = (0.5, 0.5, 1.7)
 _AVOID_M = 0.9
-"""Distance within which somebody counts as a person who is already known."""
+"""Distance within which a detection counts as a known person."""
 _STANDS_M, _GRID_M = 0.2, 0.4
-"""Clearance of a position where a person may stand, and distance between such positions."""
+"""Clearance of a person's possible position, and spacing of these positions."""
 _OWN_M = 0.3
 """Distance from the robot's middle within which an obstacle hides nothing."""
 _VIEWPOINTS, _YAWS_RAD = 4, (0.0, 0.8, -0.8, 1.6, -1.6, math.pi)
@@ -44,9 +44,9 @@ _VIEWPOINTS, _YAWS_RAD = 4, (0.0, 0.8, -0.8, 1.6, -1.6, math.pi)
 class FindPeopleOptions:
     """Search in `looks` directions, with turns of `turn_rad` in between.
 
-    A person counts when seen twice within `same_m`: in two directions, or in one by both a camera and the LiDAR. A
+    Two detections within `same_m` confirm a person: in two directions, or in one by both a camera and the LiDAR. A
     detection needs `least_score`, within `reach_m` of the camera. A robot that may move drives to `viewpoints` more
-    viewpoints at most, until no more than the share `hidden` of the positions where people may stand was out of view.
+    viewpoints at most, until at most the share `hidden` of people's possible positions was out of view.
     """
 
     looks: Count = 5
@@ -185,7 +185,7 @@ def _observation(seen: SeenPerson, inputs: FindPeopleInputs) -> ObjectObservatio
 
 
 class _View:
-    """Positions in an area where a person may stand, and which of them were in view."""
+    """Possible positions of people in an area, with a mask of those that were in view."""
 
     def __init__(self, context: SkillContext, inputs: FindPeopleInputs, reach_m: float) -> None:
         self._context, self._reach_m = context, reach_m
@@ -208,7 +208,7 @@ class _View:
         self._seen |= self._shows(np.array((here.x_m, here.y_m)), self._points)
 
     def goals(self) -> list[NavigateInputs]:
-        """Free viewpoints, those that show most of the hidden positions first."""
+        """Free viewpoints, sorted by the number of hidden positions in view."""
         here, hidden = self._context.pose(), self._points[~self._seen]
         gains = np.array([self._shows(point, hidden).sum() for point in self._points])
         drives_m = np.linalg.norm(self._points - (here.x_m, here.y_m), axis=1)

@@ -1,4 +1,4 @@
-"""The follow_person skill: keeps behind a walking person, searches for a person whom it has lost, and asks."""
+"""The follow_person skill: keeps behind a walking person, searches for a lost person, and asks."""
 
 import itertools
 import math
@@ -36,7 +36,7 @@ from skills.routine import Routine, SkillFailure
 from skills.small.speak import ListeningSkill, say
 
 _SURELY_M = 0.1
-"""Distance of a person from the edge of a place at which they are certainly in it."""
+"""Distance inside the edge of a place beyond which a person is certainly in it."""
 _SAME_PLACE_M = 1.5
 """Distance from the place where the person was seen last at which somebody is that person."""
 _WALKS_M_S, _THERE_M, _SEEN_S, _LOCKED = 0.25, 0.4, 0.6, 3
@@ -51,16 +51,15 @@ _PERSON_M, _ASIDE_M, _BY_DOOR_M = 0.3, 4.0, 1.2
 class FollowPersonOptions:
     """Distances (m) between the middles of robot and person, and patience (s).
 
-    The robot drives to `behind_m` behind where the person will be in `ahead_s`, plans again every `replan_s`, and slows
-    down so that it stands at `close_m`. It stays where it is while a standing person is within `near_m`, and turns to
-    one who is more than `turn_rad` to the side. For a person who comes towards it within `meeting_m`, it goes aside for
-    `aside_s` at most. A person who stays hidden for `lost_s` is lost, or for `gone_s` once the robot stands where they
-    were seen last: the robot says so, searches beyond `doors` doors and in the named place, each for `search_s` or
-    `plans` plans `again_s` apart, then asks and listens for `asking_s`. Somebody who may be another is asked for the
-    name within `hearing_m`, with `answer_s` for the answer, and is another after so many `silences`. The robot also
-    asks a person who stands outside the named place for `standing_s`. At the beginning it looks for the person for
-    `finding_s`. It fails after `tries` drives in a row that failed, and at the end
-    if the person was out of its sight for longer than `longest_loss_s`.
+    The robot drives to `behind_m` behind the person's position in `ahead_s`, plans again every `replan_s`, and slows
+    down to stand at `close_m`. It stays while a standing person is within `near_m`, and turns to a person more than
+    `turn_rad` to the side. If the person comes towards it within `meeting_m`, it goes aside for at most `aside_s`. The
+    person is lost after `lost_s` out of view, or after `gone_s` once the robot stands at their last position. Then the
+    robot says so, searches beyond `doors` doors and in the named place, each for `search_s` or `plans` plans `again_s`
+    apart, and at last asks and listens for `asking_s`. It asks a doubtful person for the name within `hearing_m`, with
+    `answer_s` for the answer, and rejects the person after so many `silences`. It also asks a person who stands outside
+    the named place for `standing_s`. At the beginning it looks for the person for `finding_s`. It fails after `tries`
+    failed drives in a row, and at the end if the person was out of view for longer than `longest_loss_s`.
     """
 
     behind_m: Length = 1.6
@@ -94,7 +93,7 @@ class FollowPersonOptions:
 
 
 def _at_pace(context: SkillContext, max_speed_m_s: float) -> SkillContext:
-    """The context with a controller that drives as fast as people walk, if it has a speed limit of its own."""
+    """The context with a controller at walking speed, if the controller has a speed limit."""
     controller: Any = context.stack.controller
     if not hasattr(controller, "max_speed_m_s"):
         return context
@@ -225,7 +224,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
     def _is_right(self, target: Target, before: SeenPerson) -> Routine[bool]:
         """Asks a doubted person for their name, unless somebody else may answer.
 
-        Who says no or nothing, so often, is the person no longer.
+        A person who says no, or is silent too often, is rejected.
         """
         here, seen, stands = self.context.pose(), target.seen, target.stands_still(self._now())
         tracks = [one for one in self._company.watch.tracks() if one.stamp_s > self._now() - _SEEN_S]
@@ -319,7 +318,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         self._navigate.end()
 
     def _speed_m_s(self, target: Target) -> float:
-        """The speed at which the robot does not come too near to the person; unlimited on a path away from them."""
+        """Speed limit that keeps the distance to the person; unlimited on a path away from them."""
         here, options, place_W = self.context.pose(), self.options, target.place_W(self._now())
         distance_m = math.dist((here.x_m, here.y_m), place_W)
         if self._goal is None or math.dist((self._goal.x_m, self._goal.y_m), place_W) > distance_m:
@@ -327,9 +326,9 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         return max(0.0, target.away_m_s(here)) + options.gain * max(0.0, distance_m - options.close_m)
 
     def _next_pose(self, target: Target, hidden_s: float) -> Pose2D | None:
-        """The pose to drive to: behind the person, or aside from the path of one who comes towards the robot.
+        """The next goal pose: behind the person, or aside from the path of a person who comes towards the robot.
 
-        After `_LOCKED` drives in a row that failed, it is aside from the path of the nearest other person.
+        After `_LOCKED` failed drives in a row, it is aside from the path of the nearest other person.
         """
         here, now_s, options = self.context.pose(), self._now(), self.options
         near = not hidden_s and math.dist((here.x_m, here.y_m), target.seen.place_W) < options.meeting_m
@@ -362,7 +361,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
     def _pose_behind(self, target: Target, hidden_s: float) -> Pose2D | None:
         """The nearest free pose behind the person on their trail; None to stay.
 
-        While the person is hidden, it is where they were seen last.
+        While the person is hidden, their last known position counts.
         """
         here, options, walks = self.context.pose(), self.options, target.speed_m_s > _WALKS_M_S
         end_W = np.array(target.place_W(self._now() + (options.ahead_s if walks and not hidden_s else 0.0)))
@@ -381,21 +380,21 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         return self._free(np.array(poses).reshape(-1, 3))
 
     def _turned(self, here: Pose2D, place_W: tuple[float, float]) -> Pose2D | None:
-        """The pose here that faces a person, where the robot can turn; None when it faces them nearly."""
+        """Pose on the spot that faces a person; None when the robot nearly faces them or cannot turn."""
         turn_rad = bearing_rad(here, place_W)
         if abs(turn_rad) < self.options.turn_rad:
             return None
         return self._free(np.array([(here.x_m, here.y_m, wrap(here.yaw_rad + turn_rad))]))
 
     def _clear_trail(self, target: Target, hidden_s: float) -> None:
-        """Clears the costmap where the person has walked: behind a jamb the LiDAR cannot see that they have gone."""
+        """Clears the costmap along the person's trail, because the LiDAR cannot clear cells behind a door jamb."""
         trail = target.trail[-_CLEARED:]
         left = np.linalg.norm(trail - target.seen.place_W, axis=1) > (-1.0 if hidden_s else _LEFT_M)
         if isinstance(self.context.costmap, ClearableCostmap) and left.any():
             self.context.costmap.clear_obstacles(np.column_stack([trail[left], np.full(left.sum(), _CLEARED_M)]))
 
     def _is_clear(self, straight: FloatArray) -> bool:
-        """Returns whether the robot can drive straight from a point towards another one (2, 2), as far as it may."""
+        """Returns whether the robot can drive straight from the first point to `close_m` before the second (2, 2)."""
         length_m = float(np.linalg.norm(straight[1] - straight[0]))
         share = max(0.0, 1.0 - self.options.close_m / max(length_m, 1e-3))
         points = np.linspace(
@@ -422,7 +421,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         yield from likely
 
     def _poses_beyond_doors(self, target: Target) -> Iterator[Pose2D]:
-        """Poses behind the doors where the person may have gone: from room to room, each time the likeliest door."""
+        """Poses behind the doors that the person may have taken: the likeliest door of each room in turn."""
         place_W, heading, left = np.array(target.seen.place_W), np.array(target.seen.velocity_W), [*self.context.doors]
 
         def unlikely_m(door: Doorway) -> float:

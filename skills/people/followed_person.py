@@ -1,4 +1,4 @@
-"""The person whom the robot follows: the track of one person through crossings and gaps, and the trail behind them."""
+"""The followed person: the track of one person through crossings and gaps, and the trail behind them."""
 
 import math
 from collections import deque
@@ -33,17 +33,17 @@ _LOST_M = 5.0
 _GAP_M = 1.5
 """Distance from the trail at which a person was seen again and a new trail begins."""
 _LOOP_M, _LOOP_POINTS = 0.4, 8
-"""Distance from a point of the trail, so many points back, at which the person has come back to it."""
+"""Distance from an earlier point of the trail, and its least age in points, at which the person has returned."""
 
 
 @dataclass(frozen=True)
 class TargetOptions:
-    """Conditions for another track to be the person again after a gap.
+    """Conditions under which a new track continues the person's after a gap.
 
-    The person is hidden once no scan has shown them for `hidden_s`. A track that begins later continues theirs within
-    `again_m` of the prediction, and farther by `again_m_s` for each second, up to `farthest_m`. After more than
-    `sure_s`, a new track, or one farther than `again_m` from the prediction, may be another person's; so may one after
-    somebody has come within `close_m`. A person stands still while all positions of `still_s` lie within `still_m`.
+    The person is hidden after `hidden_s` without a detection. A later track continues theirs within `again_m` of the
+    prediction, and `again_m_s` farther for each second, up to `farthest_m`. It is doubtful after more than `sure_s`,
+    farther than `again_m` from the prediction, or once another person has come within `close_m`. A person stands still
+    while all positions of `still_s` lie within `still_m`.
     """
 
     hidden_s: Delay = 0.6
@@ -71,10 +71,10 @@ def people_about(
 
 
 def is_addressed(one: SeenPerson, near: Sequence[SeenPerson], here: Pose2D, *, still: bool, in_sight: bool) -> bool:
-    """Returns whether only this person answers a question that all `near` people hear, the nearest of them first.
+    """Returns whether only this person answers a question to all `near` people, who are sorted by distance.
 
-    The person must be the nearest, and ahead of the robot. Somebody who stands `still` may also be the nearest one
-    ahead, with no obstacle between (`in_sight`), or the nearest of all where nobody is ahead.
+    The person must be the nearest, and ahead of the robot. A person who stands `still` may also be the nearest one
+    ahead, with no obstacle between (`in_sight`), or the nearest of all if nobody is ahead.
     """
     faced = [each for each in near if abs(bearing_rad(here, each.place_W)) < _FACES_RAD]
     first = next(iter(faced or near if still else faced), None)
@@ -83,10 +83,10 @@ def is_addressed(one: SeenPerson, near: Sequence[SeenPerson], here: Pose2D, *, s
 
 
 class Target:
-    """The followed person: the last view `seen`, and the largest distance `farthest_m` (m) of one that continues it.
+    """The followed person: the last detection `seen`, and the largest distance `farthest_m` of its continuation.
 
-    `doubted` is the last view of the person if this may be somebody else, `longest_loss_s` the longest time for which
-    nobody who was the person was seen near the robot.
+    `doubted` is the last certain detection if the present person is doubtful, `longest_loss_s` the longest time
+    without the person near the robot.
     """
 
     def __init__(self, first: SeenPerson, here: Pose2D, options: TargetOptions) -> None:
@@ -125,7 +125,7 @@ class Target:
         return long_enough and all(math.dist(place, last_W) < self._options.still_m for _, place in self._places)
 
     def standing_s(self, now_s: float) -> float:
-        """Time for which the person has stood still, at most since the robot trusted them."""
+        """Time for which the person has stood still since the robot last confirmed them."""
         return now_s - self._walked_s
 
     def away_m_s(self, here: Pose2D) -> float:
@@ -134,7 +134,7 @@ class Target:
         return float(off @ self.seen.velocity_W) / max(float(np.linalg.norm(off)), 1e-3)
 
     def update(self, tracks: Sequence[SeenPerson], others: Sequence[SeenPerson], now_s: float) -> None:
-        """Takes in the tracks of now, and those of them that are `others` beyond doubt."""
+        """Updates the person from the present tracks; `others` are tracks of certainly other people."""
         self.longest_loss_s = max(self.longest_loss_s, now_s - self._near_s)
         one = next((one for one in tracks if one.track == self.seen.track), None)
         if one is None or now_s - one.stamp_s > self._options.hidden_s:
@@ -155,7 +155,7 @@ class Target:
             self._others |= {each.track for each in apart if now_s - each.stamp_s < self._options.hidden_s}
 
     def doubt(self) -> None:
-        """Doubts from now on that the person in view is the followed one."""
+        """Marks the person in view as doubtful."""
         if self.doubted is None:
             self.doubted, self._others_before = self.seen, frozenset(self._others)
 
@@ -183,7 +183,7 @@ class Target:
             self._places.popleft()
 
     def _again(self, people: Sequence[SeenPerson], now_s: float) -> SeenPerson | None:
-        """The track that continues the person's after a gap: the nearest to the prediction that is nobody else's."""
+        """Continuation of the person's track after a gap: the nearest to the prediction, without other people's."""
         options, expected_W = self._options, self.place_W(now_s)
         reach_m = min(options.again_m + options.again_m_s * self.hidden_s(now_s), self.farthest_m)
         new = [
@@ -195,13 +195,13 @@ class Target:
         return min(near, key=lambda each: math.dist(each.place_W, expected_W), default=None)
 
     def _was_rejected(self, one: SeenPerson) -> bool:
-        """Returns whether a person stands where one stood who is somebody else."""
+        """Returns whether a person stands at the position of a rejected one."""
         stands = math.hypot(*one.velocity_W) < _STANDS_M_S
         return stands and any(math.dist(one.place_W, place_W) < _ONE_BODY_M for place_W in self._others_W)
 
 
 def poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, float, float]]:
-    """Poses on a trail at least so far behind its end, the nearest to the end first: along it, and facing its end."""
+    """Poses on a trail at a least distance behind its end, nearest first: along the trail, and facing its end."""
     end, back_m = trail[-1], 0.0
     for n in range(len(trail) - 1, 0, -1):
         length = float(np.linalg.norm(trail[n] - trail[n - 1]))
@@ -218,7 +218,7 @@ def poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, fl
 def poses_around(
     person_W: FloatArray, here: Pose2D, away_m: Sequence[float], costmap: FreeSpace
 ) -> Iterator[tuple[float, float, float]]:
-    """Poses at some distances from a person (2,) that face them with nothing between; the nearest to `here` first."""
+    """Poses at some distances from a person (2,) that face them with nothing between, nearest to `here` first."""
     angles = math.atan2(*(np.array((here.x_m, here.y_m)) - person_W)[::-1]) + _ROUND
     for distance_m in away_m:
         points_W = person_W + distance_m * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -228,14 +228,14 @@ def poses_around(
 
 
 def poses_beyond(door: Doorway, yaw_rad: float) -> Iterator[tuple[float, float, float]]:
-    """Poses beyond a door in a direction through it; the last one is before it, where the robot sees into the room."""
+    """Poses beyond a door in a direction through it; the last one, before the door, has a view of the room."""
     for far_m in (1.0, 1.4, 0.7, -0.8):
         x, y = np.array(door.middle_W) + far_m * np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
         yield float(x), float(y), yaw_rad
 
 
 def line_through(one: SeenPerson, here: Pose2D, beyond_m: float) -> FloatArray:
-    """Points (20, 2) from a person to the robot, and so far beyond it."""
+    """Points (20, 2) on the line from a person to the robot and on beyond it."""
     off = np.array((here.x_m, here.y_m)) - one.place_W
     return np.array(
         one.place_W + np.linspace(0.0, 1.0 + beyond_m / max(float(np.linalg.norm(off)), 1e-3), 20)[:, None] * off

@@ -25,20 +25,20 @@ from skills.small.speak import ListeningSkill, say
 
 _TRACKING: Final = PeopleOptions(period_s=1.0, idle_s=4.0, track_m=6.0, hidden_s=8.0)
 _NEAR: Final = MeetPersonOptions(apart_m=(1.3, 1.6, 2.2, 2.7))
-"""Where the robot goes for a person who fell behind: not beside them, if they stand in a doorway."""
+"""Distances from a person who fell behind at which the robot stands, larger ones for a person in a doorway."""
 _SLOWEST_M_S = 0.25
 _CLEAR_M = SAFE_MARGIN_M + 0.05
 _SURELY_M = 0.25
-"""Distance of a person from the edge of a room at which they are certainly in it, and not in its door."""
+"""Distance inside the edge of a room beyond which a person is certainly in it, and not in its door."""
 _AHEAD_M, _AHEAD_RAD = 3.0, 1.2
 _STEPS_IN, _STANDS_S = 3, 2.0
 """Drives into the room, and time for which the person stands before its door."""
 _COMES_M, _STEP_IN_M, _YAWS_RAD = 2.7, 0.3, (0.0, 0.8, -0.8, 1.6, -1.6, 2.4, -2.4, math.pi)
 """Distance at which a person comes after the robot, least further distance, and turns of the robot there."""
 _TIMES_ASKED, _ANSWER_S = 2, 5.0
-"""Number of questions for the name of somebody who may be another, and the time for each answer."""
+"""Number of questions for a doubtful person's name, and the time for each answer."""
 _ASK_AFTER_S, _WALKS_M_S, _ON_M = 2.0, 0.3, 2.0
-"""Wait before the robot asks the person to come; steps in which it looks ahead and back for one who walked."""
+"""Wait before the robot asks the person to come; steps in which it searches ahead and back for a person."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,8 @@ class GuidePersonOptions:
     """Distances between robot and person, and times.
 
     The robot drives at up to most_m_s while the person is within `close_m`, slower beyond, and stands beyond `wait_m`
-    or when it has not seen them for `hidden_s`. After `behind_s` of standing it goes back for them, at most `returns`
-    times. At the goal it waits `arrive_s` for them. Somebody within `same_m` of where they should be is taken for them.
+    or after `hidden_s` without a detection. After `behind_s` of standing it goes back for them, at most `returns`
+    times. At the goal it waits `arrive_s` for them. A detection within `same_m` of their expected position is theirs.
     """
 
     most_m_s: Speed = 0.7
@@ -61,7 +61,7 @@ class GuidePersonOptions:
 
 
 class Leading(Navigate):
-    """Drive of a robot that leads, and stands where it waits for its company; that is no trouble."""
+    """Drive of a robot that leads; a stop to wait for its company does not count as blocked."""
 
     def _give_way(self) -> tuple[float, str | None]:
         most_m_s, waits = super()._give_way()
@@ -99,7 +99,7 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         return super().step()
 
     def _candidates(self, tracks: Sequence[SeenPerson]) -> list[SeenPerson]:
-        """People who may be the one to guide, the likeliest first."""
+        """People who may be the guided person, likeliest first."""
         reach_m = _AHEAD_M if self._place_W is None else self.options.same_m
         return people_about(tracks, self.context.pose(), self._place_W, reach_m, _AHEAD_RAD)
 
@@ -117,7 +117,7 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         return SkillFailure(Cause.POSTCONDITION, f"'{said}' was said before {self._who} was at {self._inputs.place}")
 
     def run(self, inputs: GuidePersonInputs) -> Routine[Succeeded]:
-        """Leads the person, and goes back for them as often as needed."""
+        """Leads the person, and goes back for them when needed."""
         yield from self._fetch()
         for _ in range(self.options.returns + 1):
             say(self.context, f"Please follow me to {inputs.place}.")
@@ -154,7 +154,7 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         return self._are_there()
 
     def _make_sure(self) -> Routine[None]:
-        """Asks somebody who may be another for their name, twice. Raises SkillFailure unless they say yes."""
+        """Asks a doubtful person for their name, twice. Raises SkillFailure unless they say yes."""
         doubted, answer = self._doubted or (self._target is not None and self._target.doubted is not None), ""
         if self._inputs.place_W is None or not doubted:
             return
@@ -181,7 +181,7 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         return self._is_close() and self.context.clock.now() > end_s - self.options.arrive_s + _STANDS_S
 
     def _pose_further_in(self) -> Pose2D | None:
-        """A free pose in the room, so far from where the person was seen last that they come in; None without one."""
+        """Free pose in the room, far enough from the person's last position that they come in; None without one."""
         area, here = self._inputs.area_W, self.context.pose()
         if self._target is None or not area:
             return None
@@ -264,9 +264,9 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
 
 
 def _places_of(target: Target) -> Iterator[tuple[float, float]]:
-    """Places of a person who is out of sight: the last one, further in the same direction, and back along the trail.
+    """Possible places of a hidden person: the last one, further in the same direction, and back along the trail.
 
-    Where the robot sees the person from one of them, that place comes next.
+    When the robot sees the person from one of them, the person's place comes next.
     """
     last, trail = target.seen, target.trail[::-1]
     guesses, back_m = [last.place_W], _ON_M

@@ -1,4 +1,4 @@
-"""The meet_person skill: goes beside a person whom the robot has seen, and checks that they are still there."""
+"""The meet_person skill: drives to a known person, and checks that they are still there."""
 
 import math
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ _SCAN_AGE_S = 1.0
 _ARM_M = 0.5
 """Distance from a person's axis up to which their own body is in the costmap."""
 _SHORT_M = 0.25
-"""Difference between the greatest distance of the inputs and that of the pose to which the robot drives."""
+"""Difference between the largest distance of the inputs and the distance of the goal pose."""
 _POSES_EACH = 2
 """Free poses at each distance from the person to which the robot tries to drive."""
 
@@ -39,11 +39,11 @@ def person_text(name: str) -> str:
 
 @dataclass(frozen=True)
 class MeetPersonOptions:
-    """Positions of the robot beside a person: at the first free of the distances `apart_m`, turned to the person.
+    """Positions of the robot near a person: at the first free of the distances `apart_m`, turned to the person.
 
-    A robot that is nearer than `near_m` and faces the person within `facing_rad` stays. A person seen within `same_m`
-    of the expected place is the one; within `reach_m` of the robot they are looked for during `look_s`. When the person
-    has walked on, the robot goes after them, in `tries` drives at most.
+    A robot that is nearer than `near_m` and faces the person within `facing_rad` stays. A person within `same_m` of the
+    expected place is the one; the robot searches within `reach_m` for `look_s`. When the person has walked on, the
+    robot goes after them, in `tries` drives at most.
     """
 
     apart_m: tuple[Length, ...] = (1.3, 1.6)
@@ -99,7 +99,7 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
             yield Running(f"looking for {name}")
 
     def _candidates(self, people: Sequence[SeenPerson], place_W: tuple[float, float] | None) -> list[SeenPerson]:
-        """People who may be the one, the likeliest first."""
+        """People who may be the person to meet, likeliest first."""
         here = self.context.pose()
         if place_W is None:
             near = [one for one in people if one.distance_m <= self.options.ahead_m]
@@ -108,7 +108,7 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
         return sorted(near, key=lambda one: math.dist(one.place_W, place_W))
 
     def _is_in_view(self, place_W: tuple[float, float]) -> bool:
-        """Returns whether the robot stands beside a place, with no wall between."""
+        """Returns whether the robot stands near a place, with no wall between."""
         here = self.context.pose()
         towards = Pose2D(here.x_m, here.y_m, here.yaw_rad + bearing_rad(here, place_W))
         return math.dist(place_W, (here.x_m, here.y_m)) <= self.options.near_m and self._sees(towards, place_W)

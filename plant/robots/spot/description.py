@@ -34,8 +34,8 @@ def spot_facts() -> Mapping[str, Any]:
 def spot_urdf(*, visuals: bool = False, pads: bool = True) -> str:
     """URDF text of Spot with arm and LiDAR; root link `body`, free.
 
-    With `visuals` its appearance is meshes under `package://spot_visuals/`, else the collision shapes. Motions are
-    planned without the rubber `pads`, which stand a few millimetres proud of the jaws.
+    With `visuals` it is drawn by meshes under `package://spot_visuals/`, else by the collision shapes. Motion planning
+    omits the rubber `pads`, which stand a few millimetres proud of the jaws.
     """
     facts = spot_facts()
     robot = ElementTree.Element("robot", name="spot")

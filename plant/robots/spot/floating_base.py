@@ -1,4 +1,4 @@
-"""The planar floating base that bears Spot's body in place of the legs: five joints with effort limits.
+"""The planar floating base under Spot's body in place of the legs: five joints with effort limits.
 
 World -> prismatic x -> prismatic y -> revolute yaw -> prismatic height -> revolute pitch -> weld -> body.
 """
@@ -149,7 +149,7 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
     ) -> None:
         """Commands the joints for the next dt_s: ramps to `wanted` (body frame) and to the posture (height, pitch).
 
-        `state` is (x, y, yaw, height, pitch). A robot that is `stopping` brakes harder than it otherwise changes speed.
+        `state` is (x, y, yaw, height, pitch). A `stopping` robot brakes harder than its usual acceleration.
         """
         limits = self._limits
         v = self._velocity = self._ramp(wanted, dt_s, stopping=stopping)

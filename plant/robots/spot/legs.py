@@ -107,7 +107,7 @@ class LegServos(Stateful, saved=("_last",)):
     def set_points(self, feet_B: Sequence[Sequence[float]], dt_s: float) -> tuple[FloatArray, FloatArray]:
         """Positions and velocities (4, 3) of the leg joints for feet at (x, y, z) in the body frame.
 
-        A foot out of reach keeps its leg as it was.
+        The leg of a foot out of reach does not move.
         """
         solved = [self._solve(foot, p_BFoot) for foot, p_BFoot in enumerate(feet_B)]
         joints = np.minimum(np.maximum(solved, self._lower), self._upper)
@@ -128,7 +128,7 @@ _PAIRS = ((0, 3), (1, 2))  # indices into LEGS: fl with hr, fr with hl
 
 @dataclass(frozen=True)
 class TrotParameters:
-    """Shape of the trot: time and height of a swing, and how far off its place a foot may rest."""
+    """Shape of the trot: time and height of a swing, and largest distance of a resting foot from its place."""
 
     swing_s: float = 0.28
     swing_height_m: float = 0.07
@@ -158,8 +158,8 @@ class BodyMotion:
 class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_progress_s")):
     """Trot: plans the positions of the four feet, step by step. Feet are ordered as `LEGS`.
 
-    Diagonal pairs of feet swing in turn, and the others stay where they are on the floor. Footholds follow Raibert's
-    rule (Legged Robots That Balance, 1986): a foot lands where the hip will be in the middle of its next stance.
+    Diagonal pairs of feet swing in turn, while the others stay on the floor. Footholds follow Raibert's rule (Legged
+    Robots That Balance, 1986): a foot lands below the hip's position in the middle of its next stance.
     """
 
     def __init__(self, nominal_B: FloatArray, parameters: TrotParameters | None = None) -> None:
@@ -219,7 +219,7 @@ class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_p
             self._swinging = None
 
     def _place(self, foot: int, motion: BodyMotion, ahead_s: float) -> tuple[float, float]:
-        """Resting position (x, y) of a foot below the body as it will be after ahead_s."""
+        """Resting position (x, y) of a foot below the body's pose after ahead_s."""
         x, y, yaw = motion.ahead(ahead_s)
         c, s = math.cos(yaw), math.sin(yaw)
         forward, left = self._nominal_B[foot]

@@ -90,7 +90,7 @@ _ARM_GAINS = {
 
 @dataclass(frozen=True)
 class OwnLegs(LocomotionLimits):
-    """Spot stands on its legs alone, without a floating base; it cannot walk then."""
+    """Spot on its legs alone, without a floating base; it cannot walk."""
 
 
 class SpotModel(RobotBody):
@@ -102,7 +102,7 @@ class SpotModel(RobotBody):
         robot: PlacedRobot,
         visuals: bool,
     ) -> None:
-        """Adds the robot to `plant` (before Finalize), with visual meshes where they are wanted and installed."""
+        """Adds the robot to `plant` (before Finalize), with visual meshes if requested and installed."""
         meshes = visuals_folder() if visuals else None
         legs = {joint: _LEG_GAINS for leg in LEGS for joint in leg_joint_names(leg)}
         packages = {} if meshes is None else {VISUALS_PACKAGE: meshes}
@@ -121,7 +121,7 @@ class SpotModel(RobotBody):
         return super().instances() if self.floating_base is None else (self.instance, self.floating_base.instance)
 
     def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
-        """Lets links of this robot pass each other, and its legs pass the floor if a floating base bears it."""
+        """Filters collisions between links of this robot, and of its legs with the floor on a floating base."""
         super().filter_collisions(filters, floor)
         if self.floating_base is not None:
             legs = [geometry for leg in LEGS for geometry in self.geometries(leg)]

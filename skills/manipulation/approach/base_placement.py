@@ -88,7 +88,7 @@ def first_reachable_spot(
 ) -> tuple[FloatArray, Sequence[BasePlacement]] | None:
     """Returns the first spot within reach of a free pose, with its placements; else the first spot with a free pose.
 
-    `reach_cost` gives, for a spot, the cost of its reach from a pose. None when no spot has a free pose.
+    `reach_cost` returns the cost of a spot's reach from a pose. Returns None when no spot has a free pose.
     """
     for spot, free in before:
         if near := reachable_placements(free, reach_cost(spot)):

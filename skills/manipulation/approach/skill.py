@@ -26,15 +26,15 @@ from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure
 
 _STILL_BEFORE_M = 1.3
-"""Distance from the object up to which the robot stands before it."""
+"""Largest distance from the object at which the robot stands before it."""
 
 
 @dataclass(frozen=True)
 class ApproachOptions:
-    """Tolerances and speed of the drive, and when the robot stays where it is.
+    """Tolerances and speed of the drive, and the condition for a robot to stay.
 
-    The robot goes to the first of `tries` places to which a path leads. When the best grasp from here costs no more
-    than `good_grasp` above the cheapest candidate, the robot stays.
+    The robot goes to the first of `tries` places with a path. It stays when the best grasp from here costs at most
+    `good_grasp` more than the cheapest candidate.
     """
 
     position_tolerance_m: Length = 0.06
@@ -72,7 +72,7 @@ class Approach(ApproachPorts, LookingSkill[ApproachInputs]):
     def _choose(self, inputs: ApproachInputs) -> Routine[tuple[list[BasePlacement], FloatArray]]:
         """Chooses base placements, best first, and points (N, 3, world) of the arm at the first one.
 
-        The first is the present pose when that is good enough.
+        The first is the present pose if that is good enough.
         """
         context, seen = self.context, inputs.observation
         here, point_W = context.pose(), (seen.position_W[0], seen.position_W[1])
@@ -114,5 +114,5 @@ class Approach(ApproachPorts, LookingSkill[ApproachInputs]):
 
 
 def own_surfaces(inputs: ApproachInputs) -> tuple[Surface, ...]:
-    """Returns the surface that the object lies on, or all given ones when it is not among them."""
+    """Returns the object's surface, or all given ones when it is not among them."""
     return tuple(s for s in inputs.surfaces if s.name == inputs.observation.surface) or inputs.surfaces

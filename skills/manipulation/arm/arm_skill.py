@@ -27,7 +27,7 @@ CARRY_SPEED_RAD_S = 0.9
 GRIPPER_FORCE_N = 20.0
 """Force with which an empty gripper opens and closes."""
 CONTACT_LAG_M = 0.006
-"""A hand that moves slowly and freely lags by 2 mm at most (measured in the plant); in contact it lags more at once."""
+"""Lag of a slow hand that means contact; a free hand lags by at most 2 mm (measured in the plant)."""
 WEIGHING_S = 0.3
 """Time over which weighing averages the noise of the readings."""
 _PADDING_M = 0.01
@@ -35,9 +35,9 @@ _PADDING_M = 0.01
 _GRIPPER_TURN_S = 1.6
 """Time in which the gripper has turned."""
 _CHECKED_SAMPLE = 3
-"""Each so many samples of the arm's trajectory one is checked while the gripper turns."""
+"""Number of samples of the arm's trajectory between two checks while the gripper turns."""
 _BEYOND_M = 0.5
-"""Length by which the hand and the held object reach farther than the arm."""
+"""Length of the hand and the held object beyond the arm's reach."""
 _OUTLINE_MARGIN_M = 0.05
 _STOWED_RAD = 0.05
 """Joints no farther from the stowed configuration than this are stowed."""
@@ -82,9 +82,9 @@ class GripperTurn:
 class ArmSkill(RoutineSkill[InputsT]):
     """Routine that moves the arm.
 
-    `boxes` (frame B) are obstacles, `held` (frame H) are in the hand. The cells that the camera has seen are obstacles
-    too, except within `known_W` (least and greatest corners, world), where `boxes` say what is there. While `_watch` is
-    set, the loss of the held object fails the skill with `lost_message`.
+    `boxes` (frame B) are obstacles, `held` (frame H) are in the hand. Occupied cells of the camera are obstacles too,
+    except within `known_W` (least and greatest corners, world), where only `boxes` count. While `_watch` is set, the
+    loss of the held object fails the skill with `lost_message`.
     """
 
     lost_message: ClassVar[str] = "the object was lost"
@@ -107,7 +107,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         super().begin(inputs)
 
     def resume(self, inputs: InputsT) -> None:
-        """Continues after a pause or a restart, in which obstacles may have moved; a slip in it does not count."""
+        """Continues after a pause or a restart; obstacles may have moved, and a slip in the pause does not count."""
         self._watch = None if self._watch is None else self.hold_watch()
         if not self.can_go_on():
             self._forget()
@@ -167,7 +167,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return self.context.X_WB()
 
     def q_rad(self) -> FloatArray:
-        """Present arm angles (J,), clipped to their limits, because a servo may be slightly beyond them.
+        """Present arm angles (J,), clipped to their limits, because a servo may slightly exceed them.
 
         Raises SkillFailure with cause EXECUTION when the robot reports no finite angles.
         """
@@ -238,7 +238,7 @@ class ArmSkill(RoutineSkill[InputsT]):
     def attempt_at_heights(
         self, heights_m: Sequence[float], message: str, attempt: Callable[[], Routine[PlannedT]]
     ) -> Routine[PlannedT]:
-        """Runs `attempt` with the body at the first of some heights (m) at which it finds a plan.
+        """Runs `attempt` at each body height (m) in turn until it finds a plan.
 
         Raises the SkillFailure of the last height, or the first one with another cause than PLANNING.
         """
@@ -256,9 +256,9 @@ class ArmSkill(RoutineSkill[InputsT]):
     def move_to(
         self, goal: Goal, message: str, speed_rad_s: float | None = None, opening: float | None = None
     ) -> Routine[FloatArray]:
-        """Plans to the configuration that `goal(scene, q_now)` gives and moves there; returns that configuration.
+        """Plans to the configuration `goal(scene, q_now)` and moves there; returns that configuration.
 
-        The gripper comes to `opening` on the path where its wider opening touches nothing. Otherwise it closes before
+        The gripper moves to `opening` on the way if its wider opening is free of contact. Otherwise it closes before
         the motion, or opens after it.
         """
 
@@ -297,7 +297,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return guard
 
     def carry(self, R_BH: RotationMatrix, message: str, speed_rad_s: float | None = CARRY_SPEED_RAD_S) -> Routine[None]:
-        """Draws the hand near the body, turned as in R_BH about the vertical, so that the object stays upright."""
+        """Draws the hand near the body; it keeps R_BH up to a turn about the vertical: the object stays upright."""
         arm, hangs = self.arm, hangs_below(self.context.payload.corners_H, self.gripper)
         yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q, hangs), message, speed_rad_s)
 
@@ -312,8 +312,8 @@ class ArmSkill(RoutineSkill[InputsT]):
     ) -> Routine[bool]:
         """Moves the hand straight to p_BH with its present orientation; returns whether `guard` stopped it.
 
-        The line begins at the arm's present angles, or at `q_from_rad`, which the arm is near. With `clear_of_boxes`
-        the arm must touch no obstacle.
+        The line begins at the arm's present angles, or at the nearby angles `q_from_rad`. With `clear_of_boxes` the arm
+        must touch no obstacle.
         """
 
         q = self.q_rad() if q_from_rad is None else q_from_rad
@@ -339,7 +339,7 @@ class ArmSkill(RoutineSkill[InputsT]):
     def shift_by_first(
         self, offsets_B: Iterable[FloatArray], message: str, *, clear_of_boxes: bool = False
     ) -> Routine[bool]:
-        """Moves the hand by the first of some offsets (3,) that has a straight path; returns False when none has."""
+        """Moves the hand by the first offset (3,) with a straight path; returns False without one."""
         for offset_B in offsets_B:
             if (yield from self.try_shift_hand(offset_B, message, clear_of_boxes=clear_of_boxes)):
                 return True
@@ -348,7 +348,7 @@ class ArmSkill(RoutineSkill[InputsT]):
     def press(self, offset_B: FloatArray, direction_B: FloatArray, speed_rad_s: float, message: str) -> Routine[bool]:
         """Moves the hand slowly by an offset (3,) in B; returns whether contact along a direction stopped it.
 
-        Obstacles are not looked at. Raises PlanningError when the arm cannot follow the line.
+        Ignores obstacles. Raises PlanningError when the arm cannot follow the line.
         """
         X_BH, planner = self.model.X_BH(self.q_rad()), self.context.stack.arm_planner
         path = planner.line(self.model, self.q_rad(), RigidTransform(X_BH.rotation(), X_BH.translation() + offset_B))
@@ -359,7 +359,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         )
 
     def contact_guard(self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M) -> Callable[[FloatArray], bool]:
-        """A guard for `follow` that stops a slow hand when it lags along a direction as it does only in contact."""
+        """A guard for `follow` that stops a slow hand at contact, when it lags along a direction."""
 
         def guard(q_wanted_rad: FloatArray) -> bool:
             lag = self.model.X_BH(q_wanted_rad).translation() - self.model.X_BH(self.q_rad()).translation()

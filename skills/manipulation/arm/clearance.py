@@ -1,8 +1,8 @@
 """Clearance of convex shapes from boxes, in compiled loops: the arm's shapes in many configurations among many boxes.
 
-Each gap is the widest along axes that can separate the two, so it is never more than the distance. It is less than the
-distance only where a rim of a cylinder, or a corner or edge of a box, is nearest to an edge or corner. Shapes are
-spheres, capsules, cylinders and boxes about the origin of their own frame, the length of round ones along z.
+Each gap is the widest along candidate separating axes, so it never exceeds the distance. It is less than the distance
+only between a cylinder's rim, or a box's corner or edge, and an edge or corner. Shapes are spheres, capsules, cylinders
+and boxes about the origin of their own frame, the length of round ones along z.
 """
 
 from __future__ import annotations
@@ -56,13 +56,13 @@ def touching(
     R_BX: FloatArray,
     p_BX: FloatArray,
 ) -> bool:
-    """Returns whether any of S shapes comes within a padding of any of N boxes in a configuration of path_rad (K, J).
+    """Returns whether any of S shapes comes within a padding of any of N boxes on path_rad (K, J).
 
     Joint j turns about `axes` (J, 3) in its frame F, which is fixed to the link before it, the body for the first: R_PF
     (J, 3, 3), p_PF (J, 3). Shapes come in G groups, one for each link: `group_joints` (G,) move the links, or `FIXED`
     for the body itself, and `group_ends` (G,) are the numbers after each group's last shape. `group_spheres` (G, 4),
     centre and radius, hold their shapes; spheres of `radii` (S,) hold one each. The first touch ends the check, unless
-    `found` (S,) is to mark all shapes that touch.
+    `found` (S,) collects all touching shapes.
     """
     joints, groups, boxes = path_rad.shape[1], group_joints.shape[0], box_halves.shape[0]
     reach = np.sqrt(box_halves[:, 0] ** 2 + box_halves[:, 1] ** 2 + box_halves[:, 2] ** 2) + padding_m
@@ -217,7 +217,7 @@ def _from_box(x: float, y: float, z: float, half: FloatArray) -> float:
 def _box_gap(
     half: FloatArray, R_FG: FloatArray, p_FG: FloatArray, other: FloatArray, R_FX: FloatArray, p_FX: FloatArray
 ) -> float:
-    """Gap (m) of two boxes by the fifteen axes that separate boxes; negative where they overlap.
+    """Gap (m) of two boxes by their fifteen separating axes; negative where they overlap.
 
     Gottschalk, Lin and Manocha, "OBBTree", 1996.
     """

@@ -123,7 +123,7 @@ class ArmScene:
             self.set_opening(opening_before)
 
     def beyond_body_m(self, q_rad: FloatArray) -> tuple[float, float]:
-        """Lengths (m) by which the arm sticks out of the body's footprint ahead and to a side; 0 where it does not."""
+        """Overhang (m) of the arm over the body's footprint, ahead and to a side; 0 without one."""
         most_m = np.max(np.abs(np.asarray(self._capabilities.footprint_m)), axis=0)
         x, y, _ = self.model.points_B(q_rad).T
         ahead_m, beside_m = float(np.max(x) - most_m[0]), float(np.max(np.abs(y)) - most_m[1])
@@ -296,7 +296,7 @@ def _rows(shapes: Sequence[_Shape]) -> _Arrays:
 
 @lru_cache(maxsize=4)
 def _robot_of(capabilities: Capabilities) -> _Robot:
-    """The robot as described. To be copied before it changes, since it takes a while to build."""
+    """The robot of a description, cached because it is slow to build; copy it before a change."""
     fingers = () if capabilities.gripper is None else tuple(capabilities.gripper.finger_positions(0.0))
     without_visuals = re.sub(r"<visual\b.*?</visual>", "", capabilities.description, flags=re.DOTALL)
     return _Robot(without_visuals, arm_model(capabilities), fingers)
@@ -332,13 +332,13 @@ class _Robot:
             self.checker.SetCollisionFilteredBetween(one, other, True)
 
     def copy(self) -> _Robot:
-        """Returns a copy that changes by itself; the plant is common to both."""
+        """Returns an independent copy with the same plant."""
         other = copy(self)
         other.checker, other._q = self.checker.Clone(), self._q.copy()
         return other
 
     def set_joints(self, joint_positions: Mapping[str, float]) -> None:
-        """Sets all joints that are not given with each check; 0 for joints without a position."""
+        """Sets all joints other than the checked ones; 0 for joints without a position."""
         for name, start in self._positions.items():
             self._q[start] = joint_positions.get(name, 0.0)
 
@@ -363,7 +363,7 @@ class _Robot:
             self._held = boxes
 
     def shapes(self, positions: FloatArray) -> list[_Shape]:
-        """All shapes and the held boxes, with the joints that move them; `positions` are those of the whole model."""
+        """All shapes and the held boxes, with their joints; `positions` are those of the whole model."""
         plant, inspector = self.plant, self.checker.model().scene_graph().model_inspector()
         context = self.checker.UpdatePositions(positions)
         chain = [plant.GetBodyByName(joint.child) for joint in self._model.joints]
@@ -390,7 +390,7 @@ class _Robot:
 def _measured(
     inspector: SceneGraphInspector, geometry: GeometryId
 ) -> tuple[Kind, tuple[float, float, float], RigidTransform]:
-    """Kind, half extents (m) and pose in its link of a collision shape; of other kinds its oriented bounding box."""
+    """Kind, half extents (m) and pose in its link of a collision shape, or of its oriented bounding box."""
     from pydrake.geometry import Box as BoxShape
     from pydrake.geometry import Capsule, Cylinder, Sphere
 

@@ -11,7 +11,7 @@ from skills.robot import FloatArray
 
 _GRAVITY_M_S2 = 9.81
 _DAMPING_M = 0.12
-"""Damping of the least squares: a stretched arm hardly feels a pull along itself, so its short levers count little."""
+"""Damping of the least squares, for a stretched arm, which hardly feels a pull along itself."""
 
 
 def levers_m(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray) -> FloatArray:
@@ -22,13 +22,13 @@ def levers_m(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray) -> FloatArray
 
 
 def held_mass_kg(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> float:
-    """Mass (kg) at p_HO of the hand that explains efforts `extra_nm` (J,) best, by least squares."""
+    """Mass (kg) at p_HO of the hand that best explains the efforts `extra_nm` (J,), by least squares."""
     lever_nm = _GRAVITY_M_S2 * levers_m(model, q_rad, p_HO)[2]
     return float(lever_nm @ extra_nm / (lever_nm @ lever_nm))
 
 
 def hand_force_n(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> FloatArray:
-    """Force (3,) at p_HO of the hand that the joints resist with `extra_nm` (J,) more, in the body frame (N)."""
+    """Force (3,) at p_HO of the hand, in the body frame (N), from the joints' additional efforts `extra_nm` (J,)."""
     J = levers_m(model, q_rad, p_HO)
     return np.asarray(-np.linalg.solve(J @ J.T + _DAMPING_M**2 * np.eye(3), J @ extra_nm))
 
@@ -37,8 +37,8 @@ def hand_force_n(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm:
 class PullWatch:
     """Detector of a pull at the hand: compares the mean of the last readings with a baseline from the first ones.
 
-    A pull is a force beyond `threshold_n` at all readings of `pull_s`; the mean is that of `mean_s`, the baseline that
-    of the first `baseline_s`. The arm gives a reading every `period_s`.
+    A pull is a force beyond `threshold_n` at all readings of `pull_s`. The mean covers `mean_s`, the baseline the first
+    `baseline_s`. The arm gives a reading every `period_s`.
     """
 
     model: ArmModel
@@ -55,7 +55,7 @@ class PullWatch:
     _felt: int = field(default=0, init=False)
 
     def feels_pull(self, stamp_s: float, q_rad: FloatArray, efforts_nm: FloatArray) -> bool:
-        """Takes in a reading that is newer than the last one; returns whether somebody pulls."""
+        """Processes a new reading; returns whether a person pulls."""
         if stamp_s > self._stamp_s:
             self._stamp_s = stamp_s
             self._take(q_rad, efforts_nm)

@@ -1,4 +1,4 @@
-"""Object in the hand: where its corners are, and how the hand must be turned for the object to stand again."""
+"""Object in the hand: its corners, and the hand's rotations at which the object stands again."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,21 +18,21 @@ ABOVE_M = 0.10
 LEAST_ABOVE_M = 0.05
 """The same height where a spot is out of reach from `ABOVE_M`."""
 TILT_RAD = 0.3
-"""Tilt of a flat object at `LEAST_ABOVE_M`, where the level hand does not reach its spot."""
+"""Tilt of a flat object at `LEAST_ABOVE_M`, if the level hand does not reach its spot."""
 OFF_SURFACE_M = 0.01
-"""Gap between an object and the surface that it stands on, so that the two do not count as in contact."""
+"""Gap between an object and its surface below which the two count as in contact."""
 _THINNEST_M = 0.01
 """Least side of the box around an object."""
 _LESS_M = 0.01
-"""Margin by which the box of a held object is smaller on each side than it was seen."""
+"""Margin by which the box of a held object is smaller on each side than its observation."""
 _LEVEL = 0.5
 """Fingers whose direction has a larger level share point to a side, not down."""
 _FLAT = 1.2
-"""An object cannot fall over when it is lower than this multiple of its width."""
+"""Ratio of height to width below which an object cannot fall over."""
 _LONG = 1.5
-"""Ratio of an object's level sides from which on it may have to lie along an edge."""
+"""Least ratio of an object's level sides for which it may have to lie along an edge."""
 _TURNS_BELOW_RAD = 0.36
-"""Largest tilt of a hand in which an upright object turns until it is square to the fingers."""
+"""Largest tilt of a hand in which an upright object turns square to the fingers."""
 _SIDE_DROP_M = 0.12
 """Assumed extent below and above the fingers of an unknown object that is held from the side."""
 _TOP_DEPTH_M = 0.06
@@ -76,16 +76,16 @@ class HeldObject:
 
     @property
     def _level_axes(self) -> tuple[int, int]:
-        """Axes of the hand that were level when the object stood, along its longer side first."""
+        """Axes of the hand that were level while the object stood, the one along its longer side first."""
         upright = int(np.argmax(np.abs(self.R_BH.matrix()[2])))
         first, second = (axis for axis in range(3) if axis != upright)
         return (first, second) if self._sides_m[first] >= self._sides_m[second] else (second, first)
 
     def rotations(self, azimuth_rad: float, along_rad: float | None = None) -> list[RotationMatrix]:
-        """Returns rotations of the hand with which the object stands as it stood.
+        """Returns rotations of the hand at which the object stands as before.
 
-        Fingers that do not point down point towards an azimuth, or somewhat aside. The last rotations of fingers that
-        point down bring a long object to lie along a direction.
+        Fingers point down, or towards an azimuth and somewhat aside. The last rotations of downward fingers turn a long
+        object along a direction.
         """
         x_axis = self.R_BH.matrix()[:, 0]
         level = math.hypot(x_axis[0], x_axis[1]) > _LEVEL
@@ -103,7 +103,7 @@ class HeldObject:
         return [(ABOVE_M, 0.0), (LEAST_ABOVE_M, 0.0), *tilted]
 
     def _is_flat(self) -> bool:
-        """Returns whether the object is too low for its width to fall over when the gripper releases it tilted."""
+        """Returns whether the object is too low for its width to fall over after a tilted release."""
         x, y, height = np.ptp(self.corners_H @ self.R_BH.matrix().T, axis=0)
         return bool(height < _FLAT * min(x, y))
 
@@ -117,8 +117,8 @@ class HeldObject:
     ) -> Iterator[RigidTransform]:
         """Yields hand poses with the object, upright as before, at a height over a point p_BT of a surface.
 
-        p_BS is the shoulder. Tilted fingers that point down point away from the shoulder a little. A long object may
-        lie along the direction `along_rad`, such as that of the surface's edge.
+        p_BS is the shoulder. Downward fingers may tilt a little away from the shoulder. A long object may lie along the
+        direction `along_rad`, such as that of the surface's edge.
         """
         azimuth = math.atan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0])
         ahead = RotationMatrix.MakeZRotation(azimuth)
@@ -130,7 +130,7 @@ class HeldObject:
 
 
 def held_object(payload: Payload, gripper: GripperCapabilities, R_BH: RotationMatrix) -> HeldObject:
-    """Returns the object that the payload describes, or else a guess from the hand's rotation while it carries."""
+    """Returns the object of the payload, or else a guess from the hand's rotation while it carries."""
     if payload.corners_H is not None and payload.R_BH is not None:
         return HeldObject(payload.R_BH, payload.corners_H)
     if abs(R_BH.matrix()[2, 2]) < _LEVEL:
@@ -143,9 +143,9 @@ def held_object(payload: Payload, gripper: GripperCapabilities, R_BH: RotationMa
 def square_hand_pose(X_BH: RigidTransform, p_HT: FloatArray) -> RigidTransform:
     """Returns the hand pose that would have taken an upright object, held at p_HT of the hand, square to the fingers.
 
-    The fingers are a groove: an upright object that a slightly tilted hand takes turns in it on the way until it is
-    square to them (measured in the plant: from 10 to 0 degrees within half a minute). Then the object stands upright
-    again below a level hand. A hand that is tilted more keeps its pose.
+    The fingers form a groove. An upright object in a slightly tilted hand turns in the groove until it is square to the
+    fingers (measured in the plant: from 10 to 0 degrees within half a minute), and stands upright below a level hand. A
+    hand with a larger tilt keeps its pose.
     """
     x, y, z = X_BH.rotation().matrix()[:, 0]
     if abs(z) > np.sin(_TURNS_BELOW_RAD):

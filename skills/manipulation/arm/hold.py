@@ -28,13 +28,13 @@ class Grip(enum.Enum):
 
 @dataclass
 class HoldWatch:
-    """Judge of the readings of a gripper that holds an object.
+    """Monitor of the readings of a gripper that holds an object.
 
-    The robot's belief that it holds nothing counts once it has lasted for `patience_s`. An object slips when the
-    gripper has closed by more than `slip_rad` about it, or when its force has been below the part `slip_force` of its
-    first value for `slip_s`. Both times span two readings. An object that was gripped again slips on when the gripper
-    closes about it, judged from `settle_s` later on; fingers that stay apart have `regrip_s` to feel it again before it
-    counts as lost. A gripper that has opened by `released_rad` lets go on purpose.
+    An empty gripper counts after `patience_s`. An object slips when the gripper has closed by more than `slip_rad`, or
+    when its force has been below the part `slip_force` of its first value for `slip_s`. Both times span two readings.
+    After a firmer grip, a closing gripper means a further slip, judged `settle_s` later; fingers that stay apart have
+    `regrip_s` to feel the object before it counts as lost. A gripper that has opened by `released_rad` releases on
+    purpose.
     """
 
     patience_s: float = 0.05
@@ -55,7 +55,7 @@ class HoldWatch:
     def judge(self, reading: Gripper, now_s: float) -> Grip:
         """Judges the newest reading at a time on the robot's clock (s).
 
-        `force_n` is the force at the first reading with an object, or after it was gripped again.
+        `force_n` is the force at the first reading with an object, or after a firmer grip.
         """
         if self._opening is None:
             if not reading.holding:
@@ -109,7 +109,7 @@ def hold_watch(capabilities: Capabilities) -> HoldWatch:
 
 
 def firmer_n(force_n: float, capabilities: Capabilities) -> float:
-    """Force (N) to grip an object that slips at force_n: half as much again, within the gripper's limit."""
+    """Force (N) to grip an object that slips at force_n: 1.5 times as much, within the gripper's limit."""
     most_n = 0.0 if capabilities.gripper is None else _MOST_OF_FORCE * capabilities.gripper.max_force_n
     return min(_FIRMER * force_n, most_n)
 

@@ -2,10 +2,9 @@
 
 Seven joints are shoulder pan and lift, then roll and flex three times over.
 
-The shoulder pan stands for the seventh degree of freedom: it is tried at angles all over its range, and the other
-joints follow in closed form. Half a turn of roll before and after a flex joint that bends to the other side leaves the
-links where they are. Therefore solutions have elbow and wrist bent to the positive side, except those that must be near
-a given one.
+The shoulder pan stands for the seventh degree of freedom: the solver tries angles all over its range, and the other
+joints follow in closed form. A flex joint that bends to the other side, with half a turn of roll before and after it,
+gives the same link poses. Therefore elbow and wrist bend to the positive side, except in solutions near a given one.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ AXES = ((0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0,
 _PANS = 17
 """Number of pan angles that are tried."""
 _PANS_FOR_REACH = 9
-"""Number of pan angles that are tried first where any solution will do."""
+"""Number of pan angles in the first attempt, if any solution will do."""
 _BESIDE_RAD = np.array([0.0, 0.03, -0.03, 0.08, -0.08, 0.16, -0.16, 0.3, -0.3, 0.5, -0.5])
 """Differences of the pan angle from a near solution's."""
 _SINGULAR = 1e-9
@@ -43,7 +42,7 @@ _ROTATION_M = 0.3
 _DAMPING = 1e-4
 _LONGEST_STEP_RAD = 0.6
 _SAME_RAD = 0.02
-"""Difference of every joint below which two solutions count as one."""
+"""Largest joint difference between equal solutions."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ class SevenJoints:
     upper_rad: FloatArray
 
     def solutions(self, X_BL: RigidTransform, margin_rad: float) -> FloatArray:
-        """Returns joint angles (N, 7) that put the last link at X_BL, those far from the limits first; N may be 0."""
+        """Returns joint angles (N, 7) for the last link at X_BL, those far from the limits first; N may be 0."""
         found, count = np.empty((_MOST, JOINTS)), 0
         count = _solve(*self._pose(X_BL), self._pans(_PANS, margin_rad), *self._limits(margin_rad), False, False, found)
         found = found[:count]
@@ -215,7 +214,7 @@ class AnyJoints:
 
     @cached_property
     def _starts(self) -> FloatArray:
-        """Joint angles (N, J) that are spread over the limits; those of endless joints over a turn."""
+        """Joint angles (N, J), spread over the limits; those of endless joints over a turn."""
         low, high = np.maximum(self.lower_rad, -math.pi), np.minimum(self.upper_rad, math.pi)
         share = np.random.default_rng(0).random((_STARTS, len(low)))
         share[0] = 0.5
@@ -241,7 +240,7 @@ class AnyJoints:
         return self._descend(X_BL, self._starts, margin_rad, _STARTS)
 
     def reaches(self, X_BL: RigidTransform, margin_rad: float) -> bool:
-        """Returns whether there are joint angles that put the last link at X_BL, as far as the starts tell."""
+        """Returns whether a solution for the last link at X_BL is found from the starts."""
         return bool(len(self._descend(X_BL, self._starts, margin_rad, 1)))
 
     def nearest(self, X_BL: RigidTransform, q_near_rad: FloatArray, margin_rad: float) -> FloatArray | None:

@@ -1,9 +1,9 @@
 """Kinematics of an arm, read from the robot's own URDF.
 
 All poses are in the body frame B; the hand frame H is the last arm link's, x along the fingers, z along their closing.
-The inverse of two families is solved in closed form, every branch and no seeds: one has a shoulder yaw, two parallel
-pitch joints and a spherical roll-pitch-roll wrist; the other seven joints (see `SevenJoints`). That of other arms is
-iterated (see `AnyJoints`), or solved by the solver of the robot's capabilities.
+Two families have inverse kinematics in closed form, with every branch and without seeds: one has a shoulder yaw, two
+parallel pitch joints and a spherical roll-pitch-roll wrist; the other seven joints (see `SevenJoints`). Other arms are
+solved by iteration (see `AnyJoints`), or by the solver of the robot's capabilities.
 """
 
 from __future__ import annotations
@@ -253,7 +253,7 @@ def _has_closed_form(joints: tuple[ChainJoint, ...]) -> bool:
     axes = tuple(joint.axis for joint in joints)
     offsets = [joint.X_PF.translation() for joint in joints]
     turns = [joint.X_PF.rotation() for joint in joints]
-    if len(joints) == JOINTS:  # a hand that is turned about the last axis makes no other arm
+    if len(joints) == JOINTS:  # a turn of the hand about the last axis makes no other arm
         turns[-1] = turns[-1].MakeXRotation(-_roll(turns[-1])) @ turns[-1]
     if any(not turn.IsNearlyIdentity(1e-6) for turn in turns):
         return False

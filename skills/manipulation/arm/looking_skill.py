@@ -28,7 +28,7 @@ _HEAD_EXPIRY_S = 5.0
 _ASK_AGAIN_S = 0.3
 """Pause after a dark picture or one without depth."""
 _OPEN_WIDE = 0.98
-"""Part of the widest opening to which a gripper opens that hides the view."""
+"""Opening of a gripper that clears the view, as a part of its widest."""
 _OPEN_ENOUGH = 0.9
 """Part of the widest opening from which on the gripper hides nothing."""
 _HEAD_TURNS = 6
@@ -68,9 +68,8 @@ class LookingSkill(ArmSkill[InputsT]):
     ) -> Routine[None]:
         """Points the object camera at p_BT.
 
-        A hand camera goes to the first viewpoint that is within reach and free. For another camera the arm leaves the
-        view, and the body rises by `raised_m` where that is given, as far as it can; a camera of the body must have
-        p_BT in view. Raises SkillFailure.
+        A hand camera goes to the first free viewpoint within reach. For another camera the arm leaves the view, and the
+        body rises by up to `raised_m`; a camera of the body must have p_BT in view. Raises SkillFailure.
         """
         camera, can = self.object_camera, self.context.robot.capabilities()
         head = can.head if camera.mount is Mount.HEAD else None
@@ -112,8 +111,8 @@ class LookingSkill(ArmSkill[InputsT]):
     def picture(self, message: str, settle_s: float = SETTLE_S, *, near: bool = False) -> Routine[Image]:
         """Takes a picture with the object camera at rest; a head camera's picture has no depth on the robot's own arm.
 
-        Asks again for a while when the picture is missing, old, dark or without depth; one attempt of a skill waits
-        `PATIENCE_S` in all for light and depth. A camera that may be too `near` for depth is asked once. Raises
+        Tries again for a while when the picture is missing, old, dark or without depth; one attempt of a skill waits
+        `PATIENCE_S` in all for light and depth. A camera that may be too `near` for depth has one try. Raises
         SkillFailure with cause EXECUTION when the camera gives no picture or an old one.
         """
         yield from self.pause(settle_s, message)
@@ -146,7 +145,7 @@ class LookingSkill(ArmSkill[InputsT]):
         return (yield from self.sense(taken, latency_s=PICTURE_LATENCY_S, name=f"{name} picture", message=message))
 
     def stays_at_rest(self, image: Image, p_W: FloatArray, within_m: float, message: str) -> Routine[bool]:
-        """Returns whether later depth pictures show the same as `image` within a distance of p_W.
+        """Returns whether later depth pictures match `image` within a distance of p_W.
 
         The intervals between them differ, because a rolling object may be back after one interval and not after two.
         """

@@ -1,8 +1,7 @@
 """Collision-free arm paths and their timing.
 
-A path is an array (K, J) of joint angles. Joint motions are straight where that is free, else planned by a
-bidirectional rapidly exploring random tree of OMPL and shortened; straight lines of the hand go through the inverse
-kinematics.
+A path is an array (K, J) of joint angles. A joint motion is straight if that is free; otherwise OMPL's RRT-Connect
+plans it, and shortcuts shorten it. Straight lines of the hand come from the inverse kinematics.
 """
 
 from __future__ import annotations
@@ -64,10 +63,11 @@ class ArmPlanner(Protocol):
 class RrtConnect:
     """RRT-Connect: two rapidly exploring random trees that grow towards each other, then shortcuts; trapezoidal speeds.
 
-    A start in contact is left by turns of up to `escape_rad`, up to eight times that where need be. The trees grow by
-    `step_rad`, `iterations` times at most; `shortcuts` are tried on their path. Straight lines of the hand are checked
-    each `line_step_m`, at which no joint may turn by more than `line_jump_rad`. Trajectories keep `speed_rad_s`, or the
-    speed that a skill asks for, and `acceleration_rad_s2`, in samples of `sample_s`, from points `dense_rad` apart.
+    The arm leaves a start in contact by turns of up to `escape_rad`, or up to eight times that if needed. The trees
+    grow by `step_rad`, at most `iterations` times; then follow `shortcuts` attempts to shorten the path. A straight
+    line of the hand is checked each `line_step_m`; between checks no joint may turn by more than `line_jump_rad`.
+    Trajectories keep `speed_rad_s`, or the skill's speed, and `acceleration_rad_s2`, in samples of `sample_s`, from
+    points `dense_rad` apart.
     """
 
     step_rad: Turn = 0.25
@@ -86,8 +86,8 @@ class RrtConnect:
     ) -> FloatArray:
         """Returns a free path from start to goal. Raises PlanningError when an end is blocked or no path was found.
 
-        Endless joints take the shorter turn. A start that the servos' error puts in contact is left by the smallest
-        turn that frees it.
+        Endless joints take the shorter turn. If the servos' error puts the start in contact, the path begins with the
+        smallest turn that frees it.
         """
         q_goal_rad = scene.model.turned_near(q_goal_rad, q_start_rad)
         if not scene.free(q_goal_rad):
@@ -119,7 +119,7 @@ class RrtConnect:
     ) -> FloatArray:
         """Returns the joint path of a straight motion of the hand to X_BH_to, with that rotation.
 
-        Without `scene`, collisions are not checked. Raises PlanningError when the line leaves the reach, jumps or hits.
+        Without `scene` it ignores collisions. Raises PlanningError when the line leaves the reach, jumps or collides.
         """
         X_start = model.X_BH(q_start_rad)
         start, offset = X_start.translation(), X_BH_to.translation() - X_start.translation()

@@ -16,11 +16,11 @@ from skills.world_model import PlanningError
 
 UP_B = np.array([0.0, 0.0, 1.0])
 _FOREARM_ROLL = 3
-"""Joint whose turn costs twice that of another, among configurations that look at a point."""
+"""Joint whose turn costs twice as much as another's, in the choice among viewing configurations."""
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
-"""Pitches of the hand that carries when it cannot keep the object upright, in groups, the best first."""
+"""Pitches of a hand that cannot keep the object upright while it carries, in groups, best first."""
 _HANGS_M = 0.03
-"""Distance of an object's middle beyond the fingertips from which on it hangs."""
+"""Least distance of a hanging object's middle beyond the fingertips."""
 _TURNS_HANGING_RAD = tuple(np.linspace(-np.pi, np.pi, 8, endpoint=False))
 _CLOSE_BELOW_RAD = tuple(np.radians([42.0, 35.0, 50.0, 58.0, 28.0]))
 """Angles below level at which a close view looks down, the best first."""
@@ -29,7 +29,7 @@ _CLOSE_M = (0.42, 0.36, 0.48)
 TALL_M = 0.4
 """Height from which on an object does not fit into a picture from the usual viewpoints."""
 _BACK_M = 0.18
-"""Distance by which a taller object is seen from further back."""
+"""Additional distance of the viewpoints of a taller object."""
 _NEAR_M = (0.33, 0.5)
 """Range of distances of a view that counts as close."""
 _BELOW_RAD = (0.45, 1.05)
@@ -44,7 +44,7 @@ _LOW = 0.1
 _WIDE = 0.75
 """Tangent of half the angle of a wide view."""
 _THICK_M = 0.1
-"""Distance by which an arm reaches into a view beside its joints."""
+"""Half width of the arm about its joints, for views."""
 
 
 def camera_pose(p_BC: FloatArray, p_BT: FloatArray) -> RigidTransform:
@@ -76,7 +76,7 @@ def overview_viewpoints(
 ) -> list[FloatArray]:
     """Camera positions above the shoulder towards p_BT, high ones first, turned about the shoulder by shift_rad.
 
-    An object of a height that does not fit into the picture is seen from further back first.
+    For an object too high for the picture, viewpoints from further back come first.
     """
     backs_m = (_BACK_M, 0.0) if height_m > TALL_M else (0.0,)
     direction = np.arctan2(p_BT[1] - model.p_BS[1], p_BT[0] - model.p_BS[0]) + shift_rad
@@ -94,7 +94,7 @@ def close_viewpoints(
     below_rad: Sequence[float] = _CLOSE_BELOW_RAD,
     distances_m: Sequence[float] = _CLOSE_M,
 ) -> list[FloatArray]:
-    """Camera positions near p_BT that look down at it from the shoulder's side, turned about it by aside_rad."""
+    """Camera positions near p_BT that look down at p_BT from the shoulder's side, turned about it by aside_rad."""
     direction = np.arctan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0]) + aside_rad
     return [
         p_BT + distance * np.array([-np.cos(tilt) * np.cos(direction), -np.cos(tilt) * np.sin(direction), np.sin(tilt)])
@@ -103,7 +103,7 @@ def close_viewpoints(
 
 
 def sees_closely(X_BC: RigidTransform, p_BT: FloatArray) -> bool:
-    """Returns whether a camera at X_BC views p_BT about as from one of the `close_viewpoints`."""
+    """Returns whether the view of p_BT from X_BC is about that of a `close_viewpoints` position."""
     offset = p_BT - X_BC.translation()
     distance_m = float(np.linalg.norm(offset))
     off_axis_rad = np.arccos(np.clip(X_BC.rotation().matrix()[:, 2] @ offset / distance_m, -1.0, 1.0))
@@ -115,7 +115,7 @@ def sees_closely(X_BC: RigidTransform, p_BT: FloatArray) -> bool:
 def viewpoints_beside(p_BS: FloatArray, p_BC: FloatArray, p_BT: FloatArray, aside_m: float = 0.06) -> list[FloatArray]:
     """Camera positions beside and above p_BC, from which p_BT may be hidden.
 
-    The first ones are on the side of p_BC as the shoulder at p_BS sees p_BT, away from what hides p_BT.
+    The first ones lie on the side of p_BC, as seen from the shoulder at p_BS, away from the occluder.
     """
     left, left_of_shoulder = _left_of(p_BC, p_BT), _left_of(p_BS, p_BT)
     outwards = left if (p_BC - p_BS) @ left_of_shoulder >= 0.0 else -left
@@ -139,9 +139,9 @@ def carry_configuration(
 ) -> FloatArray:
     """Returns arm angles (J,) with the hand near the body, the object as upright as in R_BH.
 
-    Where the object cannot stay upright, the hand points forward and slightly up, so that the object rests on a finger
-    and leans on the palm; else level, or down. An object that `hangs` far below fingers that point down stays there,
-    ahead of the body: with the hand level its weight would turn it out. Raises PlanningError when no pose is free.
+    If the object cannot stay upright, the hand points forward and slightly up: the object rests on a finger and leans
+    on the palm; else the hand points level, or down. An object that `hangs` far below downward fingers stays there,
+    ahead of the body, because its weight would turn it out of a level hand. Raises PlanningError when no pose is free.
     """
     points_down = R_BH.matrix()[2, 0] < -0.8
     turns = _TURNS_HANGING_RAD if points_down else (0.0, 0.4, -0.4)
@@ -163,7 +163,7 @@ def tucked_configuration(
 ) -> FloatArray:
     """Returns arm angles (J,) with the hand close to the body and turned to a side, the object as upright as in R_BH.
 
-    Raises PlanningError when no such pose is free.
+    Raises PlanningError without a free pose.
     """
     beside = _turned(R_BH, (0.5 * np.pi, -0.5 * np.pi))
     q = _best_free(scene, beside, arm.tuck_x_m, arm.carry_z_m, arm.tuck_x_m[0], q_near_rad)
@@ -182,7 +182,7 @@ def _best_free(
 ) -> FloatArray | None:
     """Returns the cheapest free arm angles with the hand at one of the rotations and positions ahead of the body.
 
-    Driving along walls and up to furniture needs an arm that sticks out of the body as little as possible.
+    A small overhang of the arm lets the robot drive along walls and up to furniture.
     """
     candidates = [
         (_carry_cost(x - best_x_m, z, q, q_near_rad) + sum(scene.beyond_body_m(q)), q)
@@ -214,7 +214,7 @@ def _forward(pitches_rad: tuple[float, ...]) -> list[RotationMatrix]:
 
 
 def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationMatrix:
-    """Returns R_BH of a hand whose fingers point tilt_rad below level to azimuth_rad; side (1, -1) turns it over."""
+    """Returns R_BH of a hand with fingers tilt_rad below level towards azimuth_rad; side (1, -1) turns it over."""
     c, s, ahead, down = np.cos(azimuth_rad), np.sin(azimuth_rad), np.cos(tilt_rad), np.sin(tilt_rad)
     x_axis, z_axis = [ahead * c, ahead * s, -down], [-side * s, side * c, 0.0]
     y_axis = [-side * down * c, -side * down * s, -side * ahead]
@@ -222,7 +222,7 @@ def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationM
 
 
 def compact_configuration(can: Capabilities) -> FloatArray:
-    """Angles (J,) at which the arm sticks out least over the footprint and into views, free of contact; by a search."""
+    """Arm angles (J,), free of contact, with the least overhang over the footprint and into views; by a search."""
     model = arm_model(can)
     scene = ArmScene(can, model, {})
     low, high = np.maximum(model.lower_rad, -np.pi), np.minimum(model.upper_rad, np.pi)

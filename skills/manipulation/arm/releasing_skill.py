@@ -1,4 +1,4 @@
-"""Base of the skills that release the held object: they open the gripper, feel that it is off, and leave it there."""
+"""Base of the skills that release the held object: they open the gripper, check its force, and draw back."""
 
 import math
 from dataclasses import replace
@@ -14,11 +14,11 @@ from skills.robot import FloatArray, GripperKind
 from skills.routine import Routine
 
 _RELEASE_RAD = 0.55
-"""The finger opens so far that its tip passes beside a bottle, and no farther: wide open it would reach neighbours."""
+"""Opening at which the fingertip passes a bottle; a wider one would reach neighbours."""
 _WIDE = 0.75
-"""Largest opening of a hinged gripper that lets go, as a part of its widest."""
+"""Largest opening of a hinged gripper for a release, as a part of its widest."""
 _ASIDE_M = 0.018
-"""Fixed finger and palm leave the object by so much before the hand is drawn back, or they would drag it along."""
+"""Distance of fixed finger and palm from the object before the hand draws back, so that they do not drag it."""
 _LEVEL = 0.5
 """A closing direction with a smaller vertical share is level."""
 _BACK_M = (0.16, 0.12, 0.08, 0.05)
@@ -32,20 +32,20 @@ _SHAKE_RAD_S = 3.0
 _CALM_S = 0.2
 """Pause before weighing, in which the arm comes to rest."""
 _STILL_HELD = 0.5
-"""Part of the object's weight from which on it still hangs on the hand."""
+"""Least part of the object's weight on the arm at which it still hangs on the hand."""
 _LEAST_KG = 0.06
 """Least mass that weighing can tell from nothing."""
 
 
 class ReleasingSkill(LookingSkill[InputsT]):
-    """Routine that lets go of the held object.
+    """Routine that releases the held object.
 
-    The output `released_W` of its end is where the hand has opened, and a later failure has the cause
-    POSTCONDITION, whatever stopped the arm or the camera, because the object must be looked for.
+    The output `released_W` of its end is the point of the release. Every later failure has the cause POSTCONDITION,
+    because the robot must then search for the object.
     """
 
     def step(self) -> Step:
-        """Runs the routine on; adds where the object was let go to its end."""
+        """Continues the routine; adds the point of the release to its end."""
         step, released_W = super().step(), self.checkpoint.get("released_W")
         if isinstance(step, Running) or released_W is None:
             return step
@@ -60,14 +60,14 @@ class ReleasingSkill(LookingSkill[InputsT]):
         super().end()
 
     def release_opening(self) -> float:
-        """Opening at which the gripper lets go of the object that it holds."""
+        """Opening at which the gripper releases the held object."""
         most = _WIDE if self.gripper.kind is GripperKind.HINGED else 1.0
         release = self.context.robot.gripper().opening + self.gripper.like_turn(_RELEASE_RAD)
         return min(release, most * self.gripper.widest)
 
     def open_hand(self, message: str) -> Routine[bool]:
         """Opens the gripper just far enough; returns whether it feels nothing then."""
-        self.context.payload.offered = True  # what sticks to the rubber opens so slowly that it seems to slip, or lost
+        self.context.payload.offered = True  # the jaws leave a sticking object so slowly that it seems to slip, or lost
         yield from self.move_gripper(self.release_opening(), GRIPPER_FORCE_N, message)
         released_W = self.X_WB() @ self.model.X_BH(self.q_rad()) @ self.p_HT
         self.checkpoint = {**self.checkpoint, "released_W": released_W.tolist()}
@@ -76,9 +76,9 @@ class ReleasingSkill(LookingSkill[InputsT]):
         return free
 
     def shake_off(self, message: str, *, turns_hand: bool) -> Routine[bool]:
-        """Opens and closes the jaws a little, wide at the end, so that an object that sticks to a finger comes off.
+        """Opens and closes the jaws a little, wide at the end, to shake off an object that sticks to a finger.
 
-        With `turns_hand` the hand turns to and fro as well. Returns whether the gripper feels nothing then.
+        With `turns_hand` the hand turns to and fro as well. Returns whether the gripper then feels no object.
         """
         wide = _WIDE * self.gripper.widest
         for opening in (wide, wide - self.gripper.like_turn(_RELEASE_RAD), wide):
@@ -102,7 +102,7 @@ class ReleasingSkill(LookingSkill[InputsT]):
         return True
 
     def hangs_on_hand(self, held_kg: float | None, message: str) -> Routine[bool]:
-        """Returns whether the arm still bears most of the held weight; False where that weight is too small to tell."""
+        """Returns whether the arm still bears most of the held weight; False for an immeasurably small weight."""
         if held_kg is None or held_kg < _LEAST_KG:
             return False
         yield from self.pause(_CALM_S, message)

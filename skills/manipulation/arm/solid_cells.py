@@ -29,7 +29,7 @@ _FURTHEST_M = 2.5
 _FEWEST_POINTS = 4
 """Number of points from which on a cell is solid."""
 _SEEN_PAST_M = 0.08
-"""Depth behind a cell at which a picture shows that the cell is empty."""
+"""Depth behind a cell beyond which a picture proves the cell empty."""
 _SHADOW_CELLS = 8
 """Number of cells behind a seen one that count as solid."""
 _FLOOR_M = 0.05
@@ -45,9 +45,9 @@ _MOST_VIEWS = 32
 _AT_ARM_M = 0.12
 """Solid cells nearer to the arm's axis than this are the arm itself."""
 _AT_HELD_M = 0.05
-"""Solid cells nearer to the held object than this are the object itself, or in contact with it."""
+"""Distance from the held object within which solid cells are the object itself, or in contact with it."""
 _AGREE_M = 0.03
-"""Distance within which an occupied cell of one grid counts as occupied in another: their noise."""
+"""Noise of the grids: distance within which an occupied cell of one counts as occupied in another."""
 _AT_SURFACE_M = 0.06
 """Distance from a surveyed surface within which occupied cells are its edge."""
 _FEWEST_COLUMNS = 8
@@ -76,10 +76,10 @@ class Outline:
 
 @dataclass(frozen=True)
 class OwnSpace:
-    """Space of the robot itself: its outline, and what is near its arm, the `lines_W` (3, K), or the held object.
+    """Space of the robot itself: its outline, and the surroundings of its arm, the `lines_W` (3, K), and held object.
 
-    Space between the corners in `known_W` belongs to it, too, and so does the box about the corners (N, 3) of the
-    object `held_W`, with their pose X_WH.
+    It includes the space between the corners in `known_W`, and the box about the corners (N, 3) of the object `held_W`,
+    with their pose X_WH.
     """
 
     outline: Outline
@@ -104,7 +104,7 @@ class OwnSpace:
 
 
 def add_picture(cells: Cells, image: Image, X_WO: RigidTransform, own: Outline) -> Cells:
-    """Returns the cells (N, 3) with those in which a depth picture has points, without those that it sees past.
+    """Returns the cells (N, 3) after a depth picture: adds cells with points and clears cells that it sees through.
 
     Points within the outline `own` are ignored.
     """
@@ -159,8 +159,8 @@ def solid_boxes(
 ) -> list[Box]:
     """Boxes in the body frame around the cells within a reach, except those whose centres p_W (N, 3) are `left_out`.
 
-    Space behind a cell, up to 32 cm and within the reach, is unknown and counts as solid too: of a board only the edge
-    is seen.
+    Space behind a cell, up to 32 cm and within the reach, is unknown and counts as solid too, because the camera sees
+    only the edge of a board.
     """
     middles, origin_W = cell_centres(cells), X_WB.translation()
     middles = middles[np.linalg.norm((middles - origin_W)[:, :2], axis=1) < reach_m]
@@ -183,10 +183,10 @@ def boxes_around(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArra
 
 
 def wall_columns(grids: Sequence[GridMap], surfaces: Iterable[Surface]) -> Cells:
-    """Columns (N, 2) of cells that all grids of a map show as occupied, so that they are solid at all their heights.
+    """Columns (N, 2) of cells that are occupied in all grids of a map, and thus solid at all their heights.
 
-    A grid knows no heights, and the band of a LiDAR shows the tops of tables and their edges. So the surveyed surfaces
-    are left out, since the arm reaches over them, and so are single posts, such as the legs of chairs.
+    A grid has no heights, and a LiDAR's band shows table tops and their edges. So the columns exclude surveyed
+    surfaces, over which the arm reaches, and single posts, such as the legs of chairs.
     """
     first, *others = sorted(grids, key=lambda grid: np.count_nonzero(grid.occupied))
     points_W = first.centres(np.argwhere(first.occupied))
@@ -225,7 +225,7 @@ def _cells(keys: NDArray[np.int64]) -> Cells:
 
 
 def add_view(views: Sequence[View], image: Image, X_WO: RigidTransform) -> tuple[View, ...]:
-    """Returns the last views with one more, of which each eighth row and column of the depth is stored."""
+    """Returns the last views and a new one with each eighth row and column of its depth."""
     lens, thin = image.depth_intrinsics, _STRIDE_PX
     depth_m = image.depth_m[thin // 2 :: thin, thin // 2 :: thin]
     lens = Intrinsics(
@@ -276,7 +276,7 @@ def _at_pixels(
 
 
 def merge_cells(cells: Cells) -> list[tuple[Cells, Cells]]:
-    """Returns few boxes (first cell, cell after the last) that cover exactly these cells: runs, joined where equal."""
+    """Returns few boxes (first cell, cell after the last) that cover exactly these cells: runs, merged if equal."""
     boxes = np.concatenate([cells, cells + 1], axis=1)
     for axis, others in ((2, (0, 1, 3, 4)), (1, (0, 2, 3, 5)), (0, (1, 4, 2, 5))):
         boxes = _joined(boxes, axis, others)

@@ -1,4 +1,4 @@
-"""Grasp candidates from the shape of a seen object, and the reasons why there are none.
+"""Grasp candidates from the shape of an observed object, and the reasons for a lack of them.
 
 The gripper closes along the hand's z axis, which is kept level: from the side with the wrist rolled for upright
 objects, from above for low ones and for the tops of upright ones.
@@ -31,15 +31,15 @@ _LEAST_GRIP_M = 0.008
 _LEAST_OF_THIN = 0.35
 """The same for a thin object, as a part of its height."""
 _LEAST_BEYOND = 0.25
-"""Part of a flat object's height by which the fingers may end above its middle."""
+"""Largest height of the fingertips above a flat object's middle, as a part of its height."""
 _WELL_BEYOND_M = 0.006
-"""Depth by which the fingers should end below an object's middle: rounded tips above it press a round handle out."""
+"""Depth of the fingertips below an object's middle: rounded tips above it press a round handle out."""
 _PER_HIGH_M = 60.0
 """Cost of fingers that end higher, per metre."""
 _BESIDE_THIN_M = 0.012
 """Gap between the fixed finger and a thin object."""
 _ENDING_LEVEL_M = 0.012
-"""Gap between fingers and object at the lean with which fingers of different length end level.
+"""Gap between fingers and object in the computation of the lean at which fingers of different length end level.
 
 It is less than the gap before they close, because afterwards there is none.
 """
@@ -48,7 +48,7 @@ _PER_UNEVEN_M = 60.0
 _BEVEL_M = 0.003
 """Distance by which the back of a fingertip ends behind its tip."""
 _SHORTER_CLOSED_M = 0.004
-"""Length by which the moving finger reaches less far when closed than half open."""
+"""Loss of the moving finger's reach from half open to closed."""
 _HIGHEST_FLAT_MM = 40
 """Height up to which an object may be refused as too flat."""
 _BELOW_PALM_M = 0.05
@@ -106,7 +106,7 @@ def _ahead_rad(target: Target, p_BS: FloatArray) -> float:
 
 
 def _least_height_m(target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> float | None:
-    """Least height (m, in whole mm) that would give an object candidates; None when its height is not the reason."""
+    """Least height (m, in whole mm) at which the object has candidates; None when its height is not the reason."""
     for height_mm in range(int(1000 * target.height_m) + 1, _HIGHEST_FLAT_MM):
         if grasp_candidates(replace(target, height_m=0.001 * height_mm), p_BS, gripper):
             return 0.001 * height_mm
@@ -116,7 +116,7 @@ def _least_height_m(target: Target, p_BS: FloatArray, gripper: GripperCapabiliti
 def _attitudes(target: Target, placement: Placement, gripper: GripperCapabilities) -> Sequence[tuple[float, float]]:
     """Tilts of the fingers below level and, for grasps from above, leans about the object's long axis (rad).
 
-    With the first lean, fingers of different length end level on both sides of an object of that width.
+    At the first lean, fingers of different length end level on both sides of an object of this width.
     """
     if placement.rim:
         return [(0.5 * np.pi, 0.0)]
@@ -175,10 +175,10 @@ def _top_grip(placement: Placement, tilt_rad: float, gripper: GripperCapabilitie
 def _low_grip(
     R_BH: RotationMatrix, height_m: float, width_m: float, gripper: GripperCapabilities, beside_m: float
 ) -> tuple[float, float] | None:
-    """Depths of a grasp of a low object (m): of its middle ahead of the hand, and of the fingers beyond that middle.
+    """Depths of a grasp of a low object (m): of its middle ahead of the hand, and of the fingers beyond the middle.
 
-    The lowest corner of the closed fingers stays just above the surface, and the finger that ends higher limits the
-    grip. None when the fingers cover too little of the object.
+    The lowest corner of the closed fingers stays just above the surface, and the higher fingertip limits the grip. None
+    when the fingers cover too little of the object.
     """
     up_H, inner_z = R_BH.matrix()[2], gripper.fixed_z_m
     if not _hinged(gripper):  # the fingers close on both sides alike
@@ -228,9 +228,9 @@ def least_mass_kg(kind: ObjectKind) -> float:
 
 
 def why_too_heavy(kind: ObjectKind, max_payload_kg: float) -> str | None:
-    """Returns why even the lightest of a class is too heavy for the arm; None when only weighing can decide.
+    """Returns the reason if even the lightest of a class is too heavy for the arm; None when only weighing can decide.
 
-    Sizes tell no mass: a hose widens an extinguisher, and it may be empty.
+    Size does not give the mass: a hose widens an extinguisher, and it may be empty.
     """
     mass_kg = least_mass_kg(kind)
     if mass_kg <= max_payload_kg:

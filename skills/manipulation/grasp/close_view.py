@@ -32,21 +32,21 @@ from skills.robot import FloatArray, Image
 LOOK_HALF_SIDE_M = 0.4
 """Half side of the patch of surface that is viewed."""
 SURFACE_AROUND_M = 0.2
-"""Half side of the patch around the object that counts as surface although its edge may be unseen."""
+"""Half side of the patch around the object that counts as surface, because the camera may miss its edge."""
 _SURFACE_YIELDS_M = 0.003
 """Depth by which the surface is taken lower than it was seen."""
 _NEIGHBOUR_GROWN_M = 0.005
-"""Distance by which the boxes of neighbours are larger than what was seen of them, by the noise of the depth."""
+"""Excess of neighbours' boxes over their true size, by the noise of the depth."""
 
 _TALLER_M = 0.05
-"""Height by which an object may be taller than it was seen from afar."""
+"""Height that an observation from afar may miss."""
 
 
 @dataclass(frozen=True)
 class CloseView:
     """Close view of an object and its obstacles, with X_WB at that time.
 
-    `others` are the objects among the boxes; what is longer than objects are, such as a wall, is none.
+    `others` are the objects among the boxes, without longer ones, such as walls.
     """
 
     target: Target
@@ -81,7 +81,7 @@ def examine(
     found: tuple[Detection3D, ...],
     within_m: float,
 ) -> CloseView | None:
-    """Looks for the object within a distance (m) of where it was seen; None when it is not there."""
+    """Looks for the object within a distance (m) of its last position; None when it is not there."""
     highest_m = max(HIGHEST_M, seen.size_m[2] + _TALLER_M)
     view = segment_surface(image, place.X_WO, surface, margin_m=0.0, highest_m=highest_m)
     if view is None:
@@ -109,7 +109,7 @@ def examine(
 
 
 def _split_others(view: SurfaceView, own: Sequence[Detection3D], p_WC: FloatArray) -> SurfaceView:
-    """Splits the clusters of objects that touch, except those of the object's own detections, which are split."""
+    """Splits clusters of touching objects, except along the object's own detections."""
     own_clusters = [each for one in own if (each := matching_cluster(view.clusters, one)) is not None]
     rest = tuple(each for each in view.clusters if not any(each is one for one in own_clusters))
     split = split_touching(replace(view, clusters=rest), p_WC)
@@ -117,9 +117,9 @@ def _split_others(view: SurfaceView, own: Sequence[Detection3D], p_WC: FloatArra
 
 
 def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, float]) -> Surface:
-    """Returns the surface as far as its points show it, extended around the object, since its edge may be unseen.
+    """Returns the observed surface, extended around the object, because the camera may miss the surface's edge.
 
-    It lies a little low: fingers that take a thin object come within a millimetre of the surface and feel for it.
+    It lies a little low: fingers at a thin object come within a millimetre of the surface and feel for it.
     """
     xy = view.plane_points.p_W[:, :2]
     low, high = np.percentile(xy, [0.2, 99.8], axis=0)

@@ -27,10 +27,10 @@ _SLOW_POINTS = 3
 _OTHERS_TRIED = 3
 """Number of near objects that are checked for being in the way."""
 _MOST_CANDIDATES = 40
-"""Number of candidates that are checked again without such objects."""
+"""Number of candidates to check again without the blocking objects."""
 _OUT_OF_REACH = "out of reach"
 _OFF_M = 0.015
-"""Margin by which the object is taken smaller than its box while it is lifted."""
+"""Margin by which the object is smaller than its box in the check of the lift."""
 _LIFT_STEP_M = 0.01
 """Distance between the checks of a lift."""
 _LIFT_MARGIN_M = 0.002
@@ -38,7 +38,7 @@ _LIFT_MARGIN_M = 0.002
 _LEVEL = 0.5
 """Level share of the fingers' direction below which they point down."""
 _ALIKE_RAD = 0.3
-"""Arm postures that differ by less are alike: a lift that fails from one fails from the other."""
+"""Largest difference of equal arm postures: a lift that fails from one fails from the other."""
 
 
 @dataclass(frozen=True)
@@ -81,11 +81,11 @@ class Surroundings:
     reach_m: float = np.inf
 
     def lets_rise(self, lift_B: FloatArray) -> bool:
-        """Returns whether the object meets nothing on a straight path up.
+        """Returns whether a straight path up is free for the object.
 
-        The object is taken a little smaller than its box, so that its support and neighbours do not touch it. A box
-        that overlaps it all the same is a part of it: seen from high up, a screwdriver's shaft is an object of its own
-        beside the handle.
+        The check takes the object a little smaller than its box, so that its support and neighbours do not touch it. A
+        box that still overlaps is a part of the object: from high up, a screwdriver's shaft is detected as an object
+        next to the handle.
         """
         steps = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(lift_B) / _LIFT_STEP_M))
         x, y, z = (max(side - 2.0 * _OFF_M, 0.005) for side in self.target.size_m)
@@ -102,9 +102,9 @@ class Surroundings:
 class GeometricGraspPlanner:
     """Grasp planner by the object's outline: takes the first candidate that the arm can reach, approach and lift.
 
-    The hand keeps `padding_m` from all obstacles on its path and `final_padding_m` on the straight approach, on which
-    no joint is faster than `approach_rad_s`, on its last bit than `last_rad_s`. The gap beside the fixed finger is
-    `beside_fixed_m`, or `beside_fixed_low_m` for low objects, since a finger that comes down on top of one is stopped.
+    The hand keeps `padding_m` from all obstacles on its path, and `final_padding_m` on the straight approach. Joints
+    are at most as fast as `approach_rad_s` on the approach, and `last_rad_s` on its last bit. The gap at the fixed
+    finger is `beside_fixed_m`, or `beside_fixed_low_m` for low objects, which would stop a finger that lands on them.
     """
 
     padding_m: Margin = 0.01
@@ -161,7 +161,7 @@ class GeometricGraspPlanner:
         around: Surroundings,
         arm_planner: ArmPlanner,
     ) -> tuple[Obstacle, ...]:
-        """Returns the object, or all near ones, that block every grasp, the nearest first; empty when none does.
+        """Returns the object, or all near ones, that block every grasp, nearest first; empty without any.
 
         Only the best candidates are checked again.
         """
@@ -219,7 +219,7 @@ def _out_of_reach(model: ArmModel, around: Surroundings) -> str:
 
 
 def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -> str:
-    """Returns the message on objects in the way: before the object as seen from the shoulder, or close beside it."""
+    """Returns the message on blocking objects: before the object as seen from the shoulder, or close to its side."""
     p_ST = around.target.X_FG.translation() - model.p_BS
     before = any((other.centre_B - model.p_BS) @ p_ST < p_ST @ p_ST for other in others)
     names = " and ".join(f"the {other.seen.kind}" for other in others)

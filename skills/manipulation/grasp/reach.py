@@ -1,7 +1,7 @@
-"""Reach of the arm to an object: body heights to choose among, grasps within reach, and space that no picture shows.
+"""Reach of the arm to an object: candidate body heights, grasps within reach, and space that no picture shows.
 
-A grasp is reached when the arm gets to it, to its pre-grasp and to the end of a lift without contact with what is
-known.
+A grasp is within reach when the arm gets to it, to its pre-grasp and to the end of a lift without contact with known
+obstacles.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,9 +28,9 @@ from skills.robot import Capabilities, FloatArray, GripperCapabilities, GripperK
 from skills.routine import Routine, planning_failure
 
 _LOW_SURFACE_M = 0.2
-"""The body goes to its lowest height for an object that stands lower than this."""
+"""Height of an object below which the body goes to its lowest height."""
 _HIGH_SURFACE_M = 0.72
-"""The body goes to its highest height for an object that stands higher than this."""
+"""Height of an object above which the body goes to its highest height."""
 _BELOW_LIMIT_M = 0.005
 """Distance that the body keeps from the ends of its range of heights."""
 _LIFTS_FAR_M = 0.2
@@ -52,7 +52,7 @@ _BESIDE_COST = 0.8
 _OWN_M = 0.05
 """Margin around an object within which cells are its own."""
 _LOW_M = 0.05
-"""Height above the surface from which on cells count as a neighbour's."""
+"""Least height above the surface of a neighbour's cells."""
 _LESS_M = 0.01
 """Margin by which a neighbour's boxes are smaller than its cells."""
 _SURFACE_AROUND_M = 0.2
@@ -62,17 +62,17 @@ _SURFACE_BAND_M = 0.06
 _KNOWN_ABOVE_M = 0.34
 """Height above the object's base up to which the space around it is known."""
 WIDE: Final = 0.9
-"""Opening of a hinged gripper that reaches for an object, as a part of its widest."""
+"""Opening of a hinged gripper for the approach, as a part of its widest."""
 _NARROW: Final = 0.6
 """The same among neighbours."""
 _WIDE_PARALLEL: Final = 0.98
-"""Opening of a parallel gripper that reaches for an object, as a part of its widest."""
+"""Opening of a parallel gripper for the approach, as a part of its widest."""
 _GAP_BESIDE_M = 0.045
-"""Space left beside an object by a gripper that opens only as far as needed."""
+"""Clearance at an object's sides for a gripper that opens only as far as needed."""
 _LEAST_BESIDE_M = 0.025
-"""Least space that the fingers need beside an object that passes between them."""
+"""Least clearance between the fingers and an object that passes between them."""
 _LESS_OPEN_RAD = 0.2
-"""A narrower opening must differ at least by this from the wide one."""
+"""Least difference between a narrower opening and the wide one."""
 _GRASPABLE_M = 0.09
 """Largest side of an upright object as seen from afar."""
 _UNSEEN_NEAR_M = 0.3
@@ -90,7 +90,7 @@ CandidatesOf = Callable[[Target], list[GraspCandidate]]
 
 @dataclass(frozen=True)
 class Reached:
-    """Body height at which a grasp is reached, and the cost of that grasp above the cheapest candidate's."""
+    """Body height with a grasp within reach, and the cost of the grasp above the cheapest candidate's."""
 
     cost: float
     height_m: float
@@ -98,10 +98,10 @@ class Reached:
 
 @dataclass(frozen=True)
 class ReachCheck:
-    """Check of how an object is reached from a pose of the body.
+    """Check of the arm's reach to an object from a pose of the body.
 
-    `boxes` are the obstacles without the object, in the body frame of the moment at X_WB. `beside` are boxes of its
-    neighbours, which cells show larger than they are: a grasp that touches only those is a last choice.
+    `boxes` are the obstacles without the object, in the body frame at X_WB. `beside` are boxes of its neighbours, too
+    large because they come from cells: a grasp that touches only these is a last choice.
     """
 
     scene: ArmScene
@@ -114,9 +114,9 @@ class ReachCheck:
     wide: float = WIDE
 
     def best(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> Reached | None:
-        """Returns the cheapest height with its grasp, None when no grasp is reached.
+        """Returns the cheapest height with its grasp, None when no grasp is within reach.
 
-        `at` gives X_WB for a height; the first of `heights_m` is the usual one.
+        `at` returns X_WB for a height; the first of `heights_m` is the usual one.
         """
         found = self.all(at, heights_m)
         return min(found, key=lambda reached: reached.cost, default=None)
@@ -146,7 +146,7 @@ class ReachCheck:
         return np.concatenate([along_W, along_W + [0.0, 0.0, _ABOVE_ARM_M]])
 
     def _best(self, X_WB: RigidTransform) -> tuple[GraspCandidate | None, float]:
-        """Returns the best grasp that is reached from X_WB, and its cost above the cheapest candidate's."""
+        """Returns the best grasp within reach from X_WB, and its cost above the cheapest candidate's."""
         reached, least = reached_grasps(self.scene.model, self.candidates_of, X_WB, self.seen)
         self.scene.set_padding(_PADDING_M)
         spaces = [(self.boxes, self.wide, _BESIDE_COST if self.beside else 0.0)]
@@ -179,7 +179,7 @@ def up_B(X_WB: RigidTransform) -> FloatArray:
 
 
 def _postures(scene: ArmScene, candidate: GraspCandidate, up_B: FloatArray) -> list[FloatArray]:
-    """Returns free arm angles at a grasp, before it and after a lift; an empty list when one of the three has none."""
+    """Returns free arm angles at a grasp, before it and after a lift; an empty list unless all three exist."""
     X_BH = candidate.X_BH
     lifted = (RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B) for lift_B in lifts(scene.model, X_BH, up_B))
     found = list[FloatArray]()
@@ -203,9 +203,9 @@ def wide_share(gripper: GripperCapabilities) -> float:
 
 
 def openings(candidates: Sequence[GraspCandidate], gripper: GripperCapabilities) -> tuple[float, ...]:
-    """Returns openings for the approach: wide and, because neighbours may leave no space, only as far as needed.
+    """Returns openings for the approach: wide and, for lack of space among neighbours, only as far as needed.
 
-    The latter are for the narrowest and the widest grasp. An opening is about proportional to the finger's angle.
+    The narrow ones are for the narrowest and the widest grasp. An opening is about proportional to the finger's angle.
     """
     widths_m, found = [each.width_m for each in candidates], [wide_share(gripper) * gripper.widest]
     for width_m in (min(widths_m), max(widths_m)):
@@ -262,7 +262,7 @@ def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
 def raise_onto_surface(seen: ObjectObservation, surfaces: Sequence[Surface]) -> ObjectObservation:
     """Returns the observation raised onto its surface, because fingers cannot get around a sunken object.
 
-    From a distance a flat object seems lower than it is, by as much as its height.
+    From a distance a flat object seems too low, by up to its height.
     """
     x, y, z = seen.position_W
     top_m = max((surface.height_m for surface in surfaces if surface.name == seen.surface), default=-np.inf)
@@ -274,7 +274,7 @@ def space_about(
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
     """Least and greatest corners (world, m) of the space around an object on its surface, and of its own space.
 
-    The own space of a tall object is higher than the known space: the cells of its top are no obstacle.
+    A tall object's own space is higher than the known space: the cells of its top are no obstacle.
     """
     x, y, z = seen.position_W
     length_m, width_m, height_m = seen.size_m
@@ -288,7 +288,7 @@ def space_about(
 
 
 def _beside(seen: ObjectObservation, p_W: FloatArray) -> NDArray[np.bool_]:
-    """Mask (N,) of the points in the space around an object that are neither its own nor just above its surface."""
+    """Mask (N,) of the points around an object, without its own and those just above its surface."""
     base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
     low, high = space_about(seen)[0]
     inside = np.all((p_W > low) & (p_W < high), axis=1) & (p_W[:, 2] > base_m + _LOW_M)
@@ -308,8 +308,8 @@ def reach_check(
 ) -> Callable[[], ReachCheck]:
     """Returns a function that builds, inside a Worker job, the check of how a skill's arm reaches an object.
 
-    Obstacles are the surfaces, and what the camera has seen within the arm's reach and `beyond_m`, except just around
-    the object.
+    Obstacles are the surfaces, and the camera's occupied cells within the arm's reach and `beyond_m`, except just
+    around the object.
     """
     X_WB, known_W = skill.X_WB(), skill.known_W
     seen = raise_onto_surface(seen, surfaces)
@@ -331,10 +331,10 @@ def reach_check(
 def choose_with_look(
     skill: LookingSkill[Any], seen: ObjectObservation, choose: Callable[[], Routine[tuple[ChosenT, FloatArray]]]
 ) -> Routine[ChosenT]:
-    """Returns the choice of `choose`, which also gives the points (N, 3, world) where the arm would be for it.
+    """Returns the choice of `choose`, which also returns the arm's points (N, 3, world) for this choice.
 
-    Looks once at those points near the object that no picture has shown yet, and then chooses again. The hand camera
-    looks down at objects, so that the board above a shelf is in no picture, and the arm would meet it.
+    Looks once at points near the object that no picture has shown yet, and then chooses again. The hand camera looks
+    down at objects: the board above a shelf is in no picture, and the arm would hit it.
     """
     chosen, arm_W = yield from choose()
     if (yield from look_into_unseen(skill, seen, arm_W)):
@@ -343,9 +343,9 @@ def choose_with_look(
 
 
 def look_into_unseen(skill: LookingSkill[Any], seen: ObjectObservation, arm_W: FloatArray) -> Routine[bool]:
-    """Looks where the arm (points, world) would be near an object and no picture has looked; returns whether it did.
+    """Looks at the arm's points (world) near an object that no picture has shown; returns whether it looked.
 
-    Does not look when the object is too far away to show its surroundings, or when the arm has no path to a viewpoint.
+    Does not look at an object too far away to show its surroundings, nor without a path of the arm to a viewpoint.
     """
     if not skill.object_camera.on_hand:  # a head camera views from above what the arm would meet
         return False
@@ -365,7 +365,7 @@ def look_into_unseen(skill: LookingSkill[Any], seen: ObjectObservation, arm_W: F
 
 
 def level_viewpoints(model: ArmModel, p_BT: FloatArray) -> list[FloatArray]:
-    """Camera positions about as high as p_BT on the shoulder's side; low ones first, which see boards from below."""
+    """Camera positions about as high as p_BT on the shoulder's side; low ones first, with boards in view from below."""
     ahead = (p_BT - model.p_BS) * [1.0, 1.0, 0.0]
     ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-6)
     places = (

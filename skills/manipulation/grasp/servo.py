@@ -1,6 +1,6 @@
-"""Visual servoing: the shift of an object, as the hand camera sees it from just before the grasp.
+"""Visual servoing: the shift of an object in the hand camera's view from just before the grasp.
 
-The object's known points are shifted until their outline fits the picture best (analysis by synthesis). Pixels nearer
+It shifts the object's known points until their outline fits the picture best (analysis by synthesis). Pixels nearer
 than the camera's least depth have no depth, and count as part of the object.
 """
 
@@ -31,19 +31,19 @@ _WIDTH_PX = 80
 _POINTS = 300
 """Number of the object's points that are used."""
 _LEVELS = 4
-"""Number of heights at which points below the seen ones are added."""
+"""Number of heights of the points that are added below the observed ones."""
 _BEHIND_M = 0.03
 """Depth behind the object beyond which pixels are not its own."""
 _NEAREST_M = 0.22
 """Least depth of the camera."""
 _OF_HEIGHT = 0.3
-"""Part of the object's height below which it does not count as seen."""
+"""Part of the object's height below which its points do not count."""
 _LEAST_HEIGHT_M = 0.004
-"""Least height over the surface from which on the object counts as seen."""
+"""Least height over the surface of the object's points that count."""
 _WINDOW_PX = 9
 """Width of the window around the outline in which solid pixels count."""
 _LOOKS_DOWN = 0.5
-"""A camera with a larger vertical share of its axis sees shifts in both level directions, else only across."""
+"""Least vertical share of a camera's axis at which it measures shifts in both level directions, not only across."""
 _PER_M = 0.5
 """Overlap that a shift of one metre must gain."""
 _AIMED_M = 0.003
@@ -67,7 +67,7 @@ class SeenShift:
 def measure_shift(target: Target, image: Image, X_BC: RigidTransform) -> SeenShift | None:
     """Returns the shift of the object since `target` was seen, by the depth of a picture taken at X_BC.
 
-    None when the picture does not show its position. The body is level: its z axis points up.
+    None when its position is out of view. The body is level: its z axis points up.
     """
     picture = _Picture.around(target, image, X_BC)
     if not picture.shows_place:
@@ -83,7 +83,7 @@ def measure_shift(target: Target, image: Image, X_BC: RigidTransform) -> SeenShi
 
 
 Aim = tuple[FloatArray, tuple[ArmTrajectory, ArmTrajectory] | None]
-"""Offset (3,) in B by which to shift the hand, and the approach from there, or None where that is not free."""
+"""Shift (3,) of the hand in B, and the approach from there, or None if that is not free."""
 
 
 def aim_approach(
@@ -123,7 +123,7 @@ def _length(offset_B: FloatArray) -> float:
 
 
 def _offsets(X_BC: RigidTransform, step_m: float, reach_m: float) -> Iterator[FloatArray]:
-    """Yields level shifts (3,) that a camera can tell: a grid, or only shifts across for a camera that looks ahead."""
+    """Yields measurable level shifts (3,): a grid, or only shifts across for a camera that looks ahead."""
     axis = X_BC.rotation().matrix()[:, 2]
     ahead = np.array([axis[0], axis[1], 0.0])
     ahead = ahead / np.linalg.norm(ahead) if np.linalg.norm(ahead) > 1e-3 else np.array([1.0, 0.0, 0.0])
@@ -197,12 +197,12 @@ def _rays(lens: Intrinsics, stride: int) -> FloatArray:
 
 
 def _lowest_m(target: Target) -> float:
-    """Height over its surface from which on an object counts as seen: lower parts are too near the surface."""
+    """Least height over the surface of an object's points that count; lower points are too near the surface."""
     return max(_OF_HEIGHT * target.height_m, _LEAST_HEIGHT_M)
 
 
 def _filled(target: Target) -> FloatArray:
-    """Points (N, 3) all over an object: the seen ones, and those below them down to `_lowest_m`."""
+    """Points (N, 3) all over an object: the observed ones, and points below them down to `_lowest_m`."""
     low_m = target.base_m + _lowest_m(target)
     seen = target.points_B[target.points_B[:, 2] > low_m]
     seen = seen[:: max(1, len(seen) // _POINTS)]

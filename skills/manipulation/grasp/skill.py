@@ -47,27 +47,27 @@ _MOST_OF_FORCE = 0.95
 _PER_LEVER_N_M = 400.0
 """Additional force per metre between the grip and the centre of mass; the tips would press a thin object out."""
 _RELAX_M = 0.002
-"""Distance by which fingers that touch the surface are raised before they close."""
+"""Height by which fingers on the surface rise before they close."""
 _RELAX_THIN_M = 0.0005
 """The same for an object that is thinner than `THIN_M`."""
 _SHORT_M = 0.025
-"""Distance from its grasp at which a hand that touches something has not met the surface below the object."""
+"""Distance from the grasp beyond which a contact of the hand is not with the surface below the object."""
 _FEEL_M = 0.014
-"""Distance by which fingers go on downwards to feel the surface."""
+"""Additional depth of the fingers, to feel the surface."""
 _FEEL_RAD_S = 0.12
 _DOWN = 0.8
 """Vertical share of a direction that counts as down."""
 _ASIDE_RAD = (0.0, 0.8, -0.8)
-"""Angles about the object from which it is viewed, while a part of it is hidden."""
+"""Angles of the viewpoints about a partly hidden object."""
 _MOST_OF_LENGTH = 0.7
 """A view that shows this part of the object's length is enough."""
 _FEEL_S = 0.4
-"""Pause in which the gripper feels what it holds."""
+"""Pause for the gripper's readings of the held object."""
 _AIM_LATENCY_S = 0.1
 _AT_OBJECT_M = 0.4
-"""A hand that is nearer to an object than this may have gripped it before a restart."""
+"""Distance within which a hand may have gripped the object before a restart."""
 _GENTLY_RAD_S = 0.45
-"""Joint speed while a thin object, or one that is held far from its centre of mass, is carried."""
+"""Joint speed while the arm carries a thin object, or one held far from its centre of mass."""
 _LONG_LEVER_M = 0.05
 _HEIGHTS_TRIED = 2
 _PULL_BACK_UP_M = (0.02, 0.0)
@@ -78,10 +78,10 @@ _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
 @dataclass(frozen=True)
 class GraspOptions:
-    """Gripping force (N), and limits on which the object counts as lost.
+    """Gripping force (N), and limits beyond which the object counts as lost.
 
-    The skill looks for the object within `same_object_m` of where it was seen. A gripper that opens or closes by
-    `slip_rad` while it lifts has lost the object. After lifting the hand draws back by `pull_back_m`.
+    The skill looks for the object within `same_object_m` of its last position. A gripper that opens or closes by
+    `slip_rad` during the lift has lost the object. After the lift the hand draws back by `pull_back_m`.
     """
 
     force_n: Force = 80.0
@@ -133,7 +133,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         return Succeeded(f"holding the {name}", self._outputs())
 
     def run_again(self, inputs: GraspInputs) -> Routine[Succeeded]:
-        """Keeps an object that is in the gripper; starts again with an empty gripper."""
+        """Keeps an object in the gripper; starts again with an empty gripper."""
         seen, self._watch = inputs.observation, None
         yield from self.pause(_FEEL_S, "feeling what the gripper holds")
         at_object = self.is_hand_near(np.array(seen.position_W), _AT_OBJECT_M)
@@ -159,7 +159,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         yield from self.stand_as_usual(message)
 
     def _with_outputs(self, failure: SkillFailure) -> SkillFailure:
-        """Returns the failure with the grasps that were tried, and the objects in the way."""
+        """Returns the failure with the tried grasps and the blocking objects."""
         return SkillFailure(failure.cause, failure.message, {**self._outputs(), **failure.outputs})
 
     def _outputs(self) -> Mapping[str, object]:
@@ -245,9 +245,9 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         return (yield from choose_with_look(self, seen, choose)) or [heights_m[0]]
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
-        """Views the object and its neighbours from 0.4 m, and from aside where a part of it is hidden.
+        """Views the object and its neighbours from 0.4 m, and from aside if a part of it is hidden.
 
-        Raises SkillFailure with cause PRECONDITION when the object is not seen.
+        Raises SkillFailure with cause PRECONDITION when the object is not in view.
         """
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
         best: CloseView | None = None
@@ -329,10 +329,10 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         return found
 
     def _take(self, view: CloseView, plan: GraspPlan, seen: ObjectObservation) -> Routine[None]:
-        """Closes at the grasp as firmly as the least mass needs, lifts, weighs, and grips as firmly as the mass needs.
+        """Closes with the force for the least mass, lifts, weighs, and grips with the force for the measured mass.
 
-        Raises SkillFailure with cause POSTCONDITION when the object is not held then, PRECONDITION when it is too
-        heavy.
+        Raises SkillFailure with cause POSTCONDITION when the gripper has no object then, PRECONDITION for too heavy an
+        object.
         """
         name, least_kg = str(seen.kind), least_mass_kg(seen.kind)
         yield from self.follow(plan.to_grasp, f"reaching for the {name}")
@@ -364,11 +364,11 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         yield from self.move_gripper(0.0, self._grip_n(force_n, max(mass_kg, least_kg)), f"lifting the {name}")
 
     def _grip_n(self, least_n: float, mass_kg: float) -> float:
-        """Returns the force (N) of a grip of an object of a mass, as far as the gripper has it."""
+        """Returns the gripping force (N) for a mass, within the gripper's limit."""
         return min(least_n + _PER_KG_N * mass_kg, _MOST_OF_FORCE * self.gripper.max_force_n)
 
     def _check_reached(self, X_BH: RigidTransform, name: str) -> None:
-        """Raises SkillFailure with cause EXECUTION for fingers that would press the object out: they end before it."""
+        """Raises SkillFailure with cause EXECUTION for fingers that end before the object and would press it out."""
         short_m = float((self.model.X_BH(self.q_rad()).inverse() @ X_BH).translation()[0])
         if short_m > _SHORT_M:
             where = f"{100.0 * short_m:.0f} cm before it was about the {name}"
@@ -385,7 +385,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         raise SkillFailure(Cause.PRECONDITION, f"the {name} weighs {mass_kg:.1f} kg, and {most}")
 
     def _to_the_ground(self, ahead_B: FloatArray, touched: bool, relax_m: float, message: str) -> Routine[None]:
-        """Moves fingers that point down until they touch the surface, whose height is known to a few millimetres."""
+        """Lowers downward fingers onto the surface, because its height is known only to a few millimetres."""
         if not touched and ahead_B @ up_B(self.X_WB()) < -_DOWN:
             with suppress(PlanningError):
                 touched = yield from self.press(_FEEL_M * ahead_B, ahead_B, _FEEL_RAD_S, message)
@@ -393,7 +393,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
             yield from self.try_shift_hand(-relax_m * ahead_B, message)
 
     def _lift(self, planned_B: Sequence[FloatArray], message: str) -> Routine[bool]:
-        """Lifts as planned or, where the hand is elsewhere by now, along another path; returns whether it found one."""
+        """Lifts as planned or, if the hand has left the plan, along another path; returns whether it found one."""
         others_B = lifts(self.model, self.model.X_BH(self.q_rad()), up_B(self.X_WB()))
         return (yield from self.shift_by_first([*planned_B, *others_B], message))
 

@@ -1,4 +1,4 @@
-"""Grasps that were tried already, so that the next attempt takes another."""
+"""Grasps of earlier attempts, so that the next attempt takes another."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The hand-over skill: holds the object out to a person, and lets go when they pull at it or the operator says so."""
+"""The hand-over skill: holds the object out to a person, and releases it at their pull or the operator's word."""
 
 import itertools
 import math
@@ -44,12 +44,11 @@ _HOLD_OUT_RAD_S = 0.8
 
 @dataclass(frozen=True)
 class HandOverOptions:
-    """Positions of the robot and of the object, and when the gripper lets go.
+    """Positions of the robot and of the object, and the condition of the release.
 
     The robot stands `stand_off_m` from the person's axis, or stays within `stand_off_range_m`. The hand holds the
-    object at `height_m`, at the first of `gaps_m` from the person's axis that the arm can reach, at most `furthest_m`.
-    The gripper lets go when the hand feels a pull beyond `pull_n`; the arm draws the object in when nobody has taken it
-    within `wait_s`.
+    object at `height_m`, at the first reachable distance of `gaps_m` from the person's axis, at most `furthest_m`. The
+    gripper releases it at a pull beyond `pull_n`; the arm draws the object in when nobody has taken it within `wait_s`.
     """
 
     stand_off_m: Length = 1.5
@@ -105,7 +104,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         return (yield from self._let_go(inputs, held_kg))
 
     def run_again(self, inputs: HandOverInputs) -> Routine[Succeeded]:
-        """Continues an interrupted attempt: after the release it looks for the object with the person."""
+        """Continues an interrupted attempt: after the release it checks whether the person has the object."""
         self._watch = None
         if not self.checkpoint.get("lets_go"):
             return (yield from self.run(inputs))
@@ -129,9 +128,9 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         return Succeeded(f"gave the {name} to {person}")
 
     def _pulled(self, inputs: HandOverInputs) -> Routine[bool]:
-        """Waits for a pull at the object or the operator's answer; returns False when the time is over.
+        """Waits for a pull at the object or the operator's answer; returns False after a timeout.
 
-        Returns True as well when the object is out of the gripper: somebody pulled it out, or it has fallen.
+        Returns True as well when the object has left the gripper: a person pulled it out, or it has fallen.
         """
         message, robot = f"holding the {inputs.thing} out to {inputs.person}", self.context.robot
         period_s = robot.capabilities().sensor_period_s
@@ -153,7 +152,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
             asked.withdraw()
 
     def _let_go(self, inputs: HandOverInputs, held_kg: float | None) -> Routine[Seen]:
-        """Opens the gripper until it feels nothing, leaves the object without dragging it, and checks who has it."""
+        """Opens the gripper until it feels nothing, draws back without dragging the object, and checks who has it."""
         name, message = inputs.thing, f"giving the {inputs.thing} to {inputs.person}"
         if not self.checkpoint.get("lets_go"):
             corners_H = self.context.payload.corners_H
@@ -202,9 +201,9 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         yield from go_to_one(self, [NavigateInputs(pose, 0.08, 0.1, 0.5) for pose in free[:3]])
 
     def _hold_out(self, person: SeenPerson, name: str) -> Routine[None]:
-        """Stretches the arm towards the person, with the object as it was grasped, or else as it is carried.
+        """Stretches the arm towards the person, with the object in its grasped pose, or else in its carried pose.
 
-        An object that rests on a finger while it is carried would stay there when the gripper opens.
+        An object that rests on a finger in the carried pose would stay there when the gripper opens.
         """
         grasped_R_BH, R_BH = self.context.payload.R_BH, self.model.X_BH(self.q_rad()).rotation()
         rotations = [R_BH] if grasped_R_BH is None else [grasped_R_BH, R_BH]
@@ -243,9 +242,8 @@ def hold_out_configuration(
 ) -> FloatArray:
     """Returns arm angles (J,) with the object before the person; level_m is its height in B.
 
-    The hand is turned about the vertical towards the person, as in the first of `rotations` (R_BH) that is feasible.
-    The person's axis is at p_BP (2,), the object's centre at p_HT. Raises PlanningError when the person is out of
-    reach.
+    The hand has the first feasible rotation of `rotations` (R_BH), turned about the vertical towards the person. The
+    person's axis is at p_BP (2,), the object's centre at p_HT. Raises PlanningError when the person is out of reach.
     """
     direction = math.atan2(p_BP[1], p_BP[0])
     heading = np.array([math.cos(direction), math.sin(direction), 0.0])
@@ -274,6 +272,6 @@ def _well_placed(p_BP: FloatArray, range_m: tuple[float, float]) -> bool:
 
 
 def _same(people: list[SeenPerson], other: SeenPerson) -> list[SeenPerson]:
-    """Returns the person who stands where another one was seen, as a list; empty when there is none."""
+    """Returns the person at the position of an earlier detection, as a list; empty without one."""
     near = [p for p in people if math.dist(p.place_W, other.place_W) < _SAME_PERSON_M]
     return near[:1]

@@ -22,13 +22,13 @@ from skills.small.back_off import BackOff
 from skills.world_model import PERSON
 
 LOOKS = 3
-"""Number of views of a head camera of the place where it saw nothing."""
+"""Number of views of an empty place by a head camera."""
 SETTLES_WITHIN_S = 20.0
 """Time after the release within which a borne object must come to rest."""
 _TALL_M = 0.05
-"""Only an object that is taller than this is recognised by its height."""
+"""Least height of an object for recognition by its height."""
 _UPPER_PART = 0.5
-"""Part of a tall object's height from which on its points count."""
+"""Part of a tall object's height above which its points count."""
 _ABOVE_TOP_M = 0.06
 """Height over a tall object's top up to which its points count."""
 _BESIDE_M = 0.12
@@ -43,7 +43,7 @@ _FALLEN_M = 0.3
 _FELL_WITHIN_M = 1.0
 """Level distance from the release point within which a fallen object is looked for."""
 _PLATE_M = 0.2
-"""Half side of the square around the object in which a plate that bears it is looked for."""
+"""Half side of the square around the object for the search of a plate below it."""
 _MOVES_ABOUT_M = 0.25
 """Radius around the object in which motion is looked for."""
 _BACK_OFF_M = 0.3
@@ -56,7 +56,7 @@ _DEEP_M = 0.12
 _OVER_M = 0.005
 """Height of the hands or the tray over the object's lowest point."""
 _OWN_M = 0.14
-"""Width of the object's own space, in which the object may have turned."""
+"""Width of the object's own space; it includes turns of the object."""
 _OVER_TOP_M = 0.03
 """Height of the object's own space over its highest point."""
 _FLOOR_FROM_M = 0.07
@@ -75,7 +75,7 @@ _HIGHEST_CAMERA_M = 1.4
 class Seen(enum.Enum):
     """Outcome of the check of a released object."""
 
-    GIVEN = "given"  # it is at the release point or a little lower: somebody bears it
+    GIVEN = "given"  # the object is at the release point or a little lower: a person holds it
     FELL = "fell"  # it lies near the floor
     NOT_SEEN = "not seen"  # neither
     MOVES = "moves"  # somebody bears it, and it does not come to rest
@@ -84,7 +84,7 @@ class Seen(enum.Enum):
 
 @dataclass(frozen=True)
 class Sight:
-    """Outcome of one picture, and the point (3,) in the world that it is about (m)."""
+    """Outcome of one picture, and its point (3,) in the world (m)."""
 
     seen: Seen
     p_W: FloatArray
@@ -118,9 +118,9 @@ def judge_release(
 ) -> Sight:
     """Judges the release from a picture without the robot's arm and the objects detected in it.
 
-    An object counts as given when one of its class is near the release point, when something there is as high as its
-    upper half was, or when something lies there on a level plate. Where `names` is empty, every class except people is
-    its own.
+    The object counts as given in three cases: a detection of its class lies near the release point, points there are as
+    high as its upper half was, or an object lies there on a level plate. Without `names`, every class except people
+    matches.
     """
     own = [each for each in found if (each.class_name in names if names else each.class_name != PERSON)]
     own.sort(key=lambda each: _off_m(each, release))
@@ -152,7 +152,7 @@ def lies_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
 
 
 def stands_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
-    """Returns whether a picture's depth shows something as high as the upper half of a tall object at the release."""
+    """Returns whether a picture's depth has points as high as a tall object's upper half at the release."""
     tall_m = release.top_m - release.low_m
     if tall_m < _TALL_M:
         return False
@@ -169,10 +169,10 @@ def names_in(name: str, class_names: Iterable[str]) -> tuple[str, ...]:
 
 
 class HandOverVerification(ReleasingSkill[InputsT]):
-    """Routine that looks whether a person has the released object, at rest, and stows the arm around what bears it."""
+    """Routine that checks whether a person has the released object at rest, and stows the arm around hands or tray."""
 
     def verify(self, name: str, person: str, release: Release) -> Routine[Seen]:
-        """Checks the release by the camera and by the gripper, which closes meanwhile, and stows the arm.
+        """Checks the release by the camera and by the closing gripper, and stows the arm.
 
         A hand camera looks before the arm is stowed; for a head camera the arm leaves the view first.
         """
@@ -247,10 +247,10 @@ class HandOverVerification(ReleasingSkill[InputsT]):
         return (yield from self.compute(look, latency_s=DETECTION_LATENCY_S, name="look who has it", message=message))
 
     def _stow_beside(self, release: Release, message: str) -> Routine[None]:
-        """Stows the arm around the hands, or the tray, that bear the object now.
+        """Stows the arm around the hands or the tray under the object.
 
         For a head camera the hand first comes near the body, because a long detour would swing it through unseen space.
-        Where there is no path, the robot backs off a little and tries again.
+        Without a path the robot backs off a little and tries again.
         """
         around_person = self.boxes
         for backs_off in (False, True):
@@ -270,7 +270,7 @@ class HandOverVerification(ReleasingSkill[InputsT]):
         self.boxes = around_person
 
     def _borne(self, release: Release) -> list[Box]:
-        """Boxes (B) of the hands or the tray, of the object as it may have turned, and of the floor."""
+        """Boxes (B) of the hands or the tray, of the object in any turn, and of the floor."""
         X_BW, boxes = self.X_WB().inverse(), list[Box]()
         borne = (_BORNE_M, release.low_m - _DEEP_M, release.low_m + _OVER_M)
         for side_m, low_m, high_m in (borne, (_OWN_M, release.low_m, release.top_m + _OVER_TOP_M)):

@@ -1,4 +1,4 @@
-"""Free spots on a surface for the held object, over all pictures of it, and arm angles that put it down there."""
+"""Free spots on a surface for the held object, from all pictures of the surface, and arm angles to put it there."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _SEEN_WITHIN_M = 0.04
 _LEAST_SEEN = 15
 """Number of points of the surface that must be exceeded around a spot."""
 _UNSEEN_M = 0.1
-"""Distance of a spot from all that was seen from which on no picture shows it."""
+"""Distance from all observed points beyond which a spot counts as in no picture."""
 _ENOUGH_CLEARANCE_M = 0.3
 """Distance from objects beyond which a spot gets no better."""
 _PER_CLEARANCE = 3.0
@@ -52,7 +52,7 @@ _SAME_OBJECT_M = 0.08
 _SAMPLE_M = 0.01
 """Distance between the points of a surface that no picture shows."""
 _CELL_M = 0.01
-"""Distance between the points of objects that an outline is compared with."""
+"""Spacing of the objects' points for the comparison with an outline."""
 _SURVEYED_M = 0.01
 """Uncertainty of a surveyed height."""
 _LEAST_BACK_M = 0.08
@@ -77,7 +77,7 @@ def clear_spots(candidates: FloatArray, circles_W: Sequence[tuple[float, float, 
 
 
 def free_spots(view: SurfaceView, candidates: FloatArray, clearance_m: float = CLEARANCE_M) -> FloatArray:
-    """Returns the candidates (N, 2) around which the surface is seen, with no object within clearance_m."""
+    """Returns the candidates (N, 2) on the observed surface with no object within clearance_m."""
     if len(candidates) == 0 or len(view.plane_points) == 0:
         return np.empty((0, 2))
     from scipy.spatial import cKDTree
@@ -120,7 +120,7 @@ def unseen_view(surface: Surface, standing_W: FloatArray) -> SurfaceView:
 
 
 def merged(views: Sequence[SurfaceView]) -> SurfaceView:
-    """Returns all that several pictures of a surface show, with the plane of the last one."""
+    """Returns the union of several views of a surface, with the plane of the last one."""
     clouds = [view.plane_points for view in views]
     whole = PointCloud(
         np.concatenate([cloud.p_W for cloud in clouds]),
@@ -141,7 +141,7 @@ def spaced_spots(free: FloatArray, apart_m: float = _ANOTHER_M) -> list[FloatArr
 
 @dataclass(frozen=True)
 class FreeArea:
-    """Area in which the held object may come to rest: inside `top` (None: anywhere), clear of the points `objects`."""
+    """Area for the held object: inside `top` (None: anywhere), clear of the points `objects`."""
 
     top: shapely.Polygon | None
     objects: shapely.MultiPoint
@@ -165,7 +165,7 @@ class FreeArea:
 def free_area(surface: Surface, held: HeldObject, view: SurfaceView | None = None) -> FreeArea:
     """Returns the area of a surface inside its edges, clear of the objects of a view.
 
-    An object that is too large for the surface may stick out.
+    Too large an object may extend over the edge.
     """
     import shapely
 
@@ -190,8 +190,8 @@ def longest_edge_rad(surface: Surface) -> float:
 class SpotSearch:
     """Search for a free spot on a surface for an object, in none of the circles `clear_of` (x, y, radius).
 
-    Comfortable spots come first, then those that no picture shows yet, and at the end `tight` ones, on which the object
-    only just fits.
+    Spots with much clearance come first, then those that no picture shows yet, and at the end `tight` ones, on which
+    the object only just fits.
     """
 
     surface: Surface
@@ -220,7 +220,7 @@ class SpotSearch:
         return free_area(self.surface, self.held, self.seen())
 
     def add(self, view: SurfaceView, spot_W: FloatArray) -> None:
-        """Takes in a picture from where the arm tries to put the object down on a spot (2,) or near it."""
+        """Adds a picture that was taken where the arm tries to put the object down on a spot (2,) or near it."""
         self._views.append(view)
         self._tried.append(spot_W)
 
@@ -229,7 +229,7 @@ class SpotSearch:
         self._tried.extend(spots_W)
 
     def others(self, here_W: FloatArray) -> list[FloatArray]:
-        """Returns the spots (2,) that are worth a drive from a point (2,), the best first; turns to tight ones last."""
+        """Returns spots (2,) that are worth a drive from a point (2,), best first, tight ones last."""
         ranked = self._ranked(here_W)
         if not ranked and not self.tight:
             self.tight, self._tried = True, []
@@ -299,7 +299,7 @@ def above_goal(
 
     `takes` judges whether the object fits below a hand pose X_BH; a long object may lie along `along_rad` (B). The
     hand, open to `opening`, must be able to leave the object without contact with the boxes `beside` (B). The goal
-    raises PlanningError when there is no such point.
+    raises PlanningError without a reachable point.
     """
 
     def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
@@ -316,7 +316,7 @@ def above_goal(
 
 
 def hold_on_path(goal: Goal, box_H: Box) -> Goal:
-    """Returns that goal with the object's box in the hand on the path, unless the box is in contact at either end."""
+    """Returns the goal with the object's box in the hand on the path, unless the box is in contact at either end."""
 
     def chosen(scene: ArmScene, q: FloatArray) -> FloatArray:
         q_goal = goal(scene, q)
@@ -351,10 +351,10 @@ def _can_put_down(
 
 
 def clear_heights(heights_m: Sequence[float], now_m: float, held_W: FloatArray, surface: Surface) -> Sequence[float]:
-    """Returns the body heights (m), always with the first, at which the held object does not press on a surface.
+    """Returns the body heights (m) at which the held object presses on no surface, always with the first height.
 
-    `held_W` are the object's corners (N, 3) while the body is `now_m` high; the arm stays as it is. Only an object
-    above the surface or its edge can come to press on it.
+    `held_W` are the object's corners (N, 3) while the body is `now_m` high; the arm stays in its posture. Only an
+    object above the surface or its edge can press on it.
     """
     clearance_m = float(held_W[:, 2].min()) - surface.height_m
     if clearance_m < 0.0 or not inside_polygon(held_W[:, :2], surface.polygon_W, _OVER_M).any():

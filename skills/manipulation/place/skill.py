@@ -44,13 +44,13 @@ from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure, planning_failure
 
 _SURELY_FREE_M = 0.03
-"""Height down to which the object goes fast: it cannot touch the surface there."""
+"""Height down to which the object moves fast, because it cannot touch the surface there."""
 _PRESS_M = 0.03
-"""Distance by which the hand goes on below the height of the surface while it feels for contact."""
+"""Largest depth of the hand below the height of the surface while it feels for contact."""
 _LAG_IN_CONTACT_M = 0.02
 """Lag of a fast hand in contact: the held object hangs lower than was thought."""
 _LIFT_AGAIN_M = 0.135
-"""Distance by which an object is lifted that was over its spot before a restart."""
+"""Height by which the arm lifts an object that was over its spot before a restart."""
 _MOST_SPOTS = 80
 """Number of free spots that are tried from one place."""
 _OTHER_SPOTS = 6
@@ -62,13 +62,13 @@ _OTHER_HEIGHT_COST = 0.05
 _RELAX_M = 0.003
 """Distance by which the arm is raised after contact."""
 _FEEL_S = 0.4
-"""Pause in which the gripper feels what it holds."""
+"""Pause for the gripper's readings of the held object."""
 _FLOOR_M = 0.06
 """Surfaces lower than this are seen by the cameras on the body."""
 _STANDS_OUT_M = 0.03
 """Height over the surface from which on points belong to objects."""
 _HIGHEST_M = 0.5
-"""Height over the surface up to which points belong to objects on it."""
+"""Largest height over the surface of points that belong to objects on it."""
 _BESIDE = 0.6
 """Share of the hand's direction to a side that a tucked hand exceeds."""
 _TUCKED_M = 0.03
@@ -76,7 +76,7 @@ _TUCKED_M = 0.03
 _AHEAD_RAD = 0.6
 """Largest bearing of a spot that counts as ahead."""
 _OVER_SPOT_M = 0.45
-"""Distance of the hand from a spot below which it was putting the object down before a restart."""
+"""Distance of the hand from a spot within which the restart interrupted the placement."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
         return Succeeded(f"the object stood on the {surface.name} already")
 
     def _carried(self) -> RotationMatrix:
-        """Rotation of the hand while the object was carried, as an interrupted attempt noted it."""
+        """Rotation of the hand while it carried the object, from the note of an interrupted attempt."""
         noted = self.checkpoint.get("carried")
         rotation = self.model.X_BH(self.q_rad()).rotation() if noted is None else RotationMatrix(np.array(noted))
         self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist()}
@@ -199,7 +199,7 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
         raise SkillFailure(Cause.PLANNING, search.why_none())
 
     def _view(self, search: SpotSearch, spot_W: FloatArray) -> Routine[SurfaceView]:
-        """Looks at the surface; where the object hides it, earlier pictures and the LiDAR show what stands on it."""
+        """Looks at the surface; if the object hides it, uses earlier pictures and the LiDAR for the objects on it."""
         surface, standing_W = search.surface, self._standing_W(search.surface)
         hidden = surface.height_m < _FLOOR_M and self.object_camera.on_hand
         if hidden:
@@ -246,9 +246,9 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
         yield from self._go_before(near, search)
 
     def _go_before(self, candidates: Sequence[FloatArray], search: SpotSearch) -> Routine[FloatArray]:
-        """Drives to where the arm reaches one of some spots, or as near as possible; returns that spot.
+        """Drives to a pose within reach of one of some spots, or as near as possible; returns the spot.
 
-        Raises SkillFailure with cause PLANNING when there is no free place before any of them.
+        Raises SkillFailure with cause PLANNING when no spot has a free place before it.
         """
         yield from self._draw_in(search.held)
         context, pose, arm = self.context, self.context.pose(), self.arm
@@ -295,7 +295,7 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
     def _reach(self, search: SpotSearch) -> Callable[[FloatArray], Callable[[Pose2D], float | None]]:
         """Returns a function for the cost of putting the object down on a spot from a pose; None when out of reach.
 
-        The highest approach is left out, because the next one reaches as far.
+        Omits the highest approach, because the next one reaches as far.
         """
         model, surface, held, area = self.model, search.surface, search.held, search.area()
         heights_m, edge_rad = self._heights_m(surface), longest_edge_rad(surface)
@@ -359,11 +359,11 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
         return (yield from self.move_to(lambda scene, q: found[0], message, speed_rad_s=0.8))
 
     def _lower(self, surface: Surface, above: PrePlacePose) -> Routine[None]:
-        """Lowers the object until contact stops the hand, or the height is that of the surface.
+        """Lowers the object until contact stops the hand, or to the height of the surface.
 
-        The path down begins at the angles for which it was planned and not at the arm's present ones: they differ
-        slightly, and near a singular posture that decides whether there is a path. After contact the arm is raised a
-        little, or it would dip onto the surface as the gripper lets go. Raises SkillFailure with cause PLANNING.
+        The path down begins at its planned angles, not at the arm's present ones: near a singular posture their small
+        difference decides whether a path exists. After contact the arm rises a little, or it would dip onto the surface
+        as the gripper releases. Raises SkillFailure with cause PLANNING.
         """
         message = f"putting the object down on the {surface.name}"
         p_BH = self.model.X_BH(above.q_rad).translation() - (above.height_m - _SURELY_FREE_M) * UP_B

@@ -21,24 +21,24 @@ from skills.routine import Routine, SkillFailure
 _AT_HAND_M = 0.4
 """Depth below which a pixel shows the held object, or something too near to measure."""
 _HIDDEN = 0.5
-"""Part of such pixels from which on the held object hides the surface."""
+"""Least part of these pixels at which the held object hides the surface."""
 _SETTLES_WITHIN_S = 5.0
 _MOVES_ABOUT_M = 0.2
-"""Radius around a spot in which an object that moves is looked for."""
+"""Radius around a spot of the search for a moving object."""
 _NEW_M = 0.025
-"""Distance from all that stood on the surface before beyond which a point belongs to the object."""
+"""Distance from all earlier points on the surface beyond which a point belongs to the object."""
 _LEAST_NEW = 10
-"""Number of such points that show the object."""
+"""Least number of these points for the object to be there."""
 _ON_SURFACE_M = 0.15
-"""Height over the surface below which a detected object rests on it."""
+"""Largest height over the surface of a detected object at rest on it."""
 _NOT_SEEN = np.empty((0, 2))
 
 
 class PlaceVerification(ReleasingSkill[InputsT]):
-    """Routine that lets go of an object on a surface, and looks whether it rests there."""
+    """Routine that releases an object on a surface, and checks whether it rests there."""
 
     def let_go(self, held_kg: float | None) -> Routine[None]:
-        """Opens the gripper and leaves the object without dragging it; shakes an object off that sticks to the hand.
+        """Opens the gripper and draws back without dragging the object; shakes off an object that sticks to the hand.
 
         Raises SkillFailure with cause POSTCONDITION when it still sticks, or the hand cannot leave it.
         """
@@ -88,7 +88,7 @@ class PlaceVerification(ReleasingSkill[InputsT]):
     def _seen_again(
         self, surface: Surface, spot_W: FloatArray, put_down: Sequence[Box], before_W: FloatArray, within_m: float
     ) -> Routine[Image | None]:
-        """Returns a picture that shows the object near its spot by its depth or its class, from near if need be."""
+        """Returns a picture with the object near its spot, by depth or class, from a near viewpoint if needed."""
 
         def new(points_W: FloatArray) -> Mask:
             near = np.linalg.norm(points_W - spot_W, axis=1) < within_m
@@ -128,7 +128,7 @@ class PlaceVerification(ReleasingSkill[InputsT]):
         """Takes a picture, from afar or near, and segments the surface; no view when the held object hides it.
 
         The object hides at least the picture's lower half, so from afar the camera looks low. Raises SkillFailure with
-        cause PLANNING when the picture does not show the surface.
+        cause PLANNING when the surface is out of view.
         """
         message = f"looking for a free spot on the {surface.name}"
         X_WB, p_BS = self.X_WB(), self.model.p_BS

@@ -304,10 +304,7 @@ def build_diagram(config: DiagramConfig, meshcat: Meshcat | None = None) -> Worl
 
 
 def _filter_collisions(
-    plant: MultibodyPlant,
-    scene_graph: SceneGraph,
-    robots: Iterable[RobotBody],
-    moved: Sequence[ModelInstanceIndex],
+    plant: MultibodyPlant, scene_graph: SceneGraph, robots: Iterable[RobotBody], moved: Sequence[ModelInstanceIndex]
 ) -> None:
     """Applies the filters of the robots; models whose pose is prescribed pass each other and anything fixed."""
     filters = scene_graph.collision_filter_manager()

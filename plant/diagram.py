@@ -304,10 +304,7 @@ def build_diagram(config: DiagramConfig, meshcat: Meshcat | None = None) -> Worl
 
 
 def _filter_collisions(
-    plant: MultibodyPlant,
-    scene_graph: SceneGraph,
-    robots: Iterable[RobotBody],
-    moved: Sequence[ModelInstanceIndex],
+    plant: MultibodyPlant, scene_graph: SceneGraph, robots: Iterable[RobotBody], moved: Sequence[ModelInstanceIndex]
 ) -> None:
     """Applies the robots' filters; models with a prescribed pose pass through each other and fixed shapes."""
     filters = scene_graph.collision_filter_manager()

@@ -30,8 +30,9 @@ from skills.robot_wrapper import RobotWrapper
 CONTROL_STEPS = 2
 SLEEP_PERIOD_STEPS = 4
 _SQUARE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-HAND_OUTLINE_M, PERSON_OUTLINE_M = 0.15 * _SQUARE, 0.25 * _SQUARE
-"""Outlines (4, 2) of a hand and a person about their centres; doors wait for these."""
+HAND_OUTLINE_M = 0.15 * _SQUARE
+"""Outline (4, 2) of a hand about its centre, for which doors wait."""
+PERSON_OUTLINE_M = 0.25 * _SQUARE
 
 
 class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
@@ -199,7 +200,10 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
 Background = Callable[[Callable[[], None]], "Future[None]"]
 """Begins work in the background."""
 
-_EXACT_S, _LEAST_S = 1e-9, 1e-6
+_EXACT_S = 1e-9
+"""Rounding of times."""
+_LEAST_S = 1e-6
+"""Least time after which a trajectory has another point."""
 
 
 class Pipeline:

@@ -25,7 +25,9 @@ from plant.worlds.world import DoorRule, MoveRule, Point, SurfaceTop, World
 from skills.inputs.errors import definite
 from skills.robot import FloatArray
 
-HEIGHT_M, THICKNESS_M, ABOVE_FLOOR_M = 2.0, 0.04, 0.02
+HEIGHT_M = 2.0
+THICKNESS_M = 0.04
+ABOVE_FLOOR_M = 0.02
 SPEED_M_S = 0.6
 CLEAR_M = 0.12
 """A panel waits while a robot or a person is nearer than this to the doorway's middle line."""
@@ -227,9 +229,7 @@ class Moves(Stateful, saved=("_done",)):
             self._tell(f"nobody moves {definite(move.name)}, because the {move.to} has no free spot")
             return
         self._plant.SetFreeBodyPose(self._context, body, X_WO)
-        self._plant.SetFreeBodySpatialVelocity(
-            context=self._context, body=body, V_JpJc=SpatialVelocity(np.zeros(3), np.zeros(3))
-        )
+        self._plant.SetFreeBodySpatialVelocity(context=self._context, body=body, V_JpJc=SpatialVelocity.Zero())
         goal = f"the {move.to}" if isinstance(move.to, str) else "({:g}, {:g}, {:g})".format(*move.to)
         self._tell(f"somebody moves {definite(move.name)} to {goal}")
         for listener in self._listeners:

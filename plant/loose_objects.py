@@ -151,9 +151,7 @@ class Sleepers:
         starts = [each.body.floating_positions_start() for each in self._objects]
         self._places = np.array([range(start, start + 7) for start in starts], dtype=np.int64).reshape(-1, 7)
         self._asleep = np.zeros(len(self._objects), dtype=bool)
-        loose = (
-            body for body in _moving_bodies(plant) if int(body.model_instance()) in map(int, world.models.values())
-        )
+        loose = (body for body in _moving_bodies(plant) if int(body.model_instance()) in map(int, models))
         self._restless = sum(body.is_floating_base_body() for body in loose) - len(self._objects)
         self.all_asleep = False
         self._lift = np.zeros(plant.num_velocities())

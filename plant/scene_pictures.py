@@ -12,24 +12,12 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydrake.geometry import (
-    QueryObject,
-)
+from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform, RotationMatrix
 
 from plant.sensors.camera_spec import FAR_M, NEAR_M, colour_render_camera, depth_render_camera
 from plant.worlds.world import Point
-from skills.map_drawing import (
-    INK,
-    PLATE,
-    ZONE_COLOURS,
-    Colour,
-    Names,
-    draw_zone,
-    label,
-    text_size,
-    with_legend,
-)
+from skills.map_drawing import INK, PLATE, ZONE_COLOURS, Colour, Names, draw_zone, label, text_size, with_legend
 from skills.robot import FloatArray, Intrinsics, Picture
 
 Bounds = tuple[float, float, float, float]

@@ -308,8 +308,8 @@ class SkillContext:
         """Returns the zones drawn on the ground. Raises InputError for a mask that cannot be read."""
         from skills.navigate.zone_map import zone_map
 
-        full_m_s = self.robot.capabilities().max_speed_m_s
-        return zone_map(self.zones, min(full_m_s, getattr(self.stack.controller, "max_speed_m_s", full_m_s)))
+        full_m_s = min(self.robot.capabilities().max_speed_m_s, self.stack.controller.max_speed_m_s)
+        return zone_map(self.zones, full_m_s)
 
     def free_space(self) -> FreeSpace:
         """Returns the costmap with the keep-out zones as obstacles; one in which the robot stands, as far as it may."""

@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 
 _STRIP_M = 0.05
 _HEIGHTS_M = (0.1, 1.9)
-_IN_PLANE_M, _IN_PLANE_SHARE = 0.2, 0.3
-"""Distance from the plane of a door at which a ray ends in it; from a flat angle, jambs are no farther along it."""
+_IN_PLANE_M = 0.2
+"""Distance from the plane of a door at which a ray ends in it."""
+_IN_PLANE_SHARE = 0.3
+"""The same along a flat ray, as a share of the door's width: jambs are no farther along it."""
 _BEYOND_M = 0.5
 _FEWEST = 5
 _CLEARLY = 0.8

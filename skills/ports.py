@@ -318,10 +318,7 @@ class GraspPorts(Skill[GraspInputs]):
     done_by: ClassVar[str] = "skills.manipulation.grasp.skill:Grasp"
     name = "grasp"
     Inputs = GraspInputs
-    outputs: ClassVar[Mapping[str, type]] = {
-        "tried": tuple[TriedGrasp, ...],
-        IN_THE_WAY: tuple[ObjectObservation, ...],
-    }
+    outputs: ClassVar[Mapping[str, type]] = {"tried": tuple[TriedGrasp, ...], IN_THE_WAY: tuple[ObjectObservation, ...]}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "the object is not where it was seen or too heavy, the gripper is full, or there is no arm",
         Cause.PLANNING: "no grasp is within reach and free",

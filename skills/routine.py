@@ -379,13 +379,7 @@ class RoutineSkill(Skill[InputsT]):
         return step
 
     def finish(
-        self,
-        command: CommandId,
-        message: str,
-        what: str,
-        enough: Callable[[], bool] | None = None,
-        *,
-        until_s: float,
+        self, command: CommandId, message: str, what: str, enough: Callable[[], bool] | None = None, *, until_s: float
     ) -> Routine[float | None]:
         """Waits until a command is done; returns None, or the last tick's time (s) when a pause stopped the command.
 

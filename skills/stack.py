@@ -122,9 +122,13 @@ class LocalController(Protocol):
 
 
 class ControllerComponent(Protocol):
-    """Builds a controller for each path; a robot farther off than `lost_path_m` gives the path up."""
+    """Builds a controller for each path; a robot farther off than `lost_path_m` gives the path up.
+
+    A controller with a speed limit of its own has it as the option `max_speed_m_s`; without one it is infinite.
+    """
 
     lost_path_m: float
+    max_speed_m_s: float = np.inf
 
     def build(self, path: WayPath, footprint: Footprint, *, max_speed_m_s: float) -> LocalController:
         """Builds a controller that follows a path."""

@@ -17,17 +17,17 @@ LINES = {
     "executive/mission": 1577,
     "executive/tree": 8576,
     "executive/run": 3200,
-    "executive/record": 1404,
+    "executive/record": 1403,
     "executive/store": 1630,
     "executive/conversation": 595,
     "executive/view": 1581,
     "executive/testing": 849,
-    "executive/app": 8078,
-    "executive/cli": 3809,
-    "skills": 29931,
-    "plant": 11172,
+    "executive/app": 8063,
+    "executive/cli": 3805,
+    "skills": 29915,
+    "plant": 11168,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 426, 64, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 426, 63, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -19,10 +19,7 @@ from skills.inputs.errors import InputError
 from skills.inputs.outside import is_folder
 
 fleet = typer.Typer(
-    name="fleet",
-    help="Run the queued missions with several robots.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
+    name="fleet", help="Run the queued missions with several robots.", no_args_is_help=True, rich_markup_mode=None
 )
 
 Queue = Annotated[Path, typer.Argument(metavar="QUEUE", help="The store of `errand queue add`, or its folder.")]

@@ -25,7 +25,9 @@ from executive.words.forms import OptionGroup as Group
 from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
 
-_START, _FOXGLOVE, _VIEW = "--start", "--foxglove", "--view"
+_START: Final = "--start"
+_FOXGLOVE: Final = "--foxglove"
+_VIEW: Final = "--view"
 _FOXGLOVE_ADDRESS: Final = "127.0.0.1:8765"
 _UNTIL_CTRL_C_S: Final = 1e9
 """Value of `--view` alone: the longest wait."""

@@ -32,10 +32,7 @@ if TYPE_CHECKING:
     from executive.app.runs.queue import MissionResult, MissionRuns
 
 queue = typer.Typer(
-    name="queue",
-    help="Store missions, and run them one after another.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
+    name="queue", help="Store missions, and run them one after another.", no_args_is_help=True, rich_markup_mode=None
 )
 
 Out = Annotated[Path, typer.Option(help="Folder for logs, with a folder for each mission.")]
@@ -233,8 +230,7 @@ def serve(
     ] = None,
     until_idle: Annotated[bool, typer.Option("--until-idle", help="End when no mission is queued.")] = False,
     for_s: Annotated[
-        float | None,
-        quantity_option(Wait, "--for", help="Begin no mission after this time, and end."),
+        float | None, quantity_option(Wait, "--for", help="Begin no mission after this time, and end.")
     ] = None,
     quiet: QUIET = False,
     foxglove: FOXGLOVE = None,

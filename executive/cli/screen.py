@@ -174,7 +174,8 @@ FEWEST_ROWS = 5
 BAR_ROWS: Final = 1
 """Rows that a queue's progress bar takes above the tree."""
 _UNDER_WAY = (Styles.IDLE.value, Styles.RUNNING.value)
-PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
+PROMPT_STYLE: Final = "bold yellow"
+HELP_STYLE: Final = "dim"
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from skills.perception.class_forms import class_form
 from skills.robot import Clock
 
 PACKAGES: Final = ("spot-errand", "drake", "py-trees", "numpy")
-FREE, UNKNOWN, OCCUPIED = 255, 205, 0
+_GREY: Final = {"free": 255, "unknown": 205, "occupied": 0}
 _NOTHING_ID: Final = 0
 
 
@@ -109,7 +109,7 @@ def versions(packages: Sequence[str]) -> dict[str, str]:
 
 def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[str, Any]:
     """Encodes the map: a grey PNG (first row: largest y), its origin in the world (m), names of rooms, the dock."""
-    grey = grid.grey(free=FREE, unknown=UNKNOWN, occupied=OCCUPIED)
+    grey = grid.grey(**_GREY)
     png = cv2.imencode(".png", np.ascontiguousarray(grey[::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes()
     width_m, height_m = grid.size_m
     middles = {name: np.mean(place.polygon, axis=0) for name, place in knowledge.places.items()}

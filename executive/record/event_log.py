@@ -197,10 +197,8 @@ class EventLog(RunVisitor):
             if schema.name not in self._schemas:
                 data = json.dumps(schema.json()).encode()
                 self._schemas[schema.name] = self._writer.register_schema(schema.name, "jsonschema", data)
-            number = self._writer.register_channel(
-                message.channel, "json", self._schemas[schema.name], message.metadata
-            )
-            self._channels[key] = number
+            number = self._schemas[schema.name]
+            self._channels[key] = self._writer.register_channel(message.channel, "json", number, message.metadata)
         return self._channels[key]
 
 

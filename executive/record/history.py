@@ -46,7 +46,8 @@ from skills.perception.class_forms import ANY_OBJECT
 MOST_BYTES = 100_000_000_000
 _EXISTS: Final = "name a log that exists"
 _WRITTEN: Final = "name a log.mcap that a run has written"
-_ROS_1, _SQLITE = b"#ROSBAG V2", b"SQLite format 3"
+_ROS_1: Final = b"#ROSBAG V2"
+_SQLITE: Final = b"SQLite format 3"
 _DAMAGE = (McapError, struct.error, ZstdError, ValueError)
 
 
@@ -330,9 +331,8 @@ def seen_objects(events: Iterable[Event]) -> tuple[ObjectObservation, ...]:
             open_searches[robot] = len(searches)
             searches.append([])
         elif event.topic == TRACKS and robot in open_searches:
-            sure = [
-                track for track in event.data["tracks"] if track.get("confirmed") and track["class_name"] != ANY_OBJECT
-            ]
+            confirmed = (track for track in event.data["tracks"] if track.get("confirmed"))
+            sure = [track for track in confirmed if track["class_name"] != ANY_OBJECT]
             searches[open_searches[robot]] = [_observation(track) for track in sorted(sure, key=itemgetter("number"))]
     return distinct_objects(searches)
 

@@ -65,7 +65,8 @@ DEFINITIONS: Final[Mapping[str, str]] = {
         f"std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n{_HEADER}"
     ),
 }
-TF, TF_STATIC = "/tf", "/tf_static"
+TF: Final = "/tf"
+TF_STATIC: Final = "/tf_static"
 _ROOT: Final = "map"
 """Frame that other tools take for the fixed one; it equals the world frame."""
 _LONGEST_RANGE_M: Final = 100.0
@@ -73,8 +74,12 @@ _LEAST_RANGE_M: Final = 0.05
 _LATCHED: Final = frozenset({f"/{MAP}", TF_STATIC})
 _FOREVER: Final = {"sec": 9223372036, "nsec": 854775807}
 _IDENTITY: Final = {"translation": {"x": 0.0, "y": 0.0, "z": 0.0}, "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
-_RELIABLE, _KEEP_LAST, _TRANSIENT_LOCAL, _VOLATILE, _AUTOMATIC = 1, 1, 1, 2, 1
+_RELIABLE: Final = 1
 """Policies of rmw, by their numbers."""
+_KEEP_LAST: Final = 1
+_TRANSIENT_LOCAL: Final = 1
+_VOLATILE: Final = 2
+_AUTOMATIC: Final = 1
 
 Data = Mapping[str, Any]
 
@@ -134,7 +139,8 @@ class _BagWriter(Writer):
 
 def _write(events: Iterable[Event], path: Path) -> _Written:
     written, events = _Written(), tuple(events)
-    converter = _Converter(next((event.data["start_s"] for event in events if "start_s" in _wall(event)), 0.0))
+    starts_s = (each.data["start_s"] for each in events if each.topic == WALL and "start_s" in each.data)
+    converter = _Converter(next(starts_s, 0.0))
     try:
         with path.open("wb") as file:
             writer: Any = _BagWriter(file)
@@ -142,9 +148,8 @@ def _write(events: Iterable[Event], path: Path) -> _Written:
             for event in events:
                 time_ns = round((converter.start_s + event.stamp_s) * 1e9)
                 for message in converter.messages(event):
-                    writer.write_message(
-                        message.topic, schemas[message.kind], message.fields, time_ns, time_ns, written.count
-                    )
+                    schema = schemas[message.kind]
+                    writer.write_message(message.topic, schema, message.fields, time_ns, time_ns, written.count)
                     written.first_ns = written.first_ns if written.count else time_ns
                     written.last_ns = max(written.last_ns, time_ns)
                     written.counts[message.topic, message.kind] += 1
@@ -152,10 +157,6 @@ def _write(events: Iterable[Event], path: Path) -> _Written:
     except OSError as error:
         raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=path) from error
     return written
-
-
-def _wall(event: Event) -> Data:
-    return event.data if event.topic == WALL else {}
 
 
 def _qos(topic: str) -> str:

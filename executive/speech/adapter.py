@@ -28,7 +28,9 @@ from skills.inputs.errors import InputError
 
 Matrix = npt.NDArray[np.float16]
 
-_UP, _DOWN, _BASE = ".up", ".down", "base"
+_UP: Final = ".up"
+_DOWN: Final = ".down"
+_BASE: Final = "base"
 _FILE: Final = "noise_adapter.npz"
 _HINT: Final = f"make a new one: python -m errand_train.speech --out executive/speech/{_FILE}"
 

@@ -79,9 +79,7 @@ def _fitting(
 
 
 def _likeliest(
-    recognition: Recognition,
-    first: Candidate[Meaning],
-    fitting: list[Candidate[Meaning]],
+    recognition: Recognition, first: Candidate[Meaning], fitting: list[Candidate[Meaning]]
 ) -> Candidate[Meaning] | None:
     """Likeliest candidate given the sound, unless it is much less likely than the first reading.
 

@@ -21,15 +21,14 @@ from skills.map_drawing import ZONE_COLOURS, Names, draw_zone, with_legend
 WIDTH_PX: Final = 1400
 FOOTPRINT_M: Final = (1.1, 0.5)
 _CELL_M: Final = 0.05
-_TRAIL, _PLAN, _PARTICLE, _OBSTACLE, _ROBOT, _INK, _DOCK = (  # blue, green, red
-    (120, 158, 0),
-    (178, 114, 0),
-    (167, 121, 204),
-    (0, 94, 213),
-    (233, 180, 86),
-    (40, 40, 40),
-    (0, 190, 255),
-)
+_TRAIL: Final = (120, 158, 0)
+"""Blue, green, red; so the other colours."""
+_PLAN: Final = (178, 114, 0)
+_PARTICLE: Final = (167, 121, 204)
+_OBSTACLE: Final = (0, 94, 213)
+_ROBOT: Final = (233, 180, 86)
+_INK: Final = (40, 40, 40)
+_DOCK: Final = (0, 190, 255)
 _LEGEND: Final = (
     ("path driven", _TRAIL),
     ("path planned", _PLAN),

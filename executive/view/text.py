@@ -20,7 +20,8 @@ from skills.api import Cause
 
 MANY_NODES = 80
 DRAWN_NODES = 40
-_BRANCHES, _ASCII_BRANCHES = ("├─ ", "└─ ", "│  ", "   "), ("|-- ", "`-- ", "|   ", "    ")
+_BRANCHES = ("├─ ", "└─ ", "│  ", "   ")
+_ASCII_BRANCHES = ("|-- ", "`-- ", "|   ", "    ")
 
 
 @dataclass(frozen=True)

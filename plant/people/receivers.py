@@ -27,7 +27,10 @@ from plant.worlds.seeding import Receiving
 from skills.robot import FloatArray
 
 LEAST_HEIGHT_M = 0.5
-STILL_M_S, MOVES_M_S = 0.03, 0.15
+STILL_M_S = 0.03
+"""Speed of the hand up to which a person begins to take the object."""
+MOVES_M_S = 0.15
+"""Speed of the hand from which on they no longer do."""
 BEYOND_OUTLINE_M = 0.05
 _AT_HAND_M = 0.5
 _ROUNDING_M = 1e-9
@@ -189,17 +192,25 @@ BELOW_M = 0.018
 """Distance of the tray below the lowest point of the offered object."""
 UNDER_M = 0.15
 """Distance below the offered object from which the tray is raised."""
-SPEED_M_S, TURN_RAD_S = 0.3, 1.5
-PULL_S, RAMP_S, PAUSE_S = 6.0, 0.6, 4.0
+SPEED_M_S = 0.3
+TURN_RAD_S = 1.5
+PULL_S = 6.0
+RAMP_S = 0.6
+"""Time in which the pull grows to its full force."""
+PAUSE_S = 4.0
+"""Time between two pulls."""
 DOWN = 0.95
 """Downward share of the pull; the rest points towards the person."""
-GIVES_M, GIVES_RAD = 0.01, 0.03
-"""The gripper gives way when the object has moved this far in the hand, or the fingers have opened this far."""
+GIVES_M = 0.01
+"""The gripper gives way when the object has moved this far in the hand, or the fingers have opened as follows."""
+GIVES_RAD = 0.03
 DROPS_M = BELOW_M - 0.002
 """The same distance while nobody pulls: a smaller creep in the hand does not count as released."""
 SETTLE_S = 1.5
 ON_TRAY_M = 0.25
-_NEAR_M, _ASIDE_M, _DOWN_M = 0.004, 0.05, 0.05
+_NEAR_M = 0.004
+_ASIDE_M = 0.05
+_DOWN_M = 0.05
 _MOVED = 1e-9
 
 

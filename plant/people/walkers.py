@@ -31,8 +31,9 @@ from plant.worlds.seeding import PointRoute
 from plant.worlds.world import Point, WorldError
 from skills.robot import FloatArray
 
-BODY_KG, BODY_M = 75.0, (0.2, 1.75)
-"""Mass of a person, and radius and height of the cylinder with the same inertia."""
+BODY_KG = 75.0
+BODY_M = (0.2, 1.75)
+"""Radius and height of the cylinder with a person's inertia."""
 YIELD_M = 0.8
 """A person who yields stops when a robot's outline ahead is nearer than this to the person's centre."""
 AHEAD_RAD = 1.2
@@ -41,26 +42,37 @@ PATIENCE_S = 4.0
 """A person who has waited this long looks for another path, and again after the same time."""
 PASS_M = 0.26
 """On a detour, a person stops only for an outline nearer than this."""
-APART_M, PASS_APART_M = 0.8, 0.42
-"""Look-ahead on the path, and distance to a person's centre at which people who keep apart stop."""
+APART_M = 0.8
+"""Length of the path ahead over which people keep apart."""
+PASS_APART_M = 0.42
+"""People who keep apart stop where that path comes nearer than this to the centre of a person."""
 STEPS_M = 0.15
-MEET_M, WAY_M = 1.6, 3.0
-"""People nearer than this meet, and one makes way for the other: leaves this length of the other's path free."""
+MEET_M = 1.6
+"""People nearer than this meet, and the first by name makes way for the other."""
+FREE_PATH_M = 3.0
+"""Length of the other's path that the person who makes way leaves free."""
 DETOUR_M = 3.0
 """People walk so much farther at most to go round others."""
-GIVES_WAY_S, ASIDE_S, ASIDE_M = 0.5, 3.0, 0.6
-"""Time until a person makes way for another, time aside where nobody can pass, and distance from the others' paths."""
+GIVES_WAY_S = 0.5
+ASIDE_S = 3.0
+"""Time for which a person stands aside where nobody can pass."""
+ASIDE_M = 0.6
+"""Distance of a person who stands aside from the paths of others."""
 DOOR_M = 0.6
 """People stop for a closed door that crosses their path within this length."""
 HEARS_M = 3.0
 """People hear a robot within this distance, and a robot hears them."""
-BEHIND_M, SETS_OFF_M = 1.5, 1.9
-"""Length of the path to the robot at which a follower stops, and distance at which the follower walks again."""
+BEHIND_M = 1.5
+"""Length of the path to the robot at which a person behind it stops."""
+SETS_OFF_M = 1.9
+"""Distance from the robot from which on that person follows."""
 NEAR_M = 2.0
 """Distance of a robot that ends its follower's lapse of attention."""
 PLAN_S = 0.7
 """Time between two paths of a person who follows a robot."""
-WANDERS_M, WANDERER_CLEAR_M, PAUSES_S = 2.0, 0.45, (0.5, 4.0)
+WANDERS_M = 2.0
+WANDERER_CLEAR_M = 0.45
+PAUSES_S = (0.5, 4.0)
 _DRAWS = 20
 _HALF_BODY_M = 0.12
 
@@ -212,7 +224,9 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
     def _wait(self, name: str, walk: Walk, dt_s: float) -> None:
         """Waits for a robot, a person or a door; after a while, looks for another path, or steps aside."""
         walk.held_s += dt_s
-        first = [*self._with_right_of_way(name, walk)]
+        others = self._walks.items() if self._routes[name].apart else ()
+        later = (there for other, there in others if other > name and there.walks)
+        first = [there for there in later if math.dist(there.place_W, walk.place_W) < MEET_M]
         if walk.held_s < (GIVES_WAY_S if first else PATIENCE_S):
             return
         walk.held_s = 0.0
@@ -228,7 +242,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
             walk.drop_path()
             return
         near = [*self._around(name, walk)]
-        ways = [_swept_W(*part) for other in first for part in itertools.pairwise(other.ahead_W(WAY_M))]
+        ways = [_swept_W(*part) for other in first for part in itertools.pairwise(other.ahead_W(FREE_PATH_M))]
         most_m = walk.left_m + (DETOUR_M if first or any(self._people_near(name, walk)) else math.inf)
         path = self._path_around(name, walk, [*near, *ways])
         if path is not None and Leg(path, 0.0).lengths_m()[-1] < most_m:
@@ -253,17 +267,11 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
 
     def _step_aside(self, name: str, walk: Walk, first: Sequence[Walk], near: Sequence[FloatArray]) -> None:
         """Lets others through where nobody can pass: off their ways and the person's own, and back after a while."""
-        lines_W = (walk.trail_W, *(each.ahead_W(WAY_M) for each in (walk, *first)))
+        lines_W = (walk.trail_W, *(each.ahead_W(FREE_PATH_M) for each in (walk, *first)))
         ground = self._blocked_ground(near)
         if (place_W := ground.aside(walk.place_W, lines_W, ASIDE_M)) is not None:
             with contextlib.suppress(WorldError):
                 walk.step_aside(ground.plan_on(walk.place_W, place_W, who=name), ASIDE_S)
-
-    def _with_right_of_way(self, name: str, walk: Walk) -> Iterator[Walk]:
-        """Walking people close by with right of way over a person: those with a later name."""
-        for other, there in self._walks.items() if self._routes[name].apart else ():
-            if other > name and there.walks and math.dist(there.place_W, walk.place_W) < MEET_M:
-                yield there
 
     def _around(self, name: str, walk: Walk) -> Iterator[FloatArray]:
         """Outlines (K, 2) of the robots and, if the person keeps apart, the people close around a person."""
@@ -296,10 +304,8 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
             if other == name or away_m > APART_M + PASS_APART_M:
                 continue
             nearer = math.dist(there.place_W, walk.ahead_W(STEPS_M)[-1]) < away_m
-            if (
-                nearer
-                and shapely.LineString(walk.ahead_W(APART_M)).distance(shapely.Point(there.place_W)) < PASS_APART_M
-            ):
+            ahead = shapely.LineString(walk.ahead_W(APART_M))
+            if nearer and ahead.distance(shapely.Point(there.place_W)) < PASS_APART_M:
                 yield there.place_W
 
     def _away_m(self, robot: str, walk: Walk) -> float:

@@ -1,6 +1,6 @@
 """Findings of the referee, helpers of all judges, and the judges of following, guiding and greeting."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -15,13 +15,7 @@ from skills.robot import FloatArray
 
 NAMED_REGIONS = 3
 NEAR_M: Final[Mapping[GoalKind, float]] = MappingProxyType(
-    {
-        GoalKind.WENT: 2.0,
-        GoalKind.MET: 2.0,
-        GoalKind.FOLLOWED: 3.0,
-        GoalKind.GUIDED: 3.0,
-        GoalKind.GREETED: 2.5,
-    }
+    {GoalKind.WENT: 2.0, GoalKind.MET: 2.0, GoalKind.FOLLOWED: 3.0, GoalKind.GUIDED: 3.0, GoalKind.GREETED: 2.5}
 )
 """Greatest distance of the robot's body from the person for each kind."""
 LOST_M: Final = 5.0
@@ -129,7 +123,11 @@ def judge_greeted(condition: GoalCondition, truth: Truth) -> Finding:
     from_s, until_s = condition.from_s, step_end_s(condition, truth)
     robots = [path for name, path in truth.robots.items() if condition.robot in (None, name)]
     among = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}
-    inside = {name: list(_inside(condition, path, from_s, until_s)) for name, path in among.items()}
+    goal = condition.goal
+    inside = {
+        name: [not goal or region_at(goal, p_W) is not None for p_W in path.positions_between(from_s, until_s)]
+        for name, path in among.items()
+    }
     stayed = [name for name, ins in inside.items() if all(ins)]
     present = [name for name in among if any(inside[name])]
     times_s = condition.spoken_s
@@ -138,12 +136,6 @@ def judge_greeted(condition: GoalCondition, truth: Truth) -> Finding:
     said, there = len(times_s), " and ".join(stayed) or "nobody"
     sentence = f"{there} stood in {where(condition.goal)}, and {greeted} of {len(stayed)} heard one of {said} greetings"
     return Finding(greeted == len(stayed) and said <= max(1, len(present)), f"{sentence}.")
-
-
-def _inside(condition: GoalCondition, person: TimedPath, from_s: float, until_s: float) -> Iterator[bool]:
-    """Yields for each position of a person in an interval whether it lies in the regions of a condition."""
-    for p_W in person.positions_between(from_s, until_s):
-        yield not condition.goal or region_at(condition.goal, p_W) is not None
 
 
 def _spoke_near(condition: GoalCondition, robots: list[TimedPath], person: TimedPath, time_s: float) -> bool:

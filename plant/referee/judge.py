@@ -220,9 +220,8 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
     then_s, aside = condition.answered_s, []
     if condition.classes == (PERSON,):
         when_s = truth.now_s if then_s is None else then_s
-        people = (
-            (name, path.position_at(when_s)) for name, path in truth.persons.items() if condition.person in (None, name)
-        )
+        persons = truth.persons.items()
+        people = ((name, path.position_at(when_s)) for name, path in persons if condition.person in (None, name))
         verb = "is" if then_s is None else "was"
         there = [f"{name} {verb} in {on}" for name, p_W in people if (on := region_at(condition.source, p_W))]
         who = condition.person or "nobody"

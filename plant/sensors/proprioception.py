@@ -214,11 +214,8 @@ class OdometryModel(NoisySensor, saved=("_last",)):
     def _velocity(self, yaw_rad: float, w_WB_W: FloatArray, v_WB_W: FloatArray) -> tuple[float, float, float]:
         """Velocity (vx, vy, wz) in the level body frame, with noise."""
         vx, vy = _turned(float(v_WB_W[0]), float(v_WB_W[1]), -yaw_rad)
-        noise = self._rng.standard_normal(3) * (
-            self._noise.velocity_m_s,
-            self._noise.velocity_m_s,
-            self._noise.turn_rate_rad_s,
-        )
+        speed_m_s, turn_rad_s = self._noise.velocity_m_s, self._noise.turn_rate_rad_s
+        noise = self._rng.standard_normal(3) * (speed_m_s, speed_m_s, turn_rad_s)
         return vx + float(noise[0]), vy + float(noise[1]), float(w_WB_W[2]) + float(noise[2])
 
 

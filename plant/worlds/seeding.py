@@ -103,10 +103,15 @@ def _lapses(route: Route, rng: np.random.Generator) -> tuple[Lapse, ...]:
     )
 
 
-_LAPSE_EVERY_M, _LAPSE_BACK_M, _LAPSE_STOP_S = (4.0, 10.0), (1.0, 3.0), (2.0, 6.0)
+_LAPSE_EVERY_M = (4.0, 10.0)
+_LAPSE_BACK_M = (1.0, 3.0)
+_LAPSE_STOP_S = (2.0, 6.0)
 ATTEMPTS = 500
 ROUND_SIDES = 16
-_OBJECT_STREAM, _PEOPLE_STREAM, _FORM_STREAM, _WALK_STREAM = 1, 2, 3, 13
+_OBJECT_STREAM = 1
+_PEOPLE_STREAM = 2
+_FORM_STREAM = 3
+_WALK_STREAM = 13
 
 
 @dataclass(frozen=True)
@@ -184,11 +189,7 @@ def _form(catalogue: Mapping[str, ModelClass], name: str, world: World, seed: in
 
 
 def place_one(
-    world: World,
-    rule: ObjectRule,
-    model: tuple[str, ModelForm],
-    others: Sequence[FloatArray],
-    rng: np.random.Generator,
+    world: World, rule: ObjectRule, model: tuple[str, ModelForm], others: Sequence[FloatArray], rng: np.random.Generator
 ) -> tuple[Placement, FloatArray]:
     """Places one object of a class and form at a free pose; returns also its outline. Raises WorldError without one."""
     rules, (class_name, form) = world.seed_rules.rules, model
@@ -286,8 +287,11 @@ def polygon_distance(a: FloatArray, b: FloatArray) -> float:
 
 
 PAUSE_S = 4.0
-_CROWD_APART_M, _CROWD_M_S = 1.2, (0.7, 1.3)
-_CLUTTER_STREAM, _PASSING_STREAM, _CROWD_STREAM = 11, 12, 15
+_CROWD_APART_M = 1.2
+_CROWD_M_S = (0.7, 1.3)
+_CLUTTER_STREAM = 11
+_PASSING_STREAM = 12
+_CROWD_STREAM = 15
 _NEVER = frozenset({"person", "extinguisher"})
 """Classes that are never clutter: people, and objects that are too large for most surfaces."""
 _STOPS = 4

@@ -42,11 +42,15 @@ Angles = tuple[quantities.Angle, quantities.Angle]
 
 
 class WorldError(InputError):
-    """An unknown world, or files that do not fit together; `path` is the place in `objects.yaml`."""
+    """Files of a world that do not fit together; `path` is the place in `objects.yaml`."""
 
     def __init__(self, message: str, *, path: KeyPath = ()) -> None:
         super().__init__(message)
         self.path = path
+
+
+class UnknownWorldError(WorldError):
+    """A name or folder of no world."""
 
 
 class _Strict(BaseModel):
@@ -390,7 +394,7 @@ def _find_folder(name_or_path: str | Path) -> Path:
     close = nearest_name(str(name_or_path), known_worlds())
     hint = f" Did you mean {close!r}?" if close else ""
     known = ", ".join(known_worlds())
-    raise WorldError(
+    raise UnknownWorldError(
         f"unknown world {str(name_or_path)!r}.{hint} Known worlds: {known}; or give a folder with a world.dmd.yaml"
     )
 

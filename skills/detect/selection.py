@@ -19,16 +19,19 @@ _SAME_PLACE_M = 0.05
 _AVOIDED_M = 0.08
 _DOUBTED = 0.08
 """Belief in one of the wanted classes from which on a track of another class is worth a closer view."""
-_SMALLEST, _LARGEST = 0.4, 1.3
-"""Shares of the shortest and longest objects of a class, since clusters may be hidden in part or merged."""
+_LEAST_LENGTH = 0.4
+"""Share of the shortest object of a class: a cluster may be hidden in part."""
+_MOST_LENGTH = 1.3
+"""Share of the longest object of a class: clusters may be merged."""
 _FREE_M = 0.15
 """Distance to the next object beyond which more does not count."""
 
 
 _SEEN_AGAIN_M = 0.06
 """Distance from where an object was seen within which a segment without a label may be it."""
-_SAME_SIZE, _SAME_SIZE_M = 0.3, 0.015
-"""Difference of sizes, as a share and in metres, within which they are alike."""
+_SAME_SIZE_M = 0.015
+"""Difference within which two sizes are alike; for larger objects, this share of the size."""
+_SAME_SIZE_SHARE = 0.3
 
 
 @dataclass(frozen=True)
@@ -138,7 +141,7 @@ def _may_be(cluster: Cluster, classes: Sequence[str]) -> bool:
     """Returns whether a cluster has the size of an object of one of the classes."""
     longest = max(cluster.shape.length_m, cluster.shape.height_m)
     ranges = (class_form(name).length_m for name in classes)
-    return any(_SMALLEST * low < longest < _LARGEST * high for low, high in ranges)
+    return any(_LEAST_LENGTH * low < longest < _MOST_LENGTH * high for low, high in ranges)
 
 
 def seen_again(before: ObjectObservation, segments: Sequence[Detection3D]) -> tuple[Detection3D, ...]:
@@ -159,4 +162,4 @@ def seen_again(before: ObjectObservation, segments: Sequence[Detection3D]) -> tu
 def _is_as_large(size_m: Sequence[float], other_m: Sequence[float]) -> bool:
     """Returns whether length and height are alike; width and height of what is seen from one side may be less."""
     pairs = ((size_m[0], other_m[0]), (size_m[2], other_m[2]))
-    return all(abs(a - b) < max(_SAME_SIZE_M, _SAME_SIZE * max(a, b)) for a, b in pairs)
+    return all(abs(a - b) < max(_SAME_SIZE_M, _SAME_SIZE_SHARE * max(a, b)) for a, b in pairs)

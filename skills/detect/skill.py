@@ -8,15 +8,7 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import (
-    Cause,
-    Detection,
-    LocalisationEstimate,
-    ObjectKind,
-    ObjectObservation,
-    Running,
-    Succeeded,
-)
+from skills.api import Cause, Detection, LocalisationEstimate, ObjectKind, ObjectObservation, Running, Succeeded
 from skills.detect.descriptions import count_sentence, describe, surface_names, wanted_names
 from skills.detect.messages import (
     coverage_message,
@@ -262,11 +254,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         return sure_tracks(self._matching(inputs), inputs)
 
     def look(
-        self,
-        inputs: DetectInputs,
-        p_BT: FloatArray,
-        viewpoints_B: Sequence[FloatArray],
-        raised_m: float = 0.0,
+        self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray], raised_m: float = 0.0
     ) -> Routine[Look]:
         """Points the camera at p_BT from the first possible one of `viewpoints_B`, and updates the tracks.
 

@@ -215,11 +215,7 @@ def clear_cells(scan: Scan, centres_F: FloatArray, cell_m: float) -> NDArray[np.
 
 @compiled
 def _clear(
-    ranges: NDArray[np.float32],
-    elevations: FloatArray,
-    azimuths: FloatArray,
-    places: FloatArray,
-    cell_m: float,
+    ranges: NDArray[np.float32], elevations: FloatArray, azimuths: FloatArray, places: FloatArray, cell_m: float
 ) -> NDArray[np.bool_]:
     """The loop of `clear_cells`."""
     count = azimuths.shape[0]

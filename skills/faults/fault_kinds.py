@@ -267,7 +267,8 @@ def _loses(_: re.Match[str]) -> Effect:
     return Effect(frozenset(("gripper", "set_gripper")), act, once=True)
 
 
-_WEAK_N, _WEAK_S = 0.5, 1.0
+_WEAK_N = 0.5
+_WEAK_S = 1.0
 _NO_COMMAND: Final[Any] = -1
 
 STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (

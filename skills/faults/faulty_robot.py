@@ -34,7 +34,9 @@ _SPAN: Final = re.compile(
 _PREFIX: Final = re.compile(r"(?P<sensor>\w+)(?:\.(?P<source>[\w-]+))?: ?(?P<words>.+)")
 _STREAM: Final = 11
 """Stream of the seed for random faults."""
-_FIRST_S, _LAST_S = 5.0, 90.0
+_EARLIEST_S = 5.0
+"""Earliest time of a random fault."""
+_LATEST_S = 90.0
 _MOTIONS: Final = ("arm", "base", "body")
 
 
@@ -125,7 +127,7 @@ def random_faults(
 def _drawn(template: str, cameras: Sequence[str], rng: np.random.Generator) -> tuple[float, str]:
     """Draws one fault of a kind: its time (s) and its words."""
     images = [f"camera.{source}" for source in cameras] or ["camera"]
-    at_s = round(float(rng.uniform(_FIRST_S, _LAST_S)), 1)
+    at_s = round(float(rng.uniform(_EARLIEST_S, _LATEST_S)), 1)
     values = {
         "camera": images[int(rng.integers(len(images)))],
         "sensor": ("lidar", *images)[int(rng.integers(1 + len(images)))],

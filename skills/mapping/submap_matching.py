@@ -76,13 +76,7 @@ def _add(moments: Moments, low: float, points: FloatArray, pose: FloatArray) -> 
 
 @compiled
 def _linearise(
-    moments: Moments,
-    low: float,
-    points: FloatArray,
-    pose: FloatArray,
-    weight: float,
-    outlier_m: float,
-    inlier_m: float,
+    moments: Moments, low: float, points: FloatArray, pose: FloatArray, weight: float, outlier_m: float, inlier_m: float
 ) -> tuple[FloatArray, FloatArray, int]:
     """The loop of `Distributions.linearise`."""
     hessian, gradient = np.zeros((3, 3)), np.zeros(3)

@@ -207,10 +207,8 @@ class Survey:
         rows, columns = slice(0, shape[0]), slice(0, shape[1])
         if around_m is not None:
             rows, columns = grid.window(poses[-1].x_m, poses[-1].y_m, around_m)
-        origin_m = (
-            grid.origin_m[0] + columns.start * grid.resolution_m,
-            grid.origin_m[1] + rows.start * grid.resolution_m,
-        )
+        (x_m, y_m), cell_m = grid.origin_m, grid.resolution_m
+        origin_m = (x_m + columns.start * cell_m, y_m + rows.start * cell_m)
         occupied, observed, low = grid.ground((rows, columns), self._options.low_m)
         close = np.ones((3, 3), np.uint8)
         observed, low = (

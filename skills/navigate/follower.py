@@ -241,10 +241,7 @@ def corners_of(path: Path) -> NDArray[np.int64]:
 
 
 def speed_limits(
-    path: Path,
-    progress_m: FloatArray,
-    options: FollowerOptions,
-    corners: NDArray[np.int64] | None = None,
+    path: Path, progress_m: FloatArray, options: FollowerOptions, corners: NDArray[np.int64] | None = None
 ) -> FloatArray:
     """Speed limit along the path (m/s of progress) at each pose: by direction, clearance, and braking for later limits.
 

@@ -116,17 +116,7 @@ def search(
             cost[states], parent[states] = cost[index] + ends[end, 1], index
             heapq.heappush(heap, (cost[states], np.int64(states)))
         count = _expand(
-            space,
-            lattice,
-            moves,
-            seconds,
-            to_go,
-            int(index),
-            cost,
-            closed,
-            clear,
-            reached_states,
-            reached_totals,
+            space, lattice, moves, seconds, to_go, int(index), cost, closed, clear, reached_states, reached_totals
         )
         for n in range(count):
             new, total = reached_states[n], reached_totals[n]
@@ -142,11 +132,8 @@ def _seconds(lattice: Lattice, moves: IntArray, weights: Weights) -> FloatArray:
     seconds = np.empty((lattice.headings, moves.shape[1]))
     for k in range(lattice.headings):
         for n in range(moves.shape[1]):
-            dx, dy, dyaw = (
-                moves[k, n, 0] * lattice.cell_m,
-                moves[k, n, 1] * lattice.cell_m,
-                _turn(lattice, k, moves[k, n, 2]),
-            )
+            dx, dy = moves[k, n, 0] * lattice.cell_m, moves[k, n, 1] * lattice.cell_m
+            dyaw = _turn(lattice, k, moves[k, n, 2])
             seconds[k, n] = motion_seconds(dx, dy, dyaw, lattice.yaws_rad[k] + 0.5 * dyaw, weights)
     return seconds
 

@@ -27,7 +27,8 @@ from skills.stack import LocalController
 _STILL_THERE_M = 1.0
 _REVIEWED_M = 0.02
 _BRAKING_M_S2 = 0.4
-_ON_PATH_M, _ON_PATH_RAD = 0.35, 0.3
+_ON_PATH_M = 0.35
+_ON_PATH_RAD = 0.3
 _EARLY = 0.4
 """The robot begins to stop within this share of the goal's tolerances."""
 

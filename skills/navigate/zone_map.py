@@ -22,8 +22,9 @@ from skills.navigate.motion_cost import ZoneCosts
 from skills.robot import FloatArray, Pose2D
 from skills.world_model import FilterType, FreeSpace, Zone, ZoneKind
 
-_CELL_M, _MOST_CELLS = 0.05, 4_000_000
-"""Size of a cell, larger where the zones would fill more cells."""
+_CELL_M = 0.05
+_MOST_CELLS = 4_000_000
+"""Where the zones would fill more cells, the cells are larger."""
 _AROUND_M = 1.0
 """Ground about the zones that belongs to the grid."""
 _SUBPIXEL_BITS: Final = 6
@@ -85,9 +86,8 @@ class ZoneMap:
         """Values of a zone's mask in all cells, base + multiplier * percent; NaN in unknown cells."""
         assert zone.mask is not None
         x, y = np.meshgrid(*self.axes)
-        percent = (
-            load_filter_mask(Path(zone.mask.file)).at(np.column_stack([x.ravel(), y.ravel()])).reshape(self._shape)
-        )
+        mask = load_filter_mask(Path(zone.mask.file))
+        percent = mask.at(np.column_stack([x.ravel(), y.ravel()])).reshape(self._shape)
         return np.where(percent < 0, np.nan, zone.mask.base + zone.mask.multiplier * percent)
 
     def ground(self, zone: Zone) -> BoolGrid:

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from skills.api import Cause, ObjectKind, ObjectObservation, Running, SkillContext, Succeeded, SurveyView
+from skills.api import Cause, ObjectObservation, Running, SkillContext, Succeeded, SurveyView
 from skills.detect.descriptions import count_sentence
 from skills.detect.messages import detections_message
 from skills.geometry import grid_inside, line_of_sight, wrap
@@ -18,6 +18,7 @@ from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clear, footprint_clearance_m, pose_array
+from skills.people.meet_person import person_observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark, turn_upright
 from skills.perception.people import SeenPerson, located_people, people_detections, people_in_scan
 from skills.perception.people_tracking import SCAN_APART_M, PeopleTracker
@@ -29,15 +30,19 @@ from skills.world_model import PERSON
 
 _SCAN_AGE_S = 1.0
 _AHEAD_RAD = 0.2
-_SIZE_M = (0.5, 0.5, 1.7)
+"""Turn ahead over which the footprint must stay clear."""
 _AVOID_M = 0.9
-"""Distance within which a detection counts as a known person."""
-_STANDS_M, _GRID_M = 0.2, 0.4
-"""Clearance of a person's possible position, and spacing of these positions."""
+"""Distance within which somebody counts as a person who is already known."""
+_PERSON_CLEAR_M = 0.2
+"""Clearance of a position where a person may stand."""
+_GRID_M = 0.4
+"""Distance between such positions."""
 _OWN_M = 0.3
 """Distance from the robot's middle within which an obstacle hides nothing."""
-_VIEWPOINTS, _YAWS_RAD = 4, (0.0, 0.8, -0.8, 1.6, -1.6, math.pi)
-"""Number of best viewpoints to which the robot tries to drive, and its turns there."""
+_BEST_VIEWPOINTS = 4
+"""Number of best viewpoints to which the robot tries to drive."""
+_YAWS_RAD = (0.0, 0.8, -0.8, 1.6, -1.6, math.pi)
+"""Turns of the robot at a viewpoint from the hidden positions, the best first."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,7 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
                     raise
                 break
             found = yield from self._look_round(inputs, tracker, view)
-        return self._ended(inputs, tuple(_observation(one, inputs) for one in found), view)
+        return self._ended(inputs, tuple(person_observation(one, inputs.person, inputs.place) for one in found), view)
 
     def _look_round(self, inputs: FindPeopleInputs, tracker: PeopleTracker, view: "_View") -> Routine[list[SeenPerson]]:
         """Looks and turns in place until enough people were seen twice; returns them."""
@@ -146,10 +151,7 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
             return None
         X_WO, here_W = self.context.localiser.estimate().X_WO, self.context.pose()
         images: list[Image] = yield from self.sense(
-            lambda: [robot.image(camera.source) for camera in cameras],
-            latency_s=0.0,
-            name="pictures",
-            message=message,
+            lambda: [robot.image(camera.source) for camera in cameras], latency_s=0.0, name="pictures", message=message
         )
         if all(map(is_dark, images)):
             raise SkillFailure(Cause.EXECUTION, "it is too dark to see anybody")
@@ -177,13 +179,6 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
         return people_in_scan(scan, X_WB, robot.capabilities().footprint_m, survey=survey)
 
 
-def _observation(seen: SeenPerson, inputs: FindPeopleInputs) -> ObjectObservation:
-    """Observation of a person under the wanted name."""
-    x_m, y_m = seen.place_W
-    middle_W = (x_m, y_m, _SIZE_M[2] / 2)
-    return ObjectObservation(seen.stamp_s, ObjectKind(inputs.person), middle_W, _SIZE_M, 0.0, seen.score, inputs.place)
-
-
 class _View:
     """Possible positions of people in an area, with a mask of those that were in view."""
 
@@ -192,7 +187,7 @@ class _View:
         points = grid_inside(inputs.area_W, _GRID_M, first_m=_GRID_M / 2)
         known_W = np.array([one.position_W[:2] for one in inputs.avoid]).reshape(-1, 2)
         away_m = np.linalg.norm(points[:, None] - known_W[None], axis=2)
-        free = context.costmap.clearance_m(points) > _STANDS_M
+        free = context.costmap.clearance_m(points) > _PERSON_CLEAR_M
         self._points: FloatArray = points[free & (away_m > _AVOID_M).all(axis=1)]
         self._count = max(1, int(free.sum()))
         self._seen: NDArray[np.bool_] = np.zeros(len(self._points), bool)
@@ -215,7 +210,7 @@ class _View:
         best = (n for n in np.lexsort((drives_m, -gains)) if gains[n] > 0)
         footprint = ArmFootprint(self._context).now()
         poses = (pose for n in best if (pose := self._free_pose(self._points[n], hidden, footprint)) is not None)
-        return [NavigateInputs(pose, 0.2, 0.4) for pose in islice(poses, _VIEWPOINTS)]
+        return [NavigateInputs(pose, 0.2, 0.4) for pose in islice(poses, _BEST_VIEWPOINTS)]
 
     def _free_pose(self, at_W: FloatArray, hidden: FloatArray, footprint: Footprint) -> Pose2D | None:
         """A free pose at a position (2,), turned to the hidden positions if possible; None without one."""

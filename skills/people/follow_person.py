@@ -1,15 +1,12 @@
 """The follow_person skill: keeps behind a walking person, searches for a lost person, and asks."""
 
-import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from skills.api import Cause, ClearableCostmap, Failed, Running, SkillContext, Succeeded
-from skills.doorway import Doorway
 from skills.geometry import bearing_rad, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
@@ -25,7 +22,7 @@ from skills.people.followed_person import (
     people_about,
     poses_around,
     poses_behind,
-    poses_beyond,
+    poses_to_search,
 )
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
@@ -39,33 +36,57 @@ _SURELY_M = 0.1
 """Distance inside the edge of a place beyond which a person is certainly in it."""
 _SAME_PLACE_M = 1.5
 """Distance from the place where the person was seen last at which somebody is that person."""
-_WALKS_M_S, _THERE_M, _SEEN_S, _LOCKED = 0.25, 0.4, 0.6, 3
+_WALKS_M_S = 0.25
+"""Speed from which on a person walks."""
+_IN_VIEW_S = 0.6
+"""Age of the last view up to which a person is in view."""
+_AT_POSE_M = 0.4
+"""Distance from a pose of the search at which the robot is there; a radian counts half a metre."""
+_NEW_GOAL_M = 0.3
+"""Distance of a goal from which on the robot sets off; while it drives, the next one is that from the last goal."""
+_CHANGED_GOAL_M = 0.1
+_FAILED_DRIVES = 3
+"""Number of drives in a row that failed after which another person may be in the way."""
 _TRIED_AGAIN = (Cause.PLANNING, Cause.POSTCONDITION, Cause.EXECUTION)
-_CLEARED, _CLEARED_M, _LEFT_M = 20, 0.45, 0.7
-"""Last points of the trail about which the costmap is cleared, radius, and their least distance from the person."""
-_PERSON_M, _ASIDE_M, _BY_DOOR_M = 0.3, 4.0, 1.2
-"""Radius of a person on a path, reach of the search for a pose aside from it, and distance from a doorway."""
+_CLEARED_POINTS = 20
+"""Number of last points of the trail about which the costmap is cleared."""
+_CLEARED_M = 0.45
+"""Radius about each of them."""
+_LEFT_M = 0.7
+"""Distance from the person beyond which the trail is cleared."""
+_PERSON_M = 0.3
+"""Radius of a person on a path."""
+_BY_DOOR_M = 1.2
+"""Distance from a doorway at which robot or person may stand in its way."""
+_WAITED_SHARE = 0.25
+"""Share of the search at the beginning after which a standing person without a picture is followed, too."""
+_COMES_SHARE = 0.6
+"""Share of a person's speed towards the robot from which on they come to it."""
+_BETWEEN_M = 0.5
+"""Distance beyond `near_m` up to which a person who stands in the named place is there."""
 
 
 @dataclass(frozen=True)
 class FollowPersonOptions:
     """Distances (m) between the middles of robot and person, and patience (s).
 
-    The robot drives to `behind_m` behind the person's position in `ahead_s`, plans again every `replan_s`, and slows
-    down to stand at `close_m`. It stays while a standing person is within `near_m`, and turns to a person more than
-    `turn_rad` to the side. If the person comes towards it within `meeting_m`, it goes aside for at most `aside_s`. The
-    person is lost after `lost_s` out of view, or after `gone_s` once the robot stands at their last position. Then the
-    robot says so, searches beyond `doors` doors and in the named place, each for `search_s` or `plans` plans `again_s`
-    apart, and at last asks and listens for `asking_s`. It asks a doubtful person for the name within `hearing_m`, with
-    `answer_s` for the answer, and rejects the person after so many `silences`. It also asks a person who stands outside
-    the named place for `standing_s`. At the beginning it looks for the person for `finding_s`. It fails after `tries`
-    failed drives in a row, and at the end if the person was out of view for longer than `longest_loss_s`.
+    The robot drives to `behind_m` behind where the person will be in `ahead_s`, plans again every `replan_s`, and slows
+    down so that it stands at `close_m`. It stays where it is while a standing person is within `near_m`, and turns to
+    one who is more than `turn_rad` to the side. For a person who comes towards it within `meeting_m`, it goes aside by
+    up to `aside_m` for `aside_s` at most. A person who stays hidden for `lost_s` is lost, or for `gone_s` once the
+    robot stands where they were seen last: the robot says so, searches beyond `doors` doors and in the named place,
+    each for `search_s` or `plans` plans `again_s` apart, then asks and listens for `asking_s`. Somebody who may be
+    another is asked for the name within `hearing_m`, with `answer_s` for the answer, and is another after so many
+    `silences`. The robot also asks a person who stands outside the named place for `standing_s`. At the beginning it
+    looks for the person for `finding_s`. It fails after `tries` drives in a row that failed, and at the end if the
+    person was out of its sight for longer than `longest_loss_s`.
     """
 
     behind_m: Length = 1.6
     close_m: Length = 1.35
     near_m: Length = 2.0
     meeting_m: Length = 2.5
+    aside_m: Length = 4.0
     aside_s: Delay = 5.0
     ahead_s: Duration = 0.8
     replan_s: Duration = 0.5
@@ -95,7 +116,7 @@ class FollowPersonOptions:
 def _at_pace(context: SkillContext, max_speed_m_s: float) -> SkillContext:
     """The context with a controller at walking speed, if the controller has a speed limit."""
     controller: Any = context.stack.controller
-    if not hasattr(controller, "max_speed_m_s"):
+    if controller.max_speed_m_s == math.inf:
         return context
     limit_m_s = min(max_speed_m_s, context.robot.capabilities().max_speed_m_s)
     return replace(context, stack=replace(context.stack, controller=replace(controller, max_speed_m_s=limit_m_s)))
@@ -180,7 +201,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         """Looks for the person to follow. Raises SkillFailure when nobody is seen."""
         self._target, begun_s = None, self._now()
         while self._now() < begun_s + self.options.finding_s:
-            waited = self._now() - begun_s > 0.25 * self.options.finding_s
+            waited = self._now() - begun_s > _WAITED_SHARE * self.options.finding_s
             if (first := self._first(inputs, waited)) is not None:
                 say(self.context, "I follow you.")
                 return Target(first, self.context.pose(), self.options.target)
@@ -206,7 +227,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
             here, seen_W = self.context.pose(), target.seen.place_W
             if target.doubted is not None and not (yield from self._is_right(target, target.doubted)):
                 return False
-            near = not hidden_s and math.dist((here.x_m, here.y_m), seen_W) < self.options.near_m + 0.5
+            near = not hidden_s and math.dist((here.x_m, here.y_m), seen_W) < self.options.near_m + _BETWEEN_M
             rests = near and target.doubted is None and target.stands_still(self._now())
             if rests and place and inside_polygon(np.array([seen_W]), place, -_SURELY_M).all():
                 return True
@@ -227,7 +248,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         A person who says no, or is silent too often, is rejected.
         """
         here, seen, stands = self.context.pose(), target.seen, target.stands_still(self._now())
-        tracks = [one for one in self._company.watch.tracks() if one.stamp_s > self._now() - _SEEN_S]
+        tracks = [one for one in self._company.watch.tracks() if one.stamp_s > self._now() - _IN_VIEW_S]
         near = people_about(tracks, here, None, self.options.hearing_m, math.pi)
         if self._inputs.place_W is None:  # the person before the robot has no name
             target.doubted = None
@@ -237,15 +258,14 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         if stands:
             self._halt()
             self._plan(self._turned(here, seen.place_W))
-        asked = self.ask_for_name(self._inputs.person, self.options.answer_s)
-        try:
-            while not asked.done():
-                yield from self._tick(self._drive("asking who it is"))
-                if target.hidden_s(self._now()) and not stands:
-                    return True
-        finally:
-            asked.withdraw()
-        answer = asked.result()
+        answer = yield from self.ask_for_name(
+            self._inputs.person,
+            self.options.answer_s,
+            tick=lambda: self._tick(self._drive("asking who it is")),
+            enough=lambda: not stands and target.hidden_s(self._now()) > 0.0,
+        )
+        if answer is None:
+            return True
         self._silences = self._silences + 1 if answer not in ("yes", "no") else 0
         if answer == "yes":
             target.trust()
@@ -261,10 +281,11 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         self._company.most_m_s = math.inf
         if self._inputs.place_W is not None:  # the robot asks for the name
             target.farthest_m = math.inf
-        for goal in self._poses_to_search(target):
+        doors, here = self.context.doors, self.context.pose
+        for goal in poses_to_search(target, doors, self._inputs.until_W, self.options.doors, here, self._free):
             self._halt()
             until_s, tries = self._now() + self.options.search_s, 0
-            while _apart_m(goal, self.context.pose()) > _THERE_M and self._now() < until_s:
+            while _apart_m(goal, self.context.pose()) > _AT_POSE_M and self._now() < until_s:
                 if self._goal is None and self._now() >= self._planned_s + self.options.again_s:
                     if (tries := tries + 1) > self.options.plans:
                         break
@@ -286,7 +307,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
     def _plan(self, goal: Pose2D | None) -> None:
         """Starts or changes the drive; None keeps the present goal."""
         now = self._goal or self.context.pose()
-        if goal is None or _apart_m(goal, now) < (0.1 if self._goal else 0.3):
+        if goal is None or _apart_m(goal, now) < (_CHANGED_GOAL_M if self._goal else _NEW_GOAL_M):
             return
         inputs = NavigateInputs(goal, 0.15, 0.35, self._inputs.max_speed_m_s)
         if self._goal is None:
@@ -328,16 +349,16 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
     def _next_pose(self, target: Target, hidden_s: float) -> Pose2D | None:
         """The next goal pose: behind the person, or aside from the path of a person who comes towards the robot.
 
-        After `_LOCKED` failed drives in a row, it is aside from the path of the nearest other person.
+        After `_FAILED_DRIVES` drives in a row that failed, it is aside from the path of the nearest other person.
         """
         here, now_s, options = self.context.pose(), self._now(), self.options
         near = not hidden_s and math.dist((here.x_m, here.y_m), target.seen.place_W) < options.meeting_m
         away_m_s, blocks = target.away_m_s(here), near and self._blocks_door(target, here)
-        if blocks or (near and away_m_s < -max(_WALKS_M_S, 0.6 * target.speed_m_s)):
+        if blocks or (near and away_m_s < -max(_WALKS_M_S, _COMES_SHARE * target.speed_m_s)):
             if now_s >= self._aside_until_s:
                 self._aside = self._pose_aside(np.vstack([target.trail, line_through(target.seen, here, 0.0)]), here)
             self._aside_until_s = now_s + options.aside_s
-        elif self._tries >= _LOCKED and now_s >= self._aside_until_s:
+        elif self._tries >= _FAILED_DRIVES and now_s >= self._aside_until_s:
             others = people_about(self._company.others(), here, None, options.meeting_m, math.pi)
             self._aside = self._pose_aside(line_through(others[0], here, options.meeting_m), here) if others else None
             self._aside_until_s = now_s + options.aside_s if self._aside else -math.inf
@@ -356,7 +377,8 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
     def _pose_aside(self, path_W: FloatArray, here: Pose2D) -> Pose2D | None:
         """The nearest pose off the path (N, 2) of a person."""
         paths = with_discs(NoObstacles(), np.column_stack([path_W, np.full(len(path_W), _PERSON_M)]))
-        return pose_aside(self.context.free_space(), paths, self._outline, here, GivingWayOptions(reach_m=_ASIDE_M))
+        giving_way = GivingWayOptions(reach_m=self.options.aside_m)
+        return pose_aside(self.context.free_space(), paths, self._outline, here, giving_way)
 
     def _pose_behind(self, target: Target, hidden_s: float) -> Pose2D | None:
         """The nearest free pose behind the person on their trail; None to stay.
@@ -387,57 +409,24 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         return self._free(np.array([(here.x_m, here.y_m, wrap(here.yaw_rad + turn_rad))]))
 
     def _clear_trail(self, target: Target, hidden_s: float) -> None:
-        """Clears the costmap along the person's trail, because the LiDAR cannot clear cells behind a door jamb."""
-        trail = target.trail[-_CLEARED:]
+        """Clears the costmap where the person has walked: behind a jamb the LiDAR cannot see that they have gone."""
+        trail = target.trail[-_CLEARED_POINTS:]
         left = np.linalg.norm(trail - target.seen.place_W, axis=1) > (-1.0 if hidden_s else _LEFT_M)
         if isinstance(self.context.costmap, ClearableCostmap) and left.any():
             self.context.costmap.clear_obstacles(np.column_stack([trail[left], np.full(left.sum(), _CLEARED_M)]))
 
     def _is_clear(self, straight: FloatArray) -> bool:
-        """Returns whether the robot can drive straight from the first point to `close_m` before the second (2, 2)."""
-        length_m = float(np.linalg.norm(straight[1] - straight[0]))
+        """Returns whether the robot can drive straight from a point towards another one (2, 2), as far as it may."""
+        start, along = straight[0], straight[1] - straight[0]
+        length_m = float(np.linalg.norm(along))
         share = max(0.0, 1.0 - self.options.close_m / max(length_m, 1e-3))
-        points = np.linspace(
-            straight[0], straight[0] + share * (straight[1] - straight[0]), 1 + math.ceil(length_m / 0.1)
-        )
+        points = np.linspace(start, start + share * along, 1 + math.ceil(length_m / 0.1))
         return bool(self.context.free_space().clearance_m(points).min() > self._outline.inscribed_m + SAFE_MARGIN_M)
 
     def _free(self, poses: FloatArray) -> Pose2D | None:
         """The first of some poses (N, 3) with clearance."""
         clear = footprint_clearance_m(self.context.free_space(), self._outline, poses) > SAFE_MARGIN_M
         return Pose2D(*poses[int(np.argmax(clear))].tolist()) if clear.any() else None
-
-    def _poses_to_search(self, target: Target) -> Iterator[Pose2D]:
-        """Poses beyond the likeliest door, in the place where the person was going, and beyond more doors."""
-        likely = self._poses_beyond_doors(target)
-        yield from itertools.islice(likely, 1)
-        until_W = self._inputs.until_W
-        for door in self.context.doors if until_W else ():
-            for yaw in (door.through_rad, wrap(door.through_rad + math.pi)):
-                beyond = np.array(list(poses_beyond(door, yaw)))
-                is_in = inside_polygon(beyond[:1, :2], until_W or ()).all()
-                if is_in and (pose := self._free(beyond)) is not None:
-                    yield pose
-        yield from likely
-
-    def _poses_beyond_doors(self, target: Target) -> Iterator[Pose2D]:
-        """Poses behind the doors that the person may have taken: the likeliest door of each room in turn."""
-        place_W, heading, left = np.array(target.seen.place_W), np.array(target.seen.velocity_W), [*self.context.doors]
-
-        def unlikely_m(door: Doorway) -> float:
-            off = np.array(door.middle_W) - place_W
-            along = float(off @ heading) / max(float(np.linalg.norm(off) * np.linalg.norm(heading)), 1e-3)
-            return float(np.linalg.norm(off)) - 1.5 * along
-
-        for _ in range(min(self.options.doors, len(left))):
-            door = min(left, key=unlikely_m)
-            left.remove(door)
-            here, middle_W = self.context.pose(), np.array(door.middle_W)
-            heading = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
-            heading *= math.copysign(1.0, float((middle_W - (here.x_m, here.y_m)) @ heading))
-            place_W = middle_W + heading
-            if (pose := self._free(np.array(list(poses_beyond(door, math.atan2(*heading[::-1])))))) is not None:
-                yield pose
 
 
 def _apart_m(a: Pose2D, b: Pose2D) -> float:

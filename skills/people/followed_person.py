@@ -2,15 +2,16 @@
 
 import math
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Final
 
 import numpy as np
 
 from skills.api import FreeSpace
 from skills.doorway import Doorway
-from skills.geometry import bearing_rad, line_of_sight, wrap
+from skills.geometry import bearing_rad, inside_polygon, line_of_sight, wrap
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import predicted_place_W
 from skills.quantities import Delay, Length, Speed
@@ -32,8 +33,19 @@ _LOST_M = 5.0
 """A person farther from the robot is lost."""
 _GAP_M = 1.5
 """Distance from the trail at which a person was seen again and a new trail begins."""
-_LOOP_M, _LOOP_POINTS = 0.4, 8
-"""Distance from an earlier point of the trail, and its least age in points, at which the person has returned."""
+_LOOP_M = 0.4
+"""Distance from an earlier point of the trail at which the person has come back to it."""
+_LOOP_POINTS = 8
+"""Number of last points of the trail that are not earlier ones."""
+_POSE_STEP_M = 0.15
+"""Distance of poses along the trail."""
+_BEYOND_DOOR_M = (1.0, 1.4, 0.7, -0.8)
+"""Distances beyond a door from which the robot looks for the person."""
+_AHEAD_COUNTS_M = 1.5
+"""Distance by which a door straight ahead of a lost person counts as nearer."""
+_SCAN_S = 0.2
+"""Time between two scans, by which a view may be late."""
+_LINE_POINTS = 20
 
 
 @dataclass(frozen=True)
@@ -57,11 +69,7 @@ class TargetOptions:
 
 
 def people_about(
-    people: Sequence[SeenPerson],
-    here: Pose2D,
-    place_W: tuple[float, float] | None,
-    reach_m: float,
-    ahead_rad: float,
+    people: Sequence[SeenPerson], here: Pose2D, place_W: tuple[float, float] | None, reach_m: float, ahead_rad: float
 ) -> list[SeenPerson]:
     """The people within reach_m of a place, the nearest first; without a place, of the robot, and ahead of it."""
     centre_W = (here.x_m, here.y_m) if place_W is None else place_W
@@ -120,7 +128,7 @@ class Target:
 
     def stands_still(self, now_s: float) -> bool:
         """Returns whether the person has stood still for so long."""
-        long_enough = now_s - self._places[0][0] >= self._options.still_s - 0.2
+        long_enough = now_s - self._places[0][0] >= self._options.still_s - _SCAN_S
         last_W = self.seen.place_W
         return long_enough and all(math.dist(place, last_W) < self._options.still_m for _, place in self._places)
 
@@ -140,9 +148,8 @@ class Target:
         if one is None or now_s - one.stamp_s > self._options.hidden_s:
             one = self._again(tracks, now_s) or one
         if one is not None and one.stamp_s > self.seen.stamp_s:
-            strange = (
-                one.track != self.seen.track or math.dist(one.place_W, self.place_W(now_s)) > self._options.again_m
-            )
+            off_m = math.dist(one.place_W, self.place_W(now_s))
+            strange = one.track != self.seen.track or off_m > self._options.again_m
             again = strange and self.hidden_s(now_s) > self._options.sure_s
             if again and math.dist(self._trail[-1], one.place_W) > _GAP_M:
                 self._trail = [(one.here_W.x_m, one.here_W.y_m)]
@@ -209,7 +216,7 @@ def poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, fl
         if back_m - length > behind_m + _BACK_M:
             return
         along = math.atan2(*(trail[n] - trail[n - 1])[::-1])
-        for point in np.linspace(trail[n], trail[n - 1], max(1, math.ceil(length / 0.15)), endpoint=False):
+        for point in np.linspace(trail[n], trail[n - 1], max(1, math.ceil(length / _POSE_STEP_M)), endpoint=False):
             if np.linalg.norm(end - point) >= behind_m:
                 for yaw in (along, math.atan2(*(end - point)[::-1])) if n < len(trail) - 1 else (along,):
                     yield float(point[0]), float(point[1]), yaw
@@ -227,16 +234,60 @@ def poses_around(
             yield float(x), float(y), wrap(float(angle) + math.pi)
 
 
-def poses_beyond(door: Doorway, yaw_rad: float) -> Iterator[tuple[float, float, float]]:
-    """Poses beyond a door in a direction through it; the last one, before the door, has a view of the room."""
-    for far_m in (1.0, 1.4, 0.7, -0.8):
-        x, y = np.array(door.middle_W) + far_m * np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
-        yield float(x), float(y), yaw_rad
+def poses_to_search(
+    target: Target,
+    doors: Sequence[Doorway],
+    until_W: tuple[tuple[float, float], ...] | None,
+    most_doors: int,
+    here: Callable[[], Pose2D],
+    free: Callable[[FloatArray], Pose2D | None],
+) -> Iterator[Pose2D]:
+    """Yields poses beyond the likeliest door, in the area until_W where the person was going, and beyond more doors.
+
+    `free` gives the first of some poses with clearance.
+    """
+    likely = filter(None, map(free, _poses_beyond_doors(target, doors, most_doors, here)))
+    yield from islice(likely, 1)
+    for door in doors if until_W else ():
+        for yaw in (door.through_rad, wrap(door.through_rad + math.pi)):
+            beyond = _poses_beyond(door, yaw)
+            if inside_polygon(beyond[:1, :2], until_W or ()).all() and (pose := free(beyond)) is not None:
+                yield pose
+    yield from likely
+
+
+def _poses_beyond_doors(
+    target: Target, doors: Sequence[Doorway], most: int, here: Callable[[], Pose2D]
+) -> Iterator[FloatArray]:
+    """Yields poses (N, 3) beyond each door where the person may have gone: from room to room by the likeliest door."""
+    place_W, heading, left = np.array(target.seen.place_W), np.array(target.seen.velocity_W), [*doors]
+
+    def unlikely_m(door: Doorway) -> float:
+        off = np.array(door.middle_W) - place_W
+        along = float(off @ heading) / max(float(np.linalg.norm(off) * np.linalg.norm(heading)), 1e-3)
+        return float(np.linalg.norm(off)) - _AHEAD_COUNTS_M * along
+
+    for _ in range(min(most, len(left))):
+        door = min(left, key=unlikely_m)
+        left.remove(door)
+        pose, middle_W = here(), np.array(door.middle_W)
+        heading = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
+        heading *= math.copysign(1.0, float((middle_W - (pose.x_m, pose.y_m)) @ heading))
+        place_W = middle_W + heading
+        yield _poses_beyond(door, math.atan2(*heading[::-1]))
+
+
+def _poses_beyond(door: Doorway, yaw_rad: float) -> FloatArray:
+    """Poses (N, 3) beyond a door in a direction; the last is before it, where the robot sees into the room."""
+    x, y = door.middle_W
+    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+    return np.array([(x + far_m * c, y + far_m * s, yaw_rad) for far_m in _BEYOND_DOOR_M])
 
 
 def line_through(one: SeenPerson, here: Pose2D, beyond_m: float) -> FloatArray:
     """Points (20, 2) on the line from a person to the robot and on beyond it."""
     off = np.array((here.x_m, here.y_m)) - one.place_W
     return np.array(
-        one.place_W + np.linspace(0.0, 1.0 + beyond_m / max(float(np.linalg.norm(off)), 1e-3), 20)[:, None] * off
+        one.place_W
+        + np.linspace(0.0, 1.0 + beyond_m / max(float(np.linalg.norm(off)), 1e-3), _LINE_POINTS)[:, None] * off
     )

@@ -18,7 +18,7 @@ from skills.people.meet_person import MeetPerson, MeetPersonOptions, person_text
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.ports import GuidePersonInputs, GuidePersonPorts, MeetPersonInputs, NavigateInputs
-from skills.quantities import Delay, Length, Speed, Tries
+from skills.quantities import Delay, Length, Speed, Tries, Turn
 from skills.robot import Pose2D
 from skills.routine import ENDED_EARLY, Patience, Routine, SkillFailure
 from skills.small.speak import ListeningSkill, say
@@ -28,17 +28,19 @@ _NEAR: Final = MeetPersonOptions(apart_m=(1.3, 1.6, 2.2, 2.7))
 """Distances from a person who fell behind at which the robot stands, larger ones for a person in a doorway."""
 _SLOWEST_M_S = 0.25
 _CLEAR_M = SAFE_MARGIN_M + 0.05
+"""Clearance of a pose in a room, where the robot stands for longer."""
 _SURELY_M = 0.25
-"""Distance inside the edge of a room beyond which a person is certainly in it, and not in its door."""
-_AHEAD_M, _AHEAD_RAD = 3.0, 1.2
-_STEPS_IN, _STANDS_S = 3, 2.0
-"""Drives into the room, and time for which the person stands before its door."""
-_COMES_M, _STEP_IN_M, _YAWS_RAD = 2.7, 0.3, (0.0, 0.8, -0.8, 1.6, -1.6, 2.4, -2.4, math.pi)
-"""Distance at which a person comes after the robot, least further distance, and turns of the robot there."""
-_TIMES_ASKED, _ANSWER_S = 2, 5.0
-"""Number of questions for a doubtful person's name, and the time for each answer."""
-_ASK_AFTER_S, _WALKS_M_S, _ON_M = 2.0, 0.3, 2.0
-"""Wait before the robot asks the person to come; steps in which it searches ahead and back for a person."""
+"""Distance of a person from the edge of a room at which they are certainly in it, and not in its door."""
+_COMES_M = 2.7
+"""Distance from which on a person comes after the robot."""
+_STEP_IN_M = 0.3
+"""Least distance by which the robot goes further into a room."""
+_YAWS_RAD = (0.0, 0.8, -0.8, 1.6, -1.6, 2.4, -2.4, math.pi)
+"""Turns of the robot there from the direction away from the person, the best first."""
+_WALKS_M_S = 0.3
+"""Speed from which on a person who is out of sight has walked on."""
+_ON_M = 2.0
+"""Steps in which the robot looks for that person, ahead and back along the trail."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +48,11 @@ class GuidePersonOptions:
     """Distances between robot and person, and times.
 
     The robot drives at up to most_m_s while the person is within `close_m`, slower beyond, and stands beyond `wait_m`
-    or after `hidden_s` without a detection. After `behind_s` of standing it goes back for them, at most `returns`
-    times. At the goal it waits `arrive_s` for them. A detection within `same_m` of their expected position is theirs.
+    or when it has not seen them for `hidden_s`. After `behind_s` of standing it goes back for them, at most `returns`
+    times. At the goal it waits `arrive_s` for them, and goes further into the room, in `drives` at most, for a person
+    who has stood before its door for `outside_s`. Somebody within `same_m` of where they should be is taken for them,
+    without such a place the nearest person within `ahead_m` and `ahead_rad` ahead. A robot that waits says so after
+    `call_s`. Somebody who may be another is asked for the name `questions` times, with `answer_s` for each answer.
     """
 
     most_m_s: Speed = 0.7
@@ -58,6 +63,13 @@ class GuidePersonOptions:
     returns: Tries = 6
     arrive_s: Delay = 8.0
     same_m: Length = 1.2
+    ahead_m: Length = 3.0
+    ahead_rad: Turn = 1.2
+    drives: Tries = 3
+    outside_s: Delay = 2.0
+    call_s: Delay = 2.0
+    questions: Tries = 2
+    answer_s: Delay = 5.0
 
 
 class Leading(Navigate):
@@ -84,7 +96,7 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         self._target: Target | None = None
         self._doubted = False
         self._behind = Patience(self.context.clock, self.options.behind_s)
-        self._waiting, self._asked = Patience(self.context.clock, _ASK_AFTER_S), False
+        self._waiting, self._asked = Patience(self.context.clock, self.options.call_s), False
 
     def step(self) -> Step:
         """Looks for the person; then as `RoutineSkill.step`."""
@@ -99,9 +111,9 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         return super().step()
 
     def _candidates(self, tracks: Sequence[SeenPerson]) -> list[SeenPerson]:
-        """People who may be the guided person, likeliest first."""
-        reach_m = _AHEAD_M if self._place_W is None else self.options.same_m
-        return people_about(tracks, self.context.pose(), self._place_W, reach_m, _AHEAD_RAD)
+        """People who may be the one to guide, the likeliest first."""
+        reach_m = self.options.ahead_m if self._place_W is None else self.options.same_m
+        return people_about(tracks, self.context.pose(), self._place_W, reach_m, self.options.ahead_rad)
 
     def _gap_m(self) -> float:
         """Distance from the robot to the person, in metres; infinite while they are hidden."""
@@ -131,8 +143,8 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
 
     def _lead(self) -> Routine[bool]:
         """Drives to the goal; returns whether both are there, or False once the person is too far behind."""
-        inputs, goal = self._inputs, self._inputs.goal
-        for _ in range(_STEPS_IN):
+        inputs, goal, now_s = self._inputs, self._inputs.goal, self.context.clock.now
+        for _ in range(self.options.drives):
             drive = NavigateInputs(goal, 0.25, 0.4, self.options.most_m_s)
             leading = Leading(self.context, None, self._company)
             try:
@@ -143,8 +155,9 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
                     raise
                 if goal is not inputs.goal:
                     break
-            end_s = self.context.clock.now() + self.options.arrive_s
-            while not (self._are_there() or self._waits_outside(end_s)) and self.context.clock.now() < end_s:
+            end_s = now_s() + self.options.arrive_s
+            outside_s = end_s - self.options.arrive_s + self.options.outside_s
+            while not (self._are_there() or (self._is_close() and now_s() > outside_s)) and now_s() < end_s:
                 yield Running(f"waiting for {self._who} at {inputs.place}")
             further = None if self._are_there() else self._pose_further_in()
             if further is None:
@@ -154,18 +167,14 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         return self._are_there()
 
     def _make_sure(self) -> Routine[None]:
-        """Asks a doubtful person for their name, twice. Raises SkillFailure unless they say yes."""
-        doubted, answer = self._doubted or (self._target is not None and self._target.doubted is not None), ""
+        """Asks somebody who may be another for their name. Raises SkillFailure unless they say yes."""
+        doubted = self._doubted or (self._target is not None and self._target.doubted is not None)
         if self._inputs.place_W is None or not doubted:
             return
-        for _ in range(_TIMES_ASKED):
-            asked = self.ask_for_name(self._inputs.person, _ANSWER_S)
-            try:
-                while not asked.done():
-                    yield Running(f"asking whether it is {self._who}")
-            finally:
-                asked.withdraw()
-            if answer := asked.result():
+        answer: str | None = None
+        answer_s, asking = self.options.answer_s, Running(f"asking whether it is {self._who}")
+        for _ in range(self.options.questions):
+            if answer := (yield from self.ask_for_name(self._inputs.person, answer_s, lambda: [asking], lambda: False)):
                 break
         if answer != "yes":
             why = f"is not {self._who}" if answer else f"did not say whether they are {self._who}"
@@ -175,10 +184,6 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         """Sets the pace; returns whether the drive has to end, since the person fell behind or has ended it."""
         self._company.most_m_s = self._pace_m_s()
         return self._is_behind() or self.remark is not None
-
-    def _waits_outside(self, end_s: float) -> bool:
-        """Returns whether the person has stood near the robot for a while, but not at the goal."""
-        return self._is_close() and self.context.clock.now() > end_s - self.options.arrive_s + _STANDS_S
 
     def _pose_further_in(self) -> Pose2D | None:
         """Free pose in the room, far enough from the person's last position that they come in; None without one."""

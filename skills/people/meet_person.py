@@ -37,6 +37,12 @@ def person_text(name: str) -> str:
     return "the person" if name == PERSON else name
 
 
+def person_observation(seen: SeenPerson, name: str, place: str | None) -> ObjectObservation:
+    """Observation of a person under a name."""
+    middle_W = (*seen.place_W, PERSON_SIZE_M[2] / 2)
+    return ObjectObservation(seen.stamp_s, ObjectKind(name), middle_W, PERSON_SIZE_M, 0.0, seen.score, place)
+
+
 @dataclass(frozen=True)
 class MeetPersonOptions:
     """Positions of the robot near a person: at the first free of the distances `apart_m`, turned to the person.
@@ -114,10 +120,8 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
         return math.dist(place_W, (here.x_m, here.y_m)) <= self.options.near_m and self._sees(towards, place_W)
 
     def _is_beside(self, person: SeenPerson, near_m: float) -> bool:
-        return (
-            person.distance_m <= near_m
-            and abs(bearing_rad(self.context.pose(), person.place_W)) <= self.options.facing_rad
-        )
+        off_rad = abs(bearing_rad(self.context.pose(), person.place_W))
+        return person.distance_m <= near_m and off_rad <= self.options.facing_rad
 
     def _go_beside(self, place_W: tuple[float, float], name: str, within_m: float | None) -> Routine[None]:
         """Drives to the nearest free pose that faces a place. Raises SkillFailure when there is none."""
@@ -136,9 +140,5 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
         return bool(line_of_sight(self.context.costmap, np.array(place_W), at_W, beyond_m=_ARM_M)[0])
 
     def _met(self, inputs: MeetPersonInputs, person: SeenPerson) -> Succeeded:
-        x, y = person.place_W
-        middle_W, kind = (x, y, PERSON_SIZE_M[2] / 2), ObjectKind(inputs.person)
-        found = ObjectObservation(
-            person.stamp_s, kind, middle_W, PERSON_SIZE_M, 0.0, person.score, inputs.place or None
-        )
-        return Succeeded(f"beside {person_text(inputs.person)} at ({x:.2f}, {y:.2f})", {"person": found})
+        beside = f"beside {person_text(inputs.person)} at {place_text(person.place_W)}"
+        return Succeeded(beside, {"person": person_observation(person, inputs.person, inputs.place or None)})

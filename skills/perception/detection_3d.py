@@ -62,12 +62,9 @@ def detections_3d(
     return tuple(
         _detection_3d(image, localisation, detection, position, surfaces)
         for detection, position in placed
-        if position is not None and not _is_far_too_large(detection, position)
+        if position is not None
+        if position.spanned_m <= _FAR_TOO_LARGE * class_form(detection.class_name).length_m[1]
     )
-
-
-def _is_far_too_large(detection: Detection, position: Position) -> bool:
-    return position.spanned_m > _FAR_TOO_LARGE * class_form(detection.class_name).length_m[1]
 
 
 def _positions(image: Image, detections: Sequence[Detection]) -> list[Position | None]:
@@ -124,13 +121,10 @@ def place_covariance(p_W: FloatArray, p_WB: FloatArray, covariance: FloatArray) 
 
 def surface_below(p_W: FloatArray, base_m: float, surfaces: Sequence[Surface]) -> str | None:
     """Name of the surface below an object at p_W with its base at a height (m): "floor" for the floor, or None."""
-    off = {surface.name: abs(base_m - surface.height_m) for surface in surfaces if _above(surface, p_W)}
+    above = (one for one in surfaces if inside_polygon(p_W[None, :2], one.polygon_W, _SURFACE_MARGIN_M)[0])
+    off = {surface.name: abs(base_m - surface.height_m) for surface in above}
     near = [name for name in sorted(off, key=lambda name: off[name]) if off[name] < _SURFACE_HEIGHT_M]
     return near[0] if near else FLOOR if abs(base_m) < _FLOOR_HEIGHT_M else None
-
-
-def _above(surface: Surface, p_W: FloatArray) -> bool:
-    return bool(inside_polygon(p_W[None, :2], surface.polygon_W, _SURFACE_MARGIN_M)[0])
 
 
 def observation(detected: Detection3D, attributes: tuple[str, ...] = ()) -> ObjectObservation:

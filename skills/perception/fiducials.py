@@ -25,15 +25,21 @@ from skills.robot import FloatArray, Image, Picture
 from skills.routine import Routine, RoutineSkill
 from skills.world_model import Tag
 
-_SEARCHED_PX, _CROP_PX = 1280, 100
+_SEARCHED_PX = 1280
+"""Width to which a smaller picture is enlarged for the search."""
+_CROP_PX = 100
+"""Side to which a smaller marker is enlarged to be read."""
 _WINDOWS: Final = {"adaptiveThreshWinSizeMin": 5, "adaptiveThreshWinSizeMax": 29, "adaptiveThreshWinSizeStep": 8}
 _SMALL: Final = {"minMarkerPerimeterRate": 0.01}
 _EDGES: Final = {"cornerRefinementMethod": cv2.aruco.CORNER_REFINE_APRILTAG}
 _READ: Final = {"perspectiveRemovePixelPerCell": 8}
 _CORNER_SIGMA_PX: Final = 0.2
-_DEPTH_SIGMA_M, _DEPTH_SIGMA_PER_M = 0.002, 0.0015
+_DEPTH_SIGMA_M = 0.002
+_DEPTH_SIGMA_PER_M = 0.0015
+"""Growth of that deviation with the square of the depth."""
 _MOST_SIGMAS: Final = 3.0
-_FEWEST_DEPTHS, _MOST_DEPTHS = 12, 400
+_FEWEST_DEPTHS = 12
+_MOST_DEPTHS = 400
 _MOST_ERROR_PX: Final = 1.0
 _SAME_RAD: Final = 0.05
 """Angle between two rotations below which both solutions are one."""

@@ -39,12 +39,17 @@ _STEPS: Final = 8
 """Number of steps of iterated closest points."""
 _POINTS: Final = 250
 """Number of a segment's points that a refinement uses, about."""
-_HEIGHT_M, _HEIGHT_SHARE = 0.010, 0.06
-"""Largest difference of the height, in metres and as a part of the model's."""
-_WIDER_M, _LEAST_WIDTH = 0.015, 0.6
-"""Distance by which a segment may be wider than its model (m), and its least width as a part of the model's."""
-_WIDER_THAN_BOX_M, _LEAST_OF_BOX = 0.010, 0.8
+_HEIGHT_M: Final = 0.010
+"""Largest difference of the height, plus the next share of the model's height."""
+_HEIGHT_SHARE: Final = 0.06
+_WIDER_M: Final = 0.015
+"""Distance by which a segment may be wider than its model."""
+_LEAST_WIDTH: Final = 0.6
+"""Least width of a segment as a share of its model's width."""
+_WIDER_THAN_BOX_M: Final = 0.010
 """The same for a model of photographs: what is hidden in part does not look as in them."""
+_LEAST_WIDTH_OF_BOX: Final = 0.8
+"""Least width of a segment as a share of the width of a model of photographs."""
 _FAR_M: Final = 0.02
 """Distance from the model beyond which a point is not on it."""
 _FAR_SIGMAS: Final = 10.0
@@ -64,12 +69,20 @@ _MOST_HIDDEN: Final = 0.5
 _OPAQUE: Final = 127
 _LOW_M: Final = 0.02
 """Height below which points stand for the object's lowest part, too, which the surface's noise hides."""
-_SMOOTH_PX, _PARTS, _DIRECTIONS = 2.0, 6, 9
-"""Deviation of the smoothing of colours, parts along each side of a view, and directions of gradients."""
-_GAIN, _FAR_LAB = (0.6, 1.4), 60.0
-"""Limits of the ratio of lightness to a photograph's, and difference beyond which colours are only different."""
-_COLOUR, _GRADIENTS, _OUTLINE = 20.0, 0.22, 0.8
-"""Differences of colours (Lab), gradients and outlines (0 to 1) that each make the likeness 1 / e."""
+_SMOOTH_PX: Final = 2.0
+"""Standard deviation of the smoothing of colours."""
+_PARTS: Final = 6
+"""Parts along each side of a view that have a histogram of gradients."""
+_DIRECTIONS: Final = 9
+"""Directions in a histogram of gradients."""
+_GAIN: Final = (0.6, 1.4)
+"""Limits of the ratio of lightness to a photograph's."""
+_FAR_LAB: Final = 60.0
+"""Difference beyond which colours are only different."""
+_COLOUR_LAB: Final = 20.0
+"""Difference of colours that makes the likeness 1 / e; the next two do so for gradients and outlines (0 to 1)."""
+_GRADIENTS: Final = 0.22
+_OUTLINE: Final = 0.8
 
 
 def seen_view(cluster: Cluster, image: Image, X_WC: RigidTransform) -> NDArray[np.uint8]:
@@ -94,7 +107,7 @@ def likeness(seen: NDArray[np.uint8], views: NDArray[np.uint8]) -> float:
     off = np.minimum(np.linalg.norm(a - b, axis=-1), _FAR_LAB)
     colour = (off * both).sum(axis=(1, 2)) / np.maximum(both.sum(axis=(1, 2)), 1)
     gradients = _gradients(views) @ _gradients(seen[None])[0]
-    terms = (colour / _COLOUR, (1.0 - gradients) / _GRADIENTS, (1.0 - outline) / _OUTLINE)
+    terms = (colour / _COLOUR_LAB, (1.0 - gradients) / _GRADIENTS, (1.0 - outline) / _OUTLINE)
     return float(np.exp(-sum(term**2 for term in terms)).max())
 
 
@@ -183,7 +196,7 @@ def _first_poses(cluster: Cluster, p_W: FloatArray, sight: Sight, model: ObjectM
     near = float(np.percentile(p_W @ along, 2))
     tried = list[tuple[float, RigidTransform]]()
     some = p_W[:: max(1, len(p_W) // 120)]
-    least, wider_m = (_LEAST_OF_BOX, _WIDER_THAN_BOX_M) if len(model.views) else (_LEAST_WIDTH, _WIDER_M)
+    least, wider_m = (_LEAST_WIDTH_OF_BOX, _WIDER_THAN_BOX_M) if len(model.views) else (_LEAST_WIDTH, _WIDER_M)
     for R in model.rests:
         rest = model.points @ R.T
         top_m = float(np.ptp(rest[:, 2]))

@@ -41,8 +41,10 @@ _FRONT_TO_AXIS_M = 0.1
 _AXIS_SIGMA_M = 0.08
 _OWN_M = (0.1, 0.05)
 """Reach of the robot beyond its outline: behind, to the sides."""
-STOWED_AHEAD_M, ARM_AHEAD_M = 0.05, 0.19
-"""Reach of the robot beyond its outline ahead: with a stowed, empty arm, and else."""
+STOWED_AHEAD_M = 0.05
+"""Reach of the robot beyond its outline ahead, with a stowed, empty arm."""
+ARM_AHEAD_M = 0.19
+"""The same with any other arm."""
 
 
 @dataclass(frozen=True)
@@ -95,11 +97,7 @@ def people_in_scan(
 
 
 def _unexplained_clusters(
-    scan: Scan,
-    X_WB: RigidTransform,
-    own_m: FloatArray,
-    furthest_m: float,
-    survey: SurveyView,
+    scan: Scan, X_WB: RigidTransform, own_m: FloatArray, furthest_m: float, survey: SurveyView
 ) -> list[FloatArray]:
     """Clusters of returns, in the levelled body frame, that the survey does not explain."""
     points = scan_points(scan, azimuths=_COLUMNS, heights_m=_BODY_HEIGHTS_M, max_range_m=furthest_m + 0.5)[:, :3]

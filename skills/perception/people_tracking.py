@@ -35,8 +35,9 @@ _PREDICTED_S = 1.5
 """Longest time over which a person is taken to keep the velocity."""
 _GATE = 16.0
 """Largest squared Mahalanobis distance of a detection from its track."""
-_GROWTH_M_S, _GROWTH_M = 0.5, 1.0
-"""Growth of the largest distance while a person is hidden, and its most."""
+_GROWTH_M_S = 0.5
+"""Growth of the largest distance to a track's prediction while the person is hidden."""
+_MOST_GROWTH_M = 1.0
 _NO_MATCH = 1e6
 
 
@@ -117,7 +118,7 @@ class PeopleTracker:
         state, covariance = track.at(one.stamp_s)
         off = _place_then(track, one) - state[:2]
         hidden_s = max(0.0, one.stamp_s - track.seen.stamp_s - _PREDICTED_S)
-        if math.hypot(*off) > self._same_m + min(_GROWTH_M, _GROWTH_M_S * hidden_s):
+        if math.hypot(*off) > self._same_m + min(_MOST_GROWTH_M, _GROWTH_M_S * hidden_s):
             return _NO_MATCH
         spread = covariance[:2, :2] + _sigma2(one)
         distance = float(off @ np.linalg.solve(spread, off))
@@ -350,15 +351,12 @@ class PeopleWatch:
             stamp_s = found[0].stamp_s if found else stamp_s
             self._tracker.update(found, by_scan=False, apart_m=options.same_m)
         self._tracker.revise(lambda one: self._count_miss(one, look, stamp_s))
-        self._tracker.revise(lambda one: one if self._stays(one) else None)
+        tracks = self._options.track_m > 0.0
+        self._tracker.revise(lambda one: one if self._remembered(one) or (tracks and self._is_tracked(one)) else None)
         self._suspected = look.suspected
         self._soon = look.suspected or any(one.looks == 1 for one in self._seen)
         if any(look.found) or any(one.looks for one in before):
             self._context.publish(PEOPLE_TOPIC, self._message())
-
-    def _stays(self, one: SeenPerson) -> bool:
-        """Returns whether a person is remembered, or still tracked in scans."""
-        return self._remembered(one) or (self._options.track_m > 0.0 and self._is_tracked(one))
 
     def _count_miss(self, one: SeenPerson, look: _Look, stamp_s: float) -> SeenPerson:
         """Counts a miss of a person whom the view should have shown and did not."""

@@ -150,10 +150,7 @@ def may_rest(xy: FloatArray, height_m: FloatArray) -> Mask:
     before = np.maximum.accumulate(np.where(first, gaps - gap, 0))
     starts = np.flatnonzero(first | gap)
     rests = _with_parts_that_stick_out(
-        cells[order][starts],
-        height[starts],
-        np.maximum.reduceat(height, starts),
-        (gaps == before)[starts],
+        cells[order][starts], height[starts], np.maximum.reduceat(height, starts), (gaps == before)[starts]
     )
     found = np.empty(len(order), dtype=np.bool_)
     found[order] = np.repeat(rests, np.diff(starts, append=len(order)))
@@ -178,7 +175,9 @@ def _with_parts_that_stick_out(cells: NDArray[np.int64], low_m: FloatArray, high
 
 
 _CELL_M = 0.05
-_OUT, _HIDDEN, _SEEN = 0, 1, 2
+_OUT = 0
+_HIDDEN = 1
+_SEEN = 2
 _NEAR_M = 0.04
 _NEAR_PER_M = 0.02
 _MUCH_HIDDEN = 0.04

@@ -337,10 +337,8 @@ def _halves(outline: NDArray[np.uint8], seen: _SeenCells) -> list[NDArray[np.uin
         parts = [(nearest == n) & (outline > 0) for n in range(len(cores))]
         if min(map(np.count_nonzero, parts)) * _OUTLINE_CELL_M**2 < _LEAST_PART_M2:
             continue
-        eroded_m2 = (
-            np.count_nonzero((outline > 0) & (off_m.min(axis=0) > eroded_m + 1.5 * _OUTLINE_CELL_M))
-            * _OUTLINE_CELL_M**2
-        )
+        neck = (outline > 0) & (off_m.min(axis=0) > eroded_m + 1.5 * _OUTLINE_CELL_M)
+        eroded_m2 = np.count_nonzero(neck) * _OUTLINE_CELL_M**2
         short = eroded_m2 < max(_LEAST_NECK_M2, 8.0 * eroded_m**2)
         narrow = eroded_m < _NECK_SHARE * min(float(inside_m[part].max()) for part in parts)
         convex = all(_convexity(part) > max(_CONVEX, whole + _MORE_CONVEX) for part in parts)

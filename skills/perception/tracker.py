@@ -34,7 +34,8 @@ _SEEN_BY_CHANCE = 0.25
 _NEW_IN_A_VIEW = 0.5
 """Share of a view's evidence that is new; 1 would be views with independent errors."""
 _MOST_SURE = 0.97
-_MOST_BELIEF, _LEAST_BELIEF = 0.999, 0.05
+_MOST_BELIEF = 0.999
+_LEAST_BELIEF = 0.05
 
 
 @dataclass(frozen=True)
@@ -58,9 +59,7 @@ class Track:
     @property
     def class_name(self) -> str:
         """Likeliest class; `ANY_OBJECT` where no view had a label."""
-        return (
-            ANY_OBJECT if self.best.class_name == ANY_OBJECT else max(self.classes, key=lambda name: self.classes[name])
-        )
+        return ANY_OBJECT if self.best.class_name == ANY_OBJECT else max(self.classes, key=self.classes.__getitem__)
 
     @property
     def class_belief(self) -> float:
@@ -201,13 +200,15 @@ def _fused(track: Track, detected: Detection3D, names: Sequence[str]) -> Track:
     track_information, information = np.linalg.inv(track.covariance), np.linalg.inv(_spread(detected))
     covariance = np.linalg.inv(track_information + information)
     position = covariance @ (track_information @ track.position_W + information @ detected.position_W)
+    eye = _point(detected.eye_W)
+    known = any(math.dist(one, eye) < DIFFERENT_PLACES_M for one in track.eyes_W)
     return replace(
         track,
         classes=_classes(track.classes, detected),
         belief=_updated(track.belief, _evidence(detected)),
         position_W=position,
         covariance=covariance,
-        eyes_W=_with_eye(track.eyes_W, _point(detected.eye_W)),
+        eyes_W=track.eyes_W if known else (*track.eyes_W, eye),
         latest=_latest(track, detected),
         best=max(track.best, detected, key=lambda one: (one.class_name != ANY_OBJECT, one.detection.score)),
     )
@@ -256,13 +257,6 @@ def _updated(belief: float, ratio: float) -> float:
 
 def _odds(probability: float) -> float:
     return probability / (1.0 - probability)
-
-
-def _with_eye(
-    eyes: tuple[tuple[float, float, float], ...], eye: tuple[float, float, float]
-) -> tuple[tuple[float, float, float], ...]:
-    """Camera positions with one more, if it is a different one."""
-    return eyes if any(math.dist(one, eye) < DIFFERENT_PLACES_M for one in eyes) else (*eyes, eye)
 
 
 def _point(p: FloatArray) -> tuple[float, float, float]:

@@ -1,12 +1,12 @@
 """The speak skill says a sentence to the people around; skills that move speak and listen by the same means."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
 from skills.api import Cause, Failed, InputsT, Job, Part, Question, Running, Skill, SkillContext, Step, Succeeded
 from skills.quantities import Delay
-from skills.routine import RoutineSkill
+from skills.routine import Routine, RoutineSkill
 
 SPEECH_TOPIC: Final = "speech"
 LONGEST_TEXT: Final = 500
@@ -101,10 +101,23 @@ class ListeningSkill(RoutineSkill[InputsT]):
         """Words that somebody has said, or nothing so far."""
         return self._heard.result() if self._heard is not None and self._heard.done() else None
 
-    def ask_for_name(self, person: str, answer_s: float) -> Job[str]:
-        """Asks "Are you Robin?"; the answer is "yes", "no", or "" when nobody answers within answer_s."""
+    def ask_for_name(
+        self, person: str, answer_s: float, tick: Callable[[], Iterable[Running]], enough: Callable[[], bool]
+    ) -> Routine[str | None]:
+        """Asks "Are you Robin?"; returns "yes", "no", or "" when nobody answers within answer_s.
+
+        Waits by `tick`; returns None once `enough` holds.
+        """
         name = f"{self.name} of {self.context.robot.name}"
-        return self.context.ask(Question(name, f"Are you {person}?", ("yes", "no"), "", answer_s))
+        asked = self.context.ask(Question(name, f"Are you {person}?", ("yes", "no"), "", answer_s))
+        try:
+            while not asked.done():
+                yield from tick()
+                if enough():
+                    return None
+        finally:
+            asked.withdraw()
+        return asked.result()
 
     def begin(self, inputs: InputsT) -> None:
         """Starts to listen; see `RoutineSkill.begin`."""

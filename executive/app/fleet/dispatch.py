@@ -360,9 +360,7 @@ class Dispatch(Assigner):
         seen = None if report is None else {key: value for key, value in vars(report).items() if key != "events"}
         self._given.judge(number, seen)
         ended = EndedTree(
-            tree,
-            node_view(tree.root, result.states),
-            robot_report(result, self.robots[name].kind, report),
+            tree, node_view(tree.root, result.states), robot_report(result, self.robots[name].kind, report)
         )
         self.over.append(EndedMission(number, ended, since_s, self._now_s))
         self._end_part(number, Share(tree, result, len(tree.parts)), seen)

@@ -84,10 +84,7 @@ def fleet_mission(
 
 
 def _options(
-    stored: StoredMission,
-    world: World,
-    knowledge: Knowledge,
-    robots: Mapping[str, PlacedRobot],
+    stored: StoredMission, world: World, knowledge: Knowledge, robots: Mapping[str, PlacedRobot]
 ) -> Mapping[str, Prepared]:
     request = stored.request
     if request.world_name != world.name:

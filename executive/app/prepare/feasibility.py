@@ -23,7 +23,7 @@ from skills.inputs.errors import Problems
 from skills.manipulation.arm.kinematics import arm_model
 from skills.perception.class_forms import class_forms, known_attributes, shipped_forms
 from skills.robot import Capabilities, Pose2D
-from skills.stack import DEFAULT_FILE, default_component
+from skills.stack import DEFAULT_FILE, ControllerComponent, default_component
 
 
 class _RoutesOnMap(RoutePlanner):
@@ -52,8 +52,8 @@ class _RoutesOnMap(RoutePlanner):
 
     def _full_m_s(self) -> float:
         """Full speed of the robot with its controller."""
-        most_m_s = self._robot.capabilities.max_speed_m_s
-        return min(most_m_s, getattr(self._component("controller"), "max_speed_m_s", most_m_s))
+        controller: ControllerComponent = self._component("controller")
+        return min(self._robot.capabilities.max_speed_m_s, controller.max_speed_m_s)
 
     def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
         """Plans a route. Raises ValueError with one sentence if there is none, InputError if the map is broken."""

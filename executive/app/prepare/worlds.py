@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 
 from executive.words.knowledge import Knowledge, load_knowledge
-from plant.worlds.world import WORLDS_FOLDER, World, WorldError, known_worlds, load_world
+from plant.worlds.world import WORLDS_FOLDER, UnknownWorldError, World, WorldError, known_worlds, load_world
 from skills.inputs.errors import InputError, known_names, suggestion
 
 
@@ -13,11 +13,11 @@ def open_world(name: str) -> World:
     """Opens a world by its name or folder. Raises InputError."""
     try:
         return load_world(name)
-    except (WorldError, OSError) as error:
-        if isinstance(error, WorldError) and not str(error).startswith("unknown world"):
-            raise InputError(str(error)) from error
+    except (UnknownWorldError, OSError) as error:
         known = f"{known_names(name, known_worlds())}, and folders with a world.dmd.yaml"
         raise InputError(f"unknown world '{name[:60]}'", hint=suggestion(name, known_worlds(), known)) from error
+    except WorldError as error:
+        raise InputError(str(error)) from error
 
 
 def refuse_unusable(world: World) -> None:

@@ -133,11 +133,7 @@ class EndedTree:
 
 
 def write_report(
-    prepared: Prepared,
-    report: RunReport,
-    ended: Sequence[EndedTree],
-    artifacts: Artifacts,
-    events: Sequence[Event],
+    prepared: Prepared, report: RunReport, ended: Sequence[EndedTree], artifacts: Artifacts, events: Sequence[Event]
 ) -> Path:
     """Writes the report of a run and the picture of each tree into its folder; returns the report's path.
 

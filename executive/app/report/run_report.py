@@ -210,11 +210,7 @@ _LONG_TEXT: Final = 100
 _SENTENCE_END: Final = re.compile(r"(?<=[.!?;]) (?=\S)")
 NOT_JUDGED: Final = RefereeReport(None, "there is no referee", 0, 0)
 VERDICTS: Final[Mapping[bool | None, str]] = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
-_MARKS: Final[Mapping[bool | None, str]] = {
-    True: "[green]✓[/green]",
-    False: "[red]✗[/red]",
-    None: "[yellow]?[/yellow]",
-}
+_MARKS: Final[Mapping[bool | None, str]] = {True: "[green]✓[/green]", False: "[red]✗[/red]", None: "[yellow]?[/yellow]"}
 
 
 @cache

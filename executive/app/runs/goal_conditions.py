@@ -121,12 +121,7 @@ def _answers(part: StepPart, condition: GoalCondition, result: RobotResult, *, d
 
 
 def _timed(
-    condition: GoalCondition,
-    one: Execution,
-    share: Share,
-    moves: Sequence[_Move],
-    *,
-    last: bool,
+    condition: GoalCondition, one: Execution, share: Share, moves: Sequence[_Move], *, last: bool
 ) -> GoalCondition:
     """Returns the condition of one execution with the times at which it must hold."""
     result, ended_s = share.result, math.inf if one.ended_s is None else one.ended_s

@@ -192,7 +192,10 @@ def route_points(path: Path) -> list[tuple[float, float]]:
 
 _WIDEST: Final = 1400
 _GREY: Final = {"free": 250, "unknown": 190, "occupied": 40}
-_TRAJECTORY, _LOOP, _ROBOT, _GOAL = (70, 120, 220), (230, 150, 30), (30, 140, 60), (225, 60, 30)
+_TRAJECTORY: Final = (70, 120, 220)
+_LOOP: Final = (230, 150, 30)
+_ROBOT: Final = (30, 140, 60)
+_GOAL: Final = (225, 60, 30)
 
 
 def map_picture(ground: GridMap, graph: PoseGraph, pose: Pose2D, goal: Pose2D | None) -> Picture:

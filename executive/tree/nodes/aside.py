@@ -16,7 +16,8 @@ from skills.geometry import compose
 from skills.quantities import Coordinate, Length
 from skills.robot import Pose2D
 
-_STEP_M, _FLOOR_HALF_M = 0.2, 1.2
+_STEP_M: Final = 0.2
+_FLOOR_HALF_M: Final = 1.2
 _CORNERS: Final = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 Circle = tuple[Coordinate, Coordinate, Length]
 SETTLE_S: Final = 0.5
@@ -117,9 +118,8 @@ def move_aside_plan(
         pose_key=pose,
         surfaces=tuple(map(below.surface, below.knowledge.surfaces)),
     )
-    before = below.skill(
-        "approach", {"observation": FromBoard(obstacle), "surfaces": surfaces}, {"observation": obstacle}
-    )
+    seen = {"observation": FromBoard(obstacle), "surfaces": surfaces}
+    before = below.skill("approach", seen, {"observation": obstacle})
     stay = below.pause("stay", "take it from here", SETTLE_S)
     put = below.skill("place", {"surface": FromBoard(surface), "clear_of": FromBoard(clear)})
     back = below.at("back").skill("place", {"surface": FromBoard(surface)})

@@ -352,11 +352,8 @@ class ArmSkill(RoutineSkill[InputsT]):
         """
         X_BH, planner = self.model.X_BH(self.q_rad()), self.context.stack.arm_planner
         path = planner.line(self.model, self.q_rad(), RigidTransform(X_BH.rotation(), X_BH.translation() + offset_B))
-        return (
-            yield from self.follow(
-                planner.trajectory(path, speed_rad_s=speed_rad_s), message, self.contact_guard(direction_B)
-            )
-        )
+        trajectory, guard = planner.trajectory(path, speed_rad_s=speed_rad_s), self.contact_guard(direction_B)
+        return (yield from self.follow(trajectory, message, guard))
 
     def contact_guard(self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M) -> Callable[[FloatArray], bool]:
         """A guard for `follow` that stops a slow hand at contact, when it lags along a direction."""

@@ -239,13 +239,7 @@ class _Shape:
 class _Obstacles:
     """Boxes around the arm and the robot's shapes, as arrays."""
 
-    def __init__(
-        self,
-        model: ArmModel,
-        shapes: Sequence[_Shape],
-        boxes: _Arrays,
-        padding_m: float,
-    ) -> None:
+    def __init__(self, model: ArmModel, shapes: Sequence[_Shape], boxes: _Arrays, padding_m: float) -> None:
         """Stores boxes as half extents (N, 3), rotations (N, 3, 3) and centres (N, 3) in the body frame."""
         self._padding_m, self._boxes, self._frames = padding_m, boxes, model.frames
         self._moved = [shape for shape in shapes if shape.joint != FIXED]

@@ -108,12 +108,7 @@ class HeldObject:
         return bool(height < _FLAT * min(x, y))
 
     def above(
-        self,
-        p_BT: FloatArray,
-        p_BS: FloatArray,
-        above_m: float,
-        tilt_rad: float = 0.0,
-        along_rad: float | None = None,
+        self, p_BT: FloatArray, p_BS: FloatArray, above_m: float, tilt_rad: float = 0.0, along_rad: float | None = None
     ) -> Iterator[RigidTransform]:
         """Yields hand poses with the object, upright as before, at a height over a point p_BT of a surface.
 

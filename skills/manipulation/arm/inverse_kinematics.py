@@ -164,15 +164,7 @@ def _solve(
 
 @compiled
 def _wrist(
-    R: NDArray[np.float64],
-    c1: float,
-    s1: float,
-    c2: float,
-    s2: float,
-    c3: float,
-    s3: float,
-    c4: float,
-    s4: float,
+    R: NDArray[np.float64], c1: float, s1: float, c2: float, s2: float, c3: float, s3: float, c4: float, s4: float
 ) -> tuple[float, float, float]:
     """Returns the last three angles, by the cosines and sines of the first four, for the last link's rotation R."""
     # Columns of Rz(q1) Ry(q2) Rx(q3) Ry(q4), first in the panned frame.

@@ -267,11 +267,7 @@ def _has_closed_form(joints: tuple[ChainJoint, ...]) -> bool:
 
 
 @lru_cache(maxsize=4)
-def _read_model(
-    description: str,
-    names: tuple[str, ...],
-    stowed: tuple[float, ...],
-) -> ArmModel:
+def _read_model(description: str, names: tuple[str, ...], stowed: tuple[float, ...]) -> ArmModel:
     robot = ElementTree.fromstring(description.replace("drake:", "drake-"))  # the prefix is often left undeclared
     elements = {element.get("name"): element for element in robot.findall("joint")}
     missing = [name for name in names if name not in elements]

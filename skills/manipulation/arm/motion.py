@@ -146,11 +146,7 @@ class RrtConnect:
             rounded = _rounded(dense)
             dense = rounded if scene.path_free(rounded[::3]) else dense
         times = _times(dense, speed_rad_s or self.speed_rad_s, self.acceleration_rad_s2)
-        samples = (
-            np.append(np.arange(0.0, times[-1], self.sample_s)[:-1], times[-1])
-            if times[-1] > self.sample_s
-            else times[-1:]
-        )
+        samples = np.append(np.arange(0.0, times[-1], self.sample_s)[:-1], times[-1])
         positions = np.stack([np.interp(samples, times, dense[:, j]) for j in range(dense.shape[1])], axis=1)
         return ArmTrajectory(np.asarray(samples, dtype=float), positions)
 

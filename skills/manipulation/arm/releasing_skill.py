@@ -126,9 +126,6 @@ def retreats_B(X_BH: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
 
     The last ones point towards the shoulder at p_BS: a stretched arm has no others.
     """
-    directions_B = (
-        -X_BH.rotation().matrix()[:, 0],
-        UP_B,
-        math.sqrt(0.5) * (UP_B + towards_shoulder(p_BS, X_BH.translation())),
-    )
+    up_and_back_B = math.sqrt(0.5) * (UP_B + towards_shoulder(p_BS, X_BH.translation()))
+    directions_B = (-X_BH.rotation().matrix()[:, 0], UP_B, up_and_back_B)
     return [back_m * direction_B for direction_B in directions_B for back_m in _BACK_M]

@@ -123,10 +123,8 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
     """
     xy = view.plane_points.p_W[:, :2]
     low, high = np.percentile(xy, [0.2, 99.8], axis=0)
-    low, high = (
-        np.minimum(low, np.array(centre) - SURFACE_AROUND_M),
-        np.maximum(high, np.array(centre) + SURFACE_AROUND_M),
-    )
+    low = np.minimum(low, np.array(centre) - SURFACE_AROUND_M)
+    high = np.maximum(high, np.array(centre) + SURFACE_AROUND_M)
     corners = ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))
     top_m = view.plane.height_m - _SURFACE_YIELDS_M
     return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), top_m)

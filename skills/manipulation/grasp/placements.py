@@ -21,12 +21,28 @@ UPRIGHT_M: Final = 0.075
 """An object higher than this is grasped from the side."""
 _BIN_M = 0.01
 """Length of the slices of an outline."""
-_BREADTH_M = 0.036
+_LOCAL_HALF_M = 0.036
 """Half the length of an outline within which its local width is measured."""
-_YIELD_M = 0.004
+_FEWEST_LOCAL_POINTS = 8
+"""A length of an outline with fewer points has no local width."""
+_FINGER_YIELDS_M = 0.004
 """Depth by which a finger yields to an outline that it touches."""
-_ALIGNING_RAD = np.linspace(-0.28, 0.28, 15)
+_EDGES_PERCENT = (1, 99)
+"""Percentiles of points at the two edges of an outline; strays lie beyond them."""
+_OBLIQUE_RAD = np.linspace(-0.28, 0.28, 15)
 """Angles by which a part of an outline may lie oblique to the whole."""
+_SQUARE_RATIO = 1.4
+"""Ratio of length to width below which an object is grasped along both axes."""
+_SHIFTS_M = (0.0, 0.03, -0.03, 0.06, -0.06, 0.09, -0.09)
+"""Distances along a long object from its centre of mass at which it is grasped."""
+_FLAT_HALF_DEPTH_M = 0.02
+"""Half the depth to which the fingers enclose a flat object along their approach."""
+_ROUND_TURNS_RAD = (0.0, 0.3, -0.3, 0.6, -0.6, 0.9, -0.9)
+"""Angles from the direction of the shoulder at which a round object is approached."""
+_PER_ROUND_TURN_RAD = 0.5
+"""Cost of such an angle, per radian."""
+_PER_OFF_AHEAD_RAD = 0.15
+"""Cost of the angle between any other approach and the direction from the shoulder, per radian."""
 _LEAST_TOUCHING = 0.55
 """Least part of a finger's breadth that must touch the outline."""
 _FINGER_HALF_M = 0.03
@@ -42,19 +58,26 @@ _PER_WIDTH_M = 2.0
 _WIDE_M = 0.095
 """Local width from which on the fingers have little space on both sides."""
 _PER_WIDE_M = 20.0
-_SLIM_M, _PER_SLIM_M = 0.01, 40.0
-"""Local width below which a part turns in the fingers, and its cost per metre."""
-"""Additional cost of the local width beyond that."""
+"""Additional cost of the local width beyond that, per metre."""
+_SLIM_M = 0.01
+"""Local width below which a part turns in the fingers."""
+_PER_SLIM_M = 40.0
+"""Additional cost of the width missing below that, per metre."""
+_USUAL_SHARE = 0.56
+"""Usual height of a grip, as a share of the height of a low upright object, within the next limits."""
+_USUAL_HEIGHTS_M = (0.05, 0.095)
+_USUAL_SHARE_OF_TALL = 0.45
+"""Least usual height of a grip, as a share of the object's height; decisive for a tall one."""
 _SLICE_M = 0.03
 """Half the height of a slice of an upright object, and the distance between slices."""
 _FEWEST_POINTS = 25
 """A slice with fewer points has no outline."""
 _RIM_STEP_RAD = np.pi / 6.0
-_RIM_M = 0.012
+_RIM_BELOW_TOP_M = 0.012
 """Depth below the top down to which points belong to a rim."""
 _RIM_DEPTH_M = 0.035
 """Depth to which a finger enters a hollow object, which must be as deep there."""
-_WALL_M = 0.01
+_HOLLOW_FROM_RIM_M = 0.01
 """Distance from the rim at which the hollow begins."""
 _FINGER_SPACE_M = 0.045
 """Distance from the rim over which the hollow must be seen."""
@@ -67,15 +90,15 @@ _NARROWER_M = 0.015
 """Another slice than the usual one is considered when it is narrower by this."""
 _PER_OFF_USUAL_M = 3.0
 """Cost of the distance of a grip from the usual height, per metre."""
-_FINGERS_M = 0.1
+_FINGER_LENGTH_M = 0.1
 """Length of the fingers ahead of the palm."""
 _LEAST_REACH_M = 0.03
 """Least length of the fingers on a slice whose wider neighbour stops the palm."""
 _HAND_HALF_M = 0.06
 """Half the breadth of the hand, within which a wider part of an upright object stops the palm."""
-_MOST_ASIDE_RAD = 1.7
+_MOST_OFF_AHEAD_RAD = 1.7
 """Largest angle between the approach to a box's side and the direction from the shoulder."""
-_BESIDE_RAD = 1.0
+_HIDDEN_SIDE_RAD = 1.0
 """Angle from which on the far side of a box is hidden from the shoulder."""
 _TOP_DEPTHS_M = (0.098, 0.045)
 """Depths below its top to which fingers reach that grasp an upright object from above."""
@@ -145,17 +168,14 @@ def placements(target: Target, p_BS: FloatArray, ahead_rad: float) -> list[Place
     slices = [(float(each), target.slice(p_BS, each - _SLICE_M, each + _SLICE_M)) for each in heights_m]
     areas = [part.length_m * part.width_m + 1e-9 for _, part in slices]
     middle = np.average([part.centre_B for _, part in slices], axis=0, weights=areas)
-    usual_m = max(float(np.clip(0.56 * target.height_m, 0.05, 0.095)), 0.45 * target.height_m)
+    low_usual_m = float(np.clip(_USUAL_SHARE * target.height_m, *_USUAL_HEIGHTS_M))
+    usual_m = max(low_usual_m, _USUAL_SHARE_OF_TALL * target.height_m)
     usual = target.slice(p_BS, usual_m - _SLICE_M, usual_m + _SLICE_M)
-    better = [each for each in slices if _is_better(each[1], usual)]
+    narrow_m = usual.width_m - _NARROWER_M
+    better = [each for each in slices if each[1].width_m < narrow_m or (each[1].round and not usual.round)]
     aside = [_aside(target, part, each_m, ahead_rad) for each_m, part in [(usual_m, usual), *better]]
     above = _above(target, p_BS, ahead_rad, middle)
     return [*(_with_lever(each, middle, usual_m) for each in itertools.chain(*aside, above)), *rims]
-
-
-def _is_better(part: Target, usual: Target) -> bool:
-    """Returns whether a slice may be held better than the usual one: it is narrower, or nothing sticks out of it."""
-    return part.width_m < usual.width_m - _NARROWER_M or (part.round and not usual.round)
 
 
 def _with_lever(placement: Placement, middle: FloatArray, usual_m: float) -> Placement:
@@ -173,7 +193,7 @@ def _aside(target: Target, part: Target, height_m: float, ahead_rad: float) -> I
     for each in _round(part, ahead_rad) if part.round else _from_sides(part, higher_B, ahead_rad):
         s, t = _turned(each.azimuth_rad) @ (beside - each.xy).T
         half_depth_m = max(each.half_depth_m, -float(np.min(s[np.abs(t) < _HAND_HALF_M], initial=0.0)))
-        reach_m = _FINGERS_M - half_depth_m + (0.0 if part.round else each.half_depth_m)
+        reach_m = _FINGER_LENGTH_M - half_depth_m + (0.0 if part.round else each.half_depth_m)
         if reach_m > _LEAST_REACH_M:
             yield replace(each, half_depth_m=half_depth_m, height_m=height_m)
 
@@ -196,12 +216,12 @@ def _rims(target: Target) -> Iterator[Placement]:
     below_top_m = target.height_m + target.base_m - target.points_B[:, 2]
     for azimuth in np.arange(0.0, 2.0 * np.pi, _RIM_STEP_RAD):
         s, t = _turned(azimuth) @ (target.points_B[:, :2] - centre).T
-        local = (np.abs(t) < _BREADTH_M) & (s > 0.0)
-        wall = s[local & (below_top_m < _RIM_M)]
+        local = (np.abs(t) < _LOCAL_HALF_M) & (s > 0.0)
+        wall = s[local & (below_top_m < _RIM_BELOW_TOP_M)]
         if len(wall) < _FEWEST_POINTS:
             continue
-        inner, outer = np.percentile(wall, [1, 99])
-        inside = below_top_m[local & (s < inner - _WALL_M) & (s > inner - _FINGER_SPACE_M)]
+        inner, outer = np.percentile(wall, _EDGES_PERCENT)
+        inside = below_top_m[local & (s < inner - _HOLLOW_FROM_RIM_M) & (s > inner - _FINGER_SPACE_M)]
         if outer - inner < _THICKEST_RIM_M and len(inside) > _FEWEST_POINTS and np.percentile(inside, 5) > _RIM_DEPTH_M:
             lever_m = 0.5 * float(inner + outer)
             xy, cost = centre + lever_m * _turned(azimuth)[0], _RIM_COST + _PER_LEVER_M * lever_m
@@ -215,10 +235,8 @@ def _round(target: Target, ahead_rad: float) -> list[Placement]:
     off = np.linalg.norm(target.points_B[:, :2] - centre, axis=1)
     touching = _touching(z, off, 0.5 * target.width_m, float(np.ptp(z))) if target.upright else 1.0
     cost = _width_cost(target.width_m) + _LOOSE_COST * (1.0 - touching)
-    return [
-        Placement(centre, ahead_rad + turn, target.width_m, 0.5 * target.width_m, cost + 0.5 * abs(turn))
-        for turn in (0.0, 0.3, -0.3, 0.6, -0.6, 0.9, -0.9)
-    ]
+    turned = ((ahead_rad + turn, cost + _PER_ROUND_TURN_RAD * abs(turn)) for turn in _ROUND_TURNS_RAD)
+    return [Placement(centre, yaw, target.width_m, 0.5 * target.width_m, each) for yaw, each in turned]
 
 
 def _from_sides(target: Target, higher_B: FloatArray, ahead_rad: float) -> Iterator[Placement]:
@@ -229,20 +247,20 @@ def _from_sides(target: Target, higher_B: FloatArray, ahead_rad: float) -> Itera
     centre = np.array(target.centre_B)
     for azimuth in (wrap(target.yaw_rad + turn) for turn in (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi)):
         off = abs(wrap(azimuth - ahead_rad))
-        if off > _MOST_ASIDE_RAD:
+        if off > _MOST_OFF_AHEAD_RAD:
             continue
         directions = _turned(azimuth)
-        points_B = target.points_B if off < _BESIDE_RAD else higher_B
+        points_B = target.points_B if off < _HIDDEN_SIDE_RAD else higher_B
         s, t = directions @ (points_B[:, :2] - centre).T
-        near = float(np.percentile(s, 1))
-        reached = s < near + _FINGERS_M
+        near = float(np.percentile(s, _EDGES_PERCENT[0]))
+        reached = s < near + _FINGER_LENGTH_M
         s, t, z = s[reached], t[reached], points_B[reached, 2]
-        low, high = np.percentile(t, [1, 99])
+        low, high = np.percentile(t, _EDGES_PERCENT)
         touching = _touching_both(z, t, low, high)
         if touching > _LEAST_TOUCHING:
             half_depth = 0.5 * (float(s.max()) - near)
             xy = centre + np.array([near + half_depth, 0.5 * (low + high)]) @ directions
-            cost = _width_cost(high - low) + 0.15 * off + _LOOSE_COST * (1.0 - touching)
+            cost = _width_cost(high - low) + _PER_OFF_AHEAD_RAD * off + _LOOSE_COST * (1.0 - touching)
             yield Placement(xy, azimuth, float(high - low), half_depth, cost)
 
 
@@ -251,29 +269,30 @@ def _along(target: Target, ahead_rad: float, middle_B: FloatArray | None = None)
 
     The best is at the centre of mass `middle_B` (x, y), or at the one that the outline suggests.
     """
-    square, centre = target.length_m < 1.4 * target.width_m, np.array(target.centre_B)
+    square, centre = target.length_m < _SQUARE_RATIO * target.width_m, np.array(target.centre_B)
     for yaw in (target.yaw_rad, target.yaw_rad + 0.5 * np.pi) if square else (target.yaw_rad,):
         axis = _turned(yaw)[0]
         along = (target.points_B[:, :2] - centre) @ axis
         middle = _balance(along, (target.points_B[:, :2] - centre) @ _turned(yaw)[1])
         middle = middle if middle_B is None else float(axis @ (middle_B - centre))
-        for shift in (0.0,) if square else (0.0, 0.03, -0.03, 0.06, -0.06, 0.09, -0.09):
-            local = np.abs(along - middle - shift) < _BREADTH_M
-            if np.count_nonzero(local) < 8:
+        for shift in (0.0,) if square else _SHIFTS_M:
+            local = np.abs(along - middle - shift) < _LOCAL_HALF_M
+            if np.count_nonzero(local) < _FEWEST_LOCAL_POINTS:
                 continue
             near, at = target.points_B[local, :2], centre + (0.0 if square else middle + shift) * axis
             turned = yaw if square else _aligned(near, yaw)
             s, t = _turned(turned) @ (near - at).T
-            low, high = np.percentile(t, [1, 99])
+            low, high = np.percentile(t, _EDGES_PERCENT)
             touching = _touching_both(s, t, low, high, float(np.ptp(along)))
             if touching < _LEAST_TOUCHING:
                 continue
             xy = at + 0.5 * (low + high) * _turned(turned)[1]
             for azimuth in (turned, turned + np.pi):
-                off = abs(wrap(azimuth - ahead_rad))
-                cost = 4.0 * abs(shift) + _width_cost(high - low) + 0.15 * off + _LOOSE_COST * (1.0 - touching)
+                cost = _PER_LEVER_M * abs(shift) + _width_cost(high - low)
+                cost += _PER_OFF_AHEAD_RAD * abs(wrap(azimuth - ahead_rad))
+                cost += _LOOSE_COST * (1.0 - touching)
                 cost += 0.0 if square else _PER_BEYOND_END_M * _beyond_end_m(along, middle + shift)
-                yield Placement(xy, azimuth, float(high - low), 0.02, cost, abs(shift))
+                yield Placement(xy, azimuth, float(high - low), _FLAT_HALF_DEPTH_M, cost, abs(shift))
 
 
 def _beyond_end_m(along_m: FloatArray, at_m: float) -> float:
@@ -283,8 +302,8 @@ def _beyond_end_m(along_m: FloatArray, at_m: float) -> float:
 
 def _aligned(xy: FloatArray, yaw_rad: float) -> float:
     """Direction near a yaw along which points (N, 2) are narrowest: an oblique handle lies straight in the fingers."""
-    turned = yaw_rad + _ALIGNING_RAD
-    return float(turned[np.argmin([np.ptp(np.percentile(_turned(each)[1] @ xy.T, [1, 99])) for each in turned])])
+    turned = yaw_rad + _OBLIQUE_RAD
+    return float(turned[np.argmin([np.ptp(np.percentile(_turned(each)[1] @ xy.T, _EDGES_PERCENT)) for each in turned])])
 
 
 def _turned(azimuth_rad: float) -> FloatArray:
@@ -312,8 +331,8 @@ def _touching(s: FloatArray, t: FloatArray, edge_m: float, length_m: float) -> f
     object's length counts.
     """
     bins = np.round(s / _BIN_M).astype(int)
-    touched = [np.percentile(t[bins == k], 98) > edge_m - _YIELD_M for k in np.unique(bins)]
-    return float(sum(touched) / max(len(touched), min(2.0 * _BREADTH_M, length_m) // _BIN_M))
+    touched = [np.percentile(t[bins == k], 98) > edge_m - _FINGER_YIELDS_M for k in np.unique(bins)]
+    return float(sum(touched) / max(len(touched), min(2.0 * _LOCAL_HALF_M, length_m) // _BIN_M))
 
 
 def _balance(s: FloatArray, t: FloatArray) -> float:

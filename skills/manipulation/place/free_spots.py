@@ -240,7 +240,8 @@ class SpotSearch:
         seen, candidates = merged(self._views), self.spots()
         free, shown = self.free(seen), np.concatenate([seen.plane_points.p_W[:, :2], objects_W(seen)])
         unseen = candidates[distances_m(shown, candidates) > _UNSEEN_M]
-        costs = [_drive_m(free, here_W) + _PER_CLEARANCE * _lacks_m(seen, free), _drive_m(unseen, here_W)]
+        lacks_m = _ENOUGH_CLEARANCE_M - np.minimum(clearances_m(seen, free), _ENOUGH_CLEARANCE_M)
+        costs = [_drive_m(free, here_W) + _PER_CLEARANCE * lacks_m, _drive_m(unseen, here_W)]
         ordered = [
             spots_W[np.argsort(cost, kind="stable")] for spots_W, cost in zip((free, unseen), costs, strict=True)
         ]
@@ -264,11 +265,6 @@ class SpotSearch:
 
 def _drive_m(spots_W: FloatArray, here_W: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(spots_W - here_W, axis=1))
-
-
-def _lacks_m(view: SurfaceView, spots_W: FloatArray) -> FloatArray:
-    """Clearances (N,) that spots (N, 2) lack (m)."""
-    return np.asarray(_ENOUGH_CLEARANCE_M - np.minimum(clearances_m(view, spots_W), _ENOUGH_CLEARANCE_M))
 
 
 def _from_edge_m(surface: Surface, points_W: FloatArray) -> FloatArray:

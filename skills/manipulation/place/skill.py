@@ -168,7 +168,9 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
         heights_m, standing, moves = self._heights_m(surface), f"standing up to the {surface.name}", 0
         while True:
             yield from self.stand_at(heights_m[0], standing)
-            yield from self._hold_ahead(surface, carried)
+            if self._tucked():  # a head camera sees past an object ahead of the body
+                self.boxes = surface_boxes([surface], self.X_WB())
+                yield from self.carry(carried, f"holding the object before the {surface.name}")
             view = yield from self._view(search, spot_W)
             search.add(view, spot_W)
             try:
@@ -285,12 +287,6 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
             return (yield from planning_failure(motion)) is None
         finally:
             self.held = ()
-
-    def _hold_ahead(self, surface: Surface, carried: RotationMatrix) -> Routine[None]:
-        """Brings a tucked object ahead of the body, out of the view of a head camera."""
-        if self._tucked():
-            self.boxes = surface_boxes([surface], self.X_WB())
-            yield from self.carry(carried, f"holding the object before the {surface.name}")
 
     def _reach(self, search: SpotSearch) -> Callable[[FloatArray], Callable[[Pose2D], float | None]]:
         """Returns a function for the cost of putting the object down on a spot from a pose; None when out of reach.

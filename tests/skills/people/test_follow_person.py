@@ -11,7 +11,7 @@ from planar_robot import Bench
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
 from skills.doorway import Doorway
 from skills.people.follow_person import FollowPerson, FollowPersonOptions
-from skills.people.followed_person import Target, TargetOptions
+from skills.people.followed_person import Target, TargetOptions, poses_to_search
 from skills.perception.people import SeenPerson
 from skills.ports import FollowPersonInputs
 from skills.robot import Pose2D
@@ -177,9 +177,9 @@ def test_after_drives_that_failed_the_robot_makes_way_for_the_person_next_to_it(
 def test_the_search_goes_from_room_to_room_through_the_nearest_doors():
     walk = Walk()
     doors = (Doorway((6.0, 5.4), 1.0, 0.0), Doorway((7.5, 5.4), 1.0, 0.0), Doorway((1.0, 5.4), 1.0, 0.0))
-    walk.skill.context = replace(walk.skill.context, doors=doors)
     seen = SeenPerson((4.0, LANE_M), 0.01 * np.eye(2), 1.0, 0.0, START, velocity_W=(0.6, 0.0))
-    poses = list(walk.skill._poses_beyond_doors(Target(seen, START, TargetOptions())))
+    target, here = Target(seen, START, TargetOptions()), walk.skill.context.pose
+    poses = list(poses_to_search(target, doors, None, len(doors), here, walk.skill._free))
     assert [round(pose.x_m, 1) for pose in poses[:2]] == [7.0, 8.5]
 
 

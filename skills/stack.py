@@ -57,6 +57,8 @@ DOORS: Final = "errand.doors"
 """Entry-point group of the plug-ins that open doors (`skills.doorway.DoorOpener`)."""
 BACKENDS: Final = "errand.backends"
 """Entry-point group of the backends that drive robots; a name is the scheme of addresses, as in `spot://HOST`."""
+PLUGINS: Final[Mapping[Any, str]] = {"graph_nav": "errand-spot", "spot": "errand-spot"}
+"""Plug-ins of this project by the components and schemes that they bring."""
 PLUGIN: Final = "plugin"
 DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")
 
@@ -239,7 +241,8 @@ def _component(slot: str, given: Any) -> tuple[str, Any]:
     known = _names(slot)
     name = given.get(USE, known[0])
     if name not in known:
-        raise StackError((slot, USE), f"there is no {slot} {display_text(name)}", suggestion(str(name), known))
+        hint = f"pip install {PLUGINS[name]}" if name in PLUGINS else suggestion(str(name), known)
+        raise StackError((slot, USE), f"there is no {slot} {display_text(name)}", hint)
     return name, _typed(
         (slot,), _loaded(slot, name, SLOTS[slot]), {key: value for key, value in given.items() if key != USE}
     )
@@ -263,11 +266,15 @@ def door_opener(given: Mapping[str, Any]) -> Any:
 
 def robot_backend(scheme: str, given: Mapping[str, Any]) -> RobotBackend:
     """Returns the backend of a scheme, with its options. Raises StackError."""
-    known = sorted({entry.name for entry in installed_plugins(BACKENDS)})
-    if scheme not in known:
-        hint = suggestion(scheme, known) if known else "install one: pip install errand-spot, for example"
-        raise StackError((), f"no plug-in drives robots of '{scheme[:60]}://'", hint)
+    known = [entry.name for entry in installed_plugins(BACKENDS)]
+    if known.count(scheme) != 1:
+        several = scheme in known
+        what = f"{'several plug-ins drive' if several else 'no plug-in drives'} robots of '{scheme[:60]}://'"
+        missing = f"pip install {PLUGINS[scheme]}" if scheme in PLUGINS else suggestion(scheme, sorted(known))
+        raise StackError((), what, "uninstall all but one; errand plugins names them" if several else missing)
     backend: RobotBackend = _typed((), _loaded(scheme, scheme, BACKENDS), given)
+    for key in (key for key, value in given.items() if value is True and getattr(backend, key) is not True):
+        raise StackError((key,), "has no value", f"write {key}=VALUE")
     return backend
 
 
@@ -285,9 +292,16 @@ def _loaded(slot: str, name: str, group: str) -> type:
     except PluginDefect as defect:
         what = f"cannot load {entry.value} of distribution {distribution_of(entry)} ({defect})"
         raise StackError((slot,), what, "repair or uninstall that distribution") from defect
-    if not (dataclasses.is_dataclass(component) and component.__dataclass_params__.frozen):  # type: ignore[attr-defined]
+    if not is_frozen_dataclass(component):
         raise StackError((slot,), f"{entry.value} is no frozen dataclass", "put @dataclass(frozen=True) above it")
     return component
+
+
+def is_frozen_dataclass(component: Any) -> bool:
+    """Returns whether a component is a class of options."""
+    return isinstance(component, type) and bool(
+        getattr(getattr(component, "__dataclass_params__", None), "frozen", False)
+    )
 
 
 def _is_ours(entry: EntryPoint) -> bool:

@@ -51,6 +51,13 @@ def test_the_three_versions_of_python_are_declared_and_no_other():
         assert declared == list(VERSIONS)
 
 
+def test_plug_ins_fit_the_version_of_the_core():
+    version = (ROOT / "VERSION").read_text().strip()
+    wanted = [Requirement(words) for project in PROJECTS[1:] for words in project["dependencies"]]
+    cores = [each for each in wanted if each.name.startswith(("spot-errand", "errand-"))]
+    assert len(cores) > len(PROJECTS) - 2 and all(each.specifier.contains(version) for each in cores)
+
+
 def test_no_module_imports_what_a_later_python_lacks():
     sources = modules(*PRODUCT, *PLUGINS)
     imported = {name.partition(".")[0] for text in sources.values() for name in read(text).imports}

@@ -22,9 +22,9 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1581,
     "executive/testing": 849,
-    "executive/app": 8063,
-    "executive/cli": 3805,
-    "skills": 29915,
+    "executive/app": 8104,
+    "executive/cli": 3838,
+    "skills": 29929,
     "plant": 11168,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 426, 63, 7

@@ -11,7 +11,7 @@ import os
 import sys
 import threading
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -144,9 +144,11 @@ def help_lines() -> dict[str, str]:
         for info in (*folder.glob("*.dist-info"), *folder.glob("*.egg-info")):
             section = _text(info / "entry_points.txt").partition(f"[{COMMANDS_GROUP}]\n")[2].partition("\n[")[0]
             names = [line.partition("=")[0].strip() for line in section.splitlines() if "=" in line]
-            lines |= {name: _summary(info) for name in names if name not in COMMANDS}
-    others = {name: line for name, line in sorted(lines.items()) if name not in PLUGIN_COMMANDS}
-    return {name: each.help if name in lines else each.missing for name, each in PLUGIN_COMMANDS.items()} | others
+            owner = info.stem.partition("-")[0].replace("_", "-")
+            ours = {name: each.help for name, each in PLUGIN_COMMANDS.items() if each.distribution == owner}
+            lines |= {name: ours.get(name) or _summary(info) for name in names if name not in COMMANDS}
+    listed = {name: lines.pop(name, each.missing) for name, each in PLUGIN_COMMANDS.items()}
+    return listed | dict(sorted(lines.items()))
 
 
 def _summary(info: Path) -> str:
@@ -220,7 +222,12 @@ class _LazyGroup(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Imports and returns the command that the first argument names."""
-        name, typed = [*args, "", ""][:2]
+        with suppress(InputError) if ctx.resilient_parsing else nullcontext():  # a shell completes, and shows no error
+            self._load(*[*args, "", ""][:2])
+        return super().resolve_command(ctx, args)
+
+    def _load(self, name: str, typed: str) -> None:
+        """Imports the command of a name, for its group the command that is typed below it. Raises InputError."""
         if name in COMMANDS:
             command = shipped_command(name)
             if isinstance(command, TyperGroup):
@@ -228,7 +235,6 @@ class _LazyGroup(TyperGroup):
             self.add_command(command, name)
         elif name and "." not in name and (found := plugin_command(name)) is not None:
             self.add_command(found, name)
-        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Invokes a command as typer does; bad input ends it with one line, and long messages are cut."""

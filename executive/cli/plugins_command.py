@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -12,7 +13,7 @@ from typing import Annotated, Final
 
 import typer
 
-from executive.cli.entry import COMMANDS, COMMANDS_GROUP, PLUGIN_COMMANDS, as_command
+from executive.cli.entry import COMMANDS, COMMANDS_GROUP, PLUGIN_COMMANDS, as_command, shipped_command
 from executive.cli.number_options import quantity_option
 from executive.cli.options import takes_request
 from executive.cli.output import console_for, finish, progress_bar, show_table
@@ -27,9 +28,11 @@ from skills.inputs.plugins import CLASSES, KERNELS, LIMIT_S, OURS, PluginDefect,
 from skills.inputs.yaml_source import yaml_of
 from skills.perception.class_forms import class_forms
 from skills.quantities import Duration
-from skills.stack import BACKENDS, DOORS, SLOTS, stack_data
+from skills.stack import BACKENDS, DOORS, SLOTS, is_frozen_dataclass, stack_data
 
 _WORKERS: Final = 4
+_WORD: Final = re.compile(r"[a-z][a-z0-9_-]*")
+_SCHEME: Final = re.compile(r"[a-z][a-z0-9+.-]*")
 _MORE_S: Final = 30.0
 """Time of a process that loads a plug-in, beside the plug-in's own limit."""
 
@@ -103,8 +106,8 @@ def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
     clash = next((each for each in namesakes if _key(each) != _key(entry)), None)
     if clash is not None:
         return replace(plugin, broken=f"{distribution_of(clash)} registers the same name")
-    if entry.group == COMMANDS_GROUP and entry.name in COMMANDS:
-        return replace(plugin, broken="a command of Errand has this name")
+    if entry.group == COMMANDS_GROUP and (why := _unusable(entry.name)):
+        return replace(plugin, broken=why)
     command = [sys.executable, "-m", "executive.cli", "plugins", "--load", _key(entry), "--limit", str(limit_s)]
     try:
         ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=limit_s + _MORE_S)
@@ -114,6 +117,19 @@ def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
         return plugin
     last = ended.stderr.strip().rpartition("\n")[2].removeprefix("errand: ")
     return replace(plugin, broken=last or f"its process ended with status {ended.returncode}")
+
+
+def _unusable(name: str) -> str | None:
+    """Returns why a name cannot be that of a command; None if it can."""
+    group, dot, short = name.rpartition(".")
+    if _WORD.fullmatch(short) is None or (dot and _WORD.fullmatch(group) is None):
+        return "a command's name is a word in lower case, or GROUP.WORD"
+    if not dot:
+        return "a command of Errand has this name" if name in COMMANDS else None
+    below = getattr(shipped_command(group), "commands", None) if group in COMMANDS else None
+    if below is None:
+        return f"Errand has no group of commands '{group}'"
+    return "a command of Errand has this name" if short in below else None
 
 
 def _load(key: str, limit_s: float) -> None:
@@ -129,9 +145,17 @@ def _load(key: str, limit_s: float) -> None:
         return
     is_command = entry.group == COMMANDS_GROUP
     try:
-        run_plugin(entry, lambda: as_command(entry.name, entry.load()) if is_command else entry.load(), limit_s=limit_s)
+        used = run_plugin(
+            entry, lambda: as_command(entry.name, entry.load()) if is_command else entry.load(), limit_s=limit_s
+        )
     except PluginDefect as defect:
         raise InputError(f"cannot load {entry.value} ({defect})") from defect
+    if entry.group == BACKENDS and not (is_frozen_dataclass(used) and callable(getattr(used, "connect", None))):
+        raise InputError(f"{entry.value} is no frozen dataclass with a method connect")
+    if entry.group == BACKENDS and _SCHEME.fullmatch(entry.name) is None:
+        raise InputError(f"'{entry.name}' is no scheme in lower case")
+    if entry.group == KERNELS and not callable(used):
+        raise InputError(f"{entry.value} is no function")
 
 
 stack = typer.Typer(

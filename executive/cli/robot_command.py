@@ -31,7 +31,7 @@ from executive.view.server import PageContent, serve
 from plant.worlds.world import World
 from skills.api import SkillContext
 from skills.estimate.grid_map import load_grid_map
-from skills.inputs.errors import InputError, count_text
+from skills.inputs.errors import InputError, Problems, count_text
 from skills.quantities import Delay, Port, Seed
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack
@@ -182,7 +182,10 @@ def warm_up() -> None:
     begun_s = time.monotonic()
     steps = kernel_steps()
     with progress_bar(console_for(False), "steps", len(steps)) as advance:
+        failed = Problems()
         for step in steps:
-            step()
+            with failed:
+                step()
             advance()
     typer.echo(f"{count_text(newly_compiled(), 'function')} compiled in {time.monotonic() - begun_s:.0f} s")
+    failed.raise_any()

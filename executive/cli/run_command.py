@@ -83,7 +83,7 @@ def run(
         prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
         page = page_of if view is not None else None
         screen = ConsoleScreen(console, quiet, whole_tree, voice, page, live, timing)
-        connection = real_runner(prepared, robot) if robot else nullcontext()
+        connection = real_runner(prepared, robot) if robot is not None else nullcontext()
         with MissionStore(kept_in) as missions, missions.claim(), connection as runner:
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
             ended = MissionRuns(missions, screen, run=runner).run(mission, prepared)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import logging
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from threading import Event
-from typing import Final
-from urllib.parse import parse_qsl
+from typing import Any, Final
+from urllib.parse import unquote
 
 from yaml import YAMLError
 
@@ -30,13 +31,14 @@ from executive.run.visitor import RunEntry, RunVisitor
 from executive.run.worker import ThreadWorker
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
+from executive.words.variation import NO_VARIATION
 from plant.worlds.world import World
-from skills.inputs.errors import InputError
+from skills.inputs.errors import InputError, one_line
 from skills.inputs.yaml_source import scalar_of
-from skills.robot import Clock, ConnectedRobot, Pose2D
-from skills.stack import RobotStack, StackError, robot_backend
+from skills.robot import Clock, ConnectedRobot, Pose2D, RobotStoppedError
+from skills.stack import RobotBackend, RobotStack, StackError, robot_backend
 
-_ADDRESS: Final = re.compile(r"(?P<scheme>[a-z][a-z0-9+.-]*)://(?P<place>[^?\s]+)(\?(?P<options>\S*))?")
+_ADDRESS: Final = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<place>[^?\s]+)(\?(?P<options>\S*))?")
 
 
 @dataclass
@@ -112,17 +114,18 @@ def real_runner(prepared: Prepared, address: str) -> Iterator[Callable[..., Fini
     raises KeyboardInterrupt. Raises InputError if the address names no robot, or the robot is not ready.
     """
     if prepared.several:
-        raise InputError("a real robot runs alone", hint="leave --robots out")
+        raise InputError("a real robot runs alone", hint="name one robot")
+    if prepared.request.scenario or prepared.request.variation != NO_VARIATION:
+        what = "faults, events and variations are simulated, and not for a real robot"
+        raise InputError(what, hint="leave --fault, --scenario and the like out")
     found = _ADDRESS.fullmatch(address)
     if found is None:
         raise InputError(f"--robot {address[:60]}: is no address", hint="write spot://192.168.80.3, for example")
     try:
-        given = {key: scalar_of(value) if value else True for key, value in parse_qsl(found["options"] or "", True)}
-        driver = robot_backend(found["scheme"], given)
+        driver = robot_backend(found["scheme"].lower(), _options(found["options"]))
     except StackError as error:
-        raise InputError(f"--robot {address[:60]}: {_what(error)}", hint=error.hint) from error
-    except (YAMLError, ValueError) as error:
-        raise InputError(f"--robot {address[:60]}: an option is no value", hint="write ?option=value&option") from error
+        what = f"{error.path[0]}: {error.message}" if error.path else error.message
+        raise InputError(f"--robot {address[:60]}: {what}", hint=error.hint) from error
     compile_first()
     logging.getLogger("drake").setLevel(logging.WARNING)
     start, ready = prepared.request.start, Event()
@@ -131,12 +134,13 @@ def real_runner(prepared: Prepared, address: str) -> Iterator[Callable[..., Fini
         if not ready.is_set():
             raise KeyboardInterrupt
 
-    with ended_by_signals(interrupt), driver.connect(found["place"], prepared.tree.robot_name) as connected:
+    with ended_by_signals(interrupt), _connected(driver, found["place"], prepared.tree.robot_name) as connected:
         stack = robot_stack(prepared.robots[connected.robot.name])
         where = start if isinstance(start, Pose2D) else None
 
         def make_ready() -> None:
-            connected.make_ready()
+            with _defects_named(driver):
+                connected.make_ready()
             ready.set()
 
         made = replace(connected, make_ready=make_ready)
@@ -144,6 +148,43 @@ def real_runner(prepared: Prepared, address: str) -> Iterator[Callable[..., Fini
         yield partial(run_request, backend=backend, worker=ThreadWorker())
 
 
-def _what(error: StackError) -> str:
-    """Returns the error of an address's option, with its name."""
-    return f"{error.path[0]}: {error.message}" if error.path else error.message
+def _options(text: str | None) -> dict[str, Any]:
+    """Parses `key=value&key`, each value as in YAML, and a key alone as true. Raises StackError."""
+    options = dict[str, Any]()
+    for part in (text or "").split("&") if text else ():
+        key, equals, value = part.partition("=")
+        try:
+            read = scalar_of(unquote(value)) if equals else True
+        except (YAMLError, ValueError):
+            read = None
+        if read is None or key in options or (isinstance(read, float) and not math.isfinite(read)):
+            what = "is given twice" if key in options else "has no value"
+            raise StackError((key[:40],), what, "write each option once, as in ?option=value")
+        options[key] = read
+    return options
+
+
+@contextmanager
+def _connected(driver: RobotBackend, place: str, name: str) -> Iterator[ConnectedRobot]:
+    """Connects to a robot. Raises InputError for defects of the plug-in before and after the block, not within it."""
+    with ExitStack() as stack:
+        with _defects_named(driver):
+            connected = stack.enter_context(driver.connect(place, name))
+            if not isinstance(connected, ConnectedRobot) or connected.robot.name != name:
+                raise TypeError(f"connect yields no ConnectedRobot of the name {name}")
+        yield connected
+        with _defects_named(driver):
+            stack.close()
+
+
+@contextmanager
+def _defects_named(driver: RobotBackend) -> Iterator[None]:
+    """Raises InputError for any error but InputError in the block."""
+    try:
+        yield
+    except (InputError, RobotStoppedError):
+        raise
+    except Exception as error:
+        kind = type(driver)
+        what = f"the backend {kind.__module__}:{kind.__name__} failed ({type(error).__name__}: {one_line(str(error))})"
+        raise InputError(what, hint="repair or uninstall its distribution; errand plugins names it") from error

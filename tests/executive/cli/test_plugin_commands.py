@@ -143,6 +143,15 @@ def test_the_help_lists_the_commands_of_installed_plug_ins_with_their_own_help()
     assert {name: f"{name} " in shown and line in shown for name, line in wanted.items()} == dict.fromkeys(wanted, True)
 
 
+@pytest.mark.parametrize("typed", ["errand world sh", "errand object im"])
+def test_completion_below_a_missing_plug_in_shows_no_error(typed, nothing_installed, monkeypatch):
+    monkeypatch.setenv("_ERRAND_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", typed)
+    monkeypatch.setenv("COMP_CWORD", str(len(typed.split(" ")) - 1))
+    ended = errand(prog_name="errand")
+    assert (ended.exception is None or isinstance(ended.exception, SystemExit), ended.stderr) == (True, "")
+
+
 def test_a_plug_in_adds_a_command_to_a_group_of_errand(install):
     install("ships", ["new.ship = ships:count"])
     assert "ship" in errand("new", "--help").stdout

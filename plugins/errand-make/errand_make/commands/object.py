@@ -159,6 +159,8 @@ def tag(
     if out.suffix.lower() == ".svg":
         with writing(out):
             out.write_text(tag_svg(number, size), encoding="utf-8")
+    elif out.suffix:
+        raise InputError(f"{out} is no SVG file", hint="name a .svg file to print, or a folder for a plate")
     else:
         with new_folder(out) as folder:
             write_plate(folder, number, size)

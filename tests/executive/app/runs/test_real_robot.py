@@ -16,6 +16,7 @@ from importlib.metadata import entry_points
 import pytest
 
 from executive.record.history import read_events
+from skills import stack
 from tests.docs.documents import ROOT, blocks
 from tests.executive.cli.calls import done, errand, refusal
 from tests.executive.distribution import write_distribution
@@ -33,6 +34,7 @@ def run(tmp_path, monkeypatch):
     (tmp_path / "errand_turtle.py").write_text(files["errand_turtle.py"])
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr("skills.inputs.plugins._all_installed", entry_points)
+    monkeypatch.setattr(stack, "_loaded", stack._loaded.__wrapped__)  # each test has a class of its own
     yield ["run", "--say", "say hello", "--out", tmp_path / "out", "--quiet", "--robot"]
     sys.modules.pop("errand_turtle", None)
 
@@ -48,17 +50,66 @@ def test_a_plug_in_of_two_files_drives_a_robot(run, tmp_path):
 @pytest.mark.parametrize(
     ("address", "refused"),
     [
+        ("", "--robot : is no address; write spot://192.168.80.3, for example"),
         ("pond", "--robot pond: is no address; write spot://192.168.80.3, for example"),
         ("tortoise://pond", "no plug-in drives robots of 'tortoise://'"),
         ("turtle://pond?sped=3", "sped: unknown key 'sped'; did you mean 'speed'?"),
         ("turtle://pond?speed=fast", "speed: should be a number"),
-        ("turtle://pond?speed=[", "an option is no value; write ?option=value&option"),
+        ("turtle://pond?speed=[", "speed: has no value; write each option once, as in ?option=value"),
+        ("turtle://pond?speed=", "speed: has no value"),
+        ("turtle://pond?speed", "speed: has no value; write speed=VALUE"),
+        ("turtle://pond?speed=.nan", "speed: has no value"),
+        ("turtle://pond?wake&wake", "wake: is given twice"),
         ("turtle://desert", "no turtle answers at desert; look for one at turtle://pond"),
         ("turtle://pond", "the turtle sleeps; wake it: add ?wake=yes to the address"),
     ],
 )
 def test_an_address_is_refused_in_one_line(run, address, refused):
     assert refused in refusal(*run, address)
+
+
+def test_a_scheme_may_be_typed_in_capitals(run):
+    assert "no turtle answers at desert" in refusal(*run, "TURTLE://desert")
+
+
+@pytest.mark.parametrize("words", [["--fault", "gripper loses it at 20 s"], ["--light", "dim"], ["--people", "1"]])
+def test_what_is_simulated_is_refused(run, words):
+    assert "not for a real robot" in refusal(*run[:-1], *words, "--robot", "turtle://pond?wake")
+
+
+def test_two_plug_ins_of_one_scheme_are_refused(run, tmp_path):
+    write_distribution(tmp_path, "other-turtles", "errand.backends", "turtle = errand_turtle:Turtle")
+    assert "several plug-ins drive robots of 'turtle://'" in refusal(*run, "turtle://pond?wake")
+
+
+# defect of a plug-in              refused in one line with its class and error
+# connect raises, yields nothing   before the run
+# make_ready raises                before the run
+# raises at the end                after it
+@pytest.mark.parametrize(
+    ("former", "present", "error"),
+    [
+        (
+            "        clock = WallClock()\n",
+            "        raise ConnectionRefusedError('no pond')\n",
+            "ConnectionRefusedError: no pond",
+        ),
+        ("yield ConnectedRobot(robot, clock, make_ready, notes=", "yield dict(notes=", "TypeError: connect yields no"),
+        ("name=name, capabilities", "name='zoe', capabilities", "TypeError: connect yields no ConnectedRobot"),
+        ("clock.advance(2.0)", "raise ValueError('it turned over')", "ValueError: it turned over"),
+        (
+            "            robot.sit(",
+            "            raise OSError('it swam off')\n            robot.sit(",
+            "OSError: it swam off",
+        ),
+    ],
+)
+def test_a_defect_of_the_plug_in_is_one_line(run, tmp_path, former, present, error):
+    file = tmp_path / "errand_turtle.py"
+    assert former in file.read_text()
+    file.write_text(file.read_text().replace(former, present))
+    said = refusal(*run, "turtle://pond?speed=100&wake")
+    assert "the backend errand_turtle:Turtle failed" in said and error in said
 
 
 def test_several_robots_are_refused(run):

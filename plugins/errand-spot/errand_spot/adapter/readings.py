@@ -70,8 +70,7 @@ def unfit(state: Any, capabilities: Capabilities) -> str | None:
 def readings(state: Any, stamp_s: float, capabilities: Capabilities, last_height_m: float | None = None) -> Readings:
     """Returns the readings of a state message. Raises KeyError and ValueError if frames or numbers are missing.
 
-    The body's height is measured from the feet, because `odom` drifts in height; without feet on the floor the last
-    one counts.
+    The body's height is that over the feet, because `odom` drifts; without feet on the floor the last one counts.
     """
     kinematic = state.kinematic_state
     frames = frames_of(kinematic.transforms_snapshot)

@@ -59,8 +59,7 @@ _ROUND_SAME, _ROUND_WIDEST = 0.02, 0.52
 class ImportOptions:
     """Options of an import: name, mass (kg), class, metres per unit, the vertical axis, and closing of holes.
 
-    Without a class, the robot recognises the object by its model. Without a mass, it follows from the volume
-    (`USUAL_KG_M3`).
+    Without a class, the robot recognises the object by its model. The default mass is by volume (`USUAL_KG_M3`).
     """
 
     name: str

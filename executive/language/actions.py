@@ -28,13 +28,12 @@ from executive.words.command import TIME_UNITS_S
 
 @dataclass(frozen=True)
 class Action:
-    """Work that one verb asks for: on `objects` at `source`, towards `goal`.
+    """Action of one verb: on `objects` at `source`, towards `goal`.
 
-    `kind` is None for a statement, which only gives the place of an object. `said` is the text of the clause, `unknown`
-    are words that do not fit, `choices` phrases joined by "or", `teller` the person who put the object there. `departs`
-    marks a place that is only left, `passes` are places on the route, `time` is the length of a wait. `follows` says
-    that "then" or "after that" stands before it, and `again`, once pronouns are resolved, that the object was named
-    before.
+    `kind` is None for a statement on the place of an object. `said` is the text of the clause, `unknown` are its
+    unknown words, `choices` phrases joined by "or", `teller` is the person who put the object there. `departs` marks a
+    place that the robot only leaves, `passes` are places on the route, `time` is the length of a wait. `follows` marks
+    an action after "then" or "after that"; `again`, set once pronouns are resolved, a repeated object.
     """
 
     kind: VerbKind | None
@@ -148,7 +147,7 @@ def _being(clause: Predicate, being: Being) -> Action:
 
 
 def _narrated(clause: Predicate, being: Being) -> Action:
-    """Reads an event with its object; it asks for nothing by itself."""
+    """Reads an event with its object; an event is no request."""
     roles = read_roles(clause.items, describes=False)
     lacked = [place.phrase for place in roles.sources if place.preposition == "out of"]
     topics = [phrase for phrase in (*roles.objects, roles.searched, *lacked) if phrase is not None]
@@ -314,6 +313,6 @@ def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
 
 
 def _with_object(action: Action, extra: Sequence[str]) -> Action:
-    """Adds the words that do not fit to the action, its verb among them when the object is missing."""
+    """Adds the unknown words to the action, and its verb when the object is missing."""
     missing = () if action.objects else (action.verb,)
     return replace(action, unknown=(*action.unknown, *extra, *missing))

@@ -38,11 +38,11 @@ Addressee = tuple[str, ...] | RobotChoice
 
 @dataclass(frozen=True)
 class AddressedText:
-    """Text for one addressee: `who` is None where nobody is named; `joint` are the words before it.
+    """Text for one addressee: `who` is None if the text names nobody; `joint` are the words before it.
 
-    `then` says that it follows the text before it; `behind` names the robots whose earlier parts must be done first.
-    `otherwise` says that it depends on the condition of the text before it. `past` says that it describes what the
-    robot has done by then, which is its task.
+    `then` marks a text that follows the one before; `behind` names the robots whose earlier parts must be done first.
+    `otherwise` marks a text under the condition of the one before. `past` marks a description of the robot's finished
+    work, which is its task.
     """
 
     who: Addressee | None
@@ -87,9 +87,9 @@ class Addressees:
         return Patterns("robots.yaml", words=words)
 
     def find_robots(self, said: str, but: Sequence[str] = ()) -> Addressee:
-        """Finds the robots that `said` names; "the other robot" is the one that is none of `but`.
+        """Finds the robots that `said` names; "the other robot" is the one outside `but`.
 
-        Raises RefusalError when it names another number of robots than there are.
+        Raises RefusalError when the number of robots in `said` is wrong.
         """
         words = " ".join(said.lower().split())
         if self.forms.other.fullmatch(words):
@@ -231,7 +231,7 @@ class _Parting:
             self.found.append(AddressedText(who, "", joint, behind=behind))
             return
         who = self._who(found)
-        bare, opener = said.strip(" ,"), ""  # a condition at its end is for what follows: "if there is a coke,"
+        bare, opener = said.strip(" ,"), ""  # a condition at its end belongs to the next part: "if there is a coke,"
         match = self.calls.forms.opener.search(bare) if found.kind != "past" else None
         if match is not None and not self.calls.forms.opened.search(match[1]):
             said, opener = bare[: match.start()], match[1]

@@ -127,7 +127,7 @@ def _cuts(text: str) -> Iterator[tuple[int, int]]:
 
 
 def _kind(text: str) -> tuple[Cue, str] | None:
-    """Cue at the beginning of a clause; a complete one ("if not") ends where a clause can begin."""
+    """Cue at the beginning of a clause; after a complete cue ("if not") a clause can begin."""
     for kind, form in _kinds():
         match = form.match(text)
         behind_it = None if match is None or kind not in _WHOLE else _NEXT.match(text, match.end())
@@ -139,7 +139,7 @@ def _kind(text: str) -> tuple[Cue, str] | None:
 
 
 def trailing_cue(text: str) -> Clause | None:
-    """First cue after an action in a clause, which decides or repeats that action."""
+    """First cue after an action in a clause, as a condition or repetition of that action."""
     forms = CLAUSES.mapping("behind")
     found = [(match.start(), Cue(kind), match) for kind, form in forms for match in form.finditer(text, 1)]
     found = [one for one in found if one[1] is not Cue.IF or not CLAUSES.asks_before.search(text[: one[0]])]
@@ -192,7 +192,7 @@ _WHOLE_WORDS: Final = re.compile(
     r"(?:\b(?:none|one|any|it|them|that|this|failed|fails?|works?|out|(?:im)?possible|wrong|left|available)|^if not)$",
     re.IGNORECASE,
 )
-"""Ends of cues after which an object may follow at once: "if there is none a beer"."""
+"""Last words of cues before an object without a comma: "if there is none a beer"."""
 _ONE_VERB: Final = re.compile(r"(?:^|[\s,])(?:go|come|run|say)$", re.IGNORECASE)
 """Verbs after which "and" and "please" join no other clause: "go and charge"."""
 _ELSE: Final = re.compile(r"(?:or )?(?:else|otherwise)\b", re.IGNORECASE)

@@ -89,7 +89,7 @@ def find_address(text: str, names: Collection[str]) -> Address:
 def find_heard_wake(transcript: str, name: str, *, others: Collection[str] = ()) -> Address:
     """Finds the wake phrase for the robot `name` in a transcript, where the name may be misspelled ("Hey Ellis").
 
-    `others` are names of other robots: a word that sounds more like one of them does not call this robot.
+    `others` are names of other robots: a word with a sound nearer to one of them does not call this robot.
     """
     exact = find_address(transcript, (name, *others))
     if exact.name is not None:
@@ -137,7 +137,7 @@ def _calls(text: str, name: str) -> Iterator[tuple[int, int]]:
 
 
 def _corrected(transcript: str, name: str, others: Collection[str]) -> Iterator[str]:
-    """Corrections of the transcript, where its beginning sounds like the wake phrase or the name."""
+    """Corrections of a transcript whose beginning sounds like the wake phrase or the name."""
 
     def alike(heard: str, limit: float) -> bool:
         distance = sound_distance(heard, name)

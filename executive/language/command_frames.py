@@ -35,8 +35,7 @@ class CommandFrame:
 def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
     """Converts actions to command frames, in order.
 
-    The robot looks for the next action's object at the place where it was sent first; it does not fetch an object that
-    it holds.
+    The robot looks for the next action's object at its first destination; it does not fetch a held object.
 
     Raises RefusalError when the destination of an object is missing.
     """
@@ -76,7 +75,7 @@ def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
 
 
 def _puts_down(action: Action, before: Action) -> bool:
-    """Returns whether an action puts down an object where it was carried: "take it to the desk and set it down"."""
+    """Returns whether an action puts down an object after its transport: "take it to the desk and set it down"."""
     goal = before.goal if before.kind in _GOES_FOR else None
     carried = goal is not None and goal is not HERE and not goal.person
     return carried and action.kind is VerbKind.PLACE and action.again and action.target == before.target
@@ -108,7 +107,7 @@ def _set_down(actions: Sequence[Action]) -> tuple[Action, ...]:
 
 
 def _join_going(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Merges a bare "go" with the next action, where that has no place of its own; "then fetch" stays apart."""
+    """Merges a bare "go" with the next action, if that has no place; "then fetch" stays separate."""
     joined: list[Action] = []
     for action in actions:
         before = joined[-1] if joined and joined[-1].kind is VerbKind.GO else None

@@ -94,7 +94,7 @@ def _forbidden(mark: Negation, ahead: Sequence[Item]) -> RefusalError:
 def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> bool:
     """Returns whether the next verb replaces the negated one: going for going, handling for handling.
 
-    When no action stands before it, a negated handling is dropped.
+    Without an action before it, a negated handling is dropped.
     """
     after = next((item for item in rest if isinstance(item, Verb)), None)
     goes = negated.kinds == {VerbKind.GO}

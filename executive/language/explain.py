@@ -14,11 +14,11 @@ from executive.words.steps import steps_to_yaml
 def explain(trace: Trace) -> dict[str, Any]:
     """Explains each step of understanding a sentence, as JSON values; the steps after a refusal are empty.
 
-    `parts` are the clauses, `stands_for` the pronouns with their meanings, `frames` the commands with the names that
-    were spoken, and `refused_at` is the step that refused.
+    `parts` are the clauses, `stands_for` the pronouns with their meanings, `frames` the commands with the spoken names,
+    and `refused_at` is the refusing step.
     """
     subject = None
-    if trace.actions:  # the robot that is spoken to acts, in all that asks it for something
+    if trace.actions:  # the addressed robot acts in every request
         said = (t.text for t in trace.tokens if t.relation == "nsubj" and t.pos in ("PRON", "PROPN"))
         subject = "you (the robot)" if any(action.kind for action in trace.actions) else next(said, None)
     return {

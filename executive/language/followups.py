@@ -41,9 +41,9 @@ class FollowUp:
 
 @dataclass(frozen=True)
 class Amendment:
-    """Grounded change of a request: an object, with its number where one was said, or else a place or a person.
+    """Grounded change of a request: an object, with its spoken number if any, or else a place or a person.
 
-    `source` says that the place is where the object is; `old` is the replaced name, where it was said.
+    `source` marks the place of the object, not the destination; `old` is the replaced name, if it was said.
     """
 
     kind: ObjectKind | None = None
@@ -71,7 +71,7 @@ def parse_follow_up(text: str) -> FollowUp | None:
 def amend(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> tuple[Command, ...]:
     """Changes an object, a place or a person in commands.
 
-    The robot looks for a new object where the old one was only if the speaker named that place and it is not the old
+    The robot looks for a new object at the old one's place only if the speaker named this place and it is not the old
     one's usual place. A place without a preposition becomes the destination if the request has one, otherwise the
     source.
     """
@@ -87,7 +87,7 @@ def amend(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> t
 
 
 def skip_fetching(commands: Sequence[Command], held: ObjectKind | None, knowledge: Knowledge) -> tuple[Command, ...]:
-    """Removes the commands that a held object makes needless.
+    """Removes the commands that are needless with a held object.
 
     The robot does not fetch the same object again; it first puts another one back at its usual place.
     """
@@ -153,14 +153,14 @@ class Remark(enum.Enum):
     """Meaning of a remark about the run."""
 
     FREEZE = "freeze"  # stand still at once
-    STOP = "stop"  # end what waits for that, such as following; else stand still
-    ENOUGH = "enough"  # end what waits for that
+    STOP = "stop"  # end a step that waits for this, such as following; else stand still
+    ENOUGH = "enough"  # end a step that waits for this
     WAIT = "wait"  # pause
     GO_ON = "go_on"  # go on after a pause or a stop
     CANCEL = "cancel"  # give the mission up
     WHERE = "where"  # where the robot is
-    DOING = "doing"  # what it is doing, and why
-    ABLE = "able"  # what it can do
+    DOING = "doing"  # its present action, and the reason
+    ABLE = "able"  # its abilities
     THANKS = "thanks"  # as ENOUGH
     PRAISE = "praise"  # nothing
 

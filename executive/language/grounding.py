@@ -1,6 +1,6 @@
 """Grounding: spoken names become names of the world, and open places get their defaults.
 
-A name is looked up as it stands, then by its synonyms, then by its noun alone; an ambiguous or similar name makes a
+It looks a name up as spoken, then by its synonyms, then by its noun alone; an ambiguous or similar name makes a
 question.
 """
 
@@ -36,12 +36,12 @@ def known_line(knowledge: Knowledge | None) -> str:
 def ground(
     frames: Sequence[CommandFrame], knowledge: Knowledge, parser: DependencyParser
 ) -> tuple[tuple[Command, ...], tuple[str, ...]]:
-    """Converts frames to commands in the world's own names, with default places where none was said.
+    """Converts frames to commands in the world's own names, with default places for omitted ones.
 
-    Also returns a note on each name that was taken for another one. Similarity of English words, which the parser
-    knows, widens the meaning of unknown names.
+    Also returns a note on each name that was interpreted as another. The parser's similarity of English words widens
+    the meaning of unknown names.
 
-    Raises RefusalError when an object, place or person is unknown or ambiguous; with a question where that helps.
+    Raises RefusalError when an object, place or person is unknown or ambiguous; with a question if that helps.
     """
     grounder = _Grounder(knowledge, parser)
     commands = tuple(command for frame in grounder.needed_there(frames) for command in grounder.commands(frame))
@@ -63,7 +63,7 @@ def check_unwanted(unwanted: Sequence[Phrase], commands: Sequence[Command], know
 
 @dataclass
 class _Grounder:
-    """Grounder of names in one world, which notes the names that it took for others."""
+    """Grounder of names in one world; notes the names that it interpreted as others."""
 
     knowledge: Knowledge
     parser: DependencyParser
@@ -208,7 +208,7 @@ class _Grounder:
         return next(filter(None, map(self.knowledge.place, words)), None)
 
     def _places(self, phrase: Phrase, room: str | None, known: Mapping[str, str]) -> Sequence[str]:
-        """Places with that very name, or else with that noun; with a room, also those with such a synonym."""
+        """Places with exactly this name, or else with this noun; with a room, also those with a synonym."""
         groups = {"room": tuple(self.knowledge.places), "surface": tuple(self.knowledge.surfaces)}
         named = len(phrase.content) > 1 or self.knowledge.place(phrase.text) is not None
         if not named and groups.get(phrase.head.lemma):  # any place: "the room", "a surface"
@@ -231,7 +231,7 @@ class _Grounder:
         return list(dict.fromkeys([*own, *other, *called] if room is not None else own or other))
 
     def _left_over(self, phrase: Phrase, name: str) -> bool:
-        """Returns whether words are left that no name of the place or its room has ("kitchen 3")."""
+        """Returns whether words remain that belong to no name of the place or its room ("kitchen 3")."""
         extra = () if phrase.extra[:1] == ("of",) else phrase.extra
         said = {word for part in (*(t.word for t in phrase.content[:-1]), *extra) for word in part.lower().split()}
         spellings = self.knowledge.spellings([name, self.knowledge.room(name)])

@@ -1,7 +1,7 @@
 """Sentence as a row of items: verbs, noun phrases with their prepositions, and small words.
 
-Parsers err most in the attachment of prepositions; the row keeps the order of the words, and the verbs decide later
-which place has which role.
+Parsers err most in the attachment of prepositions; the row keeps the order of the words, and the verbs assign roles to
+the places later.
 """
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
@@ -56,9 +56,9 @@ class Adverb:
 
 @dataclass(frozen=True)
 class Being:
-    """Form of "to be"; `existential` with "there", `asked` when it stands before its subject.
+    """Form of "to be"; `existential` with "there", `asked` before its subject.
 
-    `teller` is a person who put an object where it is ("Anna left her umbrella"); `narrated` marks any verb of a
+    `teller` is the person who left an object at its place ("Anna left her umbrella"); `narrated` marks any verb of a
     narration ("somebody spilled milk on the floor"), and `topic` is its object ("the ball rolled under the sofa").
     """
 
@@ -249,7 +249,7 @@ def _gap(items: Sequence[Item], at: int) -> bool:
 
 
 def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
-    """Begins a clause of "to be", which takes its subject, and the "if" before it, from the clause before."""
+    """Begins a clause of "to be"; moves its subject, and the "if" before it, from the clause before."""
     rest, subject = last.items, last.items[-1] if last.items and not being.existential else None
     if not isinstance(subject, Chunk) or subject.role is not None:
         subject = None

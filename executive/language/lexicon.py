@@ -49,8 +49,8 @@ def read_table(name: str) -> Any:
 class Lexicon:
     """Word lists of verbs.yaml and words.yaml by their names; phrases are tuples of lower-case words.
 
-    `corrections` says of each phrase whether it may also be a filler; `light_nouns` maps a verb to the nouns that make
-    one act with it ("take a picture").
+    `corrections` maps each phrase to True if it may be a filler; `light_nouns` maps a verb to the nouns of its light
+    verb constructions ("take a picture").
     """
 
     def __init__(self) -> None:
@@ -94,9 +94,9 @@ def any_of(phrases: Iterable[str]) -> str:
 
 
 class Patterns:
-    """Regular expressions of a table, or of its section, without regard to case; each is compiled when it is used.
+    """Regular expressions of a table, or of its section, case-insensitive; each is compiled at first use.
 
-    {name} in an expression stands for another one of the section, of the table, or of `words`.
+    {name} in an expression stands for another expression of the section, of the table, or of `words`.
     """
 
     def __init__(self, table: str, section: str | None = None, words: Mapping[str, str] | None = None) -> None:

@@ -46,7 +46,7 @@ def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> No
 
 
 def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None) -> RefusalError:
-    """Refusal that names the words which the robot does not understand, each with its whole clause."""
+    """Refusal with the unknown words, each with its whole clause."""
     named = []
     for clause in dict.fromkeys(clause for _, clause in parts):
         words = dict.fromkeys(part for part, other in parts if other == clause)
@@ -64,7 +64,7 @@ def _asks_for_people(action: Action) -> bool:
 
 
 def _moved(action: Action, target: Phrase) -> bool:
-    """Returns whether an action moves a definite object from or to a place in the house, so that it is no idea.
+    """Returns whether an action moves a definite object from or to a place in the house, and no abstract idea.
 
     Examples are "the mail from the desk", and documents ("take the report to the boss").
     """
@@ -104,7 +104,7 @@ def _outside(action: Action, moved: bool) -> Iterator[str]:
 
 
 def _holdable(phrase: Phrase, action: Action) -> bool:
-    """Returns whether the robot can find the object, and take it where the action does."""
+    """Returns whether the robot can find the object, and take it to the action's goal."""
     find = action.kind is VerbKind.FIND
     if find and action.source is None:
         trade = phrase.kind is NounKind.PERSON and phrase.indefinite and not phrase.named_person  # a good dentist
@@ -116,7 +116,7 @@ def _holdable(phrase: Phrase, action: Action) -> bool:
         return False
     if not find and phrase.head.lemma in lexicon().fixtures:
         return False
-    # Verb and noun may be one act, as in "take a picture": the noun is no thing then.
+    # Verb and noun may be one act, as in "take a picture": then the noun is no object.
     acts = lexicon().light_nouns.get(action.verb.split()[0], frozenset())
     loose = phrase.indefinite or action.verb in lexicon().light_whole
     placed = action.source is not None or (action.goal is not None and action.goal.kind is NounKind.PLACE)

@@ -66,9 +66,9 @@ class NounKinds:
             return cls(noun_examples(), vector_of, stored["weights"])
 
     def kind(self, words: Sequence[str], *, lemma: str) -> NounKind | None:
-        """Kind of a noun, the last of `words`, with the words before it; None when it is unknown.
+        """Kind of a noun, the last of `words`, with the words before it; None for an unknown noun.
 
-        `lemma` is its dictionary form. In doubt the kind is one within reach.
+        `lemma` is its dictionary form. A doubtful noun gets a kind within reach.
         """
         *before, noun = words
         pairs = [f"{before[-1]} {form}" for form in (noun, lemma)] if before else []

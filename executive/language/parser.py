@@ -1,6 +1,6 @@
 """Dependency parser: spaCy's English model, loaded in little time.
 
-spaCy is loaded without the parts that a command never uses, which take most of its loading time.
+It loads spaCy without the parts that commands never use; these take most of the loading time.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class DependencyParser:
         return NounKinds.load(self.vector)
 
     def release(self) -> None:
-        """Frees the model's memory; the parser loads it again when it is next needed."""
+        """Frees the model's memory; the parser loads it again at the next use."""
         for loaded in ("_model", "_nouns"):
             self.__dict__.pop(loaded, None)
         self._parsed.clear()
@@ -128,7 +128,7 @@ class DependencyParser:
 
 @cache
 def load_parser() -> DependencyParser:
-    """Loads the parser of this process; its model is loaded when it is first needed.
+    """Loads the parser of this process; its model is loaded at first use.
 
     Raises InputError when the model's package is not installed.
     """
@@ -147,8 +147,8 @@ _YAML_OF_SPACY: Final = ("read_yaml", "write_yaml", "yaml_dumps", "yaml_loads", 
 def load_english(folder: Path) -> tuple[Language, WordRows]:
     """Loads the pipeline in a folder, and the rows of its word vectors.
 
-    The store of strings is omitted: it holds every word of the vectors, and only the labels are ever looked up. The
-    vectors stay in their file until they are used. The tokenizer's rules come from the folder alone.
+    It omits the store of strings, which holds every word of the vectors, because only labels are looked up. The vectors
+    stay in their file until their first use. The tokenizer's rules come from the folder alone.
     """
     with _small_spacy():
         from spacy.tokenizer import Tokenizer
@@ -180,7 +180,7 @@ def _affix(find: Callable[[re.Pattern[str], str], Any], pattern: str, nothing: A
 
 
 class RuleTokenizer:
-    """Tokenizer of spaCy, with the rule for a word ("don't", "o'clock") added once a text holds that word."""
+    """Tokenizer of spaCy that adds the rule for a word ("don't", "o'clock") once a text has the word."""
 
     def __init__(self, tokenizer: Callable[[str], Doc], rules: Mapping[str, Sequence[Mapping[Any, str]]]) -> None:
         self._tokenizer: Any = tokenizer
@@ -213,10 +213,9 @@ class RuleTokenizer:
 
 @contextmanager
 def _small_spacy() -> Iterator[None]:
-    """Replaces modules that spaCy's pipelines never use, and that take long to import, while spaCy is imported.
+    """Replaces slow modules that spaCy's pipelines never use while spaCy is imported.
 
-    These are its command line, its YAML, and bridges to other frameworks. It also skips the search for plug-ins of its
-    own.
+    These are its command line, its YAML, and bridges to other frameworks. It also skips spaCy's search for plug-ins.
     """
     if "spacy" in sys.modules:
         yield
@@ -239,7 +238,7 @@ def _small_spacy() -> Iterator[None]:
 
 FREQUENT_WORDS: Final = 50_000
 """Number of words of the model, by decreasing frequency, that count as English words."""
-_SEARCHES: Final = 40  # rare words that are searched for in the file before all of it is read
+_SEARCHES: Final = 40  # searches of the file for rare words before it is read as a whole
 _MOST_BYTES_OF_ENTRY: Final = 14
 _LARGEST_IN_A_BYTE: Final = 0x7F  # msgpack writes these as they are; else a byte gives the length: 0xcc, 0xcd, 0xce
 _KEY_OF_64_BITS: Final = b"\xcf"
@@ -248,10 +247,10 @@ _HEADER_BYTES: Final = 5
 
 
 class WordRows(Mapping[int, int]):
-    """Rows of vectors by the hash of a word, read from a msgpack file when they are needed.
+    """Rows of vectors by the hash of a word, read from a msgpack file on demand.
 
-    The frequent words are a dictionary. A rarer word is searched for in the bytes of the file, which takes 2 to 3 ms;
-    after 40 searches the whole file becomes the dictionary, which takes less time for many sentences.
+    The frequent words are a dictionary. A search for a rarer word in the bytes of the file takes 2 to 3 ms; after 40
+    searches the whole file becomes the dictionary, which is faster for many sentences.
     """
 
     def __init__(self, file: Path) -> None:

@@ -29,7 +29,7 @@ class Phrase:
     """Noun with the words around it.
 
     `extra` are the words joined after it ("of wine"), `of_kind` is the kind of the noun after "of", and `numbered` a
-    count that was said apart from it ("make that two").
+    separate count ("make that two").
     """
 
     tokens: tuple[Token, ...]
@@ -83,7 +83,7 @@ class Phrase:
 
     @property
     def odd_number(self) -> str | None:
-        """Words of a number that counts no objects: "one two three", "zero", "infinity", "2.5", "at least two"."""
+        """Words of a number that cannot count objects: "one two three", "zero", "infinity", "2.5", "at least two"."""
         odd = next((numeral for numeral in self._numerals() if not _value(numeral)), None)
         left = self.tokens[:-1]
         words = [t.text for t in odd or (t for t in left if t.word in lexicon().no_numbers)]
@@ -217,7 +217,7 @@ class Phrase:
         return (*(t for n, t in enumerate(left) if n in units | mine or not _is_determiner(t)), head)
 
     def _numerals(self) -> Iterator[tuple[Token, ...]]:
-        """Yields the numbers that count, each in its successive words, without those of measures ("ten inch nails")."""
+        """Yields the counting numbers, each in its successive words, without those of measures ("ten inch nails")."""
         left = tuple(t for n, t in enumerate(self.tokens[:-1]) if not self._measures(n))
         for numeral, run in groupby(
             self.tokens if self.counts else left,
@@ -259,7 +259,7 @@ def _is_determiner(token: Token) -> bool:
 
 
 def _value(numeral: Sequence[Token]) -> int | None:
-    """Number that successive words make: "twenty one", "two dozen"; None for other words."""
+    """Number of successive words: "twenty one", "two dozen"; None for other words."""
     first, *rest = map(_number, numeral)
     if first is None or not rest:
         return first

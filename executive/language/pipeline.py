@@ -32,13 +32,13 @@ _MOST_CHARACTERS: Final = 800
 class Trace:
     """Results of each step on a sentence, in the order of the fields; steps after a refusal are empty.
 
-    The first fields are given. `memory` is the memory of earlier sentences, and afterwards of this one. `lead` are
-    items before the words, `asked` marks a statement to check, `elliptic` allows that "it" is left out, `recipient`
-    receives objects where the sentence names nobody.
+    The first fields are inputs. `memory` is the memory of earlier sentences, and afterwards of this one. `lead` are
+    items before the words, `asked` marks a statement to check, `elliptic` allows an omitted "it", `recipient` receives
+    objects if the sentence names nobody.
 
     `affirmed` is a checked statement without its negation, `unwanted` are phrases after "not", `meanings` are pronouns
-    with their meanings, `notes` say which name was taken for which. `refused_at` names the step that refused. `steps`
-    is the mission of a sentence that decides, repeats, waits or the like, and `parts` are its clauses.
+    with their meanings, `notes` tell names that were interpreted as others. `refused_at` is the refusing step. `steps`
+    is the mission of a sentence with conditions, loops or waits, and `parts` are its clauses.
     """
 
     text: str
@@ -153,7 +153,7 @@ class Pipeline:
 
 
 def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError:
-    """Question about phrases joined by "or", where only one can be meant."""
+    """Question about phrases joined by "or", if only one of them is possible."""
     heard = " ".join(t.text for t in tokens[choice[0].content[0].index : choice[-1].head.index + 1]).replace(" ,", ",")
     place = all(phrase.kind is NounKind.PLACE for phrase in choice)
     slot = Slot.PLACE if place else Slot.PERSON if all(phrase.person for phrase in choice) else Slot.THING

@@ -1,6 +1,6 @@
 """Questions to the speaker, their answers, and refusals.
 
-The answer is inserted into the sentence, which is then understood again by the same steps.
+The robot inserts the answer into the sentence, and understands it again by the same steps.
 """
 
 import re
@@ -35,8 +35,8 @@ class Slot(Enum):
 class ClarifyingQuestion:
     """Question that the robot asks before it acts.
 
-    `candidates` are the possible answers, empty when any name will do; `default` is the likeliest of them; `heard` are
-    the words that the answer replaces, None when it is added.
+    `candidates` are the possible answers, empty if any name will do; `default` is the likeliest. The answer replaces
+    the words `heard`; None adds it.
     """
 
     text: str
@@ -102,7 +102,7 @@ def chosen_candidate(question: ClarifyingQuestion, answer: str) -> str | None:
 
 
 def insert_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> str:
-    """Inserts the answer into the sentence: the candidate that it means, otherwise its own words."""
+    """Inserts the answer into the sentence: the chosen candidate, otherwise the answer's own words."""
     value = chosen_candidate(question, answer) or _FILLERS.sub("", answer).strip(" ,.!?")
     if question.heard is None:
         return f"{sentence.rstrip(' .,!?')} {_whereto(value)}"
@@ -118,7 +118,7 @@ def insert_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> s
 
 
 def _nearly(question: ClarifyingQuestion, said: str) -> list[str]:
-    """Candidates of which the answer is a misspelling, or that sound like it."""
+    """Candidates with a spelling or sound like the answer's."""
     from rapidfuzz.distance import OSA
 
     from executive.language.spelling import nearest_by_sound
@@ -152,7 +152,7 @@ _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth")
 class RefusalKind(Enum):
     """Machine-readable kind of a refusal; its reason is for people."""
 
-    NOT_UNDERSTOOD = "not_understood"  # words that lie outside of what the robot does
+    NOT_UNDERSTOOD = "not_understood"  # words outside the robot's abilities
     NOTHING_TO_DO = "nothing_to_do"  # it asks for no action
     NO_SUCH_DOOR = "no_such_door"
     ABOUT_PEOPLE = "about_people"  # whom to follow, guide or greet, or where to
@@ -160,9 +160,9 @@ class RefusalKind(Enum):
 
 
 class RefusalError(Exception):
-    """Refusal of a sentence: the reason in one line, and the words that were not understood.
+    """Refusal of a sentence: the reason in one line, and the unknown words.
 
-    `question` says that an answer from the speaker would help, or is the question itself.
+    `question` is True if an answer from the speaker would help, or is the question itself.
     """
 
     def __init__(

@@ -145,7 +145,7 @@ class Reader(Row):
         return _place(token, PrepositionRole.AT if looks else PrepositionRole.GOAL)
 
     def _shown_at(self, start: int) -> Phrase | None:
-        """Noun phrase after a "that" which was not parsed as its article ("hand me that cup")."""
+        """Noun phrase after a "that" that the parser did not take as its article ("hand me that cup")."""
         points = start < len(self.tokens) and self.tokens[start].word in _SHOWN
         phrase = self.phrase_at(start + 1) if points else None
         if phrase is None or phrase.named_person or phrase.head.word in lexicon().subjects:
@@ -285,7 +285,7 @@ class Reader(Row):
         return (particle,)
 
     def _outside(self, items: list[Item]) -> Item | None:
-        """Verb that the robot does not know, where a clause may begin."""
+        """Unknown verb at a possible beginning of a clause."""
         token = self.tokens[self.at]
         if token.pos != "VERB" or token.tag not in _VERB_TAGS or not (may_begin_command(items) or token.tag == "VB"):
             return None

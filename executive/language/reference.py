@@ -15,8 +15,7 @@ from executive.language.roles import THERE, Location
 class Memory:
     """Latest referents of the conversation: objects, their location, a place, a person.
 
-    `gathered` are all objects named since one was last carried somewhere, `locations` are those of objects in
-    statements.
+    `gathered` are all objects named since the last transport, `locations` are those of objects in statements.
     """
 
     objects: tuple[Phrase, ...] = ()
@@ -41,7 +40,7 @@ class Resolution:
 
 
 def resolve(actions: Sequence[Action], memory: Memory) -> Resolution:
-    """Replaces pronouns in actions, each then with one object at most; `memory` is that of earlier sentences.
+    """Replaces pronouns in actions, which then have one object at most; `memory` is that of earlier sentences.
 
     Raises RefusalError when a pronoun stands for no earlier phrase.
     """

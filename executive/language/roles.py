@@ -16,8 +16,8 @@ from executive.language.phrases import Phrase
 class Location:
     """Place or person as spoken.
 
-    `preposition` stands before it; `within` is a larger place around it ("the table in the kitchen"), and for a person
-    the place where to find them. `phrase` is None for HERE and THERE.
+    `preposition` stands before it; `within` is a larger place around it ("the table in the kitchen"), or the place of a
+    person. `phrase` is None for HERE and THERE.
     """
 
     phrase: Phrase | None
@@ -74,8 +74,8 @@ THERE: Final = Location(None, preposition="there")
 class Roles:
     """Items after a verb, sorted into noun phrases, places by their prepositions, and unknown words.
 
-    `first_at` is the place of the first bare phrase when that is a person, `listed` says that "and" stands between the
-    phrases. `choices` are phrases joined by "or". `favour` says that the recipient stood after "for".
+    `first_at` is the place of the first bare phrase if that is a person, `listed` marks phrases joined by "and".
+    `choices` are phrases joined by "or". `favour` marks a recipient after "for".
     """
 
     objects: list[Phrase] = field(default_factory=list)
@@ -151,8 +151,8 @@ class _Placed:
 def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) -> Roles:
     """Sorts the items after a verb into roles.
 
-    `describes` says that a first "near" or "on top of" with more places after it identifies the object, `puts` that
-    "on" after "from" is the destination, as in "put the cup from the desk on the bed".
+    With `describes`, a first "near" or "on top of" before more places identifies the object. With `puts`, "on" after
+    "from" is the destination, as in "put the cup from the desk on the bed".
     """
     roles = Roles()
     spoken = list(_spoken(items, roles))
@@ -234,7 +234,7 @@ def _somebody(phrase: Phrase) -> bool:
 
 
 def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
-    """Phrases that an "or" after the row joins: the last one, and those joined to it by commas."""
+    """Phrases joined by an "or" after the row: the last one, and those joined to it by commas."""
     first = len(row) - 1
     while first > 0 and row[first].joint in _LISTING:
         before, chunk = row[first - 1].chunk, row[first].chunk

@@ -37,9 +37,9 @@ def understand_for_robots(
 ) -> Understanding:
     """Understands `sentence` for the robots called `robots`, in parts; for one robot as `understand` does.
 
-    Any robot may do a part that names none. With several robots the world's names must be known. `require_wake` says
-    that the sentence must call a robot by name, or all of them. The other arguments are those of `understand`. Never
-    raises on text.
+    Any robot may do a part that names none. With several robots the world's names must be known. With `require_wake`
+    the sentence must call one robot by name, or all. The other arguments are those of `understand`. Never raises on
+    text.
     """
     text = clean(sentence)
     names = tuple(map(display_name, robots))
@@ -231,7 +231,7 @@ class _Reader:
 
 
 def _moved(before: Understanding, meant: Understanding) -> Location | None:
-    """Place where an object was put that `meant` names again without its place ("the beer")."""
+    """Last destination of an object that `meant` names again without its place ("the beer")."""
     if meant.trace is None or before.trace is None or meant.status is not Status.OK or before.memory is None:
         return None
     named = (one.target for one in meant.trace.resolved if one.source is None and not one.again)
@@ -242,7 +242,7 @@ def _moved(before: Understanding, meant: Understanding) -> Location | None:
 
 
 def _where(meant: Understanding) -> Location | None:
-    """Last known place of the objects; None with a person, or where it is unknown."""
+    """Last known place of the objects; None with a person, or if it is unknown."""
     memory = meant.memory
     if memory is None or meant.trace is None:
         return None

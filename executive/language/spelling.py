@@ -1,4 +1,4 @@
-"""Spelling and sound of words: the known names that a word means, misspells, or was misheard for.
+"""Spelling and sound of words: finds the known name of a synonym, a misspelled or a misheard word.
 
 Text and speech share tables and distance. Rules from letters to sounds turn a word into a row of sounds
 (`letter_sounds.yaml`; Elovitz, Johnson, McHugh and Shore, "Letter-to-sound rules for automatic translation of English
@@ -8,8 +8,8 @@ substitutions cost less for similar sounds.
 The sounds: p b t d k g f v s z h m n l r w y as in print, T (thin), S (ship), C (chip), J (jam), N (sing); the vowels i
 (bit, beat), e (bet, bait), a (bat), V (but), o (pot, boat), u (boot), @ (the), and A (buy), W (now), Y (boy).
 
-Only certain corrections are made: a general synonym (`synonyms.yaml`) of one known name, and a word that is no English
-and misspells one known name. All others become a question or a refusal.
+Two corrections are certain: a general synonym (`synonyms.yaml`) of one known name, and a non-English word that
+misspells one known name. All others become a question or a refusal.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class SoundAlikes:
         return word.lower() in self._words
 
     def similarities(self, words: str) -> tuple[Alike, ...]:
-        """All phrases that make a sound, in their order, with their similarity to `words`."""
+        """All phrases with a sound, in their order, with their similarity to `words`."""
         heard = sounds_of(words)
         if not self._phrases:
             return ()
@@ -231,7 +231,7 @@ def synonyms_of(word: str, known: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def look_alikes(word: str, known: Mapping[str, str], facts: DependencyParser) -> tuple[str, ...]:
-    """Known names that an unknown word may misspell, or is similar to in meaning, the likeliest first."""
+    """Known names with a spelling or meaning near to an unknown word's, likeliest first."""
     wanted = word.lower()
     if len(wanted) > _MOST_LETTERS:
         return ()
@@ -280,7 +280,7 @@ class _Known:
 def _corrected_at(
     words: Sequence[re.Match[str]], at: int, known: _Known, facts: DependencyParser
 ) -> tuple[int, str | None]:
-    """Number of words from here that are one name, and that name if it needs another spelling."""
+    """Number of words from here in one name, and the name if it needs another spelling."""
     rows = [[word.group().lower() for word in words[at : at + count]] for count in range(_LONGEST_NAME, 0, -1)]
     fitting = [row for row in rows if at + len(row) <= len(words)]
     for row in fitting:

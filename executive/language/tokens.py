@@ -62,7 +62,7 @@ def repair_parse(tokens: Iterable[Token]) -> tuple[Token, ...]:
 
 @dataclass(frozen=True)
 class _Repair:
-    """Conditions on the words around one, by their places from it on, and their new values."""
+    """Conditions on the words around a word, by relative position, and their new values."""
 
     where: Mapping[int, Mapping[str, re.Pattern[str]]]
     then: Mapping[int, Mapping[str, str]]
@@ -101,7 +101,7 @@ def _repairs() -> tuple[_Repair, ...]:
 
 
 def _fact(tokens: Sequence[Token], at: int, name: str) -> str:
-    """Field of a word, or the name of a test that it passes; empty when it fails, and outside the sentence."""
+    """Field of a word, or the name of a passed test; empty for a failed one, and outside the sentence."""
     if not 0 <= at < len(tokens):
         return ""
     if name in _IS:
@@ -111,7 +111,7 @@ def _fact(tokens: Sequence[Token], at: int, name: str) -> str:
 
 
 def _begins_command(tokens: Sequence[Token], at: int) -> bool:
-    """Returns whether a verb that the robot knows, with its particles, and an object stand here."""
+    """Returns whether a known verb with its particles and an object stand here."""
     words = tuple(t.word for t in tokens[at : at + 3])
     length = next((n for n in range(len(words), 0, -1) if words[:n] in lexicon().verbs), None)
     behind = tokens[at + length : at + length + 1] if length is not None else []
@@ -133,7 +133,7 @@ PERSON: Final = "John"
 
 
 NameTable = tuple[re.Pattern[str], Mapping[str, str]]
-"""Pattern of all known names, and for each name in lower case the word that replaces it in the parser."""
+"""Pattern of all known names, and the parser's replacement word for each name in lower case."""
 
 
 def name_table(knowledge: Knowledge) -> NameTable:
@@ -190,7 +190,7 @@ class Affirmed:
 def affirmation(tokens: Sequence[Token], *, there: bool = False) -> Affirmed:
     """Removes the negation from a statement on a place; any other negation stays.
 
-    `there` says that "there is" stands before it.
+    `there` marks a statement after "there is".
     """
     words = [token.word for token in tokens]
     be = next((n for n, token in enumerate(tokens) if token.lemma == "be" or token.word in ("'s", "'re")), len(words))

@@ -1,4 +1,4 @@
-"""Understanding of a sentence: its commands, or the reason in one line why there are none."""
+"""Understanding of a sentence: its commands, or the reason for a refusal in one line."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ class Status(enum.Enum):
 class Understanding:
     """Meaning of a sentence: commands when `status` is OK, otherwise the reason in one line.
 
-    `steps` is the whole mission where the sentence decides, repeats, waits or the like, and empty otherwise. `parts`
-    assign it to robots by name; with several robots `commands` and `steps` are empty. `question` is the robot's
-    question, `notes` say which name was taken for which, `memory` has the referents for the next sentence, `trace` the
-    results of each step. `addressed` says that the sentence calls a robot by its name.
+    `steps` is the whole mission of a sentence with conditions, loops or waits, and empty otherwise. `parts` assign it
+    to robots by name; with several robots `commands` and `steps` are empty. `question` is the robot's question, `notes`
+    tell names that were interpreted as others, `memory` has the referents for the next sentence, `trace` the results of
+    each step. `addressed` is True if the sentence calls a robot by its name.
     """
 
     text: str
@@ -130,7 +130,7 @@ def understand(
         require_wake: whether the sentence must begin with the wake phrase.
         robot_name: the robot's name; by default the one in `knowledge`.
         memory: referents of earlier sentences, for "it" and "there".
-        correct: whether misspelled names are corrected where that is safe.
+        correct: whether to correct misspelled names when that is safe.
     """
     name = robot_name or (knowledge.robot.name if knowledge else "robot")
     called = strip_wake(clean(sentence), name, knowledge.robot.others if knowledge else ())
@@ -181,7 +181,7 @@ def _under(rules: RoomRules, meant: Understanding) -> Understanding:
 
 
 def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = None) -> Understanding:
-    """Understands a text for one robot, given as an empty trace, and perhaps its clauses."""
+    """Understands a text for one robot, given as an empty trace, and optionally its clauses."""
     trace = pipeline.run(said)
     mentioned = _MENTIONED.search(said.text) is not None
     refused = trace.refusal is not None and trace.refused_at != "cleaning"
@@ -203,7 +203,7 @@ def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = 
 def ask_until_clear(sentence: str, meant: Callable[[str], Understanding], answer: Answerer) -> Understanding:
     """Understands a sentence, and inserts the answers to its questions, at most three; `text` has them, too.
 
-    The result is a question when it is left open, or when its answer is not understood.
+    The result is a question after no answer, or after one that is not understood.
     """
     found = meant(sentence)
     for _ in range(_MOST_QUESTIONS):
@@ -223,4 +223,4 @@ _MENTIONED: Final = re.compile(
     r"|fails|should|whether|door|battery|charge|percent|repeat|holding|report|provided)\b",
     re.IGNORECASE,
 )
-"""Words without which a sentence has only plain commands, so that the rest of the language is not loaded."""
+"""Words of structured sentences; other sentences have only plain commands, and do not load the rest."""

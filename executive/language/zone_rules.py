@@ -1,4 +1,4 @@
-"""Rules for rooms in a sentence: which to keep out of, where to drive slowly, where to be quiet."""
+"""Rules for rooms in a sentence: keep out, drive slowly, be quiet."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Zones = Mapping[str, ZoneFacts]
 class RoomRules:
     """Rules of a sentence as zones by name, and the `rest` of it.
 
-    In the `knowledge` for the rest no object is expected in a room that a rule forbids.
+    The `knowledge` for the rest expects no object in a forbidden room.
     """
 
     rest: str
@@ -58,9 +58,9 @@ class RoomRules:
 
 
 def read_rules(text: str, knowledge: Knowledge | None) -> RoomRules | None:
-    """Reads the rules for rooms in a sentence; None where it has none.
+    """Reads the rules for rooms in a sentence; None without rules.
 
-    Raises RefusalError for a rule without work, and for one that is not understood.
+    Raises RefusalError for a rule without work, and for an unclear one.
     """
     if knowledge is None or _FORMS.mentions.search(text) is None:
         return None
@@ -115,7 +115,7 @@ def take_rules(text: str, knowledge: Knowledge) -> tuple[str, Zones]:
 
 
 def _end(text: str, match: re.Match[str]) -> int | None:
-    """End of the clause of a rule; None where it is no clause of its own, depends on something, or is spoken."""
+    """End of the clause of a rule; None if it is no separate clause, is conditional, or is quoted speech."""
     begin, tail = text[: match.start()], _FORMS.tail.match(text, match.end())
     end = match.end() if tail is None else tail.end()
     sentence = re.split(r"[.;!?]", begin)[-1]

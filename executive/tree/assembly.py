@@ -1,4 +1,4 @@
-"""Assembly of a mission's steps to nodes, and the data flow that the plans of all steps share."""
+"""Assembles a mission's steps to nodes, with the data flow of all their plans."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PYTHON_TYPES: Final[Mapping[Kind, type]] = {Kind.NUMBER: float, Kind.TEXT: str, 
 
 @dataclass(frozen=True)
 class Named:
-    """Named value that steps may read: its blackboard key, its type, and its quantity where it has one."""
+    """Named value that steps may read: its blackboard key, its type, and its quantity if it has one."""
 
     key: str
     type: type
@@ -45,10 +45,10 @@ class Named:
 class Flow:
     """Data flow at one point of a mission, if no step fails before it.
 
-    `names` has the values that are certain to exist, `kinds` the types of all values that any step may have given, by
-    their blackboard keys; `declared` are the names that always have a value. `held` is the object in the gripper;
-    `opening` is set while it is still the object from the beginning of the mission. The people in `met`
-    stand where an earlier step has met them.
+    `names` has the values that certainly exist, `kinds` the types of all values that a step may have given, by their
+    blackboard keys; `declared` are the names that always have a value. `held` is the object in the gripper; `opening`
+    is set while it is the object from the mission's beginning. An earlier step has met the people in `met` at their
+    places.
     """
 
     names: dict[str, Named] = field(default_factory=dict)
@@ -77,7 +77,7 @@ class Flow:
         self.met = frozenset.intersection(*(branch.met for branch in branches))
 
     def may_lack(self, before: Flow) -> None:
-        """Merges with the flow before the last step, which may be skipped, so that its values may be missing."""
+        """Merges with the flow before the last step, because that step may be skipped and its values missing."""
         after = {name: named for name, named in self.names.items() if named.is_same(before.names.get(name))}
         changed = {name for name, named in after.items() if before.names[name] != named}
         self.met &= before.met
@@ -120,9 +120,9 @@ class _Item:
 class Assembler:
     """Assembler of one mission's subtrees by the `plans` of its steps.
 
-    `pick_ups` and `move_aside` hold for steps that do not say otherwise; `flow` is the data flow at the present point.
-    Values that steps set have blackboard keys below `values_base`. `last_known` is where another robot last knew the
-    object of the mission to be.
+    `pick_ups` and `move_aside` are the defaults of steps; `flow` is the data flow at the present point. The values of
+    steps have blackboard keys below `values_base`. `last_known` is the place of the mission's object, as another robot
+    last knew it.
     """
 
     knowledge: Knowledge
@@ -193,11 +193,11 @@ class Assembler:
     def give(self, name: str | None, key: str, kind: type, builder: PlanBuilder, quantity: Any = None) -> str:
         """Lets later steps read a value under `name` (None: not at all); returns the value's blackboard key.
 
-        It is the key that the name had before, so that in a loop earlier steps read the values of later ones; else
-        `key`, or the name's own key where `key` is empty.
+        It is the name's earlier key, so that in a loop earlier steps read the values of later ones; else `key`, or the
+        name's own key if `key` is empty.
 
-        Raises InputError when the name is no word, or is that of a reading, or has another type elsewhere, since steps
-        may be repeated.
+        Raises InputError when the name is no word, is that of a reading, or has another type elsewhere, since steps may
+        be repeated.
         """
         if name is None:
             return key

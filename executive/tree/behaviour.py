@@ -41,7 +41,7 @@ class Explained:
         self.cause, self.message, self.final = None, "", False
 
     def explain_cancelled(self) -> None:
-        """Explains that the node was stopped from outside, with its last message."""
+        """Explains a stop from outside, with the node's last message."""
         self.cause = Cause.CANCELLED
         self.message = f"stopped while: {self.message}" if self.message else "stopped"
 
@@ -107,7 +107,7 @@ class ExplainedNode(_TakesKeywords, Explained):
 
     kind: ClassVar[str] = ""
     output_types: ClassVar[Mapping[str, Any]] = MappingProxyType({})
-    """Types of the values that it writes, by the option that holds the blackboard key of each."""
+    """Types of the written values, by the option with the blackboard key of each."""
     settled: ClassVar[bool] = False
     """After a restart its success stands, and nothing below it is repeated."""
     afresh: ClassVar[bool] = False
@@ -225,7 +225,7 @@ class ExplainedDecorator(ExplainedNode, Decorator):
         yield self
 
     def _held_back(self) -> Status | None:
-        """Returns the status of a tick that leaves the child alone; None where the child is ticked."""
+        """Returns the status of a tick without the child; None if the child is ticked."""
         return None
 
     def stop(self, new_status: Status) -> None:
@@ -353,7 +353,7 @@ def message_of(node: Behaviour) -> str:
 
 @runtime_checkable
 class Conditional(Protocol):
-    """Child that a selector passes over when it does not apply; that is no failure."""
+    """Child of a selector that is skipped, without a failure, when it does not apply."""
 
     def applies(self) -> bool:
         """Returns whether it may be ticked now."""
@@ -369,7 +369,7 @@ def applies(node: Behaviour) -> bool:
 
 @runtime_checkable
 class Suspendable(Protocol):
-    """Node that must be suspended when it will not be ticked for a while."""
+    """Node that must be suspended before a pause of its ticks."""
 
     def suspend(self) -> None:
         """Stops the robot and its own time until the next tick. Idempotent; never raises."""
@@ -388,7 +388,7 @@ def suspend(root: Behaviour, *, sparing: Behaviour | None = None) -> None:
 
 
 class StoppableTime:
-    """Stopwatch on the robot's clock, in seconds since its creation, without the time in which it was stopped."""
+    """Stopwatch on the robot's clock, in seconds since its creation, without the time of its stops."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock

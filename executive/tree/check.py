@@ -1,4 +1,4 @@
-"""Check of a mission before it runs: errors that make it impossible, warnings, and its estimate."""
+"""Check of a mission before it runs: errors, warnings, and its estimate."""
 
 from __future__ import annotations
 
@@ -36,12 +36,11 @@ Fault = tuple[str, str]
 class Abilities:
     """Abilities of the robot and properties of the objects, as far as they are known before a run.
 
-    `masses_kg` has the masses of all classes with a model, `lift_kg` is the payload of the arm. `classes` and
-    `attributes` are those that the robot recognises; an unknown one makes a search for several fail. `reaches_m` are
-    the heights of the lowest and the highest surface that the arm reaches; `widths_m` is the least width of each class,
-    `opens_m` the largest width that the gripper takes; `gripper` is False without one. `takers` are the people who take
-    objects from the robot (None: not known). `taken_m2` is the area of each surface that objects cover, `apart_m` the
-    free distance around an object.
+    `masses_kg` has the masses of all classes with a model, `lift_kg` is the payload of the arm. The robot recognises
+    `classes` and `attributes`; an unknown one makes a search for several objects fail. `reaches_m` are the heights of
+    the lowest and the highest reachable surface; `widths_m` has the least width of each class, `opens_m` is the
+    gripper's largest; `gripper` is False without one. `takers` are the people who take objects from the robot (None:
+    unknown). `taken_m2` is the covered area of each surface, `apart_m` the free distance around an object.
     """
 
     masses_kg: Mapping[str, float]
@@ -69,7 +68,7 @@ class Checked:
 class PlannedRoutes(RoutePlanner):
     """Planner of routes on the map with the global planner of `navigate`; each route is planned once.
 
-    `full_m_s` returns the robot's full speed, of which a zone may allow a share.
+    `full_m_s` returns the robot's full speed, for zones with a share of it.
     """
 
     def __init__(
@@ -83,9 +82,9 @@ class PlannedRoutes(RoutePlanner):
         self._routes: dict[tuple[Pose2D, Pose2D, tuple[Zone, ...]], Route | PlanningError] = {}
 
     def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
-        """Plans the route from start to goal that minds the zones.
+        """Plans the route from start to goal within the zones.
 
-        Raises ValueError with one sentence if none does, InputError for a mask that cannot be read.
+        Raises ValueError with one sentence if none exists, InputError for an unreadable mask.
         """
         if (start, goal, zones) not in self._routes:
             try:
@@ -98,7 +97,7 @@ class PlannedRoutes(RoutePlanner):
         return route
 
     def _planned(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...]) -> Route:
-        """Plans a route. Raises PlanningError, which names the zones that forbid the goal or every path."""
+        """Plans a route. Raises PlanningError with the names of the zones that forbid the goal or every path."""
         if not zones:
             path = self._path(self._costmap, start, goal)
             return Route(path_length(path), float(path.progress_m()[-1]))
@@ -126,7 +125,7 @@ class PlannedRoutes(RoutePlanner):
         return KeepOut(zone_map(zones, self._full_m_s())).space(self._costmap, self._footprint, start)
 
     def _between(self, zones: tuple[Zone, ...], start: Pose2D, goal: Pose2D) -> tuple[str, ...]:
-        """Names of the keep-out zones that cut the goal off: one that does alone, else all; none if walls do."""
+        """Names of the keep-out zones that cut the goal off: one that suffices, else all; none if walls do."""
         keep_out = tuple(zone for zone in zones if zone.kind is ZoneKind.KEEP_OUT)
 
         def leads(without: Sequence[Zone]) -> bool:
@@ -163,8 +162,8 @@ def check_tree(
 ) -> Checked:
     """Checks a compiled mission that begins at `start` with `held` in the gripper.
 
-    It checks that the objects exist and can be lifted, that surfaces and places are in reach, and that the gripper
-    holds before each step the object that the step needs.
+    It checks that the objects exist and can be lifted, that surfaces and places are in reach, and that before each step
+    the gripper holds the required object.
     """
     lines = {node.path_id: node.source for node in tree.root.walk()}
 
@@ -248,7 +247,7 @@ def _nobody_takes(command: Command, knowledge: Knowledge, abilities: Abilities) 
 
 
 def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[tuple[StepPart, Fault]]:
-    """Iterates over the parts that put more on a surface than fits there, as far as sizes are known."""
+    """Iterates over the parts that put too many objects on a surface, by the known sizes."""
     brought_m2: dict[str, float] = {}
     for part in tree.parts:
         command = part.command

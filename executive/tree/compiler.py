@@ -61,7 +61,7 @@ class CompiledTree:
 
     @property
     def buttons(self) -> tuple[str, ...]:
-        """Operator's buttons that the mission waits for or decides by."""
+        """Operator's buttons in the mission's waits and decisions."""
         return tuple(dict.fromkeys(button for node in self.root.walk() for button in buttons_of(node)))
 
     @property
@@ -85,7 +85,7 @@ def compile_mission(
         mission: the mission; its robot and name become the first parts of the path ids.
         knowledge: the world's places, surfaces, objects and people.
         registry: the skills by name.
-        last_known: where another robot last knew the object of the mission to be; it is searched there first.
+        last_known: the place of the mission's object, as another robot last knew it; the search begins there.
 
     Raises InputError when there are no steps, a place, object or skill is unknown, ports are wired wrongly, or a
     command cannot be carried out; with the file and line where known, and all further errors in `others`.

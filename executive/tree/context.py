@@ -1,4 +1,4 @@
-"""Context that the nodes of one robot's tree share while they run."""
+"""Shared context of the running nodes of one robot's tree."""
 
 import hashlib
 from collections.abc import Callable, Mapping
@@ -23,7 +23,7 @@ def leaf_seed(run_seed: int, path_id: str) -> int:
 class Endings:
     """Queue of steps under `always` whose nodes were stopped from outside.
 
-    The run takes them over from these nodes, and ticks them before anything else.
+    The run takes these steps over, and ticks them first.
     """
 
     def __init__(self) -> None:
@@ -57,7 +57,7 @@ class Endings:
 
 @dataclass
 class ArmOrder:
-    """State of the arm between skills: it may be `anywhere` after a skill that failed, stopped, or leaves it out."""
+    """State of the arm between skills: `anywhere` after a skill that failed, stopped, or leaves the arm out."""
 
     anywhere: bool = False
 

@@ -27,7 +27,7 @@ def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str
 
 
 def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[GoalCondition, GoalCondition]:
-    """Goal conditions of two commands that take everything from one place to another: it is empty, all is there."""
+    """Goal conditions of two commands that clear a place: it is empty, and all objects are at the goal."""
     source = _regions(get, knowledge, ())
     place = None if bring.goal is None else knowledge.place(bring.goal)
     assert place is not None
@@ -36,7 +36,7 @@ def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[
 
 
 def door_goal(knowledge: Knowledge, between: tuple[str, str], kind: GoalKind = GoalKind.DOOR_OPEN) -> GoalCondition:
-    """Goal condition of the question whether a door is open, or that it is open at the end of a step (DOOR_OPENED).
+    """Goal condition of a door: a right answer whether it is open, or an open door after a step (DOOR_OPENED).
 
     Raises StopIteration if the world has no such door.
     """
@@ -126,7 +126,7 @@ def _with_person(kind: GoalKind) -> _Goal:
     def goal(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> GoalCondition | None:
         name = "" if command.object is None else command.object.name
         if (kind, name) == (GoalKind.GREETED, SPEAKER):
-            return None  # nobody knows who spoke, and the speech is judged by itself
+            return None  # the speaker is unknown, and the speech is judged by itself
         place = None if command.goal in (None, START) else knowledge.place(command.goal)
         rooms = () if place is None else (knowledge.room(place),)
         regions = tuple(Region(room, knowledge.places[room].polygon) for room in rooms)

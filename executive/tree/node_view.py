@@ -1,4 +1,4 @@
-"""Views of nodes: the tree's nodes with their ports and states, as plain data that every display uses."""
+"""Views of nodes: the tree's nodes with their ports and states, as plain data for all displays."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def _record(value: Any) -> str:
 
 
 def _fact(name: str, value: Any) -> str:
-    """Formats a field with its unit: "x 5.5 m"; nothing for one that is not set."""
+    """Formats a field with its unit: "x 5.5 m"; empty for an unset one."""
     if value is None or value is False or (text := plain(value)) == "":
         return ""
     unit = next((unit for unit in _UNITS if name.endswith(f"_{unit}")), "")
@@ -113,8 +113,8 @@ def _fact(name: str, value: Any) -> str:
 class NodeView:
     """View of one node. INVALID without a cause means that it has not run yet; `hidden` counts omitted descendants.
 
-    `step` is that of the node's spec. A row of an outline has the `policy` of its step in words, and `hidden` has all
-    nodes that it does not show.
+    `step` is that of the node's spec. A row of an outline has the `policy` of its step in words, and `hidden` counts
+    all omitted nodes.
     """
 
     path_id: str
@@ -238,7 +238,7 @@ def _same_row(chain: Sequence[NodeView], authored: set[str]) -> NodeView | None:
 
 
 def _leads_to_step(node: NodeView, authored: set[str]) -> bool:
-    """Returns whether a node, or the only child with steps below it, is a step."""
+    """Returns whether a node is a step, or its only child with steps below it."""
     below = [child for child in node.children if child.path_id in authored]
     return node.step or (len(below) == 1 and _leads_to_step(below[0], authored))
 
@@ -251,14 +251,14 @@ def _is_telling(port: Port) -> bool:
 def node_view(spec: NodeSpec, states: Mapping[str, NodeState] | None = None) -> NodeView:
     """Returns the view of a spec, with states by path id.
 
-    A look that found nothing is an expected failure in a success, and in a selector that tries what is left, unless it
-    made a step fail; so is a node that failed by such looks alone.
+    A look without a find is an expected failure in a success, and in a selector with further children, unless it made a
+    step fail; so is a node that failed only by these looks.
     """
     return _with_expected(_view_of(spec, states or {}), False)
 
 
 def _with_expected(node: NodeView, inside: bool) -> NodeView:
-    """Marks the expected failures; `inside` says that those below the nearest node above may be expected."""
+    """Marks the expected failures; `inside` allows expected failures below the nearest node above."""
     state, failed = node.state, node.state.status is Status.FAILURE
     goes_on = state.status is Status.RUNNING and node.behaviour.control == "Fallback"
     inside = state.status is Status.SUCCESS or goes_on or (inside and failed and not node.step)

@@ -27,7 +27,7 @@ STOW: Final = "stow"
 BACK_OFF: Final = "back_off"
 _BLOCKED: Final = Recovery((Trigger(frozenset({Cause.PLANNING, Cause.EXECUTION}), "navigate"),))
 NAVIGATE_RECOVERIES: Final[Mapping[str, Recovery]] = {"clear_costmap": _BLOCKED, BACK_OFF: _BLOCKED}
-"""Recoveries of a drive that is blocked, by the skill that each runs before the next attempt."""
+"""Recoveries of a blocked drive, by their skill before the next attempt."""
 PICK_UPS: Final = 2
 """Number of times that a dropped object is picked up again, unless a mission says otherwise."""
 
@@ -87,12 +87,11 @@ class Assembled:
 class PlanBuilder:
     """Builder of the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start.
 
-    With `anywhere`, an object that is not in its place is searched elsewhere too, but never on the surfaces in
-    `avoided`: objects there are at their goal. With `in_gripper`, an earlier step has grasped the object; `carried` is
-    the object that an earlier step has grasped, whether this step uses it or not. A dropped object is picked up again
-    at most `pick_ups` times; at most `move_aside` objects that block a grasp are moved aside. `following` is the next
-    command. `last_known` is where another robot last knew the object of the mission to be. An earlier step has met the
-    people in `met`.
+    With `anywhere`, the robot searches for an object outside its place too, but never on the surfaces in `avoided`:
+    objects there are at their goal. With `in_gripper`, an earlier step has grasped the object; `carried` is any object
+    from an earlier step's grasp. The robot picks a dropped object up at most `pick_ups` times, and moves at most
+    `move_aside` blocking objects aside. `following` is the next command. `last_known` is the place of the mission's
+    object, as another robot last knew it. An earlier step has met the people in `met`.
     """
 
     knowledge: Knowledge
@@ -173,7 +172,7 @@ class PlanBuilder:
         return self.node("recover", name, attempt, *nodes, part=part, **options)
 
     def stow_after(self, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:
-        """Builds work after which the arm is stowed, whether it succeeds or fails, or `only_after_failure`."""
+        """Builds work and stows the arm after it, after any result or `only_after_failure`."""
         name = "stow the arm if it fails" if only_after_failure else "stow the arm in the end"
         return self.node("afterwards", name, work, self.skill(STOW), only_after_failure=only_after_failure)
 
@@ -209,7 +208,7 @@ class PlanBuilder:
         return known.issuperset(inputs) and set(kind.outputs).issuperset(outputs)
 
     def optional_ports(self, skill: str, inputs: Mapping[str, object]) -> dict[str, object]:
-        """Returns those of some inputs whose ports the registered skill has; see `has_ports`."""
+        """Returns the inputs with a port of the registered skill; see `has_ports`."""
         return {port: value for port, value in inputs.items() if self.has_ports(skill, (port,))}
 
     def surface(self, name: str) -> Surface:

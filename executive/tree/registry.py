@@ -1,8 +1,8 @@
 """Registry of the skills that a tree may use, by name: installed distributions register them as entry points.
 
 A distribution registers a skill in the group `errand.skills`, name = skill's name, value = "module:Class". The shipped
-skills stand in `pyproject.toml` in the same way. There is only this one mechanism, so that packages of users can do
-what the shipped skills do, and so that a folder on the path never becomes a skill by accident.
+skills stand in `pyproject.toml` in the same way. This is the only mechanism: users' packages have the same abilities as
+the shipped skills, and a folder on the path never becomes a skill by accident.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SkillClass = type[Skill[Any]]
 
 
 class SkillRegistry(Mapping[str, SkillClass]):
-    """Skills by name. Skills of other distributions are loaded when they are used.
+    """Skills by name. Skills of other distributions are loaded at first use.
 
     Iteration loads all of them; `names` loads none.
     """
@@ -146,8 +146,8 @@ def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:
 def _class_of(entry: EntryPoint) -> Any:
     """Returns the class of a module `ports` that names the skill by `done_by`, else the skill's own class.
 
-    The module stands in the skill's package or in one around it. With such a class, the skill's module and all its
-    imports are loaded only when the skill is used.
+    The module stands in the skill's package or in one around it. With this class, the skill's module and all its
+    imports are loaded only at the skill's first use.
     """
     package = entry.module
     while package := package.rpartition(".")[0]:

@@ -1,1 +1,1 @@
-"""Structured sentences, which decide, repeat, wait and go on, as steps of a mission."""
+"""Structured sentences as steps of a mission: conditions, loops, waits and sequences."""

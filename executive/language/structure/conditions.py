@@ -121,7 +121,7 @@ def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | No
 def parse_opening(text: str, state: State, reader: PlainReader) -> tuple[OpenDoor, State] | None:
     """Parses a request to have a door opened, with the state after it; None for other texts.
 
-    Raises RefusalError when the robot is to open a door without a plug-in itself, and see `_between`.
+    Raises RefusalError for a door without a plug-in that the robot would have to open, and see `_between`.
     """
     text = re.sub(r" for (?:me|us|you|him|her|them)$", "", text, flags=re.IGNORECASE)
     match = next((found for form in _P.each("opening") if (found := form.fullmatch(text)) is not None), None)
@@ -239,7 +239,7 @@ def _joined(words: str, state: State, reader: PlainReader) -> tuple[SpokenCondit
                 left_open = left_open or (refusal if refusal.question is not None else None)
                 continue
             known = second.holds
-            if kind is AnyOf:  # who is meant, where both are about one person, but not where
+            if kind is AnyOf:  # the person of two conditions on one person, without the place
                 one, other = first.holds.memory.person, second.holds.memory.person
                 same = one is not None and other is not None and one.name == other.name
                 person = replace(one, within=None) if one is not None and same else state.memory.person

@@ -44,8 +44,8 @@ from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, 
 class DecisionBuilder:
     """Builder of steps that decide and repeat. Its methods raise RefusalError.
 
-    `statement` is the one to which "tell Robin" refers, `given` the last clause with an object, `notes` say which
-    word was taken for which; `special` says that a mission without blocks is still more than a list of commands.
+    `statement` is the referent of "tell Robin", `given` the last clause with an object, `notes` tell words that were
+    interpreted as others; `special` marks a mission without blocks that is more than a list of commands.
     """
 
     def __init__(self, reader: PlainReader, statement: str | None = None, given: str | None = None) -> None:
@@ -252,9 +252,9 @@ class DecisionBuilder:
         return end
 
     def _replace_missing(self, row: StepRow, asked: LastCheck, said: str, body: Sequence[Clause]) -> None:
-        """Builds a choice: the last steps where their object is, otherwise the steps of the body.
+        """Builds a choice: the last steps if their object is there, otherwise the steps of the body.
 
-        Raises RefusalError when "there" could be where the object is taken, or where it is put.
+        Raises RefusalError when "there" could be the object's source or its destination.
         """
         puts = any(command.task is Task.PLACE for step in row.steps[-asked.steps :] for command in step.commands)
         if puts and re.search(r"\bthere$", said, re.IGNORECASE):
@@ -349,7 +349,7 @@ class DecisionBuilder:
         return replace(rounds, loop=rounds.loop.model_copy(update={"every_s": every_s}))
 
     def _on_the_way(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> bool:
-        """Builds parallel steps for "while driving to the kitchen, say ...", where that is simple."""
+        """Builds parallel steps for a simple "while driving to the kitchen, say ..."."""
         text = clause.text
         match = ACTS.under_way.match(text) if clause.kind is Cue.WHILE else None
         if match is None:

@@ -33,11 +33,11 @@ SEES: Final = "I can see whether something or somebody is somewhere"
 
 @dataclass(frozen=True)
 class State:
-    """State of the mission where a part of the sentence begins.
+    """State of the mission at the beginning of a part of the sentence.
 
     `memory` has the referents, `held` the object in the gripper, `goal` the robot's last destination, `at` its room
-    (None: unknown), `door` the last door, `recipient` the person who receives objects where nobody is named. `somebody`
-    says that a condition has found anybody in the place of the memory.
+    (None: unknown), `door` the last door, `recipient` the default recipient of objects. `somebody` is True after a
+    condition has found anybody in the place of the memory.
     """
 
     memory: Memory = field(default_factory=Memory)
@@ -51,10 +51,10 @@ class State:
 
 @dataclass(frozen=True)
 class SpokenCondition:
-    """Condition with its words, and the states where it holds and where it does not.
+    """Condition with its words, and the states after it for true and false.
 
-    `quotable` says that the words may be repeated as a statement, `items` are those of a look, which another condition
-    may omit.
+    The words of a `quotable` condition may be repeated as a statement; `items` are those of a look, which another
+    condition may omit.
     """
 
     condition: Condition
@@ -284,7 +284,7 @@ ATTACHED = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)
 class StepRow:
     """Steps built so far, and pending clauses, which are understood together.
 
-    `asked` is the last look or fetch; `begun` is the index of the step where the present sentence begins.
+    `asked` is the last look or fetch; `begun` is the index of the present sentence's first step.
     """
 
     state: State
@@ -296,9 +296,9 @@ class StepRow:
 
 @dataclass(frozen=True)
 class LastCheck:
-    """Condition of the last steps: they look at it (`looked`), or need it to succeed; `steps` is their number.
+    """Condition of the last steps: they check it (`looked`), or need it to succeed; `steps` is their number.
 
-    `decided` says that the last step depends on the condition.
+    `decided` is True if the last step depends on the condition.
     """
 
     supposed: SpokenCondition
@@ -316,10 +316,10 @@ class Rounds:
 
 
 def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: bool = False) -> int:
-    """Index after the clauses that belong to a condition or to rounds before `at`.
+    """Index after the clauses of a condition or of rounds before `at`.
 
-    `branch` marks a second branch, where "then" goes on after both branches. Clauses that follow the whole end it; in
-    "first ..., finally ..." they belong to it.
+    `branch` marks a second branch, in which "then" goes on after both branches. Clauses that follow the whole end it;
+    in "first ..., finally ..." they belong to it.
     """
     first = any(re.search(r"\bfirst\b", one.joint, re.IGNORECASE) for one in clauses[at : at + 1])
     for n, one in enumerate(clauses[at:], at):
@@ -340,7 +340,7 @@ def negate_supposed(supposed: SpokenCondition) -> SpokenCondition:
 
 
 def statement_of(supposed: SpokenCondition) -> str | None:
-    """Words of a condition as a statement; None where they cannot be repeated."""
+    """Words of a condition as a statement; None if they cannot be repeated."""
     said = supposed.said
     plain = supposed.quotable and not CLAUSES.deictic.search(said) and not re.match(r"it\b|there is one", said)
     return said if said and plain else None
@@ -432,7 +432,7 @@ def times_of_cue(cue: str) -> int:
 
 
 def merge_repeats(block: Repeat) -> Repeat:
-    """Merges rounds around endless rounds, which then end as the outer ones."""
+    """Merges rounds around endless rounds; the merged rounds end like the outer ones."""
     inner, outer = block.steps[0], block.loop
     if len(block.steps) > 1 or not isinstance(inner, Repeat) or not inner.loop.is_endless:
         return block

@@ -101,7 +101,7 @@ def parse_charging(text: str, state: State) -> Done | None:
 
 @dataclass(frozen=True)
 class Listener:
-    """Person to whom the robot speaks: the speaker, or somebody to go to, in words (`who`), and the place.
+    """Person to whom the robot speaks: the speaker, or another person in words (`who`), and the place.
 
     `name` is that of a known person. Without `who` and `where` the robot speaks on the spot.
     """
@@ -114,7 +114,7 @@ class Listener:
 
 @dataclass(frozen=True)
 class SpeechRequest:
-    """Speech and its listener; `text` is None where it was not said ("tell Robin")."""
+    """Speech and its listener; `text` is None if it was not said ("tell Robin")."""
 
     text: str | None
     to: Listener | None
@@ -163,7 +163,7 @@ def parse_speech(text: str, reader: PlainReader) -> SpeechRequest | None:
 
 
 def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
-    """Raises RefusalError where somebody is told or asked something whose name is not known."""
+    """Raises RefusalError for a listener with an unknown name."""
     match = re.match(r"(?:[Tt]ell|[Aa]sk) (?P<who>[A-Z][a-z]+)\b", text)
     names = knowledge.spellings(knowledge.people)
     if match is None or any(name.lower().startswith(match["who"].lower()) for name in names):

@@ -69,7 +69,7 @@ class SentenceBuilder(DecisionBuilder):
         return tuple(row.steps), row.state
 
     def _next(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
-        """Builds the clause at `at`, and those that belong to it; returns the index after them."""
+        """Builds the clause at `at` and its dependent clauses; returns the index after them."""
         clause = clauses[at]
         if clause.anyway or clause.ends_anyway:
             return self.put_always(row, clauses, at)
@@ -89,7 +89,7 @@ class SentenceBuilder(DecisionBuilder):
         return self._act(row, clause, clauses, at)
 
     def _act(self, row: StepRow, clause: Clause, clauses: Sequence[Clause], at: int) -> int:
-        """Builds the clause at `at`, which begins with an action; returns the index after it."""
+        """Builds the clause with an action at `at`; returns the index after it."""
         text = clause.text
         if ACTS.giving.match(text) is not None:
             self.given = text if (behind := trailing_cue(text)) is None else behind.before
@@ -153,7 +153,7 @@ class SentenceBuilder(DecisionBuilder):
         return at + 1
 
     def _flush_reasons(self, row: StepRow) -> None:
-        """Understands the pending clauses; those that only state a reason ("Robin is lost") ask for nothing."""
+        """Understands the pending clauses; a mere reason ("Robin is lost") is no request."""
         reasons = " ".join(clause.text for clause in row.plain)
         try:
             self.flush(row)
@@ -292,7 +292,7 @@ class SentenceBuilder(DecisionBuilder):
     def _chosen(
         self, asked: QuestionRequest, state: State, clauses: Sequence[Clause], at: int
     ) -> tuple[dict[str, Steps], int]:
-        """Steps for each of the choices: the robot brings it, where that was said."""
+        """Steps for each of the choices: the robot brings it, if the sentence says so."""
         article = r"^(?:a|an|some|the|any|another) "
         names = [re.sub(article, "", choice, flags=re.IGNORECASE) for choice in asked.choices]
         if at >= len(clauses) or clauses[at].kind is not None or not ACTS.brings.match(clauses[at].text):
@@ -301,7 +301,7 @@ class SentenceBuilder(DecisionBuilder):
         return {name: self.nest([clauses[at]], each)[0] for name, each in zip(names, chosen, strict=True)}, at + 1
 
     def _choosing(self, asked: QuestionRequest, number: int, state: State) -> State:
-        """State after the answer: "it" is the chosen object, and the person who was asked receives it."""
+        """State after the answer: "it" is the chosen object, and the asked person receives it."""
         objects = tuple(
             item.phrase for item in self.reader.read_items(asked.choices[number]) if isinstance(item, Chunk)
         )
@@ -385,11 +385,10 @@ MOST_CLAUSES: Final = 24
 
 
 def read_structure(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pipeline, memory: Memory) -> Trace:
-    """Reads a sentence that decides, repeats, waits, says or asks, given the trace of its plain reading.
+    """Reads a sentence with conditions, loops, waits or speech, given the trace of its plain reading.
 
-    Returns the plain trace for a list of plain commands: where the sentence could be such a list, only certain
-    decisions and rounds count. `clauses` are those of the sentence, where they are known, and `memory` is that of
-    earlier sentences.
+    Returns the plain trace for a list of plain commands: if the sentence could be one, only certain decisions and
+    rounds count. `clauses` are those of the sentence, if known, and `memory` is that of earlier sentences.
     """
     try:
         return _structured(plain, split(plain.text).clauses if clauses is None else clauses, pipeline, memory)
@@ -425,7 +424,7 @@ _BACK: Final = "I bring it to the place where you have spoken to me, not to wher
 
 
 def _returns_to_speaker(commands: Sequence[Command]) -> bool:
-    """Returns whether an object is brought to the speaker, with whom the robot has gone elsewhere before."""
+    """Returns whether the robot brings an object to the speaker after it has gone elsewhere with the speaker."""
     moved = next((n for n, one in enumerate(commands) if str(one.object) == SPEAKER), len(commands))
     return any(one.item is not None and one.goal == START for one in commands[moved:])
 

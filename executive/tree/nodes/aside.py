@@ -1,4 +1,4 @@
-"""Moving aside an object that blocks every grasp of the wanted one, on the surface where it stands."""
+"""Moves an object that blocks every grasp of the wanted one aside, on its own surface."""
 
 import math
 from collections.abc import Sequence
@@ -24,11 +24,11 @@ SETTLE_S: Final = 0.5
 
 
 class InTheWay(ExplainedLeaf):
-    """Leaf that notes which object blocks a grasp, and where it must not be put.
+    """Leaf that notes the object that blocks a grasp, and forbidden places for it.
 
-    Reads the blocking objects (`blocking_key`), of which it takes the first, and the wanted object (`wanted_key`).
-    Writes that first object (`obstacle_key`), the surface on which it stands (`surface_key`), the robot's pose
-    (`pose_key`), and circles of `clear_m` around the path from the robot to the wanted object (`clear_key`).
+    Reads the blocking objects (`blocking_key`), and the wanted object (`wanted_key`). Writes the first blocking object
+    (`obstacle_key`), its surface (`surface_key`), the robot's pose (`pose_key`), and circles of `clear_m` around the
+    path from the robot to the wanted object (`clear_key`).
 
     | case | status |
     |---|---|
@@ -101,8 +101,8 @@ def move_aside_plan(
 ) -> NodeSpec:
     """Takes the first object under the key `blocking`, and puts it where it does not block the one under `wanted`.
 
-    `tuck` draws the arm in between. If there is no space, the object is set down anywhere on its surface, so that the
-    gripper is free. In the end the robot returns to its earlier pose, for which a grasp without the obstacle exists.
+    `tuck` draws the arm in between. Without space, the robot sets the object down anywhere on its surface, to free the
+    gripper. In the end the robot returns to its earlier pose, from which a grasp without the obstacle exists.
     """
     obstacle, surface, clear, pose = map(below.key, ("obstacle", "surface", "clear", "pose"))
     what = below.node(

@@ -1,11 +1,11 @@
-"""Carrying an object to a person, to the start or to a surface, and picking it up again when it falls.
+"""Plans to carry an object to a person, to the start or to a surface, and to pick it up again when it falls.
 
 | event | detection | recovery |
 |---|---|---|
-| it slips | the gripper closes on it, or its force falls | it is gripped again more firmly, and carried on |
-| it slips once more | the same | it is set down, grasped again, and carried on |
+| the object slips | the gripper closes on it, or its force falls | the robot grips it more firmly, and carries it on |
+| it slips once more | the same | the robot sets it down, grasps it again, and carries it on |
 | it falls | the gripper is empty and has not opened | the robot looks where it fell, picks it up, carries it on |
-| it is not where it was put or handed over | the camera, the gripper | the same |
+| it is not at its goal or with the person | the camera, the gripper | the same |
 """
 
 import math
@@ -93,14 +93,14 @@ def _put_on_plan(builder: PlanBuilder, item: ObjectKind, surface: str, to: str) 
 
 
 def _released(builder: PlanBuilder, skill: str) -> dict[str, str]:
-    """Output of a skill that lets an object go: where that was, for the robot that looks for it."""
+    """Output of a skill that releases an object: the point of the release, for a later search."""
     return {"released_W": builder.key("released")} if builder.has_ports(skill, (), ("released_W",)) else {}
 
 
 def carried_along_plan(builder: PlanBuilder, drive: NodeSpec, to: str) -> NodeSpec:
-    """Guards a drive with the object that an earlier step has grasped; it is picked up again where it falls.
+    """Guards a drive with an object that an earlier step has grasped; the robot picks it up again where it falls.
 
-    After an earlier step that failed and was skipped, the gripper is empty and the guard passes.
+    After a failed and skipped earlier step, the gripper is empty and the guard passes.
     """
     if builder.carried is None:
         return drive
@@ -152,7 +152,7 @@ def _person_at_start(builder: PlanBuilder) -> str:
 
 DROPPED: Final = Trigger(frozenset({Cause.EXECUTION}), own=True)
 MISSED: Final = Trigger(frozenset({Cause.POSTCONDITION}))
-"""Failures after which an object is picked up again: of a guard that it is held, and of a skill that puts it down."""
+"""Failures before a new pick-up: of a guard on holding the object, and of a skill that puts it down."""
 _TURNS_RAD: Final = tuple(math.radians(turn) for turn in (0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180))
 LOST_WITHIN_M: Final = 2.0
 AHEAD_M: Final = 0.6
@@ -162,13 +162,13 @@ ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
 
 
 class Fallen(ExplainedLeaf):
-    """Leaf that notes where the robot has lost the carried object: RUNNING for `settle_s`, then SUCCESS.
+    """Leaf that notes the place of a lost object: RUNNING for `settle_s`, then SUCCESS.
 
-    Writes the robot's pose (`pose_key`); the point of the floor `ahead_m` before the body, where the object fell
-    (`spot_key`); the square of floor around it, `half_m` to each side (`floor_key`); that square with those of
-    `surfaces` within `within_m` of the robot, onto which it may have fallen (`around_key`). An object that the gripper
-    still holds has slipped: a smaller square of free floor is written, on which to set it down (`set_down_key`), and
-    the other keys are written for that place, from which it is picked up again.
+    Writes the robot's pose (`pose_key`); the point of the fall on the floor, `ahead_m` before the body (`spot_key`);
+    the square of floor around it, `half_m` to each side (`floor_key`); this square and the `surfaces` within `within_m`
+    of the robot, onto which the object may have fallen (`around_key`). An object still in the gripper has slipped: the
+    leaf writes a smaller square of free floor to set it down (`set_down_key`), and the other keys for the grasp from
+    there.
     """
 
     kind = "fallen"
@@ -202,7 +202,7 @@ class Fallen(ExplainedLeaf):
         return {options["spot_key"]: Sign.DROPPED}
 
     def initialise(self) -> None:
-        """Writes where to look for the object, by the robot's present pose."""
+        """Writes the places of the search for the object, by the robot's present pose."""
         self.clear_explanation()
         self._end_s = self.context.clock.now() + self.settle_s
         pose = self.context.pose()
@@ -245,8 +245,8 @@ class SurfacesNear(ExplainedLeaf):
     """Leaf that writes the surfaces within `within_m` of the robot, the nearest first.
 
     `rooms` has the outline of each surface's room by the surface's name. If surfaces of the robot's own room are near,
-    the others do not count, since a wall hides them. SUCCESS if there are any; FAILURE with POSTCONDITION and the
-    message `otherwise` if there are none.
+    the others do not count, since a wall hides them. SUCCESS with any surface; FAILURE with POSTCONDITION and the
+    message `otherwise` without one.
     """
 
     kind = "surfaces near"
@@ -281,10 +281,10 @@ def recover_fallen_plan(
     guards: tuple[NodeSpec, ...],
     hands_on: tuple[NodeSpec, ...] = (),
 ) -> NodeSpec:
-    """Recovers carrying `to` a goal: an object that is lost (one of the guards breaks) is picked up where it fell.
+    """Recovers carrying `to` a goal: the robot picks a lost object up where it fell, after a guard breaks.
 
-    So is an object that a skill in `hands_on` has released and that is not at its goal. After each of the builder's
-    `pick_ups` at most, the carrying begins again.
+    It does the same if a skill in `hands_on` has released the object and it is not at its goal. The carrying begins
+    again at most `pick_ups` times, by the builder.
     """
     if not builder.pick_ups:
         return carry

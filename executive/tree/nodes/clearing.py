@@ -49,9 +49,9 @@ class ForEachFound(MemoryComposite):
     | SUCCESS | FAILURE with ERROR, CANCELLED or a held object, or the `misses`th FAILURE | FAILURE with its cause |
     | halted | halted | INVALID with CANCELLED |
 
-    A success at the position of a missed object takes that object off the list. `done` and `missed` are blackboard
-    keys, cleared at a new start if they are in `forgets`. `did` names the action ("moved", "to the bench"), `where` the
-    place that is clear in the end.
+    A success at the position of a missed object removes it from `missed`. `done` and `missed` are blackboard keys,
+    cleared at a new start if they are in `forgets`. `did` names the action ("moved", "to the bench"), `where` the
+    cleared place.
     """
 
     kind = "for each found"

@@ -40,7 +40,7 @@ LONGEST_WAIT_S: Final = 3600.0
 COUNTED: Final = Annotated[float, Quantity(ge=0.0, le=1_000.0)]
 """Number of objects that a look counts."""
 _ANSWERS: Final[Mapping[str, tuple[str, type]]] = {"answer": ("key", bool), "count": ("count_key", float)}
-"""Results of a status check by their names: the option of its answer node that holds the key, and the type."""
+"""Results of a status check by name: the answer node's option with the key, and the type."""
 
 
 def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembled:
@@ -121,9 +121,8 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     """Finds the object, approaches it, grasps it, draws the arm in.
 
     After a failed approach or grasp, the recovery for the failure runs and the robot tries again; a failed search is
-    final. With `anywhere`, an object that is not in its place is searched elsewhere too. An object that an earlier step
-    has grasped is searched only if the gripper is empty. While the gripper holds another object, it fails with
-    PRECONDITION.
+    final. With `anywhere`, the robot also searches elsewhere. It searches for an object from an earlier step's grasp
+    only with an empty gripper. While the gripper holds another object, the plan fails with PRECONDITION.
     """
     item = builder.required_object(builder.command.object)
     if builder.command.item is not None:
@@ -192,8 +191,8 @@ def are_trips(get: Command, bring: Command | None) -> bool:
 def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     """Gets one object and brings it to the goal, as often as requested; `builder` belongs to the command to get them.
 
-    Raises InputError for too many objects, a person as the goal, no source, or a source where the robot would find
-    the objects again that it has brought.
+    Raises InputError for too many objects, a person as the goal, no source, or a source in which the robot would find
+    the delivered objects again.
     """
     get, goal = builder.command, bring.goal
     count, item = get.object_count, get.object
@@ -236,7 +235,7 @@ PLANS: Final[StepPlans] = {Do: _plan, Say: _plan}
 
 
 def _met_after(command: Command, met: frozenset[str], knowledge: Knowledge) -> frozenset[str]:
-    """Returns the people who stand where the robot has met them, after a command that succeeded."""
+    """Returns the people at the places of their meeting with the robot, after a successful command."""
     if command.task in (Task.FOLLOW, Task.GUIDE) and command.object is not None:
         return met - {knowledge.person(command.object.name) or ""}
     goes = command.task is None and command.item is None and command.goal is not None

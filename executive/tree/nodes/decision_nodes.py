@@ -1,4 +1,4 @@
-"""Decisions of a running mission: conditions as data, the looks that they take, and the nodes that decide.
+"""Decisions of a running mission: conditions as data, their looks, and the nodes that decide.
 
 A decision is true, false, or not known yet (None) before a look that it needs.
 """

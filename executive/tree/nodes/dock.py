@@ -18,11 +18,11 @@ from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 
 _BEFORE_M: Final = 0.7
-"""Distance by which the robot stands farther from the tag than on the dock when it looks for it."""
+"""Additional distance from the tag, compared with the docked pose, at which the robot looks for it."""
 
 
 def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
-    """Docks and charges; where the robot does not charge, it backs off and docks again."""
+    """Docks and charges; if the robot does not charge, it backs off and docks again."""
     charge = builder.skill("charge", {"level": level})
     attempt = builder.at("attempt").sequence("dock and charge", *_onto_dock(builder, dock), charge)
     again = Recovery((failure_trigger(Cause.POSTCONDITION, of=charge),), uses=2)

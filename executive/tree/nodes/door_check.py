@@ -1,6 +1,6 @@
-"""Doors: a look whether one is open, from before it, or else from its other side; and a door that is to be opened.
+"""Doors: the check whether one is open, from before it, or else from its other side; and the opening of a door.
 
-A closed door may bar the path to its viewpoint, so the robot also looks from the pose where its drive ended.
+A closed door may block the path to its viewpoint, so the robot also looks from the end of its drive.
 """
 
 import math
@@ -31,7 +31,7 @@ CHECK_DOOR: Final = "check_door"
 _FROM_EITHER: Final = "look from one side, or else from the other"
 _CANNOT_TELL: Final = frozenset({Cause.PRECONDITION, Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION})
 _LOOKS: Final = 1000
-"""Limit of the looks at a door that cannot be judged, as while people walk through; the time limit comes first."""
+"""Limit of inconclusive looks at a door, as while people walk through; the time limit comes first."""
 _IF_CLOSED: Final = MappingProxyType({False: 1})
 _HERE_M: Final = 2.0
 _HERE_RAD: Final = 0.9
@@ -68,7 +68,7 @@ class KnownDoor(ExplainedLeaf):
 
 
 class BeforeDoor(MemoryComposite):
-    """Composite that applies while the robot stands where it sees through a door; status as its only child."""
+    """Composite that applies while the robot's pose has a view through a door; status as its only child."""
 
     kind = "before door"
     door: Doorway
@@ -84,7 +84,7 @@ class BeforeDoor(MemoryComposite):
 
 
 def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str, max_age_s: float = 0.0) -> NodeSpec:
-    """Looks at a door; the answer goes to `key`. What the robot knows counts up to `max_age_s`.
+    """Looks at a door; the answer goes to `key`. The robot's knowledge counts up to an age of `max_age_s`.
 
     Raises InputError when the world has no such door.
     """
@@ -104,7 +104,7 @@ def _known_or(builder: PlanBuilder, door: Door, look: NodeSpec, key: str, max_ag
 
 
 def _looks(builder: PlanBuilder, door: Door, key: str) -> Iterator[NodeSpec]:
-    """Looks from where the robot stands before the door, else from the room on one side, else from the other.
+    """Looks from the robot's pose before the door, else from the room on one side, else from the other.
 
     The room with more doors comes first, since the robot can reach it more easily when this door is closed.
     """
@@ -126,7 +126,7 @@ def _looks(builder: PlanBuilder, door: Door, key: str) -> Iterator[NodeSpec]:
 
 
 def _open_plan(_: Assembler, block: OpenDoor, builder: PlanBuilder) -> Assembled:
-    """Looks at a door; where it is closed, calls its plug-in, or asks the people there and waits before it."""
+    """Looks at a door; if it is closed, calls its plug-in, or asks the people there and waits before it."""
     door, key, wanted = _door(builder, block.door.between), builder.key("open"), block.door
     look = builder.at("look")
     first = look.node("selector", _FROM_EITHER, *_looks(look, door, key), part="look")

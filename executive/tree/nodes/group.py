@@ -68,7 +68,7 @@ class Always(Afterwards):
 
 
 class InZones(ExplainedDecorator):
-    """Decorator whose subtree minds `zones`, besides those of the nodes above it.
+    """Decorator that adds `zones` to those of the nodes above, for its subtree.
 
     | child | status |
     |---|---|

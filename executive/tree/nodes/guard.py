@@ -1,7 +1,7 @@
-"""Conditions that must hold while nodes run, and the policies for readings that are too old.
+"""Conditions that must hold while nodes run, and the policies for old readings.
 
-They stand in a compiled tree as plain data; each run uses copies of its own. A condition returns None when it holds,
-`Failed` when it does not, and `Waiting` when that is not known yet.
+A compiled tree has them as plain data; each run uses its own copies. A condition returns None when it holds, `Failed`
+when it does not, and `Waiting` while its value is unknown.
 """
 
 import copy
@@ -26,7 +26,7 @@ CONTROL_TOPIC = "control"
 
 @dataclass(frozen=True)
 class Waiting:
-    """Verdict of a condition that cannot be judged yet, with one sentence; the nodes below are suspended meanwhile."""
+    """Verdict of a condition without a value yet, with one sentence; the nodes below are suspended meanwhile."""
 
     message: str
 

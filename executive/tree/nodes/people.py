@@ -1,6 +1,6 @@
-"""People: finding the one who is meant, going there, following, guiding, and greeting; the plans and the nodes.
+"""People: plans and nodes to find a person, and to go to, follow, guide and greet them.
 
-The robot knows nobody by face. Where several people may be meant, it asks each "Are you Robin?".
+The robot recognises no faces. Among several people, it asks each "Are you Robin?".
 """
 
 import math
@@ -39,11 +39,11 @@ ANSWER_WITHIN_S: Final = 12.0
 """Time for the answer to "Are you Robin?"."""
 STILL_NEAR_M: Final = 3.5
 STILL_NEAR_S: Final = 120.0
-"""Distance and time within which a person whom an earlier step has met is still the same one."""
+"""Distance and time within which a person is still the one of an earlier meeting."""
 
 
 class OnlyIfNear(OnlyIfKnown):
-    """Composite that applies while the robot is near the person under `key`, whom it met a short time ago.
+    """Composite that applies while the robot is near the person under `key` and met them a short time ago.
 
     Status as its only child.
     """
@@ -61,7 +61,7 @@ class OnlyIfNear(OnlyIfKnown):
 
 
 class AskWhoItIs(AskPeople):
-    """Leaf that makes sure that the person before the robot, seen under `seen`, is `person`.
+    """Leaf that checks that the person before the robot, detected under `seen`, is `person`.
 
     | case | status |
     |---|---|
@@ -194,7 +194,7 @@ class EachInTurn(ForEachFound):
 
 
 class NearRoom(ExplainedLeaf):
-    """Leaf that checks that the robot is in a room, or at most `NEAR_ROOM_M` from it, so that it sees who is there.
+    """Leaf that checks that the robot is in a room, or at most `NEAR_ROOM_M` from it, with a view of its people.
 
     SUCCESS if it is, else FAILURE with EXECUTION.
     """
@@ -247,7 +247,7 @@ def person_text(person: str) -> str:
 
 
 def person_of(builder: PlanBuilder) -> str:
-    """Returns whom the command is about: a known person, `ANYBODY` or `SPEAKER`. Raises InputError otherwise."""
+    """Returns the person of the command: a known person, `ANYBODY` or `SPEAKER`. Raises InputError otherwise."""
     whom = builder.command.object
     name = "" if whom is None else whom.name
     person = SPEAKER if name == SPEAKER else builder.knowledge.somebody(name)
@@ -257,9 +257,9 @@ def person_of(builder: PlanBuilder) -> str:
 
 
 def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> NodeSpec:
-    """Finds a person and goes beside them: near the robot if it has just met them, else where they are looked for.
+    """Finds a person and goes to them: near the robot if it has just met them, else by a search.
 
-    That is `place`, where the person is said to be, or else their usual room, then all other rooms, the nearest first.
+    The search begins at `place`, or else in the person's usual room; then come all other rooms, nearest first.
     """
     knowledge, met = builder.knowledge, builder.met_key(person)
     usual = knowledge.room(builder.place(knowledge.people[person].at))
@@ -300,7 +300,7 @@ def _elsewhere_plan(builder: PlanBuilder, person: str, rooms: tuple[str, ...]) -
 def _meet_one_plan(
     builder: PlanBuilder, person: str, ports: Mapping[str, object], *, expected: bool = True
 ) -> NodeSpec:
-    """Goes beside one person after the other, until one of them is the one who is meant."""
+    """Goes to one person after the other, until one of them is the right one."""
     seen, observations, met = builder.key("seen"), builder.key("all"), builder.met_key(person)
     who = builder.node(
         "who is it",
@@ -334,7 +334,7 @@ def _in_room(builder: PlanBuilder, room: str, then: NodeSpec) -> NodeSpec:
 
 
 def _to_room(builder: PlanBuilder, pose: Pose2D | FromBoard, area: Constant | FromBoard, to: str) -> NodeSpec:
-    """Goes to a pose in a room, or near it; where somebody stands in the door, as near as that."""
+    """Goes to a pose in a room, or near it; if a person stands in the door, as near as possible."""
     once = builder.at("once").skill("navigate", {"goal": pose})
     near = builder.node("near room", f"is {to} near?", part="near", area=area)
     return builder.node("selector", f"go to {to}", once, near, go_near_plan(builder, pose, to), part="to-room")
@@ -362,13 +362,13 @@ def _each_in_turn(
 
 
 def _go_beside(builder: PlanBuilder, person: str, key: str, place: object = "", **options: object) -> NodeSpec:
-    """Goes beside the person who was seen under a key, in a room called `place`; notes there where they are now."""
+    """Goes to the person detected under a key, in a room called `place`; updates the person's position there."""
     ports = {"person": person, "place_W": PlaceOf(key), "place": place, **options}
     return builder.skill("meet_person", ports, {"person": key})
 
 
 def go_to_goal_plan(builder: PlanBuilder, goal: str) -> NodeSpec:
-    """Drives to a place or to the start; or finds a person and goes beside them."""
+    """Drives to a place or to the start; or finds a person and goes to them."""
     person = builder.knowledge.person(goal)
     if person is None:
         return go_near_plan(builder, goal_pose(builder, goal), goal_in_words(builder, goal))

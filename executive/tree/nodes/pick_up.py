@@ -1,4 +1,4 @@
-"""Picking an object up: approach it, grasp it, draw the arm in, with recoveries for each failure.
+"""Plans to pick an object up: approach it, grasp it, draw the arm in, with recoveries for each failure.
 
 Other recoveries stand with their work: of drives in `executive.tree.plan`, of searches in
 `executive.tree.nodes.search`, of a dropped object in `executive.tree.nodes.carry`, of charging in
@@ -121,7 +121,7 @@ def pick_up_plan(
 
 
 def tuck_plan(builder: PlanBuilder) -> NodeSpec:
-    """Draws the arm in, in two attempts; if both fail and the object is held, it is carried as it is."""
+    """Draws the arm in, in two attempts; if both fail and the gripper holds the object, the arm stays out."""
     causes = frozenset({Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION})
     twice = builder.node(
         "retry", "draw in the arm, twice if need be", builder.skill("stow"), part="tuck-in", attempts=2, causes=causes

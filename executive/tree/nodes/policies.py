@@ -269,8 +269,8 @@ class Summary(ExplainedDecorator):
 class RememberPose(ExplainedLeaf):
     """Leaf that writes the robot's pose (world frame) to the blackboard.
 
-    RUNNING until the robot is localised, then SUCCESS; FAILURE with PRECONDITION after `patience_s` without. With
-    `keep`, SUCCESS at once if there is a pose already, such as that of the person who asked for the mission.
+    RUNNING until the robot is localised, then SUCCESS; FAILURE with PRECONDITION after `patience_s`. With `keep`,
+    SUCCESS at once if a pose is stored already, such as that of the mission's speaker.
     """
 
     kind = "remember"

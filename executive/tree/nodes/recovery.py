@@ -1,7 +1,6 @@
-"""Recovery by cause: an attempt, and recoveries that each fit certain failures.
+"""Recovery by cause: an attempt, and recoveries for certain failures.
 
-After a failure one recovery runs, then the next attempt. All counts are bounded, and attempts share only the data that
-they share on purpose.
+After a failure one recovery runs, then the next attempt. All counts are bounded; attempts share only intended data.
 """
 
 from __future__ import annotations
@@ -26,8 +25,8 @@ from skills.api import Cause, ObjectObservation
 class Trigger:
     """Kind of failure: of the node `node` (None: of the whole attempt), with one of `causes`.
 
-    With `own`, the failure must be the node's own, such as a guard's, and not that of a node below it. A final failure
-    fits no trigger.
+    With `own`, the failure must be the node's own, such as a guard's, not that of a node below it. A final failure fits
+    no trigger.
     """
 
     causes: frozenset[Cause]
@@ -56,7 +55,7 @@ class Trigger:
 class Recovery:
     """Rule of a recovery: it runs after failures that fit one of the triggers, at most `uses` times.
 
-    With `given`, only while the blackboard has a value under that key. After the failure of a `final` recovery no other
+    With `given` it runs only while the blackboard has a value under this key. After a failed `final` recovery no other
     one runs. The success of a recovery that `completes` is the success of the whole.
     """
 
@@ -83,7 +82,7 @@ class Recovery:
 
 @dataclass(frozen=True)
 class _AttemptFailure:
-    """Failure of an attempt, and the number of its steps that had succeeded."""
+    """Failure of an attempt, and the number of its successful steps."""
 
     cause: Cause
     message: str
@@ -196,7 +195,7 @@ class Recover(MemoryComposite):
 
 
 class Afterwards(MemoryComposite):
-    """Composite of work (the first child) and of a step that tidies up after it (the second), whatever the result.
+    """Composite of work (the first child) and of a step that tidies up after it (the second), after any result.
 
     | work | tidying | status |
     |---|---|---|

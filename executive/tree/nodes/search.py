@@ -32,7 +32,7 @@ MOST_ELSEWHERE: Final = 3
 HALF_M: Final = 1.2
 """Half the side of the square of floor on which a fallen object is searched."""
 BACK_M: Final = 0.5
-"""Distance to back off, so that an object before the feet is about as far ahead as in a grasp."""
+"""Distance to back off, to bring an object before the feet to about the distance of a grasp."""
 MOST_ASIDE: Final = 2
 ASIDE_M: Final = 0.45
 _TALLY: Final = "observations"
@@ -53,11 +53,11 @@ class Answer(ExplainedDecorator):
     | with `tallies`: ended, fewer counted | some not seen | FAILURE with the cause that prevented the look |
     | halted | any | INVALID with CANCELLED |
 
-    `looks` names for each surface the leaves that look at it, one for each viewpoint; the surface is seen when all of
-    them succeeded, or failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; with `tells` it
-    includes the found object. `question` is the text of a yes, `denied` of a no; without `yes_or_no` they stand alone,
-    since "is it empty" and "is there anything on it" are one question. `tallies` are the blackboard keys under which
-    the leaves write all found objects, of which each is counted once; the number goes to `count_key`, if given.
+    `looks` has the leaves of each surface, one for each viewpoint; the surface is seen when all of them succeeded, or
+    failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; with `tells` it includes the found object.
+    `question` is the text of a yes, `denied` of a no; without `yes_or_no` they stand alone, since "is it empty" and "is
+    there anything on it" are one question. The leaves write all found objects under the blackboard keys `tallies`. Each
+    object counts once; the number goes to `count_key`, if given.
     """
 
     kind = "answer"
@@ -184,9 +184,9 @@ def tally_of(leaf: NodeSpec) -> str:
 def people_looks(
     builder: PlanBuilder, person: str, place: str | None, key: str, *, tallied: bool
 ) -> tuple[tuple[str, NodeSpec], ...]:
-    """Builds a drive and a look around for each room in which a person is searched; see `look_plans`.
+    """Builds a drive and a look around for each room of the search for a person; see `look_plans`.
 
-    Raises InputError when the place is a surface, or for one of several people, whom the robot cannot tell apart.
+    Raises InputError for a surface as the place, and for one of several people, because all look alike to the robot.
     """
     knowledge = builder.knowledge
     if place in knowledge.surfaces:
@@ -239,8 +239,8 @@ def search_plan(
     """Looks for the object where it was detected before, then at each surface; the first detection ends the search.
 
     If it is not in its place, the robot looks at some surfaces from the side, then, with `anywhere`, at surfaces
-    elsewhere. Where another robot last saw it, the floor beside the surface counts too, since it may have fallen out of
-    that robot's gripper. Raises InputError when the place has no surfaces.
+    elsewhere. At the surface of another robot's last detection, the floor nearby counts too, since the object may have
+    fallen out of that robot's gripper. Raises InputError when the place has no surfaces.
     """
     surfaces = surfaces_first_known(builder, item, place)
     name = builder.knowledge.object_name(item.name) or item.name
@@ -304,7 +304,7 @@ def _looks_from_aside(
 
 
 def surfaces_first_known(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
-    """Returns the required surfaces, and before them the one where another robot last saw the object."""
+    """Returns the required surfaces, after the surface of another robot's last detection of the object."""
     known, surfaces = builder.last_known_of(item), required_surfaces(builder, item, place)
     first = [known.surface] if known is not None and known.surface in builder.knowledge.surfaces else []
     return tuple(dict.fromkeys((*filter(None, first), *surfaces)))

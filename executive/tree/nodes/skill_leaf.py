@@ -59,9 +59,9 @@ class SkillLeaf(ExplainedLeaf):
     | suspended | RUNNING; the next tick calls `Skill.resume`, and the time between does not count |
     | halted | INVALID with CANCELLED |
 
-    `end` is called in every case. Each attempt gets a new skill object, so that attempts share nothing. `first` are the
-    skills that stow the arm: they run before the skill if the arm may be anywhere, unless the robot has no arm. After
-    an arm skill without a path the next one follows, which moves the base, and so on.
+    The leaf calls `end` in every case. Each attempt gets a new skill object, so that attempts share no state. `first`
+    are the skills that stow the arm: they run before the skill if the arm may be anywhere, unless the robot has no arm.
+    After an arm skill without a path follows the next one, which moves the base, and so on.
     """
 
     kind = "skill"
@@ -222,7 +222,7 @@ class SkillLeaf(ExplainedLeaf):
         return step
 
     def _bring_in(self, first: Skill[Any], skill: Skill[Any]) -> Running:
-        """Runs one step of a skill that stows the arm; begins the next one, or the skill itself with its time."""
+        """Runs one step of a skill that stows the arm; then begins the next one, or the leaf's skill and its time."""
         step = first.step()
         if isinstance(step, Running) and self._time.elapsed_s() <= first.default_timeout_s:
             return step

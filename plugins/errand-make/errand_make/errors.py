@@ -1,11 +1,11 @@
-"""Errors of importing objects: files and options that cannot be used, and libraries that are missing."""
+"""Errors of importing objects: unusable files and options, and missing libraries."""
 
 from importlib import import_module
 from typing import Any
 
 
 class ObjectImportError(Exception):
-    """A mesh file or an option that cannot be used; the message says why, `hint` what to do."""
+    """Error of an unusable mesh file or option, with the reason as message and a `hint`."""
 
     def __init__(self, message: str, hint: str) -> None:
         self.message, self.hint = message, hint
@@ -17,7 +17,7 @@ class LibraryMissingError(ImportError):
 
 
 def library(name: str) -> Any:
-    """Imports a library that takes long to import. Raises LibraryMissingError when it is not installed."""
+    """Imports a slow library on demand. Raises LibraryMissingError when it is not installed."""
     try:
         return import_module(name)
     except ImportError as error:

@@ -55,7 +55,7 @@ class _Ring:
 
 
 def _smoothed(facing: FloatArray, neighbour: FloatArray) -> FloatArray:
-    """Normal that is shared with the neighbouring band, unless there is an edge between them."""
+    """Normal shared with the neighbouring band, unless an edge lies between them."""
     if facing @ neighbour < SMOOTH_COSINE:
         return facing
     both = facing + neighbour
@@ -162,7 +162,7 @@ class Mesh:
         self.add_lathe(cap or material, [(radius, height), (0, height)], centre=centre, sides=sides)
 
     def add_mesh(self, other: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> None:
-        """Adds another mesh, transformed by the (3, 3) matrix R, which may scale, then moved by p."""
+        """Adds another mesh, transformed by the (3, 3) matrix R, scaling included, then moved by p."""
         matrix, offset = np.asarray(R, dtype=float), np.asarray(p, dtype=float)
         to_normal = np.linalg.inv(matrix)
         for material, points, normals, uvs in other.groups():

@@ -96,7 +96,7 @@ class MassProperties:
 
 
 def solid_mass(mesh: Mesh, density_kg_m3: float) -> MassProperties:
-    """Mass properties of a closed mesh that is filled evenly. Raises ValueError when it encloses no volume."""
+    """Mass properties of a closed mesh of uniform density. Raises ValueError when it encloses no volume."""
     a, b, c = _corners(mesh)
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
     return _gathered(a, b, c, volume * density_kg_m3, apex=True)
@@ -140,7 +140,7 @@ _SMALL_KG_M2 = 5e-6
 class Model:
     """One rigid body: its visual geometry (a mesh file beside the SDF), collision shapes, mass and friction.
 
-    A model without mass properties is for welding to the world.
+    A model without mass properties must be welded to the world.
     """
 
     name: str

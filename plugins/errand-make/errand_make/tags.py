@@ -1,6 +1,6 @@
 """AprilTags of family 36h11: files to print, plates for worlds, and plates on imported models.
 
-The plate of a tag is `MARGIN` cells wider on each side than its black square, since a tag needs white around it.
+The plate of a tag has a white margin of `MARGIN` cells around the black square, for the detection.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def write_plate(folder: Path, tag: int, size_m: float) -> Path:
 def stick_on(folder: Path, tag: int, size_m: float, side: str) -> None:
     """Puts the plate of a tag on a side of the imported model in a folder.
 
-    Raises ObjectImportError where it is there already, or wider than that side, InputError when there is no model.
+    Raises ObjectImportError when the tag is there already, or wider than this side; InputError without a model.
     """
     model, outward = read_imported(folder), SIDES.get(side)
     if outward is None:

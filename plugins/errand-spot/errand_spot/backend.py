@@ -41,10 +41,10 @@ class EstopHolder(StrEnum):
 class Spot:
     """A Spot behind its API, at `HOST[:PORT]`; implements `skills.stack.RobotBackend`.
 
-    `user` is by default that of BOSDYN_CLIENT_USERNAME; the password is that of BOSDYN_CLIENT_PASSWORD, or asked for.
+    `user` is by default BOSDYN_CLIENT_USERNAME; the password comes from BOSDYN_CLIENT_PASSWORD, or from a prompt.
     `certificate` is that of a server, by default the SDK's own. `power_on` switches the motors on, and off at the end.
     `take` takes the lease from its holder, and `estop=own` replaces the tablet's E-stop, each after a typed yes.
-    `padding` is the distance, m, that the robot keeps from obstacles by itself.
+    `padding` is the distance (m) of the robot's own obstacle avoidance.
     """
 
     user: str | None = None
@@ -106,10 +106,10 @@ def _confirmed(question: str) -> bool:
 
 @dataclass(frozen=True)
 class Access:
-    """Access to a robot: address, user and password; may motors, lease and E-stop be switched on, taken, replaced?
+    """Access to a robot: address, user and password, and permissions for motors, lease and E-stop.
 
-    `confirm` asks a person a question and returns whether they said yes. `padding_m` is the distance that the robot
-    keeps from obstacles by itself (None: its usual one).
+    `confirm` asks a person a question and returns True for a yes. `padding_m` is the distance of the robot's own
+    obstacle avoidance (None: its default).
     """
 
     address: Address
@@ -123,7 +123,7 @@ class Access:
 
 
 class Watch:
-    """Watch over the robot after each wait of its clock: reads it, and ends a run that it cannot go on with."""
+    """Monitor of the robot after each wait of its clock: reads the robot, and ends a run that it cannot continue."""
 
     def __init__(self, robot: ApiRobot) -> None:
         self._robot, self.running = robot, False
@@ -139,11 +139,11 @@ class Watch:
 def connected(name: str, access: Access) -> Iterator[ReadyRobot]:
     """Connects to a robot, checks it and gets its lease. `make_ready` then lets it stand.
 
-    However it ends, the robot stops, motors that were switched on here are switched off, and policy, lease and an
-    E-stop of our own are given back.
+    On every exit it stops the robot, switches off motors that it has switched on, and returns policy, lease and our own
+    E-stop.
 
     Raises:
-        InputError: the robot cannot be reached, or is not ready; the message says what is missing.
+        InputError: the robot cannot be reached, or is not ready; the message names the missing parts.
     """
     connection = Connection(access.address, access.user, access.password)
     with ExitStack() as ending:

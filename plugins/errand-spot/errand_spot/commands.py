@@ -121,7 +121,7 @@ def _run(script: Path, arguments: list[str], server: SpotServer, pace: PaceOptio
 
 
 def _environment(server: SpotServer) -> dict[str, str]:
-    """Environment variables with which programs and drivers find the server, and log in."""
+    """Environment variables with the server's address and login, for programs and drivers."""
     return {
         "SPOT_IP": "127.0.0.1",
         "SPOT_PORT": str(server.port),

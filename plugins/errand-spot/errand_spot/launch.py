@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bosdyn.client.sdk import Sdk
 
 ADVANCE: Final = "/errand.Clock/Advance"
-"""Call that steps a robot whose pace a client gives: google.protobuf.Duration -> google.protobuf.Timestamp."""
+"""Call by which a client steps the robot: google.protobuf.Duration -> google.protobuf.Timestamp."""
 _NAME: Final = "clock.spot.robot"
 
 
@@ -49,9 +49,9 @@ def use_server(certificate: Path, port: int) -> None:
 
 
 def step_in_sleep(certificate: Path, port: int) -> None:
-    """Gives the SDK and the program a module `time` with the robot's time, whose `sleep` steps the robot.
+    """Replaces the module `time` of the SDK and the program: it has the robot's time, and `sleep` steps the robot.
 
-    To be called before the SDK is imported. Other threads sleep in true time.
+    Call it before the import of the SDK. Other threads sleep in true time.
     """
     trusted = grpc.ssl_channel_credentials(certificate.read_bytes())
     channel = grpc.secure_channel(f"127.0.0.1:{port}", trusted, [("grpc.ssl_target_name_override", _NAME)])

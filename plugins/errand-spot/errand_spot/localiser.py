@@ -1,4 +1,4 @@
-"""Localiser of a robot that localises itself on a map of its own, as Spot does with GraphNav."""
+"""Localiser for a robot with its own localisation, such as Spot's GraphNav."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from skills.robot import OwnLocalisation, Pose2D, Robot
 class GraphNav:
     """The robot's own localisation: GraphNav of a Spot that has its map and was localised on it before the run.
 
-    `seed_pose` is the pose of the map's seed frame in the world, x, y (m) and yaw (rad). The error of a place is
-    expected to have the standard deviations `sigma` in x, y and yaw. A place older than `max_age_s` does not count.
+    `seed_pose` is the pose of the map's seed frame in the world, x, y (m) and yaw (rad). `sigma` are the standard
+    deviations of a pose in x, y and yaw. A pose older than `max_age_s` does not count.
     """
 
     seed_pose: tuple[Coordinate, Coordinate, Angle] = (0.0, 0.0, 0.0)
@@ -33,7 +33,7 @@ class GraphNav:
 
 
 class OwnLocaliser:
-    """Localiser by what the robot says; implements `skills.api.Localiser`."""
+    """Localiser from the robot's reported pose; implements `skills.api.Localiser`."""
 
     def __init__(self, options: GraphNav) -> None:
         self._options, self._X_WS = options, Pose2D(*options.seed_pose)
@@ -42,7 +42,7 @@ class OwnLocaliser:
         self._localised = False
 
     def estimate(self) -> LocalisationEstimate:
-        """The latest place, `localised` unless the robot says that it is lost, or says nothing."""
+        """The latest pose, `localised` unless the robot reports that it is lost, or is silent."""
         X_WO = compose(self._X_WS, self._last.X_SO).transform()
         return LocalisationEstimate(
             self._last.stamp_s, X_WO, self._covariance.copy(), self._localised, float(self._localised)

@@ -26,10 +26,10 @@ from skills.robot import FloatArray, Image, Pose2D, Robot, Scan
 
 _CELL_M, _MARGIN_M = 0.025, 1.0
 _MOST_CELLS, _HALF_SIZE_M = 4_000_000, 500.0
-"""Most cells of a map, and the distance from its middle to where its points count."""
+"""Most cells of a map, and the radius about its middle within which its points count."""
 _HEIGHTS_M: Final = (0.7, 1.3)
 _STEP_M, _SAME_M = 0.6, 0.2
-"""Distance between waypoints along a path, and from an earlier one that stands for a new one."""
+"""Distance between waypoints along a path, and distance within which an earlier one replaces a new one."""
 _CLEAR_M: Final = 0.45
 """Clearance of a line between two waypoints that no path joins."""
 _UNSURE: Final = np.diag([0.1**2, 0.1**2, 0.05**2])

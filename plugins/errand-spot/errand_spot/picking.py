@@ -1,6 +1,6 @@
 """Picks up the object at a point with the grasp skill, for a server that commands a robot without a mission.
 
-The frame `odom` serves as the world: nothing is localised, no map is known, and no network names the object.
+The frame `odom` serves as the world, without localisation, map or detector.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _FLOOR_M: Final = 0.06
 
 
 def observe(point: FloatArray, points: FloatArray, stamp_s: float) -> ObjectObservation:
-    """Returns the object at a point of a cloud (N, 3): what stands around the point on the highest surface below it."""
+    """Returns the object at a point of a cloud (N, 3): the points around it above the highest surface below it."""
     near = points[np.linalg.norm(points[:, :2] - point[:2], axis=1) < _AROUND_M]
     base_m = _surface_below(near, float(point[2]))
     own = near[(np.linalg.norm(near[:, :2] - point[:2], axis=1) < _OWN_M) & (near[:, 2] > base_m + _ABOVE_M)]
@@ -130,7 +130,7 @@ class _Constrained:
 
 
 class PointPicker:
-    """Picks up what stands at a point: looks closely with the hand's camera, plans, grasps, lifts and carries."""
+    """Picks up the object at a point: looks closely with the hand's camera, plans, grasps, lifts and carries."""
 
     def __init__(self, robot: Robot, clock: Clock) -> None:
         self._robot, self._clock, self._stack = robot, clock, default_stack()
@@ -141,7 +141,7 @@ class PointPicker:
     def begin(
         self, lease: Lease, point_O: FloatArray, points_O: FloatArray, allows: Callable[[RotationMatrix], bool]
     ) -> None:
-        """Starts to pick up the object at a point of a cloud (N, 3), both in `odom`, as the hand may be turned."""
+        """Starts to pick up the object at a point of a cloud (N, 3), both in `odom`, with an allowed hand rotation."""
         self.end()
         self.no_plan = False
         stack, robot = self._stack, self._robot
@@ -174,7 +174,7 @@ class PointPicker:
         return True  # also when no way was found to carry what is held
 
     def end(self) -> None:
-        """Stops what it has begun."""
+        """Stops the pick."""
         if self._skill is not None and self._worker is not None:
             self._skill.end()
             self._worker.close()

@@ -200,7 +200,7 @@ def _refused(mesh: Path | None = None) -> Iterator[None]:
 
 
 def _unlike_its_class(made: ImportedObject) -> str | None:
-    """Returns why the robot may not recognise the object as one of its class, by size; None if the size fits."""
+    """Returns the reason why an object's size may not fit its class for the detector; None if it fits."""
     form = class_forms().get(made.class_name)
     if form is None:
         return None

@@ -186,7 +186,7 @@ class _Document:
         return Surface((float(r), float(g), float(b)))
 
     def _picture(self, effect: Element, name: str) -> str | None:
-        """File of the picture that a texture names: by a sampler, its surface and the image, or by the image."""
+        """File of a texture's picture: by a sampler, its surface and the image, or by the image."""
         parameters = {each.get("sid", ""): each for each in effect.iter() if _name(each) == "newparam"}
         for _ in range(MOST_LINKS):
             if name not in parameters:

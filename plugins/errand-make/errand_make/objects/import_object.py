@@ -36,7 +36,7 @@ from skills.robot import FloatArray, Picture
 LARGEST_M: Final = 5.0
 SMALLEST_M: Final = 0.005
 PROUD_M: Final = 0.0003
-"""Distance by which the small spheres stand out, so that they bear the body."""
+"""Distance by which the small spheres stand out to carry the body."""
 PLACES: Final = 6
 USUAL_KG_M3: Final = 600.0
 """Density of an object of unknown mass: between wood and a plastic bottle that is full."""
@@ -57,9 +57,9 @@ _ROUND_SAME, _ROUND_WIDEST = 0.02, 0.52
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """Options of an import: name, mass (kg), class, metres per unit, the axis that is up, and closing of holes.
+    """Options of an import: name, mass (kg), class, metres per unit, the vertical axis, and closing of holes.
 
-    Without a class, the robot knows the object by its model. Without a mass, the volume gives it (`USUAL_KG_M3`).
+    Without a class, the robot recognises the object by its model. The default mass is by volume (`USUAL_KG_M3`).
     """
 
     name: str
@@ -230,7 +230,7 @@ def _scale_hint(largest_m: float, scale: float) -> str:
 
 
 def _refuse_impossible(mass: MassProperties) -> None:
-    """Refuses an inertia that no body has, because of pieces that are inside out. Raises ObjectImportError."""
+    """Refuses an impossible inertia, as from pieces that are inside out. Raises ObjectImportError."""
     moments = np.linalg.eigvalsh(mass.inertia)
     if moments[0] <= 0.0 or moments[2] > (1.0 + 1e-6) * (moments[0] + moments[1]):
         hint = "unite its pieces to one body and let its normals be calculated again, or import its hull"
@@ -238,7 +238,7 @@ def _refuse_impossible(mass: MassProperties) -> None:
 
 
 def _at_rest(body: _Body) -> _Body:
-    """Lays the body down as it would rest, with the centre of its bounding box at the origin."""
+    """Lays the body down in its resting pose, with the centre of its bounding box at the origin."""
     turned = body.transform(resting_rotation(body.solid.points, _mass(body.solid).com), np.zeros(3))
     points = turned.solid.points
     return turned.transform(np.eye(3), -(points.min(axis=0) + points.max(axis=0)) / 2.0)

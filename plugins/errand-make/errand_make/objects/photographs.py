@@ -23,9 +23,9 @@ FEWEST, MOST = 4, 60
 _LONGEST_PX, _SMALLEST_PX = 640, 48
 """Side to which larger photographs are reduced, and least length of the object in them."""
 _BORDER, _MOST_UNLIKE = 0.03, 0.4
-"""Width of the border as a part of the photograph's, and its share from which on what differs is the background."""
+"""Width of the border as a part of the photograph's, and its least differing share that is still background."""
 _DIFFERENT, _LIGHTNESS = 10.0, 0.5
-"""Least difference in Lab from the background, and the weight in it of lightness, which a soft shadow changes."""
+"""Least difference in Lab from the background, and its weight of lightness, which a soft shadow changes."""
 _MATTE: Final = "photograph the object before a sheet of one colour that it does not have"
 
 Rgba = NDArray[np.uint8]
@@ -34,7 +34,7 @@ Rgba = NDArray[np.uint8]
 def import_photographs(
     photographs: Path, options: ImportOptions, folder: Path, reports: ImportReports, size_m: tuple[float, float, float]
 ) -> ImportedObject:
-    """Writes the model of an object in a folder of photographs into an existing folder, and notes what is left out.
+    """Writes the model of an object in a folder of photographs into an existing folder, and notes omissions.
 
     `size_m` are width, depth and height as the object stands. Raises as `import_object` does, and InputError when fewer
     than four photographs can be used, or there are too many.
@@ -73,8 +73,8 @@ def _crops(photographs: Path) -> tuple[list[Rgba], list[InputError]]:
 def cut_out(file: Path) -> Rgba:
     """The object of a photograph on transparent ground, cut to its bounds.
 
-    It is what is opaque, or else the largest part that differs from the border. Raises InputError when the file cannot
-    be read, the background is not plain, there is no object before it, or it is too small or cut by the border.
+    The object is the opaque part, or else the largest part unlike the border. Raises InputError when the file cannot be
+    read, the background is not plain, or the object is missing, too small or cut by the border.
     """
     bgr, pixels = read_pixels(file, flags=cv2.IMREAD_COLOR), read_pixels(file)
     alpha = pixels[..., 3] if pixels.shape == (*bgr.shape[:2], 4) else np.zeros(bgr.shape[:2])
@@ -95,7 +95,7 @@ def cut_out(file: Path) -> Rgba:
 
 
 def _before_ground(rgb: Rgba, file: Path) -> NDArray[np.bool_]:
-    """Mask of what differs from the border's colour, which may change evenly across. Raises InputError."""
+    """Mask of the pixels unlike the border's colour, which may change evenly across. Raises InputError."""
     lab = cv2.cvtColor(rgb / np.float32(255.0), cv2.COLOR_RGB2LAB) * np.array([_LIGHTNESS, 1.0, 1.0], np.float32)
     v, u = np.mgrid[-1 : 1 : len(rgb) * 1j, -1 : 1 : len(rgb[0]) * 1j]
     at, border = np.dstack([np.ones_like(u), u, v]), np.maximum(np.abs(u), np.abs(v)) > 1.0 - 2.0 * _BORDER
@@ -109,7 +109,7 @@ def _before_ground(rgb: Rgba, file: Path) -> NDArray[np.bool_]:
 
 
 def _largest(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """The largest connected part of a mask, without threads and with its holes, whose colour is that of the ground."""
+    """The largest connected part of a mask, without threads, and with its holes of the background's colour."""
     opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     outlines, _ = cv2.findContours(opened, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     chosen = sorted(outlines, key=cv2.contourArea)[-1:]

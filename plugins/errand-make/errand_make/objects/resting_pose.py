@@ -1,7 +1,7 @@
-"""The rest of a body on a plane: the sides on which it can rest, and small spheres at their corners that bear it.
+"""The rest of a body on a plane: its resting sides, and small spheres at their corners that carry it.
 
-A convex part that lies on a box has a single contact point and would wobble. So each side on which the body can rest
-gets spheres at its corners, which touch the side's plane from inside.
+A convex part on a box has a single contact point and would wobble. So each resting side gets spheres at its corners,
+which touch the side's plane from inside.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _MOST_CANDIDATES: Final = 60
 _OTHER_SIDE: Final = 0.97
 _WALL: Final = 0.9
 _SLACK: Final = 0.5
-"""Share of its radius by which a foot may stand out of faces less than 26 degrees from its side: of a round handle."""
+"""Share of its radius by which a foot may stand out of a round handle's faces (under 26 degrees from its side)."""
 MOST_RESTS: Final = 10
 _OTHER_REST: Final = 0.85
 _PROJECTIONS, _EXACT = 200, 0.02
@@ -52,7 +52,7 @@ class Side:
 
 
 def resting_rotation(points: FloatArray, com: FloatArray) -> FloatArray:
-    """Rotation (3, 3) that lays a body down so that it rests; the identity if it stands as it is."""
+    """Rotation (3, 3) of a body into its resting pose; the identity if it rests already."""
     as_it_is = side_towards(points, com, np.array(DOWN))
     if as_it_is is not None and as_it_is.tipping_rad >= _LEAST_TIPPING_RAD:
         return np.eye(3)
@@ -68,7 +68,7 @@ def resting_rotation(points: FloatArray, com: FloatArray) -> FloatArray:
 
 
 def resting_rotations(points: FloatArray, com: FloatArray) -> FloatArray:
-    """Rotations (K, 3, 3) in which a body rests: the given one, then the steadiest on sides that differ clearly."""
+    """Rotations (K, 3, 3) of resting poses: the given one, then the steadiest on clearly different sides."""
     downs = [np.array(DOWN)]
     for side in sorted(resting_sides(points, com), key=lambda side: -side.tipping_rad):
         if all(float(side.normal @ down) < _OTHER_REST for down in downs):
@@ -77,7 +77,7 @@ def resting_rotations(points: FloatArray, com: FloatArray) -> FloatArray:
 
 
 def resting_sides(points: FloatArray, com: FloatArray) -> list[Side]:
-    """Sides of a body on which it does not fall over, the lowest centre of mass first."""
+    """Stable sides of a body, the lowest centre of mass first."""
     hull = ConvexHull(points)
     normals, index = np.unique(np.round(hull.equations[:, :3], 3), axis=0, return_inverse=True)
     triangles = points[hull.simplices]
@@ -112,7 +112,7 @@ def side_towards(points: FloatArray, com: FloatArray, normal: FloatArray) -> Sid
 
 
 def feet(points: FloatArray, com: FloatArray, parts: Sequence[FloatArray]) -> list[Sphere]:
-    """Small spheres at the corners of the sides on which a body can rest, first of the side on which it stands.
+    """Small spheres at the corners of a body's resting sides, those of its present side first.
 
     They touch the planes of the sides from inside, each within one of the body's convex `parts` (N, 3): between a
     hammer's claw and its handle they would catch the fingers of a gripper.
@@ -133,14 +133,14 @@ def feet(points: FloatArray, com: FloatArray, parts: Sequence[FloatArray]) -> li
 
 
 def _rounded_feet(side: Side, radius: float) -> list[Sphere]:
-    """Feet of a side that is not plane, for instance of a ball, which would roll away."""
+    """Feet of a curved side, for instance of a ball, which would roll away."""
     middle = side.corners.mean(axis=0)
     centres = middle + (_spread(side.corners) - middle) / 2.0 - side.normal * radius
     return [Sphere(radius=radius, p=(x, y, z)) for x, y, z in centres.tolist()]
 
 
 def _feet_of(side: Side, hulls: Sequence[FloatArray], radius: float) -> list[Sphere]:
-    """Feet of one side, each in the part at its corner, smaller where that is narrow; none where too few fit."""
+    """Feet of one side, each in the part at its corner, smaller in a narrow part; none if too few fit."""
     slack_m = _SLACK * radius
     walls = [hull - np.outer(hull[:, :3] @ side.normal > _WALL, [0.0, 0.0, 0.0, slack_m]) for hull in hulls]
     found = list[Sphere]()

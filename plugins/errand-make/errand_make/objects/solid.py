@@ -1,4 +1,4 @@
-"""A mesh as a solid body: its closed surface, its volume, and the convex parts that fill it."""
+"""A mesh as a solid body: its closed surface, its volume, and its convex parts."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class _Patches:
         alike = (edges[first] != edges[second]).all(axis=1)
         count = len(faces)
         one, other = first % count, second % count
-        # each triangle stands twice, as it is and turned; what is joined must be wound alike
+        # each triangle stands twice, as given and turned; joined triangles must be wound alike
         ends = np.where(alike, other, other + count), np.where(alike, other + count, other)
         label = _components(np.concatenate([one, one + count]), np.concatenate(ends), 2 * count)
         as_it_is, turned = label[:count], label[count:]
@@ -78,8 +78,8 @@ def _pieces(faces: Faces) -> NDArray[np.int64]:
 def _bounding(points: FloatArray, faces: Faces) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Masks (T,) of triangles to flip so that neighbours agree, and of triangles that bound the body.
 
-    Where more than two triangles meet at an edge, rays from both sides of each patch tell the side that is inside. A
-    patch between two parts of the body, or outside, bounds nothing.
+    At an edge of more than two triangles, rays from both sides of each patch find the inside. A patch between two parts
+    of the body, or outside, bounds no volume.
     """
     patches = _Patches.of(faces)
     turned, bounding = patches.turned.copy(), np.ones(len(faces), dtype=np.bool_)
@@ -194,10 +194,10 @@ class Solid:
 
 
 def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid, NDArray[np.bool_]]:
-    """Solid that triangles (T, 3, 3) enclose, and the mask (T,) of the triangles that are flipped to face outward.
+    """Solid within triangles (T, 3, 3), and the mask (T,) of the triangles that are flipped to face outward.
 
-    Joins points that lie close together, leaves doubled triangles out and triangles inside of the body, and turns
-    those that face inward. With `close_holes`, a fan about its centre closes each ring of edges without partners.
+    Merges close points, drops doubled triangles and triangles inside the body, and flips triangles that face inward.
+    With `close_holes`, a fan about its centre closes each ring of edges without partners.
 
     Raises:
         ObjectImportError: the surface is open, has one side only, meets itself, or is flat.
@@ -228,7 +228,7 @@ def _refuse_flat(triangles: FloatArray) -> None:
 
 
 def _least_open(triangles: FloatArray) -> _Surface:
-    """Surface of triangles (T, 3, 3): closed over small gaps, if that closes all of it."""
+    """Surface of triangles (T, 3, 3), closed over small gaps if this closes all of it."""
     exact = _surface(triangles, _SAME_POINT)
     for gap in _SEAMS if len(exact.rims) else ():
         with suppress(ObjectImportError):
@@ -241,7 +241,7 @@ def _least_open(triangles: FloatArray) -> _Surface:
 class _Surface:
     """A surface whose triangles agree: points, indices, edges (E, 2) without a partner, and its own triangles.
 
-    `origin` is the index of the triangle that stands for each of the given ones (T,), -1 for none.
+    `origin` (T,) is the surface's triangle for each given one, -1 for none.
     """
 
     points: FloatArray
@@ -253,7 +253,7 @@ class _Surface:
 def _surface(triangles: FloatArray, gap: float) -> _Surface:
     """Surface of triangles (T, 3, 3), whose points are joined over gaps that are a share of its size.
 
-    Raises ObjectImportError when triangles meet at an edge in a way that bounds no body.
+    Raises ObjectImportError when the triangles at an edge bound no body.
     """
     points, corners = _joined(triangles, gap)
     apart = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
@@ -401,7 +401,7 @@ def hull_of(points: FloatArray) -> ConvexHull:
 
 
 def _few_corners(corners: FloatArray) -> FloatArray:
-    """Selects the corners that lie farthest in `MOST_CORNERS` directions, if there are more corners than that."""
+    """Selects the farthest corners in `MOST_CORNERS` directions, if there are more corners."""
     if len(corners) <= MOST_CORNERS:
         return corners
     step = np.arange(MOST_CORNERS) + 0.5

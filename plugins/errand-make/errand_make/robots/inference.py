@@ -1,4 +1,4 @@
-"""Reads off a URDF what it says about a robot's parts, as the first text of its `robot.yaml`."""
+"""Infers a robot's parts from its URDF, for the first text of its `robot.yaml`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Notes = dict[str, str]
 
 
 class Inference:
-    """Inference from a URDF: `data` of the robot's file, and `notes` by its keys on what a person has to decide."""
+    """Inference from a URDF: `data` of the robot's file, and `notes` by its keys on a person's decisions."""
 
     def __init__(self, urdf: UrdfFile, source: UrdfFile, name: str) -> None:
         """`urdf` is what `copy_meshes` wrote, without the simulated sensors of `source`."""
@@ -158,7 +158,7 @@ class Inference:
         return [each for each in self._moving.values() if each.parent in links]
 
     def _arm_joints(self) -> list[UrdfJoint]:
-        """The longest run of joints that turn, each alone behind the one before it."""
+        """The longest chain of revolute joints without branches."""
         runs = list[list[UrdfJoint]]()
         for first in self._moving.values():
             run = [first]
@@ -245,9 +245,9 @@ class Inference:
 
 
 def arm_places(x_m: float, z_m: float, reach_m: float, tip_m: float, front_m: float) -> dict[str, Any]:
-    """Distances at which an arm with its shoulder at x_m and z_m of the body works, as parts of its length.
+    """Working distances of an arm with its shoulder at x_m and z_m of the body, as parts of its length.
 
-    They are those of Spot and Fetch: stands, nearer stands, places to carry at, and those to which it is drawn in.
+    They are those of Spot and Fetch: stands, nearer stands, carrying positions, and positions close to the body.
     """
     whole = reach_m + tip_m
 
@@ -286,8 +286,8 @@ def write_robot_file(
 ) -> tuple[Capabilities, list[str]]:
     """Writes the `robot.yaml` of a robot whose `robot.urdf` is in a folder; `source` is the file it was made from.
 
-    `stow` finds the angles at which the arm is stowed. Returns the robot's capabilities and what a person has to check.
-    Raises InputError for what no robot can have.
+    `stow` finds the angles of the stowed arm. Returns the robot's capabilities and the points for a person to check.
+    Raises InputError for impossible values.
     """
     inference = Inference(UrdfFile(folder / "robot.urdf"), source, name)
     _write(folder / ROBOT_FILE, inference)
@@ -300,7 +300,7 @@ def write_robot_file(
 
 
 def _write(path: Path, inference: Inference) -> None:
-    """Writes a robot's file, with a comment before each part that a person has to check."""
+    """Writes a robot's file, with a comment before each part for a person to check."""
     lines = ["# A robot for Errand. SI units: m, rad, kg, N, s; `docs/how-to/own-robot.md` explains the keys.\n"]
     for key, value in inference.data.items():
         lines += [f"# CHECK: {inference.notes[key]}.\n"] if key in inference.notes else []

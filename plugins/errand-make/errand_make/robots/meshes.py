@@ -45,7 +45,7 @@ def copy_meshes(urdf: UrdfFile, packages: Mapping[str, Path], folder: Path) -> I
 
 
 def _write(urdf: UrdfFile, path: Path) -> None:
-    """Writes the text with the present names of its meshes; lines and comments stay, so that errors name the same."""
+    """Writes the text with the new names of its meshes; lines and comments stay, so that errors name the same lines."""
     names = iter([mesh.get("filename", "") for mesh in urdf.robot.iter("mesh")])
     text = _MESH.sub(lambda found: f'{found[1]}"{next(names)}"' if found[1] else found[0], urdf.text)
     path.write_text(text, encoding="utf-8")

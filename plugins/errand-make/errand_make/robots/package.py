@@ -17,7 +17,7 @@ from skills.manipulation.arm.poses import compact_configuration
 
 _TEMPLATES: Final = PackageTemplates("robot", Path(__file__).parent / "templates")
 _BAND_M: Final = 0.05
-"""Half the band of heights of the returns of a planar LiDAR, which a robot that tilts a little smears."""
+"""Half the height band of a planar LiDAR's returns, which small tilts of the robot smear."""
 
 
 def check_robot_name(name: str) -> None:
@@ -26,7 +26,7 @@ def check_robot_name(name: str) -> None:
 
 
 def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, Path]) -> list[str]:
-    """Writes a package with the robot `name` into a folder; returns what a person has to check.
+    """Writes a package with the robot `name` into a folder; returns the points for a person to check.
 
     Raises:
         InputError: the URDF or a mesh cannot be used; with file and line.

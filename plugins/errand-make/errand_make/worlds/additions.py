@@ -18,7 +18,7 @@ from skills.robot import Pose2D
 def add(folder: Path, wanted: Wanted) -> str:
     """Adds a part to the world of a folder; returns a sentence on it.
 
-    Raises InputError when it cannot be added; the files of the world are then as before.
+    Raises InputError when it cannot be added, and leaves the files of the world unchanged.
     """
     site = Site.open(folder)
     with restored(folder):

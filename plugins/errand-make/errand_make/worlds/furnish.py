@@ -49,7 +49,7 @@ _PERSON_RADIUS_M: Final = 0.35
 _BEARINGS: Final = tuple(k * math.pi / 8 for k in (3, -3, 2, -2, 4, -4, 1, -1, 0))
 """Bearings of a person, seen from the start; the way ahead is the last choice."""
 _COMMON_FACTS: Final = "flat"
-"""World whose knowledge has facts of many objects, for worlds that get such an object."""
+"""World with facts of many objects in its knowledge, for additions to other worlds."""
 _MATERIALS: Final = {"wood": Material((0.72, 0.55, 0.36))}
 _RULES: Final = """# What the seed places: loose objects on surfaces, people about the start.
 rules: {from_edge_m: [0.08, 0.25], clear_m: 0.12, rim_m: 0.03, drop_m: 0.001}
@@ -110,7 +110,7 @@ class Furniture:
 
 
 def covered(grid: Grid, pose: Pose2D, box: Box) -> Bools:
-    """Mask of the cells that a box covers, which stands in the frame of a pose."""
+    """Mask of the cells under a box in the frame of a pose."""
     rows, columns = np.indices(grid.cells.shape)
     x, y = ((k + 0.5) * grid.resolution_m + low for k, low in zip((columns, rows), grid.origin_m, strict=True))
     c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
@@ -190,7 +190,7 @@ def _in(cells: Bools, grid: Grid, pose: Pose2D) -> bool:
 
 
 def _free(grid: Grid, clearance: Any, at: tuple[float, float]) -> float:
-    """Clearance (m) at a point; 0 where it is not free, or outside."""
+    """Clearance (m) at a point; 0 at occupied points and outside."""
     column, row = (int((value - low) // grid.resolution_m) for value, low in zip(at, grid.origin_m, strict=True))
     inside = 0 <= row < clearance.shape[0] and 0 <= column < clearance.shape[1]
     return max(0.0, float(clearance[row, column])) if inside else 0.0
@@ -240,7 +240,7 @@ def _directives(file: Path, name: str, pose: Pose2D) -> str:
 
 
 def add_object(folder: Path, name: str, model: str, surface: str) -> None:
-    """Lets the seed place an object on a surface, and tells the robot where it usually is. Raises WorldError."""
+    """Adds an object that the seed places on a surface, and its usual place to the knowledge. Raises WorldError."""
     known = read_yaml(open_world(_COMMON_FACTS).knowledge_path).data["things"].get(name, {})
     facts = {**known, "usual": [surface]}
     rule = {"name": name, "model": model, "surfaces": [surface]}

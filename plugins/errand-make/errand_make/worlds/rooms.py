@@ -117,7 +117,7 @@ def body_margin_m(grid: Grid, clearance: FloatArray, pose: Pose2D) -> float:
 
 
 def find_rooms(grid: Grid, start: Pose2D) -> tuple[tuple[Room, ...], tuple[Door, ...]]:
-    """Finds the rooms that can be reached from the start, the largest first, and the doors between them."""
+    """Finds the rooms within reach of the start, largest first, and the doors between them."""
     clearance = clearance_m(grid)
     labels, saddles = _segmented(grid, clearance)
     reached = reached_cells(clearance, grid, start)
@@ -250,7 +250,7 @@ def _flooded(far: Any, order: Any, narrower: float, widest: float, least: float)
 
 
 def compile_kernels() -> None:
-    """Finds the rooms of a small map, which compiles what numba has not in its cache."""
+    """Finds the rooms of a small map, to compile the functions that numba's cache lacks."""
     cells = np.full((60, 60), FREE, np.uint8)
     cells[28:32, :24] = cells[28:32, 36:] = OCCUPIED
     find_rooms(Grid(cells, (0.0, 0.0), 0.05), Pose2D(1.5, 0.7, 0.0))

@@ -1,4 +1,4 @@
-"""World in a folder of the user's own, as additions and zones change it."""
+"""World in a user's folder, to be changed by additions and zones."""
 
 from __future__ import annotations
 

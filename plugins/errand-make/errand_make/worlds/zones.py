@@ -20,7 +20,7 @@ from skills.inputs.schema import first_error
 def add_zone(folder: Path, name: str, facts: Mapping[str, Any]) -> Zone:
     """Adds a zone with the facts of the knowledge file, without those that are None; `place` may be any name of a room.
 
-    Raises InputError when the world or the facts are wrong; the files are then as before.
+    Raises InputError when the world or the facts are wrong, and leaves the files unchanged.
     """
     site = Site.open(folder)
     given = {key: value for key, value in facts.items() if value is not None}

@@ -1,4 +1,4 @@
-"""Commands as messages of the API, those that were sent, and how far each has come by the robot's feedback."""
+"""Commands as messages of the API, and the sent commands with their progress by the robot's feedback."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _Move: Final = arm_command_pb2.ArmJointMoveCommand.Feedback
 def mobility_params(raised_m: float, pitch_rad: float, padding_m: float | None) -> Any:
     """Returns mobility parameters: posture, limits of speed, and the robot's own avoidance of obstacles.
 
-    The body is `raised_m` above its usual height. The robot keeps `padding_m` from obstacles (None: as usual).
+    The body is `raised_m` above its usual height. The robot keeps `padding_m` from obstacles (None: its default).
     """
     params = RobotCommandBuilder.mobility_params(body_height=raised_m, footprint_R_body=EulerZXY(pitch=pitch_rad))
     for limit, sign in ((params.vel_limit.max_vel, 1.0), (params.vel_limit.min_vel, -1.0)):
@@ -109,9 +109,9 @@ def halt(part: str | None) -> Any:
 
 @dataclass
 class Sent:
-    """A command that was sent: its number at the robot, its part, its last known status, and its end (our clock).
+    """A sent command: its number at the robot, its part, its last known status, and its end (our clock).
 
-    `path_rad` (K, joints) is the path that the arm must not leave.
+    `path_rad` (K, joints) is the arm's planned path.
     """
 
     number: int
@@ -122,7 +122,7 @@ class Sent:
 
 
 class SentCommands:
-    """The commands that were sent, by their ids; threads may share it."""
+    """The sent commands by their ids; threads may share it."""
 
     def __init__(self) -> None:
         self._lock, self._next = Lock(), 1
@@ -215,7 +215,7 @@ def _stopped(cause: CommandCause, reason: str) -> CommandStatus:
 
 
 def _judged(statuses: Any, number: int, *done: int) -> CommandStatus:
-    """Returns the status that a number of an enumeration means: done, stopped by a trouble, or running."""
+    """Returns the status of an enumeration's number: done, stopped by a trouble, or running."""
     wrong = trouble(statuses.DESCRIPTOR, number)
     if wrong is not None:
         return _stopped(wrong.cause, wrong.text)

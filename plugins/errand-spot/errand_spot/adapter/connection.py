@@ -36,11 +36,11 @@ _FILES: Final[Mapping[str, str]] = {
     },
     **{"velodyne-point-cloud": "point_cloud", "graph-nav-service": "graph_nav.graph_nav"},
 }
-"""Files of the SDK that describe the services that are called, by the names of the services."""
+"""Files of the SDK that describe the called services, by the names of the services."""
 
 
 class LostError(RuntimeError):
-    """A call that the robot did not answer, or refused; it has the cause, and who holds the lease instead."""
+    """Error of a call that the robot refused or did not answer, with the cause and the present lease holder."""
 
     def __init__(self, message: str, cause: CommandCause = CommandCause.NO_ANSWER, holder: str = "") -> None:
         super().__init__(message)
@@ -49,7 +49,7 @@ class LostError(RuntimeError):
 
 @dataclass(frozen=True)
 class Address:
-    """Address of a robot: host, port, and the certificate that it must show (None: the SDK's own)."""
+    """Address of a robot: host, port, and its expected certificate (None: the SDK's own)."""
 
     host: str
     port: int = 443
@@ -93,7 +93,7 @@ class Connection:
         return service in self._stubs
 
     def call(self, service: str, name: str, request: Any, timeout_s: float = CALL_S, *, checked: bool = True) -> Any:
-        """Calls a service. Raises LostError when no answer comes in time, or (if `checked`) one that is no success."""
+        """Calls a service. Raises LostError after a timeout, or (if `checked`) for an answer without success."""
         request.header.client_name = CLIENT
         request.header.request_timestamp.FromNanoseconds(round(self._now_s() * 1e9))
         try:
@@ -158,7 +158,7 @@ class Connection:
         self.call("lease", "RetainLease", lease_pb2.RetainLeaseRequest(lease=self.lease))
 
     def holder(self) -> str:
-        """Name of the client that has the body's lease; empty when it is free. Raises LostError."""
+        """Name of the body's lease holder; empty when it is free. Raises LostError."""
         resources = self.call("lease", "ListLeases", lease_pb2.ListLeasesRequest()).resources
         return next((each.lease_owner.client_name for each in resources if each.resource == "body"), "")
 

@@ -1,6 +1,6 @@
-"""Heartbeat of a run: lease, keepalive policy and an E-stop of our own, without which the robot stops.
+"""Heartbeat of a run: lease, keepalive policy and our own E-stop; the robot stops without them.
 
-All is said from the run's heartbeat and by no thread of its own: a run that hangs falls silent, and the robot stops.
+The run's heartbeat sends all messages, without a separate thread: a run that hangs falls silent, and the robot stops.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Heartbeat:
     # -- E-stop ------------------------------------------------------------------------------------------------------
 
     def hold_estop(self) -> None:
-        """Replaces all E-stops by our own, which is released. Raises LostError, while the motors are on too."""
+        """Replaces all E-stops by our own, released one. Raises LostError, also while the motors are on."""
         endpoint = estop_pb2.EstopEndpoint(role=_ROLE, name=CLIENT)
         endpoint.timeout.CopyFrom(duration(ESTOP_S))
         endpoint.cut_power_timeout.CopyFrom(duration(CUT_S))
@@ -79,7 +79,7 @@ class Heartbeat:
             self._connection.call("estop", "DeregisterEstopEndpoint", request)
 
     def _release(self) -> None:
-        """Says that the robot may move. The first answer only gives the challenge."""
+        """Releases the E-stop. The first answer only returns the challenge."""
         Response, wrong = estop_pb2.EstopCheckInResponse, None
         for _ in range(2):
             request = estop_pb2.EstopCheckInRequest(endpoint=self._endpoint, stop_level=estop_pb2.ESTOP_LEVEL_NONE)
@@ -94,9 +94,9 @@ class Heartbeat:
     # -- keepalive ---------------------------------------------------------------------------------------------------
 
     def add_policy(self) -> None:
-        """Lets the robot act alone when we fall silent: it frees the lease, and switches its motors off.
+        """Adds the policy for our silence: the robot frees the lease and switches its motors off.
 
-        The policy is gone while another client has the lease. A robot without the service does neither. Raises
+        The policy is absent while another client has the lease, and a robot without the service has none. Raises
         LostError.
         """
         self._wanted = self._connection.has("keepalive")
@@ -127,7 +127,7 @@ class Heartbeat:
             self._connection.call("keepalive", "ModifyPolicy", request)
 
     def _check_in(self) -> None:
-        """Says that we are here; adds the policy again that another program has removed."""
+        """Checks in; adds the policy again if another program has removed it."""
         try:
             self._connection.call("keepalive", "CheckIn", keepalive_pb2.CheckInRequest(policy_id=self._policy))
         except LostError as error:

@@ -58,7 +58,7 @@ class Readings:
 
 
 def unfit(state: Any, capabilities: Capabilities) -> str | None:
-    """Returns what a robot lacks that its state should show; None when it has all."""
+    """Returns the parts that a robot's state lacks, as a text; None when it is complete."""
     names = {our_joint(joint.name) for joint in state.kinematic_state.joint_states}
     arm = () if capabilities.arm is None else capabilities.arm.joint_names
     if arm and not (state.HasField("manipulator_state") and names.intersection(arm)):
@@ -68,9 +68,9 @@ def unfit(state: Any, capabilities: Capabilities) -> str | None:
 
 
 def readings(state: Any, stamp_s: float, capabilities: Capabilities, last_height_m: float | None = None) -> Readings:
-    """Returns the readings of a state message. Raises KeyError and ValueError for one that lacks frames or numbers.
+    """Returns the readings of a state message. Raises KeyError and ValueError if frames or numbers are missing.
 
-    The height of the body is that over the feet, because `odom` drifts in height; without feet on the floor the last.
+    The body's height is that over the feet, because `odom` drifts; without feet on the floor the last one counts.
     """
     kinematic = state.kinematic_state
     frames = frames_of(kinematic.transforms_snapshot)
@@ -118,7 +118,7 @@ def readings(state: Any, stamp_s: float, capabilities: Capabilities, last_height
 
 
 def off_path_rad(path_rad: FloatArray, q_rad: FloatArray) -> float:
-    """Distance of an arm from its path (K, joints): the largest of its joints' (rad), at the nearest point."""
+    """Distance of an arm from its path (K, joints): the largest joint error (rad) at the nearest point."""
     starts, steps = path_rad[:-1], np.diff(path_rad, axis=0)
     lengths = np.maximum((steps**2).sum(axis=1), 1e-12)
     shares = np.clip(((q_rad - starts) * steps).sum(axis=1) / lengths, 0.0, 1.0)
@@ -148,7 +148,7 @@ def scan(
 
 
 def depth_scan(answers: Sequence[Any], stamp_s: float, X_BL: RigidTransform, X_OB: RigidTransform) -> Scan:
-    """Returns what the depth cameras see within 4 m as a revolution of a lidar at X_BL. Raises NoImageError."""
+    """Returns the depth cameras' points within 4 m as a revolution of a LiDAR at X_BL. Raises NoImageError."""
     seen = [_points_B(answer) for answer in answers]
     points_L = X_BL.inverse() @ np.concatenate([np.zeros((0, 3)), *seen]).T
     return scan(np.asarray(points_L.T), stamp_s, X_BL, X_OB, _DEPTH_RINGS_DEG)

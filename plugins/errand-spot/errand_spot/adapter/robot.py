@@ -1,7 +1,7 @@
 """A Spot behind the Robot protocol, driven through its API.
 
-Readings are those of the last `poll`; commands are sent at once and followed by `poll`. The robot's clock of the
-protocol begins when the connection is made.
+Readings are those of the last `poll`; commands are sent at once and followed by `poll`. The protocol's robot clock
+begins with the connection.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class ApiRobot:
         return self.sensors.scan
 
     def own_localisation(self) -> OwnLocalisation | None:
-        """Latest place by GraphNav, None while it knows none; it is read after somebody has asked for it."""
+        """Latest pose by GraphNav, None before it has one; polled only after the first use."""
         self.sensors.localises = True
         return self.sensors.place
 
@@ -127,7 +127,7 @@ class ApiRobot:
         return self.sensors.readings.powered
 
     def faults(self) -> tuple[str, ...]:
-        """Present faults, with a pressed E-stop, feet that are not known, and a robot that does not answer."""
+        """Present faults, with a pressed E-stop, unknown feet, and a silent robot."""
         now, silent_s = self.sensors.readings, self.sensors.silent_s()
         own = {
             PRESSED: not now.released,
@@ -206,7 +206,7 @@ class ApiRobot:
         return self._sent.add(Sent(number, part, until_s=until_s + _LATE_S))
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
-        """Follows a joint trajectory, and holds at its end; done when the robot says so, stopped when it leaves it."""
+        """Follows a joint trajectory and holds at its end; done by the robot's report, stopped off the path."""
         if (refused := self._objection("arm", lease, until_s, trajectory.times_s)) is not None:
             return refused
         path_rad = np.vstack([self.sensors.arm_rad, trajectory.positions_rad])
@@ -223,7 +223,7 @@ class ApiRobot:
         return refused or self._send(commands.claw(opening, force_n), Sent(0, "gripper", until_s=until_s))
 
     def carry(self, holding: bool, *, lease: Lease) -> None:
-        """Says whether the robot keeps what it holds when the communication is lost; said again until it answers."""
+        """Sets whether the robot keeps the held object after a loss of communication; repeats until it answers."""
         if lease == self._current:
             self._carries = holding
             with suppress(LostError):
@@ -265,7 +265,7 @@ class ApiRobot:
     # -- own ---------------------------------------------------------------------------------------------------------
 
     def lease_holder(self) -> Lease | None:
-        """Lease that counts now, as far as the robot has said; another client's has its name."""
+        """Valid lease by the robot's last answer; another client's lease has the client's name."""
         return Lease(self._name, self._taken_by, self._lease_number + 1) if self._taken_by else self._current
 
     def acquire_lease(self, holder: str) -> Lease:
@@ -298,10 +298,10 @@ class ApiRobot:
     # -- upkeep ------------------------------------------------------------------------------------------------------
 
     def poll(self) -> None:
-        """Reads state and scan, follows the commands that run, and says what the robot must hear.
+        """Reads state and scan, follows the running commands, and sends the heartbeat.
 
-        What the robot does not answer keeps its last value: old readings stop the drive, and are a fault later. While
-        it does not answer nothing else is asked, so the robot falls back on E-stop, policy and stale lease.
+        Unanswered readings keep their last value: old readings stop the drive, and are a fault later. A silent robot
+        gets no other calls, so it falls back on E-stop, policy and stale lease.
         """
         read_state, read_scan = self.sensors.read_state, self.sensors.read_scan
         acting = (self._follow, self._halt_unsure, self._say_carry)
@@ -319,7 +319,7 @@ class ApiRobot:
                     return
 
     def _follow(self) -> None:
-        """Reads how far the commands have come; ends those that are late, and arms that have left their path."""
+        """Reads the progress of the commands; ends late ones, and arm motions off their path."""
         for sent in self._sent.running():
             try:
                 if sent.part == "dock":
@@ -339,7 +339,7 @@ class ApiRobot:
                 raise LostError(status.reason)
 
     def _watched(self, sent: Sent) -> CommandStatus:
-        """Status of a command that runs: stopped when its time is over, or the arm has left its path."""
+        """Status of a running command: stopped after its time, or when the arm has left its path."""
         if self._clock.now() >= sent.until_s:
             return CommandStatus(CommandState.STOPPED, "expired before it was done", CommandCause.LATE)
         off_rad = off_path_rad(sent.path_rad, self.sensors.arm_rad) if sent.part == "arm" else 0.0
@@ -349,13 +349,13 @@ class ApiRobot:
         return sent.status
 
     def _end_running(self, error: LostError) -> None:
-        """Ends the commands that run while the robot does not answer; their parts stop when it does again."""
+        """Ends the running commands of a silent robot; their parts stop when it answers again."""
         for sent in self._sent.running():
             self._unsure.add(sent.part)
             self._sent.update(sent, CommandStatus(CommandState.STOPPED, str(error), error.cause))
 
     def _halt_unsure(self) -> None:
-        """Stops the parts of which it is not known whether they move; the gripper keeps its clamp."""
+        """Stops the parts that may be moving; the gripper keeps its clamp."""
         for part in list(self._unsure):
             if part != "gripper" and self._connection.lease is not None:
                 try:
@@ -374,7 +374,7 @@ class ApiRobot:
             self._synchronised_s, self.sensors.clock_jumped = self._clock.now(), False
 
     def _keep(self) -> None:
-        """Says what the robot must hear; looks whether a lease that was taken is free again."""
+        """Sends the heartbeat; checks whether a lost lease is free again."""
         self.heartbeat.beat()
         if self._taken_by and time.monotonic() - self._looked_s > _LOOK_S:
             self._looked_s = time.monotonic()
@@ -395,7 +395,7 @@ class ApiRobot:
         return f"lease {lease.number} of {lease.holder!r} no longer counts{by}"
 
     def _objection(self, part: str, lease: Lease, until_s: float, values: Iterable[float] = ()) -> CommandId | None:
-        """Refuses a command that must not be sent; returns None for one that may."""
+        """Refuses a forbidden command; returns None for an allowed one."""
         now_s, values = self._clock.now(), np.append(np.asarray(values, dtype=float), min(until_s, 1e9))
         clock_s, state_s = now_s - self._synchronised_s, self.sensors.silent_s()
         if (gone := self._without(lease)) is not None:
@@ -422,7 +422,7 @@ class ApiRobot:
         return self._sent.add(sent)
 
     def _lost(self, error: LostError, what: str, part: str | None) -> CommandId:
-        """Notes a command that failed on its way; the robot may have begun it, so its part is stopped."""
+        """Notes a command that was lost on its way, and stops its part, because the robot may have begun it."""
         if error.cause is CommandCause.NO_LEASE:
             self._lose(error.holder)
         else:
@@ -430,7 +430,7 @@ class ApiRobot:
         return self._refused(f"{what}: {error}", error.cause)
 
     def _lose(self, holder: str) -> None:
-        """Notes that another client has the lease; it is not taken back."""
+        """Notes that another client has the lease; does not take it back."""
         self._current, self._connection.lease, self._taken_by = None, None, holder
 
     def _refused(self, reason: str, cause: CommandCause) -> CommandId:

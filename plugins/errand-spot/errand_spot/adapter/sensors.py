@@ -72,7 +72,7 @@ class Sensors:
         return (f"There is no LiDAR: the scan is that of the depth cameras, which see {DEPTH_RANGE_M:g} m far.",)
 
     def missing(self) -> str | None:
-        """Returns what the robot lacks by its last state; None when it has arm and joints."""
+        """Returns the missing parts by the robot's last state; None when it has arm and joints."""
         return unfit(self._state, self._capabilities)
 
     def silent_s(self) -> float:
@@ -141,7 +141,7 @@ class Sensors:
         return picture(source, f"{source}_camera", answers, stamp_s, FrameTree(frames), coloured=hand)
 
     def fix_focus(self) -> None:
-        """Keeps the focus of the hand's camera as it is, because intrinsics change with it. Raises LostError."""
+        """Fixes the focus of the hand's camera, because intrinsics change with it. Raises LostError."""
         if self._connection.has("gripper-camera-param"):
             request = gripper_camera_param_pb2.GripperCameraParamRequest()
             request.params.focus_auto.value = False

@@ -1,4 +1,4 @@
-"""Statuses of the API's responses: for each that is no success, its cause and what to do about it."""
+"""Statuses of the API's responses: for each failure its cause and a hint."""
 
 from __future__ import annotations
 
@@ -122,12 +122,12 @@ CODES: Final[Mapping[grpc.StatusCode, tuple[Cause, str]]] = {
     **dict.fromkeys((grpc.StatusCode.FAILED_PRECONDITION, grpc.StatusCode.ALREADY_EXISTS), _OTHER),
     **dict.fromkeys((grpc.StatusCode.INTERNAL, grpc.StatusCode.DATA_LOSS), _OTHER),
 }
-"""Cause of each gRPC code that is no success, and a sentence with the fix."""
+"""Cause of each gRPC error code, and a sentence with the fix."""
 
 
 @dataclass(frozen=True)
 class Trouble:
-    """Cause of a response that is no success, a text that names the status and the fix, and who holds the lease."""
+    """Cause of a failed response, a text with the status and the fix, and the lease holder."""
 
     cause: Cause
     text: str
@@ -135,9 +135,9 @@ class Trouble:
 
 
 def trouble(statuses: Any, number: int, said: str = "", holder: str = "") -> Trouble | None:
-    """Returns the trouble that a status means, with what the robot `said`; None for one that is a success.
+    """Returns the trouble of a status, with the robot's text `said`; None for a success.
 
-    `statuses` describes the enumeration. A status that a newer robot sends is a refusal.
+    `statuses` describes the enumeration. An unknown status of a newer robot is a refusal.
     """
     value = statuses.values_by_number.get(number)
     if value is not None and value.name in GOOD:
@@ -150,7 +150,7 @@ def trouble(statuses: Any, number: int, said: str = "", holder: str = "") -> Tro
 
 
 def response_trouble(answer: Any) -> Trouble | None:
-    """Returns the trouble of a response: of its header, of the lease that was used, or of its status."""
+    """Returns the trouble of a response: of its header, of the used lease, or of its status."""
     fields = answer.DESCRIPTOR.fields_by_name
     found = None
     if "header" in fields:

@@ -35,7 +35,7 @@ class ArmMotion:
     going: ClassVar[int]
     complete: ClassVar[int]
     stalled: ClassVar[int]
-    """Statuses within that field: before the goal, at it, and when it is not reached."""
+    """Statuses within that field: before the goal, at it, and stalled."""
 
     def __init__(self) -> None:
         self.status: int = Status.STATUS_PROCESSING
@@ -53,7 +53,7 @@ class ArmMotion:
             self.feedback = self._made(self._progress(computer))
 
     def _progress(self, computer: Computer) -> int:
-        """Status within the field, by the robot's word and its joints."""
+        """Status within the field, by the robot's command status and its joints."""
         state, joints = computer.robot.command_status(self._command).state, computer.snapshot.joints
         if state is CommandState.DONE:
             return self.complete
@@ -92,7 +92,7 @@ class ArmMotion:
 
 
 def smooth(start_rad: FloatArray, times_s: Sequence[float], positions_rad: Sequence[FloatArray]) -> ArmTrajectory:
-    """Returns a trajectory through postures at times, later where a joint would be too fast and then in time again.
+    """Returns a trajectory through postures at times; it is late where a joint would be too fast, then catches up.
 
     Between the postures it follows monotone cubic curves (Fritsch and Carlson, 1980).
     """
@@ -163,7 +163,7 @@ class JointMove(ArmMotion):
 
 
 def _joints(message: Any, before: FloatArray) -> FloatArray:
-    """Joint angles of a message; those that are left out stay."""
+    """Joint angles of a message; omitted ones keep their value."""
     return np.array(
         [
             finite(getattr(message, name).value, f"position.{name}") if message.HasField(name) else value
@@ -188,7 +188,7 @@ class Named(ArmMotion):
         super().__init__()
 
     def begin(self, computer: Computer) -> None:
-        """Starts to move, by way of the ready posture where the arm folds or unfolds; stows no item that may not be."""
+        """Starts to move, through the ready posture to fold or unfold; refuses to stow with an unstowable item."""
         if self._posture is None and not computer.grip.may_stow(computer.snapshot.gripper):
             self.feedback = self._made(self.stalled)
             return

@@ -1,4 +1,4 @@
-"""gRPC services from plain classes: headers, tokens and malformed messages are treated in one place.
+"""gRPC services from plain classes, with one place for headers, tokens and malformed messages.
 
 A service is a class whose methods have the names of the API's calls. Each takes the request and the `Call`, and returns
 the response; a stream of requests comes as a list, and a stream of responses is returned as an iterable. Calls of the
@@ -27,12 +27,12 @@ MOST_STREAMED_BYTES: Final = 256 * 1024**2
 """Most bytes of all requests of a stream."""
 _CHUNK_BYTES: Final = 1024**2
 UserOf = Callable[[str], str | None]
-"""Returns the user of a token; None for one that does not count."""
+"""Returns the user of a token; None for an invalid one."""
 
 
 @dataclass(frozen=True)
 class Call:
-    """Circumstances of a call: who calls, and when it was received (robot time, s since 1970)."""
+    """Context of a call: its user, and the time of its receipt (robot time, s since 1970)."""
 
     user: str
     client_name: str
@@ -71,7 +71,7 @@ class _ServiceHandler:
         return grpc.method_handlers_generic_handler(self._service.type, methods)
 
     def _handler(self, method: Any) -> grpc.RpcMethodHandler:
-        """Returns the handler of one call; those with streams both ways are not served."""
+        """Returns the handler of one call; calls with streams both ways are not served."""
         answer, streams = getattr(self._service, method.name, None), (method.client_streaming, method.server_streaming)
         if answer is None or all(streams):
             return _unimplemented(f"{self._service.type}/{method.name}")
@@ -104,7 +104,7 @@ class _ServiceHandler:
         return handler_of(handle, parse, response_type.SerializeToString)
 
     def _answered(self, answer: Callable[[], Any], response_type: Any, *, many: bool) -> tuple[list[Any], Any]:
-        """Returns the responses, one unless there are `many`, and the API's error: what the service raises."""
+        """Returns the responses, one unless there are `many`, or the API's error for an exception of the service."""
         Error = header_pb2.CommonError
         try:
             return (list(answer()) if many else [answer()]), Error(code=Error.CODE_OK)
@@ -116,7 +116,7 @@ class _ServiceHandler:
 
 
 def _collected(given: Iterable[Any], context: grpc.ServicerContext) -> list[Any]:
-    """Returns all requests of a call; refuses those that cannot be parsed, and an empty or endless stream."""
+    """Returns all requests of a call; refuses malformed ones, and an empty or endless stream."""
     requests, size = list[Any](), 0
     for request in given:
         if request is _MALFORMED:
@@ -164,7 +164,7 @@ def _token(context: grpc.ServicerContext) -> str:
 
 
 def _unimplemented(call: str) -> grpc.RpcMethodHandler:
-    """Returns a handler that refuses a call by its name, whatever its messages are."""
+    """Returns a handler that refuses every call of a name."""
 
     def refuse(_request: Any, context: grpc.ServicerContext) -> Any:
         context.abort(grpc.StatusCode.UNIMPLEMENTED, f"{call} is not served by Errand")

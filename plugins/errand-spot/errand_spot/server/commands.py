@@ -1,4 +1,4 @@
-"""Power and motion commands of clients: who may, when, and how far each has come."""
+"""Power and motion commands of clients: permission, timing and progress."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class PowerService(Service):
         return Response(status=power_pb2.STATUS_IN_PROGRESS)
 
     def FanPowerCommand(self, request: Any, _call: Call) -> Any:
-        """Takes a command for the fans, of which the simulated robot has none that turn."""
+        """Accepts a command for the fans, which do not turn in simulation."""
         Response = power_pb2.FanPowerCommandResponse
         used = self._leases.use(request.lease, _ALL)
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
@@ -94,7 +94,7 @@ class PowerService(Service):
         )
 
     def FanPowerCommandFeedback(self, request: Any, _call: Call) -> Any:
-        """Tells whether the time of a command is over, or a later one has taken its place."""
+        """Returns whether a command's time is over, or a later command has replaced it."""
         Response, end_s = power_pb2.FanPowerCommandFeedbackResponse, self._fan_ends_s.get(request.command_id)
         if end_s is None:
             raise InvalidRequestError(f"command_id: there is no command {request.command_id}")
@@ -213,7 +213,7 @@ class RobotCommandService(Service):
 
 
 def _log_failure(begun: Future[None]) -> None:
-    """Logs the error of a command that could not begin, which no client waits for."""
+    """Logs the error of a command that could not begin, because no client waits for it."""
     if (error := begun.exception()) is not None:
         _LOG.error("a command could not begin", exc_info=error)
 

@@ -213,11 +213,11 @@ class Computer:
         return self._started_s + (time.monotonic() - self._started_monotonic_s if real else self.clock.now())
 
     def until_s(self, robot_time_s: float) -> float:
-        """Converts a robot time to one of the robot's clock; what is left of it counts from now on."""
+        """Converts a robot time to the robot's clock; the remaining time counts from now on."""
         return self.clock.now() + self.left_s(robot_time_s)
 
     def left_s(self, robot_time_s: float) -> float:
-        """Returns what is left until a robot time (s); in whole steps by a client's pace, whose clock is not exact."""
+        """Returns the time left until a robot time (s), in whole steps at a client's pace, with its inexact clock."""
         left_s = robot_time_s - self.now_s()
         exact = self.pace is Pace.REAL or math.isinf(left_s)
         return left_s if exact else PERIOD_S * round(left_s / PERIOD_S)
@@ -257,7 +257,7 @@ class Computer:
             self.step()
 
     def serve(self, stopping: Event) -> None:
-        """Does the work of clients until `stopping` is set; one of them steps the clock, by `do(step)`."""
+        """Does the work of clients until `stopping` is set; one client steps the clock, by `do(step)`."""
         while not stopping.is_set():
             with suppress(queue.Empty):
                 self._work.get(timeout=_LATE_S)()
@@ -304,7 +304,7 @@ class Computer:
             self.sit()
 
     def _watch(self) -> None:
-        """Obeys E-stop, keepalive and stale leases, and finishes what takes time with the motors."""
+        """Obeys E-stop, keepalive and stale leases, and finishes slow switching of the motors."""
         for watch in self.watchers:
             watch()
         level = self.estop.level()
@@ -323,7 +323,7 @@ class Computer:
     # -- motions -----------------------------------------------------------------------------------------------------
 
     def move(self, motions: Mapping[str, Motion]) -> None:
-        """Starts motions in place of those that run; one motion may move several parts."""
+        """Starts motions in place of the running ones; one motion may move several parts."""
         for part, motion in motions.items():
             if (before := self._motions.pop(part, None)) is not None:
                 before.end(OVERRIDDEN)
@@ -382,7 +382,7 @@ class Computer:
         return state is CommandState.DONE or (low and self.clock.now() - self._still_since_s > _STILL_S)
 
     def tell_carried(self) -> None:
-        """Tells the robot whether it must keep what the gripper holds."""
+        """Sets whether the robot keeps the object in the gripper."""
         carry = self.grip.carry_state(self.snapshot.gripper)
         keeps = carry != robot_state_pb2.ManipulatorState.CARRY_STATE_NOT_CARRIABLE
         self.robot.carry(keeps and self.grip.holds(self.snapshot.gripper), lease=self.lease)
@@ -392,7 +392,7 @@ class Computer:
         return self.snapshot.sitting and self.dock_O is not None and self.near(self.dock_O)
 
     def near(self, goal_O: Pose2D) -> bool:
-        """Returns whether the body is at a pose in `odom`, as exactly as a dock needs it."""
+        """Returns whether the body is at a pose in `odom`, at a dock's accuracy."""
         pose = self.snapshot.odometry.pose
         off_m = math.hypot(goal_O.x_m - pose.x_m, goal_O.y_m - pose.y_m)
         return off_m < _DOCKED_M and abs(math.remainder(goal_O.yaw_rad - pose.yaw_rad, math.tau)) < _DOCKED_RAD
@@ -415,7 +415,7 @@ class Computer:
         )
 
     def _frames(self, odometry: Odometry, joints: Joints) -> Frames:
-        """The frame tree as a real Spot gives it: the root is `body`; `odom` and `vision` are the same here."""
+        """The frame tree in the form of a real Spot: the root is `body`; `odom` and `vision` are equal here."""
         X_BO = odometry.X_OB.inverse()
         X_OF = odometry.pose.transform(float(odometry.X_OB.translation()[2]))
         edges = {

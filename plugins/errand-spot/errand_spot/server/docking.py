@@ -1,4 +1,4 @@
-"""Docking at the robot's own dock, whose place is known: prep pose, dock, undock, and the state on it."""
+"""Docking at the robot's own dock at its known pose: prep pose, dock, undock, and the state on it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from errand_spot.server.task import WHOLE, Steps, Task, stow, walk
 from skills.robot import Pose2D
 
 DOCK_ID: Final = 520
-"""Number of the dock, as on the fiducial of a real Spot's first one."""
+"""Number of the dock: that of a real Spot's first fiducial."""
 _PREP_M: Final = 0.9
 _NEAR_M: Final = 4.0
 _REMEMBERED: Final = 20
@@ -115,7 +115,7 @@ class DockingService(Service):
         return made
 
     def GetDockingState(self, _request: Any, _call: Call) -> Any:
-        """Tells whether the robot is on its dock, on its way to it, or leaves it."""
+        """Returns whether the robot is on its dock, drives to it, or leaves it."""
         State, running = (
             Api.DockState,
             [task for task in self._tasks.values() if task.state == Progress.STATUS_IN_PROGRESS],
@@ -131,7 +131,7 @@ class DockingService(Service):
         return Api.GetDockingStateResponse(dock_state=on)
 
     def _refused(self, request: Any, behaviour: int) -> int | None:
-        """Status with which a command is refused; None for one that can be tried."""
+        """Status of a refused command; None for an allowed one."""
         Response, computer, dock_O = Api.DockingCommandResponse, self._computer, self._computer.dock_O
         if computer.snapshot.motors is not Motors.ON:
             return int(Response.STATUS_ERROR_NOT_AVAILABLE)
@@ -145,7 +145,7 @@ class DockingService(Service):
         return int(Response.STATUS_ERROR_GRIPPER_HOLDING_ITEM) if holds else None
 
     def _late(self, clock_identifier: str, end_s: float) -> int | None:
-        """Status of a command whose end time does not count; None for one that does."""
+        """Status of a command with an invalid end time; None for a valid one."""
         left_s = end_s - self._computer.now_s()
         if not self._clocks.knows(clock_identifier):
             return int(Progress.STATUS_ERROR_NO_TIMESYNC)

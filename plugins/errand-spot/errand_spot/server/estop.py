@@ -1,4 +1,4 @@
-"""E-stop: endpoints that clients hold, whose silence or word stops the motors."""
+"""E-stop: endpoints of clients; an endpoint's silence or command stops the motors."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class EstopService(Service):
             self._held["tablet"] = _Held(endpoint, estop_pb2.ESTOP_LEVEL_NONE, own=True)
 
     def level(self) -> int:
-        """The level that counts for the robot, the strictest of all endpoints; cut if one is missing, or all are."""
+        """The robot's level, the strictest of all endpoints; cut if one or all are missing."""
         now_s = time.monotonic()
         with self._lock:
             if not self._config.endpoints or len(self._held) < len(self._config.endpoints):
@@ -136,7 +136,7 @@ class EstopService(Service):
             return Response(status=Response.STATUS_OK, challenge=held.challenge, request=request)
 
     def GetEstopSystemStatus(self, _request: Any, _call: Call) -> Any:
-        """Returns the level of each endpoint, and the one that counts."""
+        """Returns the level of each endpoint, and the robot's level."""
         made, level, now_s = estop_pb2.GetEstopSystemStatusResponse(), self.level(), time.monotonic()
         with self._lock:
             for held in self._held.values():

@@ -1,4 +1,4 @@
-"""Faults of the server for tests of its clients: calls that are lost, late, refused or answered with another status."""
+"""Faults of the server for tests of its clients: lost, late and refused calls, and answers with another status."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Fault:
 
     The request comes late by `request_s`, the answer by `answer_s`; `math.inf` loses it. The answer has another gRPC
     `code`, or other values in `fields`, by their paths (`header.error.code`; in a list each element has the value).
-    The robot does what the call asks unless `handled` is false.
+    The robot executes the call unless `handled` is false.
     """
 
     request_s: float = 0.0
@@ -49,7 +49,7 @@ class Switchboard(grpc.ServerInterceptor):  # type: ignore[misc]
             del self._faults[call]
 
     def intercept_service(self, continuation: Callable[[Any], Any], handler_call_details: Any) -> Any:
-        """Returns the handler of a call, which does as its fault says."""
+        """Returns the handler of a call with its fault."""
         handler, call = continuation(handler_call_details), handler_call_details.method.strip("/")
         fault = self._faults.get(call) or self._faults.get("*")
         if fault is None or handler is None or handler.unary_unary is None:

@@ -25,7 +25,7 @@ from skills.robot import FloatArray, Pose2D
 Poses = Mapping[str, RigidTransform]
 """Poses X_SW of waypoints by their ids."""
 _SEEN_M: Final = 6.0
-"""Distance from a waypoint up to which its snapshot has points."""
+"""Largest distance of a snapshot's points from its waypoint."""
 _FARTHEST_M: Final = 10_000.0
 _Validation = graph_nav_pb2.UploadGraphResponse.ValidationStatus
 
@@ -90,7 +90,7 @@ class GraphMap:
         return map_pb2.Edge.Id(from_waypoint=start, to_waypoint=end)
 
     def poses(self, root: str) -> Poses:
-        """Poses of the waypoints that anchors and edges place together with one; without anchors in its frame."""
+        """Poses of the waypoints connected with one by anchors and edges; without anchors in its frame."""
         anchors = {
             each.id: transform(each.seed_tform_waypoint, "anchor.seed_tform_waypoint")
             for each in self.graph.anchoring.anchors
@@ -99,7 +99,7 @@ class GraphMap:
         return found if root in found else self._joined({root: RigidTransform()})
 
     def _joined(self, placed: Poses) -> Poses:
-        """The given poses, and those of all waypoints that edges join to them."""
+        """The given poses, and those of all waypoints connected to them by edges."""
         found, waiting = dict(placed), deque(placed)
         while waiting:
             here = waiting.popleft()
@@ -141,7 +141,7 @@ class GraphMap:
         return np.concatenate(made)
 
     def tags(self, poses: Poses) -> Mapping[int, RigidTransform]:
-        """Poses X_ST of the AprilTags that snapshots show, or that are anchored, by their numbers."""
+        """Poses X_ST of the AprilTags in snapshots or anchors, by their numbers."""
         made: dict[int, RigidTransform] = {}
         for X_SK, snapshot in self._snapshots(poses):
             for each in snapshot.objects:
@@ -164,7 +164,7 @@ def _ends(edge: Any) -> tuple[str, str]:
 
 
 def _refuse_invalid(upload: Any, graph: Any) -> None:
-    """Raises InvalidGraphError for ids that come twice in an upload or lack a waypoint, and for poses that are none."""
+    """Raises InvalidGraphError for repeated ids in an upload, ids without a waypoint, and invalid poses."""
     report, known = _Validation(), {each.id for each in graph.waypoints}
     twice = [[key for key, n in Counter(map(key_of, listed(upload))).items() if n > 1] for listed, key_of in _LISTS]
     report.duplicate_waypoint_ids.extend(twice[0])
@@ -201,7 +201,7 @@ def _is_pose(message: Any) -> bool:
 
 
 def _points_K(cloud: Any) -> FloatArray | None:
-    """The points (N, 3) of a cloud in `odom`; None for one that has none, or is coded otherwise."""
+    """The points (N, 3) of a cloud in `odom`; None for an empty cloud, or another encoding."""
     frames, size = frames_of(cloud.source.transforms_snapshot), 12 * cloud.num_points
     coded = cloud.encoding == point_cloud_pb2.PointCloud.ENCODING_XYZ_32F and len(cloud.data) == size > 0
     if not coded or not {"odom", cloud.source.frame_name_sensor} <= frames.keys():

@@ -27,7 +27,7 @@ from errand_spot.server.state import RobotStateService, WorldObjectService, kine
 from skills.robot import Pose2D
 
 _AROUND_M, _ASTRAY_M = 2.5, 3.0
-"""Way along edges on which the robot's next waypoint may lie, and distance from it at which all others count, too."""
+"""Length along edges within which the next waypoint may lie, and distance at which all others count, too."""
 _REACH_M, _REACH_RAD = 1.0, 0.6
 """Usual distance and turn from the first guess within which the scan may place the robot."""
 _GOAL_M: Final = 3.0
@@ -61,7 +61,7 @@ class Live:
 
 
 class GraphNavService(Service):
-    """Keeps one map. The robot is localised by scans on the snapshots' points, or by odometry on a map without them."""
+    """Stores one map. Scans localise the robot on the snapshots' points, or odometry on a map without points."""
 
     name, type, authority = "graph-nav-service", "bosdyn.api.graph_nav.GraphNavService", f"api.{DOMAIN}"
 
@@ -146,7 +146,7 @@ class GraphNavService(Service):
         return Response(lease_use_result=used, status=Response.STATUS_OK)
 
     def ValidateGraph(self, _request: Any, _call: Call) -> Any:
-        """Answers that the map can be used: one that cannot is not taken in."""
+        """Answers that the map is valid, because uploads of invalid maps are refused."""
         Response = graph_nav_pb2.ValidateGraphResponse
         return Response(status=Response.STATUS_OK)
 
@@ -214,7 +214,7 @@ class GraphNavService(Service):
         return _Set(status=_Set.STATUS_OK, localization=self._localization(place, place.waypoint, snapshot))
 
     def _by_tag(self, request: Any, tags: Mapping[int, RigidTransform], snapshot: Snapshot) -> Pose2D | None:
-        """Pose X_SO by the nearest tag in sight that the map has, or by the one that is asked for."""
+        """Pose X_SO by the nearest visible tag of the map, or by the requested one."""
         only = request.fiducial_init == _Request.FIDUCIAL_INIT_SPECIFIC
         seen = [each for each in self._live.objects.tags() if each.number in tags]
         seen = [each for each in seen if not only or each.number == request.use_fiducial_id]
@@ -245,7 +245,7 @@ class GraphNavService(Service):
         self._place = replace(place, waypoint=near)
 
     def GetLocalizationState(self, request: Any, call: Call) -> Any:
-        """Returns the robot's place, and what else is asked for of its present readings, but pictures."""
+        """Returns the robot's pose on the map, and the requested present readings, except pictures."""
         made, snapshot, place = graph_nav_pb2.GetLocalizationStateResponse(), self._computer.snapshot, self._place
         made.robot_kinematics.CopyFrom(kinematic_state(snapshot))
         if place is not None:
@@ -285,7 +285,7 @@ class GraphNavService(Service):
         return self._navigate(request, graph_nav_pb2.NavigateToResponse, plan)
 
     def NavigateRoute(self, request: Any, _call: Call) -> Any:
-        """Goes along a route, from where it is nearest unless the request says otherwise."""
+        """Goes along a route, from its nearest point unless the request says otherwise."""
 
         def plan(known: GraphMap, place: Place) -> tuple[Sequence[str], Pose2D]:
             names = list(request.route.waypoint_id)
@@ -340,7 +340,7 @@ class GraphNavService(Service):
         return made
 
     def _begin(self, request: Any, plan: Plan, lease: Any) -> int:
-        """Starts a navigation, or puts off the end of one that runs; returns its number. Raises CannotError."""
+        """Starts a navigation, or extends a running one; returns its number. Raises CannotError."""
         known, place, number = self._map, self._place, int(request.command_id)
         if not self._clocks.knows(request.clock_identifier):
             raise CannotError("NO_TIMESYNC")
@@ -378,7 +378,7 @@ class GraphNavService(Service):
         return int(Feedback.STATUS_COMMAND_OVERRIDDEN if holds else Feedback.STATUS_LEASE_ERROR)
 
     def NavigationFeedback(self, request: Any, _call: Call) -> Any:
-        """Returns how far a navigation has come, by default the last one."""
+        """Returns the progress of a navigation, by default the last one."""
         number = request.command_id or max(list(self._routes), default=0)
         if not number:
             return Feedback(status=Feedback.STATUS_NO_ROUTE)
@@ -401,7 +401,7 @@ def _streamed(Response: Any, stored: Any, **named: str) -> Iterator[Any]:
 def _exact(
     localiser: MapLocaliser, X_SO: Pose2D, snapshot: Snapshot, reach_m: float, reach_rad: float
 ) -> Pose2D | None:
-    """Pose X_SO at which the scan fits near a first guess; None when it does not."""
+    """Pose X_SO of the scan's fit near a first guess; None without a fit."""
     found = None if snapshot.scan is None else localiser.start(X_SO, snapshot.scan, reach_m)
     if found is None or abs(math.remainder(found.yaw_rad - X_SO.yaw_rad, math.tau)) > reach_rad:
         return None

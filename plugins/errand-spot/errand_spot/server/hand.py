@@ -79,7 +79,7 @@ class Cartesian(ArmMotion):
         self._plan(computer)
 
     def _plan(self, computer: Computer) -> None:
-        """Plans what is left of the path from where hand and body are; stalled unless all of it is in reach."""
+        """Plans the rest of the path from the present poses of hand and body; stalled unless all of it is in reach."""
         self._tracks, self._X_OB, before = False, computer.snapshot.X_AB("odom", "body"), computer.arm_rad()
         X_BO, X_OW, now_s = self._X_OB.inverse(), computer.snapshot.X_AB("odom", "link_wr1"), computer.clock.now()
         times, postures, time_s = list[float](), list[FloatArray](), 0.0
@@ -100,7 +100,7 @@ class Cartesian(ArmMotion):
         self._follow(computer, times, postures)
 
     def _track(self, computer: Computer) -> None:
-        """Moves the hand along its path while the body moves below it, as far as the arm reaches."""
+        """Moves the hand along its path, within the arm's reach, while the body moves below it."""
         now_s = computer.clock.now()
         if now_s < self._tracked_s + _TRACK_S:
             return
@@ -145,7 +145,7 @@ class Cartesian(ArmMotion):
 
 
 class FollowArm(BaseMotion):
-    """Walks until the Cartesian goal of the hand lies ahead of the body; beside other motions of the arm it stays."""
+    """Walks until the hand's Cartesian goal lies ahead of the body; stands during other motions of the arm."""
 
     field = "follow_arm_feedback"
 
@@ -185,7 +185,7 @@ class FollowArm(BaseMotion):
 
 
 class Gaze(ArmMotion):
-    """Turns the hand's camera to a point, where the hand is or at a pose of its tool."""
+    """Turns the hand's camera to a point, at the hand's present position or a pose of its tool."""
 
     field = "arm_gaze_feedback"
     complete = arm_command_pb2.GazeCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
@@ -228,7 +228,7 @@ class Gaze(ArmMotion):
 
 
 def _between(X_AB: RigidTransform, X_AC: RigidTransform, share: float) -> RigidTransform:
-    """Pose at a share of the straight way from B to C; the rotation turns about one axis."""
+    """Pose at a share of the straight line from B to C; the rotation turns about one axis."""
     turn = X_AB.rotation().InvertAndCompose(X_AC.rotation()).ToAngleAxis()
     moved = (1.0 - share) * X_AB.translation() + share * X_AC.translation()
     return RigidTransform(X_AB.rotation() @ RotationMatrix(AngleAxis(share * turn.angle(), turn.axis())), moved)
@@ -309,7 +309,7 @@ def _known(frame: str, snapshot: Snapshot) -> str:
 
 
 def solutions(solver: Solver, X_BW: RigidTransform) -> list[FloatArray]:
-    """Joint angles that put the wrist at a pose; none for one that is far away."""
+    """Joint angles for the wrist at a pose; none for a distant one."""
     near = float(np.abs(X_BW.translation()).max()) < _FARTHEST_M
     return list(solver.inverse(X_BW)) if near else []
 

@@ -1,4 +1,4 @@
-"""Identity of the robot and of those who call it: certificate, users and tokens, directory, licence and clock."""
+"""Identity of the robot and its clients: certificate, users and tokens, directory, licence and clock."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class AuthService(Service):
     name, type, authority, needs_token = "auth", "bosdyn.api.AuthService", f"auth.{DOMAIN}", False
 
     def __init__(self, passwords: Mapping[str, str], key: bytes) -> None:
-        """Takes the passwords of the users by name, and the key that signs tokens."""
+        """Stores the users' passwords by name, and the key that signs tokens."""
         self._passwords, self._key = dict(passwords), key
         self._failures: dict[str, _Failures] = {}
         self._lock = Lock()
@@ -128,7 +128,7 @@ class AuthService(Service):
         return Response(status=Response.STATUS_OK, token=jwt.encode(claims, self._key, algorithm=_ALGORITHM))
 
     def user_of(self, token: str) -> str | None:
-        """Returns the user of a token; None if it was not given by this robot, or has expired."""
+        """Returns the user of a token; None if another robot issued it, or it has expired."""
         try:
             claims = jwt.decode(token, self._key, algorithms=[_ALGORITHM], audience=SERIAL)
         except jwt.InvalidTokenError:
@@ -158,7 +158,7 @@ class RobotIdService(Service):
 
 
 class DirectoryService(Service):
-    """Lists the services of the robot, and those that clients have registered."""
+    """Lists the services of the robot, and those registered by clients."""
 
     name, type, authority = "directory", "bosdyn.api.DirectoryService", f"api.{DOMAIN}"
 
@@ -311,6 +311,6 @@ def _round_trip(trip: Any) -> tuple[float, float]:
 
 
 def _estimate(trips: _Trips) -> Any:
-    """The estimate by the shortest round trip, which is the surest; earlier ones are forgotten, as clocks drift."""
+    """The estimate with the shortest and thus surest round trip; earlier ones are dropped, because clocks drift."""
     round_trip_s, skew_s = min(trips)
     return time_sync_pb2.TimeSyncEstimate(round_trip_time=duration(round_trip_s), clock_skew=duration(skew_s))

@@ -1,4 +1,4 @@
-"""Keepalive: policies of clients that say what the robot does when their client falls silent."""
+"""Keepalive: policies with the robot's actions after a client's silence."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _STATUS: Final = keepalive_pb2.GetStatusResponse
 
 @dataclass
 class _Live:
-    """A policy, when its client last checked in (s), and the numbers of its actions that were done since."""
+    """A policy, its client's last check-in (s), and the numbers of the actions done since."""
 
     policy: Any
     checked_s: float

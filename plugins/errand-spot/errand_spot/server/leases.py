@@ -37,7 +37,7 @@ def _tree(resource: str) -> Any:
 
 @dataclass
 class _Claim:
-    """Claim on one of the smallest parts: the newest lease that was used, its owner, and when it was used last (s)."""
+    """Claim on one of the smallest parts: the newest used lease, its owner, and the time of its last use (s)."""
 
     lease: Any
     owner: Any
@@ -49,10 +49,10 @@ class _Claim:
 
 
 class LeaseService(Service):
-    """Gives leases, and judges those that come with commands.
+    """Issues leases, and validates those of commands.
 
-    Each smallest part has at most one claim. A lease counts if it is not older than the newest lease that was used for
-    each of its parts: sequences of numbers are compared from the front, and a sub-lease has a longer one.
+    Each smallest part has at most one claim. A lease is valid if it is not older than the newest used lease of each of
+    its parts: sequences of numbers are compared from the front, and a sub-lease has a longer one.
     """
 
     name, type, authority = "lease", "bosdyn.api.LeaseService", f"lease.{DOMAIN}"
@@ -68,7 +68,7 @@ class LeaseService(Service):
     # -- the API's calls --------------------------------------------------------------------------------------------
 
     def AcquireLease(self, request: Any, call: Call) -> Any:
-        """Gives a lease on a resource that nobody claims, or whose claims are stale."""
+        """Issues a lease on a resource without claims, or with stale ones."""
         Response, resource = lease_pb2.AcquireLeaseResponse, request.resource
         if not _exists(resource):
             return Response(status=Response.STATUS_INVALID_RESOURCE)
@@ -169,7 +169,7 @@ class LeaseService(Service):
     # -- inside ------------------------------------------------------------------------------------------------------
 
     def _claim(self, resource: str, call: Call) -> tuple[Any, Any, list[str]]:
-        """Claims a resource: the new lease, its owner, and the parts that somebody claimed before."""
+        """Claims a resource; returns the new lease, its owner, and the parts with an earlier claim."""
         self._number += 1
         lease = lease_pb2.Lease(resource=resource, epoch=self.epoch, sequence=[self._number])
         lease.client_names.append(call.client_name)

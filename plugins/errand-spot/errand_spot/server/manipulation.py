@@ -1,4 +1,4 @@
-"""Manipulation: walks to the object that a pixel or a ray shows, and picks it up; what clients say of a held item."""
+"""Manipulation: walks to the object at a pixel or a ray, and picks it up; clients' statements on a held item."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ class Picker(Protocol):
         """Goes on; returns None until the attempt is over, then whether the object is held."""
 
     def end(self) -> None:
-        """Stops what it has begun."""
+        """Stops the pick."""
 
 
 class _ObjectTask(Task):
-    """Looks where an object is, walks there and perhaps picks it up. Other threads read `found_O`."""
+    """Finds an object, walks there and, on request, picks it up. Other threads read `found_O`."""
 
     broken = Api.MANIP_STATE_GRASP_FAILED
 
@@ -107,7 +107,7 @@ class _ObjectTask(Task):
         return least_m < math.hypot(x, y) < most_m and abs(math.atan2(y, x)) < _AHEAD_RAD
 
     def _before(self, computer: Computer, point_O: FloatArray) -> Pose2D:
-        """Pose on the line to a point from which the body's middle faces it at the distance that the task needs."""
+        """Pose on the line to a point, facing it at the task's distance from the body's middle."""
         arm, pose, offset_m = computer.capabilities.arm, computer.snapshot.odometry.pose, self._offset_m
         if offset_m is None:
             above = self._picker is not None and _only_from_above(self._allows)
@@ -117,7 +117,7 @@ class _ObjectTask(Task):
         return Pose2D(x_m - offset_m * math.cos(yaw_rad), y_m - offset_m * math.sin(yaw_rad), yaw_rad)
 
     def _phase(self, computer: Computer, point_O: FloatArray) -> int:
-        """State of a pick by where the hand is: on its way to the object, about it, or holding it."""
+        """State of a pick by the hand's position: on its path to the object, at it, or holding it."""
         off_m = float(np.linalg.norm(computer.snapshot.X_AB("hand", "odom") @ point_O))
         if computer.snapshot.gripper.holding or off_m < _GRASPING_M:
             return int(Api.MANIP_STATE_GRASPING_OBJECT)
@@ -134,7 +134,7 @@ class ManipulationService(Service):
         self._ids, self._tasks = count(1), OrderedDict[int, _ObjectTask]()
 
     def ManipulationApi(self, request: Any, _call: Call) -> Any:
-        """Starts a task in place of all motions. One that cannot be done is an invalid request."""
+        """Starts a task in place of all motions. An impossible task is an invalid request."""
         used = self._leases.use(request.lease, WHOLE)
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Api.ManipulationApiResponse(lease_use_result=used)
@@ -162,7 +162,7 @@ class ManipulationService(Service):
         return made
 
     def OverrideGrasp(self, request: Any, _call: Call) -> Any:
-        """Takes a client's word on whether an item is held, and how it may be carried."""
+        """Accepts a client's statement on whether an item is held, and how it may be carried."""
         Override, grip = Api.ApiGraspOverride, self._computer.grip
         word, carry = request.api_grasp_override.override_request, request.carry_state_override.override_request
         known = (Override.OVERRIDE_HOLDING, Override.OVERRIDE_NOT_HOLDING)
@@ -258,7 +258,7 @@ def _unit(values: Sequence[float], field: str) -> FloatArray:
 
 
 def _pixel_aim(given: Any, _snapshot: Snapshot) -> Aim:
-    """Aim of a pixel, where the camera was by the frames of the request. Raises InvalidRequestError."""
+    """Aim of a pixel from the camera's pose in the frames of the request. Raises InvalidRequestError."""
     k, sensor = given.camera_model.intrinsics, given.frame_name_image_sensor
     fx, fy = (finite(getattr(k.focal_length, axis), f"camera_model.focal_length.{axis}") for axis in "xy")
     if min(fx, fy) <= 0.0:

@@ -28,7 +28,7 @@ FLAT_FRAMES: Final = ("odom", "vision", "body", "flat_body", "gpe")
 
 
 class RefusedError(Exception):
-    """A command that is refused with a status of the API, and why."""
+    """Error of a refused command, with a status of the API and the reason."""
 
     def __init__(self, status: int, message: str) -> None:
         self.status = status
@@ -56,7 +56,7 @@ def end_of(message: Any, now_s: float, name: str) -> float:
 
 
 def soon(ahead_s: float, name: str) -> float:
-    """Returns how far ahead a time is (s), 0 for one that has passed. Raises RefusedError for one that is too far."""
+    """Returns the duration until a time (s), 0 for a past one. Raises RefusedError for one too far ahead."""
     if ahead_s > LONGEST_S:
         said = f"{name} is {ahead_s:.0f} s ahead; at most {LONGEST_S:.0f} s are allowed"
         raise RefusedError(Answer.STATUS_TOO_DISTANT, said)
@@ -281,7 +281,7 @@ def error_to(pose: Pose2D, goal: Pose2D) -> FloatArray:
 
 
 def drive(computer: Computer, velocity: FloatArray, end_s: float) -> None:
-    """Drives until an end (robot time), or two steps: a plant that is late does not drive on what is left of a time."""
+    """Drives until an end (robot time), or for two steps, so that a late plant does not overrun the end."""
     until_s = min(computer.until_s(end_s), computer.clock.now() + 2.0 * PERIOD_S)
     vx, vy, wz = (float(value) for value in velocity)
     computer.robot.drive(vx, vy, wz, until_s=until_s, lease=computer.lease)
@@ -324,7 +324,7 @@ def posture(params: Any, computer: Computer) -> tuple[float, float]:
 
 
 def speed_limit(params: Any) -> Callable[[FloatArray], FloatArray]:
-    """Returns a function that limits velocities (3,) as the parameters say, or to usual speeds."""
+    """Returns a function that limits velocities (3,) by the parameters, or to usual speeds."""
     most, least = np.array([_USUAL_M_S, _USUAL_M_S, _USUAL_RAD_S]), -np.array([_USUAL_M_S, _USUAL_M_S, _USUAL_RAD_S])
     for name, limits in (("max_vel", most), ("min_vel", least)):
         if params.HasField("vel_limit") and params.vel_limit.HasField(name):

@@ -1,4 +1,4 @@
-"""A service of our own by which a client steps the robot, for tests of programs that must be repeatable."""
+"""Our own service for clients that step the robot, for repeatable tests of programs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MOST_S: Final = 60.0
 
 
 class Pacer(grpc.GenericRpcHandler):  # type: ignore[misc]
-    """Steps the robot by the duration that a call asks for, at least once, and answers with its time then."""
+    """Steps the robot by a call's duration, at least once, and returns the new robot time."""
 
     def __init__(self, computer: Computer) -> None:
         self._computer = computer

@@ -22,7 +22,7 @@ _PICTURE_TIMEOUT_S: Final = 5.0
 
 
 class _Source:
-    """One source of the image service: a camera, its picture or its depth, and how pictures are coded."""
+    """One source of the image service: a camera, its picture or its depth, and the encoding."""
 
     def __init__(self, name: str, camera: CameraCapabilities, *, coloured: bool = False) -> None:
         self.name, self.camera, self.coloured = name, camera, coloured
@@ -73,7 +73,7 @@ class ImageService(Service):
         return made
 
     def GetImage(self, request: Any, _call: Call) -> Any:
-        """Takes the pictures that are asked for; each has a status of its own."""
+        """Takes the requested pictures; each has its own status."""
         made = image_pb2.GetImageResponse()
         for each in request.image_requests:
             self._answer(made.image_responses.add(), each)
@@ -137,7 +137,7 @@ class ImageService(Service):
 
 
 def _converted(source: _Source, pixels: NDArray[Any], request: Any) -> tuple[NDArray[Any] | None, int]:
-    """Pixels in the format that is asked for, or that of the source; None for one that it does not have."""
+    """Pixels in the requested format, or that of the source; None for an unsupported one."""
     Pixels, wanted = image_pb2.Image, request.pixel_format
     own = (
         Pixels.PIXEL_FORMAT_DEPTH_U16
@@ -267,7 +267,7 @@ class LocalGridService(Service):
 
 
 class GripperCameraParamService(Service):
-    """Stores parameters of the hand's camera; its pictures stay as they are."""
+    """Stores parameters of the hand's camera, without an effect on its pictures."""
 
     name, type, authority = "gripper-camera-param", "bosdyn.api.GripperCameraParamService", f"api.{DOMAIN}"
 
@@ -280,7 +280,7 @@ class GripperCameraParamService(Service):
         return gripper_camera_param_pb2.GripperCameraGetParamResponse(params=self._params)
 
     def SetParams(self, request: Any, _call: Call) -> Any:
-        """Changes those parameters that are given."""
+        """Changes the given parameters."""
         changed = gripper_camera_param_pb2.GripperCameraParams()
         changed.CopyFrom(self._params)
         changed.MergeFrom(request.params)

@@ -15,7 +15,7 @@ from errand_spot.server.identity import DOMAIN
 from skills.robot import FloatArray, NoImageError
 
 _WIDE_M, _WIDER = 0.01, 0.006
-"""Radius of a ray (m), and by how much it widens with the distance: about half a pixel of depth."""
+"""Radius of a ray (m), and its growth with the distance: about half a pixel of depth."""
 _DEEP_M, _NEAREST_M = 0.03, 0.05
 _TIMEOUT_S: Final = 5.0
 

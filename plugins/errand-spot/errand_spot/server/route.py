@@ -24,21 +24,21 @@ Feedback = graph_nav_pb2.NavigationFeedbackResponse
 _NEXT_M: Final = 0.25
 """Distance from a waypoint at which the robot goes on to the next one."""
 _NEAR_M, _NEAR_RAD, _LEAST_M, _LEAST_RAD = 0.06, 0.06, 0.03, 0.04
-"""Usual and least distance and turn from the goal at which it is reached."""
+"""Usual and least tolerances of distance and turn at the goal."""
 _GAIN_1_S, _TURN_FIRST_RAD = 1.5, 0.5
 _OUTLINE_M: Final = (0.6, 0.31)
 """Half length and half width of the body, with a margin."""
 _BRAKING_S, _CLOSE_M = 0.7, 0.03
-"""Time that the robot takes to meet an obstacle at the least, and the distance at which it waits."""
+"""Least time to a collision with an obstacle, and the distance at which the robot waits."""
 _HEIGHTS_M: Final = (0.15, 1.0)
 _STILL, _MOVED = 0.03, 0.05
-"""Velocity (m/s, rad/s) of a robot that stands, and the motion (m plus rad) that counts as one."""
+"""Largest velocity (m/s, rad/s) of a standing robot, and the least motion (m plus rad) that counts."""
 STUCK_S: Final = 5.0
 
 
 @dataclass(frozen=True)
 class Place:
-    """Robot on the map: pose X_SO of `odom`, poses of all waypoints, the one where it is, and whether it is lost."""
+    """Robot on the map: pose X_SO of `odom`, poses of all waypoints, its own waypoint, and whether it is lost."""
 
     X_SO: RigidTransform
     poses: Poses
@@ -52,7 +52,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Course:
-    """Waypoints to drive along, their poses in frame S with the goal as the last, and how near to it is near enough.
+    """Waypoints to drive along, their poses in frame S with the goal as the last, and the goal's tolerances.
 
     `poses` are those of the whole map, `limit` limits velocities (3,).
     """
@@ -82,7 +82,7 @@ class Course:
 
 
 class FollowRoute:
-    """Drives along a course until its end time, which a client may put off by setting `end_s` (robot time)."""
+    """Drives along a course until its end time, which a client may extend by setting `end_s` (robot time)."""
 
     def __init__(
         self,
@@ -92,7 +92,7 @@ class FollowRoute:
         place: Callable[[], Place | None],
         cause: Callable[[], int],
     ) -> None:
-        """`place` gives where the robot is, `cause` the status of a motion that something else has ended."""
+        """`place` returns the robot's place on the map, `cause` the status of an interrupted motion."""
         self.course, self.end_s = course, end_s
         self._graph, self._place, self._cause = graph, place, cause
         self.status: int = Feedback.STATUS_FOLLOWING_ROUTE
@@ -126,7 +126,7 @@ class FollowRoute:
             drive(computer, np.zeros(3), math.inf)
 
     def end(self, _status: int) -> None:
-        """Ends it for another command, a lost lease, or motors that are switched off."""
+        """Ends it for another command, a lost lease, or after the motors are switched off."""
         if self.status == Feedback.STATUS_FOLLOWING_ROUTE:
             self.status = self._cause()
 
@@ -154,7 +154,7 @@ class FollowRoute:
             self.status = Feedback.STATUS_STUCK
 
     def _free_m(self, snapshot: Snapshot, velocity: FloatArray) -> float:
-        """Distance that the body can go in the direction of a velocity before it meets an obstacle of the last scan."""
+        """Free distance of the body in the direction of a velocity, by the obstacles of the last scan."""
         scan, speed = snapshot.scan, float(np.hypot(velocity[0], velocity[1]))
         if scan is None or speed == 0.0:
             return math.inf
@@ -202,7 +202,7 @@ def _passed(here: Pose2D, stop: Pose2D, following: Pose2D) -> bool:
 
 
 def _velocity(error: FloatArray, *, last: bool) -> FloatArray:
-    """Velocity (3,) towards a stop that lies at `error` in the body frame: first turns to it, then drives."""
+    """Velocity (3,) towards a stop at `error` in the body frame: first turns to it, then drives."""
     far_m, bearing_rad = math.hypot(error[0], error[1]), math.atan2(error[1], error[0])
     if last and far_m < _NEXT_M:
         return np.asarray(_GAIN_1_S * error)

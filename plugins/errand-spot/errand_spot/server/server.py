@@ -43,7 +43,7 @@ LISTED: Final[Mapping[str, str]] = {
     "robot-state-streaming": "bosdyn.api.RobotStateStreamingService",
     "spot-check": "bosdyn.api.spot.SpotCheckService",
 }
-"""Services of a real Spot that are in the directory, and whose calls answer UNIMPLEMENTED."""
+"""Services of a real Spot in the directory that answer UNIMPLEMENTED."""
 SERVICES: Final[tuple[type[Service], ...]] = (
     identity.AuthService,
     identity.RobotIdService,
@@ -94,8 +94,8 @@ _DESCRIBED_IN: Final = (
 class Options:
     """Options of a server: users with their passwords, port (0 takes a free one), pace, and the operator's tablet.
 
-    `picker` picks up objects for the manipulation service; without it picks are refused. `dock_O` is the robot's pose
-    on its dock, in `odom`. Without `perception` odometry alone localises the robot, and no tags are seen.
+    `picker` picks up objects for the manipulation service, which otherwise refuses picks. `dock_O` is the robot's pose
+    on its dock, in `odom`. Without `perception` only odometry localises the robot, and no tags are detected.
     """
 
     passwords: Mapping[str, str]
@@ -108,7 +108,7 @@ class Options:
 
 
 class SpotServer:
-    """Server of the API for one robot. Nothing steps it before `run`."""
+    """Server of the API for one robot; it stands still before `run`."""
 
     def __init__(
         self, robot: Robot, clock: Clock, solver: Solver | None, credentials: Credentials, options: Options
@@ -153,7 +153,7 @@ class SpotServer:
         robot_name: str,
         options: Options,
     ) -> Sequence[Service]:
-        """All services that are served; the directory lists them and the others."""
+        """All implemented services; the directory lists them and the others."""
         computer, clocks = self.computer, identity.TimeSyncService()
         others = [(name, type_name, f"api.{DOMAIN}") for name, type_name in LISTED.items()]
         known = [(each.name, each.type, each.authority) for each in SERVICES]

@@ -187,7 +187,7 @@ def kinematic_state(snapshot: Snapshot) -> Any:
 
 
 class WorldObjectService(Service):
-    """Lists the objects that clients have added, and the known AprilTags that the body's cameras see."""
+    """Lists objects added by clients, and the known AprilTags in view of the body's cameras."""
 
     name, type, authority = "world-objects", "bosdyn.api.WorldObjectService", f"api.{DOMAIN}"
 
@@ -264,7 +264,7 @@ class WorldObjectService(Service):
 
 
 class InverseKinematicsService(Service):
-    """Answers whether the arm reaches a pose with the body where it stands."""
+    """Returns whether the arm reaches a pose from the body's present pose."""
 
     name, type, authority = "inverse-kinematics", "bosdyn.api.spot.InverseKinematicsService", f"api.{DOMAIN}"
 
@@ -309,7 +309,7 @@ class FaultService(Service):
         self._lock, self._active = Lock(), dict[tuple[str, str], Any]()
 
     def faults(self) -> list[Any]:
-        """All faults, with those of services that have fallen silent."""
+        """All faults, with those of silent services."""
         with self._lock:
             made = list(self._active.values())
         for service in self._silent():
@@ -353,7 +353,7 @@ class PayloadService(Service):
 
 
 class DataBufferService(Service):
-    """Takes what clients log, and keeps none of it."""
+    """Accepts and discards the logs of clients."""
 
     name, type, authority = "data-buffer", "bosdyn.api.DataBufferService", f"buffer.{DOMAIN}"
 

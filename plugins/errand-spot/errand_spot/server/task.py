@@ -25,7 +25,7 @@ Steps = Generator[None, None, int]
 
 
 class Task:
-    """Motion of all parts that goes on step by step, with a state of the API. Other threads read `state`."""
+    """Stepwise motion of all parts, with a state of the API. Other threads read `state`."""
 
     broken: int
     """State of a task that another command has ended."""

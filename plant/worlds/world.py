@@ -27,10 +27,8 @@ if TYPE_CHECKING:
 WORLDS_FOLDER = Path(__file__).resolve().parent
 PACKAGE_NAME = "errand"
 DIRECTIVES: Final = "world.dmd.yaml"
-ROBOTS: Final = "map"
-"""Folder of the grids that robots use."""
-TRUTH: Final = "truth"
-"""Folder of a world's surveyed grids, if the robot has made its own map."""
+ROBOTS: Final = "map"  # folder of the grids that robots use
+TRUTH: Final = "truth"  # folder of the surveyed grids, if the robot has made its own map
 
 Point = tuple[quantities.Coordinate, quantities.Coordinate]
 Polygon = tuple[Point, ...]

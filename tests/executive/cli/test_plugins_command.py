@@ -55,7 +55,7 @@ def test_each_plug_in_is_listed_with_what_is_wrong_with_it(errand):
         ("errand.kernels", "bell = wavers_bell:NUMBER", "wavers_bell:NUMBER is no function"),
     ],
 )
-def test_what_cannot_be_used_is_listed_with_the_reason(errand, tmp_path, group, entry, why):
+def test_an_unusable_entry_is_listed_with_the_reason(errand, tmp_path, group, entry, why):
     write_distribution(tmp_path, "ringers", group, entry)
     (tmp_path / "wavers_bell.py").write_text("NUMBER = 3\nclass Bell: pass\ndef ring(): pass\n")
     listed = json_of(errand("plugins", "--limit", "2", "--json"))["plugins"]

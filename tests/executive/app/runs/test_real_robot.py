@@ -73,7 +73,7 @@ def test_a_scheme_may_be_typed_in_capitals(run):
 
 
 @pytest.mark.parametrize("words", [["--fault", "gripper loses it at 20 s"], ["--light", "dim"], ["--people", "1"]])
-def test_what_is_simulated_is_refused(run, words):
+def test_faults_and_variations_are_refused(run, words):
     assert "not for a real robot" in refusal(*run[:-1], *words, "--robot", "turtle://pond?wake")
 
 

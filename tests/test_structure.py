@@ -24,7 +24,7 @@ LINES = {
     "executive/testing": 849,
     "executive/app": 8104,
     "executive/cli": 3838,
-    "skills": 29929,
+    "skills": 29932,
     "plant": 11166,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 426, 63, 7

@@ -90,8 +90,7 @@ class ScanMatchingLocaliser:
         if self._transformed is None or self._transformed[0] is not self._X_WO:
             self._transformed = self._X_WO, self._X_WO.transform()
         covariance = self._covariance.copy()
-        health = self._inlier_share if self._localised else 0.0
-        return LocalisationEstimate(self._stamp_s, self._transformed[1], covariance, self._localised, health)
+        return LocalisationEstimate(self._stamp_s, self._transformed[1], covariance, self._localised, self._health())
 
     def update(self, robot: Robot) -> None:
         """Takes in the newest scan, if it is new."""
@@ -143,6 +142,10 @@ class ScanMatchingLocaliser:
         self._correct(points_F)
         if not self._localised and self._poor_scans > 0 and self._poor_scans % self._options.search_every_scans == 0:
             self._search(points_F, self._options.search_radius_m)
+
+    def _health(self) -> float:
+        """Trust in the estimate, 0 to 1."""
+        return self._inlier_share if self._localised else 0.0
 
     def _points(self, scan: Scan) -> FloatArray:
         """At most max_points returns of a scan, evenly chosen, in the levelled body frame."""

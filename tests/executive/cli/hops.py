@@ -14,7 +14,7 @@ from pathlib import Path
 from types import CodeType, FrameType
 
 from executive.app.runs import queue, simulated  # noqa: F401
-from executive.cli import entry, run_command, spot_command  # noqa: F401
+from executive.cli import entry, run_command  # noqa: F401
 from executive.language.parser import load_parser
 from executive.run.tree_run import TreeRun
 from plant.engine import PipelinedRobot

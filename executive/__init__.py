@@ -84,7 +84,7 @@ def run_mission(
     Raises:
         InputError: the mission is not understood, `check` finds an error in it, or a keyword argument cannot be used.
     """
-    from executive.app.prepare.checker import prepare_checked
+    from executive.app.prepare.from_request import prepare_checked
     from executive.app.prepare.mission_files import request_of
     from executive.app.runs.one_run import run_request
 

@@ -12,11 +12,11 @@ from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
     "executive/words": 3416,
-    "executive/language": 8245,
+    "executive/language": 8240,
     "executive/speech": 1582,
     "executive/mission": 1577,
     "executive/tree": 8572,
-    "executive/run": 3200,
+    "executive/run": 3220,
     "executive/record": 1403,
     "executive/store": 1630,
     "executive/conversation": 595,
@@ -27,7 +27,7 @@ LINES = {
     "skills": 29932,
     "plant": 11166,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 426, 63, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 427, 63, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -124,7 +124,7 @@ def _own_results(out: Path, evaluation: Evaluation) -> Path:
 def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> Evaluation:
     """Builds the runs of a request at many seeds; asks its questions once. Raises InputError."""
     from executive.app.evaluate.evaluation_file import evaluation_at_seeds, seed_range
-    from executive.app.prepare.checker import prepare_checked
+    from executive.app.prepare.from_request import prepare_checked
 
     chosen = seed_range(seeds)
     prepared = prepare_checked(asked, ask=terminal_answerer(), anyway=anyway)

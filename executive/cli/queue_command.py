@@ -72,7 +72,7 @@ def add(
     as_json: AS_JSON = False,
 ) -> None:
     """Checks and queues a sentence or a mission file; with a trigger, `errand queue serve` queues it each time."""
-    from executive.app.prepare.checker import prepare_checked
+    from executive.app.prepare.from_request import prepare_checked
 
     trigger = _trigger(at, every, on, missed)
     refuse_unaddressed(request)

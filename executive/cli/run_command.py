@@ -59,7 +59,7 @@ def run(
 ) -> None:
     """Runs a sentence or a mission file in the simulated world, or with a real robot."""
     refuse_unaddressed(request)
-    from executive.app.prepare.checker import prepare_checked
+    from executive.app.prepare.from_request import prepare_checked
     from executive.app.runs.page_view import PageView, queue_function
     from executive.app.runs.queue import MissionRuns
     from executive.app.runs.real_robot import real_runner

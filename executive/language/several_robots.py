@@ -15,7 +15,8 @@ from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.spelling import CorrectedText, correct_spelling
-from executive.language.understand import Part, Status, Understanding, meaning, understand, with_rules
+from executive.language.understand import Part, Status, Understanding, meaning, under_rules, understand
+from executive.language.zone_rules import read_rules
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
 from executive.words.robot_config import display_name, find_robot
@@ -77,7 +78,9 @@ def understand_for_robots(
         return _Reader(tuple(robots), Pipeline(parser, known), known).addressed(sentence, cut, memory)
 
     try:
-        found = with_rules(said.text, knowledge, read)
+        rules = read_rules(said.text, knowledge)
+        found = read(rules.rest, rules.knowledge)
+        found = under_rules(rules, found) if rules.zones else found
     except RefusalError as refusal:
         found = Understanding(sentence, Status.REFUSED, reason=refusal.reason, unknown_words=refusal.unknown)
         return replace(found, addressed=addressed)

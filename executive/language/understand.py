@@ -149,33 +149,24 @@ def understand(
     if correct and knowledge is not None:
         said = correct_spelling(called.text, knowledge, parser)
     try:
-        found = with_rules(
-            said.text, knowledge, lambda text, known: meaning(Trace(text, memory or Memory()), Pipeline(parser, known))
-        )
+        rules = read_rules(said.text, knowledge)
+        meant = meaning(Trace(rules.rest, memory or Memory()), Pipeline(parser, rules.knowledge))
+        found = under_rules(rules, meant) if rules.zones else meant
     except RefusalError as refusal:
         trace = Trace(said.text, refusal=refusal, refused_at="rules")
         found = Understanding(said.text, Status.REFUSED, (), refusal.reason, refusal.unknown, trace=trace)
     return replace(found, text=sentence, notes=(*said.notes, *found.notes), addressed=addressed)
 
 
-def with_rules(
-    text: str, knowledge: Knowledge | None, understand_rest: Callable[[str, Knowledge | None], Understanding]
-) -> Understanding:
-    """Understands a sentence that may have rules for rooms, which become zones of a group around all steps.
+def under_rules(rules: RoomRules, meant: Understanding) -> Understanding:
+    """Puts the steps, or those of each part, into a group with the rules for rooms.
 
-    Raises RefusalError for a rule that is not understood or has no work, and for work in a forbidden room.
+    Raises RefusalError for work in a forbidden room.
     """
-    rules = read_rules(text, knowledge)
-    if rules is None:
-        return understand_rest(text, knowledge)
-    meant = understand_rest(rules.rest, rules.knowledge)
-    return _under(rules, meant) if meant.status is Status.OK else meant
-
-
-def _under(rules: RoomRules, meant: Understanding) -> Understanding:
-    """Puts the steps, or those of each part, into a group with the rules. Raises RefusalError."""
+    if meant.status is not Status.OK:
+        return meant
     if meant.parts:
-        parts = tuple(replace(part, meaning=_under(rules, part.meaning)) for part in meant.parts)
+        parts = tuple(replace(part, meaning=under_rules(rules, part.meaning)) for part in meant.parts)
         return replace(meant, parts=parts)
     return replace(meant, steps=(rules.around(meant.all_steps),), notes=(*meant.notes, *rules.notes))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from pydantic import ValidationError
@@ -32,14 +32,14 @@ Zones = Mapping[str, ZoneFacts]
 
 @dataclass(frozen=True)
 class RoomRules:
-    """Rules of a sentence as zones by name, and the `rest` of it.
+    """Rules of a sentence as zones by name, and the `rest` of it; no zones for a sentence without rules.
 
     The `knowledge` for the rest expects no object in a forbidden room.
     """
 
     rest: str
-    zones: Zones
-    knowledge: Knowledge
+    knowledge: Knowledge | None
+    zones: Zones = field(default_factory=dict)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -48,31 +48,32 @@ class RoomRules:
 
     def around(self, steps: Sequence[Step]) -> Group:
         """Puts steps into a group with the zones. Raises RefusalError for work in a forbidden room."""
-        forbidden = _forbidden(self.zones)
+        forbidden, knowledge = _forbidden(self.zones), self.knowledge
+        assert knowledge is not None
         for command in (command for step in steps for each in step.walk() for command in each.commands):
-            place = self.knowledge.place(command.goal_at or command.goal or "")
-            if place is not None and (room := self.knowledge.room(place)) in forbidden:
+            place = knowledge.place(command.goal_at or command.goal or "")
+            if place is not None and (room := knowledge.room(place)) in forbidden:
                 what = "and send me there" if place == room else f"and the {place} is in it"
                 raise RefusalError(f"you keep me out of the {room}, {what}; say one of the two", [room])
         return Group(steps=tuple(steps), zones=dict(self.zones))
 
 
-def read_rules(text: str, knowledge: Knowledge | None) -> RoomRules | None:
-    """Reads the rules for rooms in a sentence; None without rules.
+def read_rules(text: str, knowledge: Knowledge | None) -> RoomRules:
+    """Reads the rules for rooms in a sentence.
 
     Raises RefusalError for a rule without work, and for an unclear one.
     """
     if knowledge is None or _FORMS.mentions.search(text) is None:
-        return None
+        return RoomRules(text, knowledge)
     rest, zones = take_rules(text, knowledge)
     if not zones:
-        return None
+        return RoomRules(text, knowledge)
     if not re.search(r"\w", rest):
         example = f"'{text.strip(' .!')} and bring me a drink'"
         lasting = "`errand world zone add` makes a lasting rule for a world of your own"
         what = f"a rule for a room needs work in the same sentence, as in {example}; {lasting}"
         raise RefusalError(what, [text])
-    return RoomRules(rest, zones, _without(knowledge, _forbidden(zones)))
+    return RoomRules(rest, _without(knowledge, _forbidden(zones)), zones)
 
 
 def _forbidden(zones: Zones) -> frozenset[str]:

@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 
 from executive.record.schemas import RUN, TASK
-from executive.tree.compiler import CompiledTree
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectKind, Publish
@@ -30,7 +29,8 @@ _NOTHING_ID: Final = 0
 def announce(
     publish: Publish,
     clock: Clock,
-    tree: CompiledTree,
+    robot_name: str,
+    commands: Sequence[Command],
     knowledge: Knowledge,
     *,
     world: str,
@@ -38,18 +38,18 @@ def announce(
     scenario: Sequence[str] = (),
     robots: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """Publishes the run's facts, then one message for each command.
+    """Publishes the run's facts, then one message for each command of a robot.
 
     `scenario` lists the faults and events of the run, `robots` the kind of each of several robots. Raises KeyError for
     a class without a number.
     """
-    texts = [str(command) for command in tree.commands]
+    texts = [str(command) for command in commands]
     facts = {"world": world, "seed": seed, "commands": texts, "versions": versions(PACKAGES)}
     more = {"scenario": list(scenario), "robots": dict(robots)}
     publish(RUN, {**facts, **{key: value for key, value in more.items() if value}})
-    count, stamp = len(tree.commands), clock.now()
-    for index, command in enumerate(tree.commands):
-        numbers = {"sequence": index, "robot_name": tree.robot_name, "mission_count": count, "task_count": index + 1}
+    count, stamp = len(commands), clock.now()
+    for index, command in enumerate(commands):
+        numbers = {"sequence": index, "robot_name": robot_name, "mission_count": count, "task_count": index + 1}
         publish(TASK, {"stamp": stamp, **numbers, **_task_message(command, knowledge)})
 
 

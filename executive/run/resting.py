@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
-from executive.run.run_robot import RunRobot
+from executive.run.session import RunRobot
 from executive.run.traffic_table import TrafficTable
 from executive.run.watchdog import Watchdog
 from skills.api import Running, SkillContext

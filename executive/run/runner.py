@@ -13,8 +13,7 @@ from executive.run.control import Control
 from executive.run.control_state import ControlRequests, Event
 from executive.run.outcome import Ending, Outcome, RobotResult, RobotStatus, RunResult, ending_of
 from executive.run.resting import Resting
-from executive.run.run_robot import RunRobot
-from executive.run.session import Session
+from executive.run.session import RunRobot, Session
 from executive.run.visitor import (
     Assigner,
     MissionEnd,

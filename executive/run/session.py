@@ -1,40 +1,134 @@
-"""One robot's missions in a run: their turns, their ticks, and the orderly end."""
+"""One robot of a run, and its missions: their turns, their ticks, and the orderly end."""
 
-import math
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final, TypeVar
 
-import numpy as np
-
-from executive.record.schemas import DOORS, JOINTS, NAVIGATION, OUTCOME, POSE, SCAN, STATE, stamp
+from executive.record.schemas import OUTCOME
+from executive.record.work import CountedDetector
 from executive.run.control_state import MissionRequest, Turn
-from executive.run.outcome import Ending, Outcome, RobotResult, ending_of
-from executive.run.run_robot import RunRobot
+from executive.run.guarded_robot import GuardedRobot
+from executive.run.outcome import Ending, Outcome, RobotResult, RobotStatus, ending_of
+from executive.run.robot_log import RobotLog
 from executive.run.tree_run import TreeRun
 from executive.run.visitor import RunEntry, RunShared, TickNote
 from executive.run.watchdog import VerbHung
 from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree
+from executive.tree.context import RunContext
 from executive.tree.node import NodeState, Snapshot
+from executive.tree.nodes.skill_leaf import ERROR_TOPIC
 from executive.tree.plan import start_key
 from executive.words.slug import slug
-from skills.api import Cause, LocalisationEstimate, ObstacleLayerView, ParticleView
-from skills.doorway import Doorway, SeenDoor
+from skills.api import Cause
+from skills.detection import Detector
 from skills.inputs.errors import disk_is_full
-from skills.navigate.cut_off import DoorWatch
-from skills.robot import Pose2D
+from skills.navigate.footprint import Footprint
+from skills.robot import Lease, Pose2D
 
-POSE_PERIOD_S: Final = 0.5
-SENSORS_PERIOD_S: Final = 1.0
-DOORS_PERIOD_S: Final = 10.0
-"""Steps of time in which the log has the age of what is known of a door."""
-MOST_PARTICLES: Final = 30
+HOLDER: Final = "errand"
+_NO_LEASE: Final = Lease("", "", 0)
 LEASE_PATIENCE_S: Final = 60.0
 SILENT_S: Final = 3.0
-_EPSILON_S: Final = 1e-9
-_NOTHING: Final = np.empty((0, 2))
 ResultT = TypeVar("ResultT")
+
+
+def _with_tags(entry: RunEntry) -> Detector:
+    """Returns the detector of a robot, which recognises objects by their tags, too, where there are any."""
+    if not entry.tree.tags:
+        return entry.detector
+    from skills.perception.fiducials import with_tags
+
+    return with_tags(entry.detector, entry.tree.tags)
+
+
+class RunRobot:
+    """Robot of a run, with or without a mission.
+
+    `context` is what a tree may use of it, under the present lease; `pose` is its estimated pose when it last sensed
+    (None: not localised).
+    """
+
+    def __init__(self, entry: RunEntry, shared: RunShared) -> None:
+        """Raises the errors of the robot's verbs."""
+        self.name: Final = entry.robot.name
+        limits, self._traffic = shared.settings, shared.traffic
+        self.pose: Pose2D | None = None
+        self._guarded = GuardedRobot(
+            entry.robot, shared.watchdog, limit_s=limits.verb_limit_s, image_limit_s=limits.image_limit_s
+        )
+        self._traffic.join(self.name, Footprint.of(self._guarded.capabilities()).discs)
+        self.context = self._context(entry, shared)
+
+    def _context(self, entry: RunEntry, shared: RunShared) -> RunContext:
+        """Context of the robot's tree, without a lease."""
+        name, control, publish = self.name, shared.control, shared.visitors.publish
+        return RunContext(
+            robot=self._guarded,
+            lease=_NO_LEASE,
+            clock=shared.clock,
+            worker=shared.worker,
+            localiser=entry.localiser,
+            costmap=entry.costmap,
+            publish=lambda topic, message: publish(topic, {"robot": name, **message}),
+            seed=shared.settings.seed,
+            board=Board(slug(entry.tree.robot_name)),
+            ask=lambda question: control.ask(question, shared.clock, name),
+            listen=lambda: control.listen(name),
+            stop_pressed=lambda: control.stop_pressed(name),
+            presses=lambda: control.presses,
+            day_began_s=shared.day_began_s,
+            detector=CountedDetector(_with_tags(entry), shared.work),
+            work=shared.work,
+            stack=entry.stack,
+            doors=entry.tree.doors,
+            tags=entry.tree.tags,
+            zones=entry.tree.zones,
+            walls=entry.walls,
+            traffic=shared.traffic.view_of(name),
+        )
+
+    def status(self, *, now: bool = False) -> RobotStatus:
+        """Reads the robot's pose (as last sensed, or `now`), its gripper and its battery.
+
+        Raises the errors of its verbs.
+        """
+        robot, pose = self.context.robot, self.context.known_pose() if now else self.pose
+        return RobotStatus(pose, robot.gripper().holding, robot.battery().charge)
+
+    def sense(self) -> None:
+        """Updates the estimators, and reports the robot's estimated pose to the others."""
+        context = self.context
+        if estimators := context.robot_excluders:
+            covered_W = self._traffic.covered_W(self.name)
+            for estimator in estimators:
+                estimator.exclude_robots(covered_W)
+        context.localiser.update(context.robot)
+        estimate = context.localiser.estimate()
+        context.costmap.update(context.robot, estimate)
+        self.pose = context.known_pose()
+        self._traffic.report(self.name, self.pose)
+
+    def claim(self) -> RunContext:
+        """Claims the free lease; returns the context under it. Raises LeaseError."""
+        self.context = replace(self.context, lease=self._guarded.claim(HOLDER))
+        return self.context
+
+    def stop_and_leave(self) -> None:
+        """Stops the robot and returns its lease. Raises nothing."""
+        context = self.context
+        self.attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
+        self.attempt("return the lease", self._guarded.give_lease_back)
+
+    def attempt(self, what: str, call: Callable[[], object]) -> bool:
+        """Calls `call` and returns whether it succeeded; logs a defect instead of raising it."""
+        try:
+            call()
+        except (Exception, VerbHung):
+            self.context.publish(ERROR_TOPIC, {"node": self.name, "what": what, "traceback": traceback.format_exc()})
+            return False
+        return True
 
 
 class Session(RunRobot):
@@ -69,11 +163,7 @@ class Session(RunRobot):
         self.gone: str | None = None
         self.note: TickNote | None = None
         self._asked_at: Pose2D | None = None
-        self._pose_due_s = self._sensors_due_s = shared.clock.now()
-        self._matched_s = -math.inf
-        self._navigation: Mapping[str, object] = {}
-        self._doors = DoorWatch(self.context)
-        self._known_doors: tuple[tuple[str, float], ...] = ()
+        self._log = RobotLog(self.name, self.context)
 
     @property
     def tree(self) -> CompiledTree:
@@ -124,22 +214,10 @@ class Session(RunRobot):
         return True
 
     def sense(self) -> None:
-        """Updates the estimators, counts new scan matches, and logs pose and state twice a second."""
+        """Updates the estimators and writes the robot's log."""
         super().sense()
         self._asked_at = self._asked_at or self.pose
-        context, estimate = self.context, self.context.localiser.estimate()
-        if estimate.stamp_s != self._matched_s:
-            self._matched_s = estimate.stamp_s
-            context.work.count("scan_matches")
-        if context.clock.now() >= self._pose_due_s - _EPSILON_S:
-            self._pose_due_s += POSE_PERIOD_S
-            self._publish_pose(estimate)
-            self._publish_state(estimate)
-            self._publish_navigation()
-        if context.clock.now() >= self._sensors_due_s - _EPSILON_S:
-            self._sensors_due_s += SENSORS_PERIOD_S
-            self._publish_sensors()
-            self._watch_doors()
+        self._log.write()
 
     def may_move(self) -> bool:
         """Returns whether the robot has its lease; a lost lease suspends the mission until the robot has it again.
@@ -347,74 +425,3 @@ class Session(RunRobot):
     def _note_result(self, result: RobotResult) -> None:
         self._preempting += (result,)
         self.context.publish(OUTCOME, {**result.message_of_end(), "mission": result.tree.mission_name})
-
-    def _publish_pose(self, estimate: LocalisationEstimate) -> None:
-        X_WB = self.context.X_WB()
-        p, q = X_WB.translation(), X_WB.rotation().ToQuaternion()
-        flat = Pose2D.from_transform(X_WB)
-        self.context.publish(
-            POSE,
-            {
-                "timestamp": stamp(self.context.clock.now()),
-                "frame_id": "world",
-                "robot": self.name,
-                "pose": {
-                    "position": {"x": p[0], "y": p[1], "z": p[2]},
-                    "orientation": {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()},
-                },
-                "yaw_rad": flat.yaw_rad,
-                "covariance": estimate.covariance.ravel().tolist(),
-            },
-        )
-
-    def _publish_state(self, estimate: LocalisationEstimate) -> None:
-        """Logs the gripper, the battery, the speed, and the quality of the localisation."""
-        robot = self.context.robot
-        self.context.publish(
-            STATE,
-            {
-                "robot": self.name,
-                "holding": robot.gripper().holding,
-                "charge": round(robot.battery().charge, 4),
-                "speed_m_s": round(math.hypot(*robot.odometry().velocity[:2]), 3),
-                "localised": estimate.localised,
-                "localisation_health": round(estimate.health, 3),
-                "position_sigma_m": round(math.sqrt(estimate.covariance[0, 0] + estimate.covariance[1, 1]), 4),
-            },
-        )
-
-    def _publish_sensors(self) -> None:
-        """Logs the joints and the latest LiDAR scan."""
-        robot = self.context.robot
-        self.context.publish(JOINTS, {"robot": self.name, "joints": robot.joints()})
-        if (scan := robot.scan()) is not None:
-            self.context.publish(SCAN, {"robot": self.name, "scan": scan})
-
-    def _publish_navigation(self) -> None:
-        """Logs particles of the localiser and obstacles that the map lacks (x, y in m), when either is new."""
-        localiser, costmap = self.context.localiser, self.context.costmap
-        particles = localiser.particles_W(MOST_PARTICLES) if isinstance(localiser, ParticleView) else _NOTHING
-        seen = costmap.obstacle_cells() if isinstance(costmap, ObstacleLayerView) else _NOTHING
-        columns = np.round(np.concatenate([particles[:, :2].T, seen.T], axis=1), 2)
-        (x, y), count = columns.tolist(), len(particles)
-        new = {"particle_x": x[:count], "particle_y": y[:count], "seen_x": x[count:], "seen_y": y[count:]}
-        if new != self._navigation:
-            self._navigation = new
-            self.context.publish(NAVIGATION, {"robot": self.name, **new})
-
-    def _watch_doors(self) -> None:
-        """Looks at the doors in view; logs the states of all doors when the memory of one is new."""
-        self._doors.look()
-        doors, memory = self.context.doors, self.context.door_memory
-        seen = [memory.last_seen(door) for door in doors]
-        known = tuple((one.state.value, max(one.seen_s, 0.0) // DOORS_PERIOD_S) for one in seen)
-        if known != self._known_doors:
-            self._known_doors = known
-            self.context.publish(DOORS, {"robot": self.name, "doors": list(map(_door_message, doors, seen))})
-
-
-def _door_message(door: Doorway, seen: SeenDoor) -> Mapping[str, object]:
-    """State of a door for the log: its two ends (x, y) in metres, and the time when the robot saw it (s)."""
-    ends = [[round(float(value), 3) for value in end] for end in door.ends()]
-    seen_s = round(seen.seen_s, 1) if math.isfinite(seen.seen_s) else None
-    return {"between": list(door.between), "ends": ends, "state": seen.state.value, "seen_s": seen_s}

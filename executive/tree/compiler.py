@@ -14,17 +14,15 @@ from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec, node_pages
 from executive.tree.nodes.decision_nodes import buttons_of
 from executive.tree.nodes.door_check import doorway
-from executive.tree.nodes.group import mission_plan
+from executive.tree.nodes.group import mission_plan, whole_mission
 from executive.tree.nodes.interrupts import watch_plan
-from executive.tree.nodes.policies import under_policy
-from executive.tree.plan import PICK_UPS, PlanBuilder, Registry, StepPart, start_key
+from executive.tree.plan import PICK_UPS, Registry, StepPart, start_key
 from executive.tree.port_values import assignable, conforms, describe_type, field_types, required_fields
-from executive.words.command import START, Command
+from executive.words.command import Command
 from executive.words.knowledge import Knowledge
-from executive.words.leaf_steps import UseMission
 from executive.words.mission import Mission
 from executive.words.slug import slug
-from executive.words.step import OnFailure, Policy, Step
+from executive.words.step import Step
 from skills.api import Surface, Tag, Zone
 from skills.doorway import Doorway
 from skills.inputs.errors import InputError, suggestion, with_article
@@ -96,36 +94,13 @@ def compile_mission(
     pick_ups = PICK_UPS if mission.pick_ups is None else mission.pick_ups
     assembler = Assembler(knowledge, registry, PLANS, start, pick_ups, mission.move_aside or 0, last_known=last_known)
     builder, steps = assembler.builder(base, mission.source), mission_plan(assembler, mission, base)
-    root = watch_plan(builder, replace(_whole(mission, builder, steps.nodes), step=True))
+    root = watch_plan(builder, replace(whole_mission(mission, builder, steps.nodes), step=True))
     check_wiring(root)
     doors = tuple(doorway(knowledge, door) for door in knowledge.doors)
     tags, surfaces = knowledge.known_tags(), tuple(map(builder.surface, knowledge.surfaces))
     own = (mission.robot_name, mission.name, mission.commands, root, steps.parts, mission.steps)
     zones = knowledge.with_zones(mission.whole_zones).known_zones()
     return CompiledTree(*own, doors, tags, surfaces, zones)
-
-
-def _whole(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec, ...]) -> NodeSpec:
-    """Builds a mission's steps under its policy."""
-    remember = builder.node("remember", "where it starts", part="remember-start", key=builder.start_key, keep=True)
-    all_steps = list(mission.walk())
-    used = (step.mission for step in all_steps if isinstance(step, UseMission))
-    policies: tuple[Policy, ...] = (mission, *all_steps, *used)
-    returns = any(policy.on_failure is OnFailure.RETURN for policy in policies)
-    leads_back = returns or any(command.goal == START for command in mission.commands)
-    first = [remember] if leads_back else []
-    if mission.is_empty and not any(map(_may_skip, steps)):
-        return builder.sequence(mission.name, *first, *steps)
-    body = builder.sequence("steps", *steps, part="steps")
-    whole = under_policy(body, mission, builder.at("whole"), mission.name, may_skip=False)
-    if _may_skip(whole):
-        paths = tuple(node.path_id for node in steps)
-        whole = builder.node("summary", "tell what was skipped", whole, part="summary", steps=paths)
-    return builder.sequence(mission.name, *first, whole)
-
-
-def _may_skip(node: NodeSpec) -> bool:
-    return any(below.behaviour.skips for below in node.walk())
 
 
 def check_wiring(root: NodeSpec) -> None:

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from executive.run.run_robot import GuardedRobot
+from executive.run.guarded_robot import GuardedRobot
 from executive.run.watchdog import Watchdog
 from plant.engine import Pipeline, PipelinedRobot
 from skills.faults.faulty_robot import FaultyRobot, inject_faults, parse_fault
@@ -98,7 +98,7 @@ def test_a_wrapper_has_every_verb_with_the_signature_of_the_protocol(wrapper):
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("maker", MAKERS)
 def test_a_verb_arrives_with_its_arguments_and_its_answer_comes_back(maker, verb, monkeypatch):
-    monkeypatch.setattr("executive.run.run_robot.garbage_check", lambda verb: None)
+    monkeypatch.setattr("executive.run.guarded_robot.garbage_check", lambda verb: None)
     robot = RecordingRobot()
     wrapped = MAKERS[maker](robot)
     by_position, by_name = arguments_of(verb)

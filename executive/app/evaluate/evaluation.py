@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from executive.app.evaluate.results import Case, Evaluation, Evidence, Results, ResultsFile, RunSpec, Standing
 from executive.app.evaluate.workers import Pool, installed_code
-from executive.app.prepare.checker import prepare_checked
+from executive.app.prepare.from_request import prepare_checked
 from executive.app.report.run_report import RunReport
 from executive.app.runs.one_run import return_memory, run_request
 from executive.mission.request import Request

@@ -322,9 +322,8 @@ class Dispatch(Assigner):
         if self.log is not None:
             world, seed = prepared.world.name, prepared.request.seed
             kinds = {name: robot.kind for name, robot in self.robots.items()}
-            announce(
-                self.log, self.backend.clock, prepared.tree, prepared.knowledge, world=world, seed=seed, robots=kinds
-            )
+            tree, clock, known = prepared.tree, self.backend.clock, prepared.knowledge
+            announce(self.log, clock, tree.robot_name, tree.commands, known, world=world, seed=seed, robots=kinds)
 
     def _stuck(self, name: str, *, holding: bool) -> str | None:
         """Returns why no other robot can continue a robot's mission; None if one can."""

@@ -7,11 +7,10 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
-from executive.app.prepare.feasibility import check_prepared, refuse_impossible, route_planner_of
+from executive.app.prepare.feasibility import check_prepared, route_planner_of
 from executive.app.prepare.from_request import prepare
 from executive.app.prepare.prepared import Prepared
 from executive.app.prepare.worlds import refuse_unusable
-from executive.language.questions import Answerer
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, RoutePlanner
@@ -49,14 +48,6 @@ class Checked:
         lines += [f"about {taken.duration_s:.0f} s, {taken.distance_m:.0f} m of driving"] if self.ok else []
         pictures = (to_svg(readable(node_view(tree.root), DRAWN_NODES)) for tree in self.trees)
         return "".join(f"<p>{escape(line)}</p>" for line in lines) + "".join(pictures)
-
-
-def prepare_checked(request: Request, *, ask: Answerer | None = None, anyway: bool = False) -> Prepared:
-    """Prepares a request; unless `anyway`, raises InputError with all errors of `errand check`."""
-    prepared = prepare(request, ask=ask)
-    if not anyway:
-        refuse_impossible(prepared)
-    return prepared
 
 
 class Checker:

@@ -9,6 +9,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from executive.app.prepare.feasibility import refuse_impossible
 from executive.app.prepare.mission_files import mission_file
 from executive.app.prepare.placed_robots import knowledge_for, only_robot, placed_robots, refuse_blocked
 from executive.app.prepare.prepared import Prepared, combine
@@ -24,7 +25,7 @@ from executive.mission.load import (
 )
 from executive.mission.request import Request
 from executive.mission.resolve import mission_from_file
-from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge, Pose, with_own_objects
 from executive.words.mission import DEFAULT_WORLD, Mission, MissionPart, QuestionPolicy
@@ -70,6 +71,14 @@ def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
     if loaded is None:
         return _for_called_robots(setting)
     return _in_parts(setting, loaded, loaded.parts) if loaded.parts is not None else _for_one_robot(setting, loaded)
+
+
+def prepare_checked(request: Request, *, ask: Answerer | None = None, anyway: bool = False) -> Prepared:
+    """Prepares a request; unless `anyway`, raises InputError with all errors of `errand check`."""
+    prepared = prepare(request, ask=ask)
+    if not anyway:
+        refuse_impossible(prepared)
+    return prepared
 
 
 def prepare_alone(request: Request) -> Prepared:
@@ -176,7 +185,8 @@ class Setting:
             except WorldError as error:
                 raise InputError(str(error), hint="take --people out") from error
         tree = compile_mission(mission, knowledge=self.knowledge, registry=installed_skills())
-        _check_masks(tree)
+        if masks := [Path(zone.mask.file) for zone in tree.zones if zone.mask is not None]:
+            _read_again(masks)
         request = replace(request, world_name=world.name, robot=mission.robot_name)
         name, robots = mission.robot_name, self.robots
         if not robots:
@@ -201,16 +211,15 @@ def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
     return request, loaded, world if request.map is None else with_map(world, request.map), knowledge
 
 
-def _check_masks(tree: CompiledTree) -> None:
-    """Reads the filter masks of a tree's zones again. Raises InputError for a mask that cannot be read."""
-    if files := [zone.mask.file for zone in tree.zones if zone.mask is not None]:
-        from skills.estimate.grid_map import load_filter_mask  # most worlds have no masks, and need no pictures
-        from skills.navigate.zone_map import zone_map
+def _read_again(masks: Sequence[Path]) -> None:
+    """Reads filter masks again. Raises InputError for one that cannot be read."""
+    from skills.estimate.grid_map import load_filter_mask  # most worlds have no masks, and need no pictures
+    from skills.navigate.zone_map import zone_map
 
-        load_filter_mask.cache_clear()
-        zone_map.cache_clear()
-        for file in files:
-            load_filter_mask(Path(file))
+    load_filter_mask.cache_clear()
+    zone_map.cache_clear()
+    for file in masks:
+        load_filter_mask(file)
 
 
 def _named_robots(loaded: Mission | None, world: World, knowledge: Knowledge) -> tuple[RobotConfig, ...]:

@@ -93,8 +93,9 @@ def run_request(
             live.follow(log)
         log_map(log, world, prepared.knowledge)
         facts: dict[str, Any] = {"world": world.name, "seed": request.seed, "scenario": scenario.lines()}
+        facts["robots"] = kinds if prepared.several else {}
         for each in prepared.all:
-            announce(log, clock, each.tree, each.knowledge, **facts, robots=kinds if prepared.several else {})
+            announce(log, clock, each.tree.robot_name, each.tree.commands, each.knowledge, **facts)
         journals = () if durable is None else durable.journals.values()
         watching = [artifacts, log, *journals, *visitors, *([] if page is None else [page])]
         if scenario:

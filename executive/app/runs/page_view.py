@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from executive.app.prepare.checker import prepare_checked
+from executive.app.prepare.from_request import prepare_checked
 from executive.app.prepare.mission_files import shipped_missions
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.backend import Scene

@@ -17,7 +17,7 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from executive.app.prepare.checker import prepare_checked
+from executive.app.prepare.from_request import prepare_checked
 from executive.app.runs.queue import MissionResult, Runner, interrupted_error, next_queued, run_in_turn
 from executive.mission.parameters import parse_json_values
 from executive.mission.request import Request

@@ -18,11 +18,13 @@ from executive.tree.nodes.recovery import Afterwards
 from executive.tree.nodes.values import set_plan
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import steps as model
+from executive.words.command import START
 from executive.words.condition import AllOf, Condition, ValueIs
 from executive.words.expression import Expression, Template, kind_of, literal
 from executive.words.goal import GoalCondition, GoalKind, When
 from executive.words.leaf_steps import UseMission
 from executive.words.mission import Mission
+from executive.words.step import OnFailure, Policy
 from skills.api import Zone
 from skills.inputs.errors import InputError
 
@@ -192,6 +194,29 @@ def _use_plan(assembler: Assembler, step: UseMission, builder: PlanBuilder) -> A
     body = builder.sequence(used.name, *steps.nodes)
     whole = under_policy(body, used, builder.at("whole"), used.name, may_skip=False)
     return Assembled((whole,), steps.parts)
+
+
+def whole_mission(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec, ...]) -> NodeSpec:
+    """Builds a mission's steps under its policy."""
+    remember = builder.node("remember", "where it starts", part="remember-start", key=builder.start_key, keep=True)
+    all_steps = list(mission.walk())
+    used = (step.mission for step in all_steps if isinstance(step, UseMission))
+    policies: tuple[Policy, ...] = (mission, *all_steps, *used)
+    returns = any(policy.on_failure is OnFailure.RETURN for policy in policies)
+    leads_back = returns or any(command.goal == START for command in mission.commands)
+    first = [remember] if leads_back else []
+    if mission.is_empty and not any(map(_may_skip, steps)):
+        return builder.sequence(mission.name, *first, *steps)
+    body = builder.sequence("steps", *steps, part="steps")
+    whole = under_policy(body, mission, builder.at("whole"), mission.name, may_skip=False)
+    if _may_skip(whole):
+        paths = tuple(node.path_id for node in steps)
+        whole = builder.node("summary", "tell what was skipped", whole, part="summary", steps=paths)
+    return builder.sequence(mission.name, *first, whole)
+
+
+def _may_skip(node: NodeSpec) -> bool:
+    return any(below.behaviour.skips for below in node.walk())
 
 
 PLANS: Final[StepPlans] = {model.Group: _plan, UseMission: _use_plan}

@@ -4,7 +4,7 @@ import pytest
 
 from executive.app.evaluate import evaluation
 from executive.app.evaluate.random_missions import random_missions
-from executive.app.prepare.checker import prepare_checked
+from executive.app.prepare.from_request import prepare_checked
 from executive.words.goal import RefereeReport
 from skills.inputs.errors import InputError
 from tests.executive.cli.calls import errand, json_of

@@ -10,7 +10,8 @@ from executive.words.command import Task, parse_command
 
 def test_run_and_commands_are_announced(compiled, make, knowledge, clock):
     logged = []
-    announce(lambda topic, m: logged.append((topic, m)), clock, compiled(*make.FETCH), knowledge, world="flat", seed=4)
+    commands = compiled(*make.FETCH).commands
+    announce(lambda topic, m: logged.append((topic, m)), clock, "alice", commands, knowledge, world="flat", seed=4)
     assert [topic for topic, _ in logged] == ["run", "taskChannel", "taskChannel"]
     (_, run), (_, first), (_, second) = logged
     assert (run["seed"], run["commands"]) == (4, list(make.FETCH))

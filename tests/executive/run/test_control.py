@@ -9,8 +9,8 @@ from py_trees.common import Status
 
 from executive.run.control import Control
 from executive.run.control_state import Mode
+from executive.run.guarded_robot import GuardedRobot
 from executive.run.outcome import Outcome
-from executive.run.run_robot import GuardedRobot
 from executive.run.visitor import RunVisitor
 from executive.run.watchdog import Watchdog
 from skills.api import Cause, Failed, Question, Running, Succeeded, nobody_speaks, nobody_to_ask

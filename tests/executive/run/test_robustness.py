@@ -10,8 +10,8 @@ import pytest
 from mcap.reader import make_reader
 
 from executive.record.event_log import EventLog
+from executive.run.guarded_robot import GarbageError, GuardedRobot, garbage_check
 from executive.run.outcome import Outcome
-from executive.run.run_robot import GarbageError, GuardedRobot, garbage_check
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
 from executive.run.watchdog import Watchdog

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from executive.run.run_robot import GuardedRobot
+from executive.run.guarded_robot import GuardedRobot
 from executive.run.watchdog import Watchdog
 from executive.run.worker import LockStepWorker, ThreadWorker
 from plant.robots.spot.kind import spot_capabilities

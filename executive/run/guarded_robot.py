@@ -1,27 +1,17 @@
-"""Robot in a run: every verb is guarded by the watchdog and the lease, and its answer is checked."""
+"""Robot whose verbs are guarded by the watchdog and the lease, and whose answers are checked."""
 
 import functools
 import math
 import threading
 import time
-import traceback
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any, Final
 
 import numpy as np
 
-from executive.record.work import CountedDetector
-from executive.run.outcome import RobotStatus
-from executive.run.visitor import RunEntry, RunShared
-from executive.run.watchdog import IMAGE_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog, call_aside, hung_message
+from executive.run.watchdog import IMAGE_LIMIT_S, VERB_LIMIT_S, Watchdog, call_aside, hung_message
 from executive.run.worker import in_lock_step_job
-from executive.tree.board import Board
-from executive.tree.context import RunContext
-from executive.tree.nodes.skill_leaf import ERROR_TOPIC
-from executive.words.slug import slug
-from skills.detection import Detector
-from skills.navigate.footprint import Footprint
 from skills.robot import (
     Battery,
     Capabilities,
@@ -36,7 +26,6 @@ from skills.robot import (
     LeaseError,
     Odometry,
     OwnLocalisation,
-    Pose2D,
     Robot,
     Scan,
 )
@@ -44,8 +33,6 @@ from skills.robot_wrapper import VERBS, AnswerT, RobotWrapper
 
 Check = Callable[[Any], str | None]
 _EMPTY: Final = (0, 0)
-HOLDER: Final = "errand"
-_NO_LEASE: Final = Lease("", "", 0)
 
 
 class GarbageError(RuntimeError):
@@ -138,103 +125,6 @@ class GuardedRobot(RobotWrapper):
                 return call()
             raise RuntimeError(f"'{verb}' was called inside a job: read the robot before, or by `Worker.sense`")
         return call() if verb == "image" else call_aside(call, verb, limit_s)
-
-
-def _with_tags(entry: RunEntry) -> Detector:
-    """Returns the detector of a robot, which recognises objects by their tags, too, where there are any."""
-    if not entry.tree.tags:
-        return entry.detector
-    from skills.perception.fiducials import with_tags
-
-    return with_tags(entry.detector, entry.tree.tags)
-
-
-class RunRobot:
-    """Robot of a run, with or without a mission.
-
-    `context` is what a tree may use of it, under the present lease; `pose` is its estimated pose when it last sensed
-    (None: not localised).
-    """
-
-    def __init__(self, entry: RunEntry, shared: RunShared) -> None:
-        """Raises the errors of the robot's verbs."""
-        self.name: Final = entry.robot.name
-        limits, self._traffic = shared.settings, shared.traffic
-        self.pose: Pose2D | None = None
-        self._guarded = GuardedRobot(
-            entry.robot, shared.watchdog, limit_s=limits.verb_limit_s, image_limit_s=limits.image_limit_s
-        )
-        self._traffic.join(self.name, Footprint.of(self._guarded.capabilities()).discs)
-        self.context = self._context(entry, shared)
-
-    def _context(self, entry: RunEntry, shared: RunShared) -> RunContext:
-        """Context of the robot's tree, without a lease."""
-        name, control, publish = self.name, shared.control, shared.visitors.publish
-        return RunContext(
-            robot=self._guarded,
-            lease=_NO_LEASE,
-            clock=shared.clock,
-            worker=shared.worker,
-            localiser=entry.localiser,
-            costmap=entry.costmap,
-            publish=lambda topic, message: publish(topic, {"robot": name, **message}),
-            seed=shared.settings.seed,
-            board=Board(slug(entry.tree.robot_name)),
-            ask=lambda question: control.ask(question, shared.clock, name),
-            listen=lambda: control.listen(name),
-            stop_pressed=lambda: control.stop_pressed(name),
-            presses=lambda: control.presses,
-            day_began_s=shared.day_began_s,
-            detector=CountedDetector(_with_tags(entry), shared.work),
-            work=shared.work,
-            stack=entry.stack,
-            doors=entry.tree.doors,
-            tags=entry.tree.tags,
-            zones=entry.tree.zones,
-            walls=entry.walls,
-            traffic=shared.traffic.view_of(name),
-        )
-
-    def status(self, *, now: bool = False) -> RobotStatus:
-        """Reads the robot's pose (as last sensed, or `now`), its gripper and its battery.
-
-        Raises the errors of its verbs.
-        """
-        robot, pose = self.context.robot, self.context.known_pose() if now else self.pose
-        return RobotStatus(pose, robot.gripper().holding, robot.battery().charge)
-
-    def sense(self) -> None:
-        """Updates the estimators, and reports the robot's estimated pose to the others."""
-        context = self.context
-        if estimators := context.robot_excluders:
-            covered_W = self._traffic.covered_W(self.name)
-            for estimator in estimators:
-                estimator.exclude_robots(covered_W)
-        context.localiser.update(context.robot)
-        estimate = context.localiser.estimate()
-        context.costmap.update(context.robot, estimate)
-        self.pose = context.known_pose()
-        self._traffic.report(self.name, self.pose)
-
-    def claim(self) -> RunContext:
-        """Claims the free lease; returns the context under it. Raises LeaseError."""
-        self.context = replace(self.context, lease=self._guarded.claim(HOLDER))
-        return self.context
-
-    def stop_and_leave(self) -> None:
-        """Stops the robot and returns its lease. Raises nothing."""
-        context = self.context
-        self.attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
-        self.attempt("return the lease", self._guarded.give_lease_back)
-
-    def attempt(self, what: str, call: Callable[[], object]) -> bool:
-        """Calls `call` and returns whether it succeeded; logs a defect instead of raising it."""
-        try:
-            call()
-        except (Exception, VerbHung):
-            self.context.publish(ERROR_TOPIC, {"node": self.name, "what": what, "traceback": traceback.format_exc()})
-            return False
-        return True
 
 
 def garbage_check(verb: str) -> Check | None:

@@ -9,13 +9,11 @@ executive's leaf wraps it once, turns exceptions into failures with cause ERROR,
 from __future__ import annotations
 
 import enum
-import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -371,16 +369,11 @@ class Skill(ABC, Generic[InputsT]):
     are the parts of the robot that the skill uses: skills that share none may run side by side. `Options` is a frozen
     dataclass of the skill's settings in a stack file, all with defaults.
 
-    A class without a body may declare all this in the module `ports` of the skill's package or of one around it; the
-    class that does the work derives from it and is named by `done_by` ("module:Class"). Then trees are compiled without
-    its imports.
-
     `max_data_age_s` is the largest age (s) of the data on which a success rests, by name: a sense verb (not `image`),
     "localisation", or an output port whose value has a `stamp_s`. A success on older data is a failed postcondition.
     """
 
     name: ClassVar[str]
-    done_by: ClassVar[str] = ""
     Inputs: ClassVar[type]
     outputs: ClassVar[Mapping[str, type]] = {}
     causes: ClassVar[Mapping[Cause, str]] = {}
@@ -392,21 +385,6 @@ class Skill(ABC, Generic[InputsT]):
     uses: ClassVar[frozenset[Part]] = WHOLE_ROBOT
     Options: ClassVar[type] = NoOptions
     checkpoint: Mapping[str, Any] = MappingProxyType({})
-
-    def __new__(cls, *_: Any, **__: Any) -> Self:
-        """Creates a skill; for a class that only declares one, the skill that does the work."""
-        return object.__new__(cls.loaded())
-
-    @classmethod
-    def loaded(cls) -> type[Self]:
-        """Returns the class that does the work. Raises TypeError when `done_by` names a class of another base."""
-        module, _, name = cls.done_by.partition(":")
-        if not (module and inspect.isabstract(cls)):
-            return cls
-        found = getattr(import_module(module), name)
-        if not issubclass(found, cls):
-            raise TypeError(f"{cls.done_by} does not derive from {cls.__name__}, which names it")
-        return found  # type: ignore[no-any-return]
 
     def __init__(self, context: SkillContext, options: Any = None) -> None:
         self.context = context

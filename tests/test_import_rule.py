@@ -241,7 +241,7 @@ CALL = "def f():\n    "
         (breaches, "plant/referee/judge.py", "from executive.words.goal import GoalCondition", []),
         (breaches, "plant/referee/judge.py", "from executive.tree import goals", ["executive.tree.goals"]),
         (breaches, "executive/words/goal.py", "from executive.language import u", ["executive.language.u"]),
-        (breaches, "executive/words/goal.py", "from skills import ports", ["skills.ports"]),
+        (breaches, "executive/words/goal.py", "from skills import stack", ["skills.stack"]),
         (breaches, "executive/run/runner.py", f"{CALL}import plant.simulation", ["plant.simulation"]),
         (breaches, "executive/run/runner.py", "from executive.cli.entry import app", ["executive.cli.entry.app"]),
         (breaches, "executive/run/runner.py", "from skills.api import Cause", []),

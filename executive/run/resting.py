@@ -11,7 +11,7 @@ from executive.run.watchdog import Watchdog
 from skills.api import Running, SkillContext
 from skills.navigate.giving_way import GivingWay
 from skills.navigate.skill import Navigate
-from skills.ports import NavigateInputs
+from skills.navigate.surroundings import NavigateInputs
 
 _LOOK_S = 0.5
 

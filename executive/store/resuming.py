@@ -190,7 +190,6 @@ def resumed_skill(
     skill: type[Skill[Any]], path: str, ports: Mapping[str, Any], recollection: Recollection
 ) -> type[Skill[Any]]:
     """Returns a stand-in for a skill at one node of a resumed tree: it repeats the result from before, or works."""
-    skill.loaded()
 
     class Resumed(_Resumed):
         def __init__(self, context: SkillContext) -> None:

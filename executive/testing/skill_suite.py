@@ -165,7 +165,6 @@ def stale_sensors(case: SuiteCase) -> Iterator[str]:
 
 def _recorded(skill: type[Skill[Any]], made: list[Skill[Any]]) -> type[Skill[Any]]:
     """Returns a subclass of the skill that appends its instances to `made`."""
-    skill = skill.loaded()
 
     def init(self: Any, *arguments: Any, **options: Any) -> None:
         skill.__init__(self, *arguments, **options)

@@ -11,9 +11,7 @@ import dataclasses
 import inspect
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
-from importlib.util import find_spec
 from typing import Any, Final
 
 from executive.tree.port_values import describe_type, field_types
@@ -132,7 +130,7 @@ def _only(entries: Sequence[EntryPoint], ours: Mapping[str, SkillClass], limit_s
 
 def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:
     try:
-        skill = run_plugin(entry, lambda: _class_of(entry), limit_s=limit_s)
+        skill = run_plugin(entry, entry.load, limit_s=limit_s)
         faults = run_plugin(entry, lambda: list(faults_of(skill, registered_as=entry.name)))
     except PluginDefect as defect:
         raise _error(
@@ -143,27 +141,12 @@ def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:
     return skill  # type: ignore[no-any-return]
 
 
-def _class_of(entry: EntryPoint) -> Any:
-    """Returns the class of a module `ports` that names the skill by `done_by`, else the skill's own class.
-
-    The module stands in the skill's package or in one around it. With this class, the skill's module and all its
-    imports are loaded only at the skill's first use.
-    """
-    package = entry.module
-    while package := package.rpartition(".")[0]:
-        if find_spec(f"{package}.ports") is not None:
-            for kind in vars(import_module(f"{package}.ports")).values():
-                if inspect.isclass(kind) and issubclass(kind, Skill) and kind.done_by == entry.value:
-                    return kind
-    return entry.load()
-
-
 def faults_of(skill: Any, *, registered_as: str) -> Iterator[tuple[str, str]]:
     """Iterates over the rules for skills that a class breaks, as messages with hints."""
     if not (inspect.isclass(skill) and issubclass(skill, Skill)):
         yield "it is no subclass of skills.api.Skill", "register the skill's class"
         return
-    if inspect.isabstract(skill) and not skill.done_by:
+    if inspect.isabstract(skill):
         missing = ", ".join(sorted(skill.__abstractmethods__))
         yield f"it does not define {missing}", f"define {missing}"
     name = getattr(skill, "name", None)

@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from skills.api import FLOOR, ObjectObservation
+from skills.api import FLOOR, ObjectObservation, Surface
 from skills.perception.class_forms import ANY_OBJECT, class_form
 from skills.perception.detection_3d import Detection3D, has_attribute
 from skills.perception.surface_segmentation import Cluster
 from skills.perception.tracker import CONFIRMED_BELIEF, Track
-from skills.ports import DetectInputs
-from skills.quantities import Angle, Duration, Length, Tries
+from skills.quantities import Angle, Coordinate, Duration, Height, Length, Tries
 from skills.robot import FloatArray
 
 _NAMED_WITHIN_M = 0.06
@@ -32,6 +31,28 @@ _SEEN_AGAIN_M = 0.06
 _SAME_SIZE_M = 0.015
 """Difference within which two sizes are alike; for larger objects, this share of the size."""
 _SAME_SIZE_SHARE = 0.3
+
+
+@dataclass(frozen=True)
+class DetectInputs:
+    """Wanted objects (any of `classes`, with all `attributes`) and the surfaces to search.
+
+    The class "thing" is any object, whether the detector knows its class or not; objects at the positions of `avoid`
+    are the last choice.
+
+    The search ends with the first `count` objects; a count of 0 searches all surfaces and counts all objects. With
+    `expected_W` it searches only that position, and only objects within 0.35 m of it count. With `floor`, visible
+    objects on the floor beside the surfaces count too.
+    """
+
+    classes: tuple[str, ...]
+    surfaces: tuple[Surface, ...]
+    attributes: tuple[str, ...] = ()
+    expected_W: tuple[Coordinate, Coordinate, Height] | None = None
+    count: Tries = 1
+    floor: bool = False
+    avoid: tuple[ObjectObservation, ...] = ()
+    seen_before: ObjectObservation | None = None
 
 
 @dataclass(frozen=True)

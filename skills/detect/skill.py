@@ -1,7 +1,7 @@
 """The detect skill: searches surfaces with the hand camera, and confirms each object from a second viewpoint."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -18,6 +18,7 @@ from skills.detect.messages import (
     tracks_message,
 )
 from skills.detect.selection import (
+    DetectInputs,
     DetectOptions,
     is_sure,
     level_distance,
@@ -37,7 +38,6 @@ from skills.perception.model_matching import identified
 from skills.perception.point_cloud import Coverage, in_plain_view
 from skills.perception.surface_segmentation import Cluster, loose_clusters, segment_3d, segment_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
-from skills.ports import DetectInputs, DetectPorts
 from skills.robot import FloatArray, Image
 from skills.routine import Routine, SkillFailure, planning_failure
 
@@ -63,9 +63,23 @@ class Look:
     clusters: tuple[Cluster, ...]
 
 
-class Detect(DetectPorts, LookingSkill[DetectInputs]):
-    """Implementation of `DetectPorts`."""
+class Detect(LookingSkill[DetectInputs]):
+    """Searches surfaces for objects without driving. Stows the arm when it finds too few."""
 
+    name = "detect"
+    Inputs = DetectInputs
+    outputs: ClassVar[Mapping[str, type]] = {
+        "observation": ObjectObservation,
+        "observations": tuple[ObjectObservation, ...],
+    }
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "a class, attribute or surface cannot be searched for from here, or there is no arm",
+        Cause.PLANNING: "the arm reaches no viewpoint",
+        Cause.EXECUTION: "the arm did not reach its viewpoint, or the camera shows nothing",
+        Cause.POSTCONDITION: "no such object is seen, or fewer than asked for",
+    }
+    default_timeout_s = 90.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"observation": 3.0}
     Options: ClassVar[type] = DetectOptions
     options: DetectOptions
 

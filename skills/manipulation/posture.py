@@ -1,10 +1,14 @@
 """Skills of the arm alone: stow folds it onto the body, pose_arm moves it to joint angles, as saved by teleop."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 
-from skills.api import Cause, Succeeded
+from skills.api import Cause, Part, Succeeded
 from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
-from skills.ports import PoseArmInputs, PoseArmPorts, StowInputs, StowPorts
+from skills.quantities import Angle, Turn
 from skills.routine import Routine, SkillFailure, planning_failure
 
 _NEAR_X_M = 0.05
@@ -19,8 +23,23 @@ _THERE_RAD = 0.05
 """Largest error of a joint angle at which the arm has reached its pose."""
 
 
-class Stow(StowPorts, ArmSkill[StowInputs]):
-    """Implementation of `StowPorts`."""
+@dataclass(frozen=True)
+class StowInputs:
+    """No inputs."""
+
+
+class Stow(ArmSkill[StowInputs]):
+    """Brings the arm near the body, and the body to its usual height. An arm that is near the body stays there."""
+
+    name = "stow"
+    Inputs = StowInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.ARM})
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PLANNING: "the arm finds no free path",
+        Cause.EXECUTION: "the arm did not reach its goal",
+    }
+    default_timeout_s = 30.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
 
     def run(self, inputs: StowInputs) -> Routine[Succeeded]:
         """Stows or carries.
@@ -49,8 +68,30 @@ class Stow(StowPorts, ArmSkill[StowInputs]):
             yield from self.carry(X_BH.rotation(), "drawing in the arm")
 
 
-class PoseArm(PoseArmPorts, ArmSkill[PoseArmInputs]):
-    """Implementation of `PoseArmPorts`."""
+@dataclass(frozen=True)
+class PoseArmInputs:
+    """Joint angles from the shoulder on, and an opening (0 closed).
+
+    None, or a held object, leaves the gripper as it is.
+    """
+
+    joints_rad: tuple[Angle, ...]
+    opening: Turn | None = None
+
+
+class PoseArm(ArmSkill[PoseArmInputs]):
+    """Moves the arm on a free path to joint angles, then the gripper to an opening."""
+
+    name = "pose_arm"
+    Inputs = PoseArmInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.ARM})
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "the pose is not one of this robot's arm",
+        Cause.PLANNING: "the arm finds no free path",
+        Cause.EXECUTION: "the arm did not reach its goal",
+    }
+    default_timeout_s = 30.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5}
 
     def run(self, inputs: PoseArmInputs) -> Routine[Succeeded]:
         """Moves the arm, then the gripper."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, Failed, PlanningError, Running, SkillContext, Step, Succeeded
+from skills.api import Cause, Failed, Part, PlanningError, Running, SkillContext, Step, Succeeded
 from skills.geometry import relative_pose
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
@@ -17,9 +17,8 @@ from skills.navigate.follower import Drive
 from skills.navigate.footprint import Footprint, footprint_clearance_m
 from skills.navigate.giving_way import Avoided
 from skills.navigate.path import Path
-from skills.navigate.surroundings import Company, NavigateOptions, Surroundings
+from skills.navigate.surroundings import Company, NavigateInputs, NavigateOptions, Surroundings
 from skills.navigate.trip_planning import TripPlanning, place_text
-from skills.ports import NavigateInputs, NavigatePorts
 from skills.robot import Pose2D
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 from skills.stack import LocalController
@@ -63,13 +62,24 @@ class _Progress:
         return min(1.0, max(0.0, 1.0 - left_m / max(self.whole_m or left_m, left_m, 1e-3)))
 
 
-class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
-    """The skill that `NavigatePorts` declares.
+class Navigate(RoutineSkill[NavigateInputs]):
+    """Drives to a pose: plans a path for the whole footprint, follows it, and stands still at the goal.
 
     An attempt goes through the stages localise, plan, follow, wait aside and settle; each stage returns the next one.
     A robot that stands on the reserved path of another leaves its stage and goes aside first.
     """
 
+    name: ClassVar[str] = "navigate"
+    Inputs: ClassVar[type] = NavigateInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "localisation is lost, the LiDAR does not work, or the robot refuses to drive",
+        Cause.PLANNING: "the goal is blocked, or there is no path, even after waiting for what stands there to move",
+        Cause.EXECUTION: "the robot makes no progress, loses localisation or its LiDAR, or refuses to drive on",
+        Cause.POSTCONDITION: "it stands still, but not at the goal",
+    }
+    default_timeout_s: ClassVar[float] = 180.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
     Options: ClassVar[type] = NavigateOptions
     options: NavigateOptions
 

@@ -18,7 +18,7 @@ from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, ScanHealt
 from skills.navigate.zone_map import KeepOut, ZoneMap
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
-from skills.quantities import Delay, Duration, Length, Margin, Speed, Tries, TurnRate
+from skills.quantities import Coordinate, Delay, Duration, Length, Margin, Speed, Tries, Turn, TurnRate
 from skills.robot import FloatArray, Pose2D
 from skills.routine import PATIENCE_S
 from skills.stack import LocalController
@@ -142,6 +142,21 @@ class PaceManager:
         share = (distance_m - options.near_m) / (options.far_m - options.near_m)
         slow = min(options.near_m_s, most_m_s)
         return slow + min(1.0, max(0.0, share)) * (most_m_s - slow)
+
+
+@dataclass(frozen=True)
+class NavigateInputs:
+    """The goal (the body's pose in the world), tolerances and the maximum speed.
+
+    Poses at `nearby_m`, forward and left of the goal, count as reached too: a failure is final only if none is
+    reachable.
+    """
+
+    goal: Pose2D
+    position_tolerance_m: Length = 0.10
+    yaw_tolerance_rad: Turn = 0.10
+    max_speed_m_s: Speed = 0.8
+    nearby_m: tuple[tuple[Coordinate, Coordinate], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ from skills.navigate.door_openers import DoorCalls
 from skills.navigate.giving_way import Avoided
 from skills.navigate.path import Path
 from skills.navigate.planner import LatticePlanner
-from skills.navigate.surroundings import NavigateOptions, Surroundings
-from skills.ports import NavigateInputs
+from skills.navigate.surroundings import NavigateInputs, NavigateOptions, Surroundings
 from skills.robot import Pose2D
 from skills.routine import Patience, SkillFailure
 from skills.world_model import zones_sentence

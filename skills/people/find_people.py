@@ -1,7 +1,7 @@
 """The find_people skill: looks for people in an area, turns in place, and drives to further viewpoints."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import ClassVar
@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from skills.api import Cause, ObjectObservation, Running, SkillContext, Succeeded, SurveyView
+from skills.api import Cause, ObjectObservation, Part, Running, SkillContext, Succeeded, SurveyView
 from skills.detect.descriptions import count_sentence
 from skills.detect.messages import detections_message
 from skills.geometry import grid_inside, line_of_sight, wrap
@@ -18,12 +18,12 @@ from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clear, footprint_clearance_m, pose_array
+from skills.navigate.surroundings import NavigateInputs
 from skills.people.meet_person import person_observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark, turn_upright
 from skills.perception.people import SeenPerson, located_people, people_detections, people_in_scan
 from skills.perception.people_tracking import SCAN_APART_M, PeopleTracker
-from skills.ports import FindPeopleInputs, FindPeoplePorts, NavigateInputs
-from skills.quantities import Count, Delay, Length, Share, Tries, Turn, TurnRate
+from skills.quantities import Coordinate, Count, Delay, Length, Share, Tries, Turn, TurnRate
 from skills.robot import FloatArray, Image, Pose2D
 from skills.routine import Patience, Routine, SkillFailure
 from skills.world_model import PERSON
@@ -46,6 +46,25 @@ _YAWS_RAD = (0.0, 0.8, -0.8, 1.6, -1.6, math.pi)
 
 
 @dataclass(frozen=True)
+class FindPeopleInputs:
+    """Area to search: the corners (x, y) of `area_W`, with the name `place`.
+
+    `person` is the name of the wanted person; any person counts, since the skill recognises no faces. A `count` of 0
+    counts all people. People near the positions of `avoid` do not count. A person counts once a picture shows them;
+    with `unpictured`, bodies that two scans show count too, after all others. With `moves`, the robot drives to
+    viewpoints that show the rest of the area, until enough people are found.
+    """
+
+    area_W: tuple[tuple[Coordinate, Coordinate], ...]
+    place: str
+    person: str = PERSON
+    count: Tries = 1
+    avoid: tuple[ObjectObservation, ...] = ()
+    unpictured: bool = False
+    moves: bool = False
+
+
+@dataclass(frozen=True)
 class FindPeopleOptions:
     """Search in `looks` directions, with turns of `turn_rad` in between.
 
@@ -65,9 +84,23 @@ class FindPeopleOptions:
     hidden: Share = 0.15
 
 
-class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
-    """Implementation of `FindPeoplePorts`."""
+class FindPeople(MovingSkill[FindPeopleInputs]):
+    """Looks for people with body cameras and LiDAR; with the LiDAR alone if the detector has no class of people."""
 
+    name = "find_people"
+    Inputs = FindPeopleInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
+    outputs: ClassVar[Mapping[str, type]] = {
+        "observation": ObjectObservation,
+        "observations": tuple[ObjectObservation, ...],
+    }
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "there is no new scan",
+        Cause.EXECUTION: "it is dark, there is no picture, the robot refuses to turn, or part of the area is hidden",
+        Cause.POSTCONDITION: "nobody is seen, or fewer than asked for",
+    }
+    default_timeout_s = 150.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"localisation": 1.0}
     Options: ClassVar[type] = FindPeopleOptions
     options: FindPeopleOptions
 

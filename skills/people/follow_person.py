@@ -1,22 +1,23 @@
 """The follow_person skill: keeps behind a walking person, searches for a lost person, and asks."""
 
 import math
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from skills.api import Cause, ClearableCostmap, Failed, Running, SkillContext, Succeeded
+from skills.api import Cause, ClearableCostmap, Failed, Part, Running, SkillContext, Succeeded
 from skills.geometry import bearing_rad, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
 from skills.navigate.giving_way import GivingWayOptions, pose_aside
 from skills.navigate.skill import Navigate
-from skills.navigate.surroundings import Company
+from skills.navigate.surroundings import Company, NavigateInputs
 from skills.navigate.trip_planning import place_text
 from skills.people.followed_person import (
+    FollowPersonOptions,
     Target,
-    TargetOptions,
     is_addressed,
     line_through,
     people_about,
@@ -25,9 +26,8 @@ from skills.people.followed_person import (
     poses_to_search,
 )
 from skills.perception.people import SeenPerson
-from skills.perception.people_tracking import PeopleOptions, PeopleWatch
-from skills.ports import FollowPersonInputs, FollowPersonPorts, NavigateInputs
-from skills.quantities import Delay, Duration, Factor, Length, Speed, Tries, Turn
+from skills.perception.people_tracking import PeopleWatch
+from skills.quantities import Coordinate, Duration, Speed
 from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure
 from skills.small.speak import ListeningSkill, say
@@ -67,50 +67,19 @@ _BETWEEN_M = 0.5
 
 
 @dataclass(frozen=True)
-class FollowPersonOptions:
-    """Distances (m) between the middles of robot and person, and patience (s).
+class FollowPersonInputs:
+    """The person's name for messages, and `place_W` (x, y), where they were seen last; None: the nearest one ahead.
 
-    The robot drives to `behind_m` behind where the person will be in `ahead_s`, plans again every `replan_s`, and slows
-    down so that it stands at `close_m`. It stays where it is while a standing person is within `near_m`, and turns to
-    one who is more than `turn_rad` to the side. For a person who comes towards it within `meeting_m`, it goes aside by
-    up to `aside_m` for `aside_s` at most. A person who stays hidden for `lost_s` is lost, or for `gone_s` once the
-    robot stands where they were seen last: the robot says so, searches beyond `doors` doors and in the named place,
-    each for `search_s` or `plans` plans `again_s` apart, then asks and listens for `asking_s`. Somebody who may be
-    another is asked for the name within `hearing_m`, with `answer_s` for the answer, and is another after so many
-    `silences`. The robot also asks a person who stands outside the named place for `standing_s`. At the beginning it
-    looks for the person for `finding_s`. It fails after `tries` drives in a row that failed, and at the end if the
-    person was out of its sight for longer than `longest_loss_s`.
+    With the corners `until_W` of the place `until`, the skill ends once the person has stood there for 5 s. It ends
+    when somebody tells it to, and after `time_limit_s` at the latest.
     """
 
-    behind_m: Length = 1.6
-    close_m: Length = 1.35
-    near_m: Length = 2.0
-    meeting_m: Length = 2.5
-    aside_m: Length = 4.0
-    aside_s: Delay = 5.0
-    ahead_s: Duration = 0.8
-    replan_s: Duration = 0.5
-    gain: Factor = 1.0
-    lost_s: Delay = 6.0
-    gone_s: Delay = 1.5
-    finding_s: Delay = 8.0
-    asking_s: Delay = 12.0
-    search_s: Delay = 20.0
-    plans: Tries = 6
-    again_s: Duration = 1.0
-    hearing_m: Length = 2.8
-    answer_s: Delay = 5.0
-    standing_s: Delay = 30.0
-    silences: Tries = 2
-    doors: Tries = 3
-    tries: Tries = 60
-    longest_loss_s: Delay = 20.0
+    person: str = "the person"
+    place_W: tuple[Coordinate, Coordinate] | None = None
+    until_W: tuple[tuple[Coordinate, Coordinate], ...] | None = None
+    until: str = ""
+    time_limit_s: Duration = 600.0
     max_speed_m_s: Speed = 1.2
-    ahead_rad: Turn = 1.2
-    turn_rad: Turn = 0.6
-    ahead_m: Length = 4.0
-    target: TargetOptions = field(default_factory=TargetOptions)
-    people: PeopleOptions = field(default_factory=lambda: PeopleOptions(period_s=1.0, idle_s=4.0, track_m=7.0))
 
 
 def _at_pace(context: SkillContext, max_speed_m_s: float) -> SkillContext:
@@ -126,9 +95,23 @@ class _Told(Exception):  # noqa: N818 - no program error
     """Somebody told the robot to end."""
 
 
-class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
-    """Implementation of `FollowPersonPorts`; the navigate skill drives."""
+class FollowPerson(ListeningSkill[FollowPersonInputs]):
+    """Keeps behind a walking person by LiDAR and body cameras; searches for a person whom it has lost, and asks.
 
+    The navigate skill drives.
+    """
+
+    name = "follow_person"
+    Inputs = FollowPersonInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE, Part.VOICE})
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "nobody is seen, localisation is lost, or the robot refuses to drive",
+        Cause.PLANNING: "no path leads to the person",
+        Cause.EXECUTION: "the person is lost, or the robot loses localisation or its LiDAR, or refuses to drive on",
+        Cause.TIMEOUT: "the person has not stood still in the place within the time limit",
+    }
+    default_timeout_s: ClassVar[float] = 1800.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
     Options: ClassVar[type] = FollowPersonOptions
     options: FollowPersonOptions
 

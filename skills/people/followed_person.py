@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Final
 
@@ -13,8 +13,8 @@ from skills.api import FreeSpace
 from skills.doorway import Doorway
 from skills.geometry import bearing_rad, inside_polygon, line_of_sight, wrap
 from skills.perception.people import SeenPerson
-from skills.perception.people_tracking import predicted_place_W
-from skills.quantities import Delay, Length, Speed
+from skills.perception.people_tracking import PeopleOptions, predicted_place_W
+from skills.quantities import Delay, Duration, Factor, Length, Speed, Tries, Turn
 from skills.robot import FloatArray, Pose2D
 
 _TRAIL_STEP_M = 0.1
@@ -88,6 +88,53 @@ def is_addressed(one: SeenPerson, near: Sequence[SeenPerson], here: Pose2D, *, s
     first = next(iter(faced or near if still else faced), None)
     is_first = first is not None and first.place_W == one.place_W
     return is_first and (near[0].place_W == one.place_W or (still and in_sight))
+
+
+@dataclass(frozen=True)
+class FollowPersonOptions:
+    """Distances (m) between the middles of robot and person, and patience (s).
+
+    The robot drives to `behind_m` behind where the person will be in `ahead_s`, plans again every `replan_s`, and slows
+    down so that it stands at `close_m`. It stays where it is while a standing person is within `near_m`, and turns to
+    one who is more than `turn_rad` to the side. For a person who comes towards it within `meeting_m`, it goes aside by
+    up to `aside_m` for `aside_s` at most. A person who stays hidden for `lost_s` is lost, or for `gone_s` once the
+    robot stands where they were seen last: the robot says so, searches beyond `doors` doors and in the named place,
+    each for `search_s` or `plans` plans `again_s` apart, then asks and listens for `asking_s`. Somebody who may be
+    another is asked for the name within `hearing_m`, with `answer_s` for the answer, and is another after so many
+    `silences`. The robot also asks a person who stands outside the named place for `standing_s`. At the beginning it
+    looks for the person for `finding_s`. It fails after `tries` drives in a row that failed, and at the end if the
+    person was out of its sight for longer than `longest_loss_s`.
+    """
+
+    behind_m: Length = 1.6
+    close_m: Length = 1.35
+    near_m: Length = 2.0
+    meeting_m: Length = 2.5
+    aside_m: Length = 4.0
+    aside_s: Delay = 5.0
+    ahead_s: Duration = 0.8
+    replan_s: Duration = 0.5
+    gain: Factor = 1.0
+    lost_s: Delay = 6.0
+    gone_s: Delay = 1.5
+    finding_s: Delay = 8.0
+    asking_s: Delay = 12.0
+    search_s: Delay = 20.0
+    plans: Tries = 6
+    again_s: Duration = 1.0
+    hearing_m: Length = 2.8
+    answer_s: Delay = 5.0
+    standing_s: Delay = 30.0
+    silences: Tries = 2
+    doors: Tries = 3
+    tries: Tries = 60
+    longest_loss_s: Delay = 20.0
+    max_speed_m_s: Speed = 1.2
+    ahead_rad: Turn = 1.2
+    turn_rad: Turn = 0.6
+    ahead_m: Length = 4.0
+    target: TargetOptions = field(default_factory=TargetOptions)
+    people: PeopleOptions = field(default_factory=lambda: PeopleOptions(period_s=1.0, idle_s=4.0, track_m=7.0))
 
 
 class Target:

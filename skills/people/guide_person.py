@@ -1,24 +1,23 @@
 """The guide_person skill: goes ahead of a person at their pace, waits for them, and goes back for them."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
 import numpy as np
 
-from skills.api import Cause, Running, Step, Succeeded
+from skills.api import Cause, Part, Running, Step, Succeeded
 from skills.geometry import grid_inside, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.navigate.skill import Navigate
-from skills.navigate.surroundings import Company
+from skills.navigate.surroundings import Company, NavigateInputs
 from skills.people.followed_person import Target, TargetOptions, people_about
-from skills.people.meet_person import MeetPerson, MeetPersonOptions, person_text
+from skills.people.meet_person import MeetPerson, MeetPersonInputs, MeetPersonOptions, person_text
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
-from skills.ports import GuidePersonInputs, GuidePersonPorts, MeetPersonInputs, NavigateInputs
-from skills.quantities import Delay, Length, Speed, Tries, Turn
+from skills.quantities import Coordinate, Delay, Length, Speed, Tries, Turn
 from skills.robot import Pose2D
 from skills.routine import ENDED_EARLY, Patience, Routine, SkillFailure
 from skills.small.speak import ListeningSkill, say
@@ -41,6 +40,21 @@ _WALKS_M_S = 0.3
 """Speed from which on a person who is out of sight has walked on."""
 _ON_M = 2.0
 """Steps in which the robot looks for that person, ahead and back along the trail."""
+
+
+@dataclass(frozen=True)
+class GuidePersonInputs:
+    """Name of a person for messages, the robot's pose at the goal, and the name of the goal.
+
+    The person was seen at `place_W` (x, y); None: the nearest one ahead. They must stand in the outline `area_W` in the
+    end; without one, near the robot.
+    """
+
+    person: str
+    goal: Pose2D
+    place: str
+    place_W: tuple[Coordinate, Coordinate] | None = None
+    area_W: tuple[tuple[Coordinate, Coordinate], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -82,9 +96,20 @@ class Leading(Navigate):
         return most_m_s, waits
 
 
-class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
-    """Implementation of `GuidePersonPorts`."""
+class GuidePerson(ListeningSkill[GuidePersonInputs]):
+    """Goes ahead of a person to a place: at their pace, waits for them, and goes back for them."""
 
+    name = "guide_person"
+    Inputs = GuidePersonInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE, Part.VOICE})
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "there is no new scan, or localisation is lost",
+        Cause.PLANNING: "there is no path to the place, or back to the person",
+        Cause.EXECUTION: "the robot makes no progress or refuses to drive",
+        Cause.POSTCONDITION: "the person is lost, does not come along, or ends it on the way",
+    }
+    default_timeout_s = 600.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
     Options: ClassVar[type] = GuidePersonOptions
     options: GuidePersonOptions
 

@@ -1,23 +1,23 @@
 """The meet_person skill: drives to a known person, and checks that they are still there."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import ClassVar, Final
 
 import numpy as np
 
-from skills.api import Cause, ObjectKind, ObjectObservation, Running, Succeeded
+from skills.api import Cause, ObjectKind, ObjectObservation, Part, Running, Succeeded
 from skills.geometry import bearing_rad, facing_poses, line_of_sight
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
+from skills.navigate.surroundings import NavigateInputs
 from skills.navigate.trip_planning import place_text
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
-from skills.ports import MeetPersonInputs, MeetPersonPorts, NavigateInputs
-from skills.quantities import Delay, Length, Tries, Turn
+from skills.quantities import Coordinate, Delay, Length, Tries, Turn
 from skills.robot import Pose2D
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 from skills.world_model import PERSON
@@ -44,6 +44,19 @@ def person_observation(seen: SeenPerson, name: str, place: str | None) -> Object
 
 
 @dataclass(frozen=True)
+class MeetPersonInputs:
+    """Name of a person and of their room, and the point (x, y) where they were seen; None: the nearest one ahead.
+
+    With `within_m`, the robot may stop at this distance (m) where nothing nearer is free.
+    """
+
+    person: str
+    place_W: tuple[Coordinate, Coordinate] | None = None
+    place: str = ""
+    within_m: Length | None = None
+
+
+@dataclass(frozen=True)
 class MeetPersonOptions:
     """Positions of the robot near a person: at the first free of the distances `apart_m`, turned to the person.
 
@@ -62,9 +75,21 @@ class MeetPersonOptions:
     tries: Tries = 4
 
 
-class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
-    """Implementation of `MeetPersonPorts`."""
+class MeetPerson(RoutineSkill[MeetPersonInputs]):
+    """Goes beside a person, also if they move on, and faces them. The output `person` is where they are."""
 
+    name = "meet_person"
+    Inputs = MeetPersonInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
+    outputs: ClassVar[Mapping[str, type]] = {"person": ObjectObservation}
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "there is no new scan",
+        Cause.PLANNING: "there is no free place to stand beside the person, or no path",
+        Cause.EXECUTION: "the robot did not reach the place to stand",
+        Cause.POSTCONDITION: "nobody is seen there, or the person walks on",
+    }
+    default_timeout_s = 180.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5, "person": 2.0}
     Options: ClassVar[type] = MeetPersonOptions
     options: MeetPersonOptions
 

@@ -1,18 +1,18 @@
 """The back_off skill: drives a short distance to where there is more clearance."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, Running, Succeeded
+from skills.api import Cause, Part, Running, Succeeded
 from skills.geometry import compose, relative_pose
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.navigate.sensor_watch import ScanHealth
-from skills.ports import BackOffInputs, BackOffPorts
 from skills.quantities import Delay, Length, Speed
 from skills.robot import BaseKind, Pose2D
 from skills.routine import PATIENCE_S, Routine, SkillFailure
@@ -24,6 +24,14 @@ _STEP_M = 0.05
 
 
 @dataclass(frozen=True)
+class BackOffInputs:
+    """Distance (m), and the least distance (m) that counts as success."""
+
+    distance_m: Length = 0.4
+    least_m: Length = 0.15
+
+
+@dataclass(frozen=True)
 class BackOffOptions:
     """Speed of the robot, distance from the goal at which it stops (m), and time to come to rest (s)."""
 
@@ -32,9 +40,19 @@ class BackOffOptions:
     settle_s: Delay = 0.4
 
 
-class BackOff(BackOffPorts, MovingSkill[BackOffInputs]):
-    """Implementation of `BackOffPorts`."""
+class BackOff(MovingSkill[BackOffInputs]):
+    """Drives a short distance out of a tight place: straight, slowly, in the first direction with enough clearance."""
 
+    name: ClassVar[str] = "back_off"
+    Inputs: ClassVar[type] = BackOffInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "the LiDAR does not work",
+        Cause.PLANNING: "there is no clearance in any direction",
+        Cause.EXECUTION: "the robot refuses to drive or makes no progress",
+    }
+    default_timeout_s: ClassVar[float] = 15.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
     Options: ClassVar[type] = BackOffOptions
     options: BackOffOptions
 

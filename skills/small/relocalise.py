@@ -1,18 +1,18 @@
 """The relocalise skill: searches the whole map for the robot's pose, standing, then turning, then driving a little."""
 
 import math
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, LocalisationEstimate, Localiser, Running, SearchingLocaliser, Succeeded
+from skills.api import Cause, LocalisationEstimate, Localiser, Part, Running, SearchingLocaliser, Succeeded
 from skills.navigate.base import MovingSkill
 from skills.navigate.sensor_watch import WatchOptions, low_points
 from skills.perception.fiducials import look_for_tags
-from skills.ports import RelocaliseInputs, RelocalisePorts
-from skills.quantities import Delay, Height, Length, Margin, Share, Speed, Turn, TurnRate
+from skills.quantities import Delay, Height, Length, Margin, Share, Speed, Tries, Turn, TurnRate
 from skills.robot import Capabilities, FloatArray, NoImageError, Pose2D, Scan
 from skills.routine import PATIENCE_S, Routine, SkillFailure
 
@@ -66,6 +66,14 @@ _LEAST_STEP_M = 0.15
 
 
 @dataclass(frozen=True)
+class RelocaliseInputs:
+    """Largest numbers of headings to search in, an eighth of a turn apart, and of drives elsewhere."""
+
+    turns: Tries = 8
+    drives: Tries = 3
+
+
+@dataclass(frozen=True)
 class RelocaliseOptions:
     """Time of a search (s), speed and angle of the turns between searches.
 
@@ -85,9 +93,19 @@ class RelocaliseOptions:
     low: WatchOptions = field(default_factory=WatchOptions)
 
 
-class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
-    """Implementation of `RelocalisePorts`."""
+class Relocalise(MovingSkill[RelocaliseInputs]):
+    """Finds the robot's pose on the map again. A pose counts once new scans agree with it for a second."""
 
+    name: ClassVar[str] = "relocalise"
+    Inputs: ClassVar[type] = RelocaliseInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "there are no new scans, or this robot's localiser cannot search",
+        Cause.EXECUTION: "the robot refuses to move, or a camera gives no picture",
+        Cause.POSTCONDITION: "no pose on the map fits what the robot sees",
+    }
+    default_timeout_s: ClassVar[float] = 240.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"localisation": 1.0}
     Options: ClassVar[type] = RelocaliseOptions
     options: RelocaliseOptions
 

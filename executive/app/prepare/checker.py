@@ -15,7 +15,6 @@ from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, RoutePlanner
 from executive.tree.node_view import node_view
-from executive.view.formats import to_svg
 from executive.view.text import DRAWN_NODES, readable
 from skills.inputs.errors import InputError
 
@@ -42,6 +41,8 @@ class Checked:
 
     def _repr_html_(self) -> str:
         """Returns the errors, warnings and commands, or the estimate, and the tree of each robot."""
+        from executive.view.formats import to_svg  # only notebooks show it
+
         taken = self.estimate
         lines = [f"error: {error}" for error in self.errors] + [f"warning: {warning}" for warning in self.warnings]
         lines += [str(command) for tree in self.trees for command in tree.commands]

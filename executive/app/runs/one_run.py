@@ -111,8 +111,7 @@ def run_request(
         if durable is not None:  # the next mission of the queue begins in this one's world
             next(iter(durable.journals.values())).keep_world()
             for trouble in durable.troubles:
-                error = {"node": prepared.tree.robot_name, "what": "keep the mission's state", "traceback": trouble}
-                log(ERROR_TOPIC, error)
+                log(ERROR_TOPIC, {"node": prepared.tree.robot_name, "what": "store its state", "traceback": trouble})
         counts = dict(sorted(Counter({**result.work, **backend.work(), "bytes_logged": log.bytes}).items()))
         log(WORK, counts)
     finished, recording = _conclude(prepared, backend, result, log, artifacts, counts)

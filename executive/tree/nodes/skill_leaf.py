@@ -112,8 +112,6 @@ class SkillLeaf(ExplainedLeaf):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for skill in (self.skill, *self.first):
-            skill.loaded()  # no tick has to wait for it
         self._time = StoppableTime(self.context.clock)
 
     @property

@@ -26,9 +26,8 @@ from skills.api import (
     SkillContext,
 )
 from skills.manipulation.grasp.candidates import GraspCandidate
-from skills.manipulation.grasp.skill import Grasp
+from skills.manipulation.grasp.skill import Grasp, GraspInputs
 from skills.perception.class_forms import ANY_OBJECT
-from skills.ports import GraspInputs
 from skills.robot import Clock, FloatArray, Lease, Robot, Scan
 from skills.stack import default_stack
 from skills.world_model import FLOOR

@@ -12,7 +12,7 @@ from skills.api import FreeSpace, Running
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.skill import Navigate
-from skills.ports import NavigateInputs
+from skills.navigate.surroundings import NavigateInputs
 from skills.robot import ArmCapabilities, FloatArray, Pose2D
 from skills.routine import Routine, RoutineSkill, planning_failure
 

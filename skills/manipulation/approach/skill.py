@@ -1,6 +1,7 @@
 """The approach skill: drives to where the arm can grasp a seen object, and looks at the object again."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
@@ -8,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from skills.api import FLOOR, Cause, ObjectObservation, Succeeded, Surface
+from skills.detect.selection import DetectInputs
 from skills.detect.skill import Detect
 from skills.manipulation.approach.base_placement import (
     BasePlacement,
@@ -20,13 +22,21 @@ from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.grasp.candidates import why_no_candidates
 from skills.manipulation.grasp.reach import body_heights_m, choose_with_look, observed_target, reach_check
 from skills.navigate.footprint import Footprint
-from skills.ports import ApproachInputs, ApproachPorts, DetectInputs, NavigateInputs
+from skills.navigate.surroundings import NavigateInputs
 from skills.quantities import Count, Length, Margin, Speed, Turn
 from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure
 
 _STILL_BEFORE_M = 1.3
 """Largest distance from the object at which the robot stands before it."""
+
+
+@dataclass(frozen=True)
+class ApproachInputs:
+    """Object as it was seen, and the surfaces near it, including the one that it lies on."""
+
+    observation: ObjectObservation
+    surfaces: tuple[Surface, ...]
 
 
 @dataclass(frozen=True)
@@ -44,9 +54,19 @@ class ApproachOptions:
     good_grasp: Margin = 0.1
 
 
-class Approach(ApproachPorts, LookingSkill[ApproachInputs]):
-    """Implementation of `ApproachPorts`."""
+class Approach(LookingSkill[ApproachInputs]):
+    """Drives slowly, with the arm stowed, to where the arm can grasp an object, and looks at the object again."""
 
+    name = "approach"
+    Inputs = ApproachInputs
+    outputs: ClassVar[Mapping[str, type]] = {"observation": ObjectObservation}
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PLANNING: "no free place to stand is near enough to the object, or no path leads there",
+        Cause.EXECUTION: "the robot did not reach the place to stand",
+        Cause.POSTCONDITION: "the object is not seen again from there",
+    }
+    default_timeout_s = 150.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5, "observation": 3.0}
     Options: ClassVar[type] = ApproachOptions
     options: ApproachOptions
 

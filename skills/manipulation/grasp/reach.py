@@ -22,6 +22,7 @@ from skills.manipulation.arm.kinematics import ArmModel
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.solid_cells import boxes_around, never_seen
 from skills.manipulation.grasp.candidates import GraspCandidate
+from skills.manipulation.grasp.close_view import SURFACE_AROUND_M, square
 from skills.manipulation.grasp.placements import UPRIGHT_M, Target
 from skills.manipulation.grasp.planning import PREGRASPS_M, lifts, within_reach
 from skills.robot import Capabilities, FloatArray, GripperCapabilities, GripperKind
@@ -36,6 +37,7 @@ _BELOW_LIMIT_M = 0.005
 _LIFTS_FAR_M = 0.2
 """A body with a larger range of heights than this also tries heights in between."""
 _PARTS_OF_LIFT = (0.25, 0.5, 0.75)
+_HEIGHTS_TRIED = 2
 _OTHER_HEIGHT_COST: Final = 0.15
 """Cost of an unusual body height: the body moves, and is less steady."""
 _PADDING_M = -0.002
@@ -373,3 +375,23 @@ def level_viewpoints(model: ArmModel, p_BT: FloatArray) -> list[FloatArray]:
         for up_m, radius in product((-0.1, -0.2, 0.0, -0.3, 0.1), (0.25, 0.35, 0.15))
     )
     return [np.array(place) for place in places if np.linalg.norm(np.array(place) - p_BT) > _NEAREST_VIEW_M]
+
+
+def heights_to_grasp(skill: LookingSkill[Any], seen: ObjectObservation) -> Routine[list[float]]:
+    """Chooses body heights (m) from which the arm seems to reach the object, the best first; at least one."""
+    base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
+    heights_m = body_heights_m(base_m, skill.context.robot.capabilities())
+
+    def choose() -> Routine[tuple[list[float], FloatArray]]:
+        pose = skill.context.pose()
+        check_now = reach_check(skill, seen, [square(seen.position_W, base_m, "guess", SURFACE_AROUND_M)])
+
+        def chosen() -> tuple[list[float], FloatArray]:
+            check = check_now()
+            found = sorted(check.all(pose.transform, heights_m), key=lambda each: each.cost)
+            return [each.height_m for each in found][:_HEIGHTS_TRIED], check.arm_W(pose.transform, heights_m)
+
+        message = f"choosing how high to stand before the {seen.kind}"
+        return (yield from skill.compute(chosen, latency_s=0.1, name="choose a height", message=message))
+
+    return (yield from choose_with_look(skill, seen, choose)) or [heights_m[0]]

@@ -17,24 +17,21 @@ from skills.manipulation.arm.held_object import held_box, square_hand_pose
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import TALL_M, close_viewpoints, overview_viewpoints, sees_closely
 from skills.manipulation.grasp.candidates import THIN_M, GraspCandidate, least_mass_kg, why_no_candidates, why_too_heavy
-from skills.manipulation.grasp.close_view import LOOK_HALF_SIDE_M, SURFACE_AROUND_M, CloseView, examine, square
+from skills.manipulation.grasp.close_view import LOOK_HALF_SIDE_M, CloseView, examine, square
 from skills.manipulation.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, pull_back_B
 from skills.manipulation.grasp.reach import (
     WIDE,
-    body_heights_m,
-    choose_with_look,
+    heights_to_grasp,
     openings,
     passing,
-    reach_check,
     space_about,
     up_B,
 )
 from skills.manipulation.grasp.servo import Aim, aim_approach, measure_shift
-from skills.manipulation.grasp.tried_grasps import others_first, tried_grasp
+from skills.manipulation.grasp.tried_grasps import TriedGrasp, others_first, tried_grasp
 from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
-from skills.ports import GraspInputs, GraspPorts, TriedGrasp
 from skills.quantities import Force, Length, Margin, Turn
 from skills.robot import FloatArray, GripperKind
 from skills.routine import Routine, SkillFailure
@@ -69,11 +66,18 @@ _AT_OBJECT_M = 0.4
 _GENTLY_RAD_S = 0.45
 """Joint speed while the arm carries a thin object, or one held far from its centre of mass."""
 _LONG_LEVER_M = 0.05
-_HEIGHTS_TRIED = 2
 _PULL_BACK_UP_M = (0.02, 0.0)
 """Rises of the hand while it draws back from the surface, the best first."""
 _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 """Distances by which the hand draws back from an object after a failure, the best first."""
+
+
+@dataclass(frozen=True)
+class GraspInputs:
+    """Object as it was seen; grasps like those in `avoid` are the last choice."""
+
+    observation: ObjectObservation
+    avoid: tuple[TriedGrasp, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -90,9 +94,27 @@ class GraspOptions:
     pull_back_m: Margin = 0.12
 
 
-class Grasp(GraspPorts, LookingSkill[GraspInputs]):
-    """Implementation of `GraspPorts`."""
+class Grasp(LookingSkill[GraspInputs]):
+    """Grasps an object and holds it near the body. On failure it opens the gripper and stows the arm.
 
+    The output `tried` is `avoid` and the grasp of this attempt, also after a failure. After a failure for want of a
+    plan, `in_the_way` are the objects that block every grasp, the nearest first; else it is empty.
+    """
+
+    name = "grasp"
+    Inputs = GraspInputs
+    outputs: ClassVar[Mapping[str, type]] = {"tried": tuple[TriedGrasp, ...], IN_THE_WAY: tuple[ObjectObservation, ...]}
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "the object is not where it was seen or too heavy, the gripper is full, or there is no arm",
+        Cause.PLANNING: "no grasp is within reach and free",
+        Cause.EXECUTION: "the arm or the gripper did not reach its goal",
+        Cause.POSTCONDITION: "the gripper closed on nothing, or the object slipped out",
+    }
+    default_timeout_s = 120.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
+    changes_world = True
+    gripper_before = False
+    gripper_after = True
     Options: ClassVar[type] = GraspOptions
     options: GraspOptions
     lost_message = "the object fell out of the gripper while it was lifted"
@@ -169,7 +191,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
     def _take_where_it_is(self, inputs: GraspInputs) -> Routine[tuple[CloseView, GraspPlan]]:
         """Looks, plans and takes; looks once more when the object has moved meanwhile. Raises SkillFailure."""
         seen = inputs.observation
-        heights_m = yield from self._heights(seen)
+        heights_m = yield from heights_to_grasp(self, seen)
         attempt = partial(self._look_and_plan, seen, inputs.avoid)
         view, plan = yield from self.attempt_at_heights(heights_m, f"standing up to the {seen.kind}", attempt)
         if not (yield from self._take_unmoved(view, plan, inputs)):
@@ -224,25 +246,6 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         """Looks at the object from the body's present height, and plans its grasp."""
         view = yield from self._look_closely(seen)
         return view, (yield from self._plan(view, str(seen.kind), avoid))
-
-    def _heights(self, seen: ObjectObservation) -> Routine[list[float]]:
-        """Chooses body heights (m) from which the arm seems to reach the object, the best first; at least one."""
-        base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
-        heights_m = body_heights_m(base_m, self.context.robot.capabilities())
-
-        def choose() -> Routine[tuple[list[float], FloatArray]]:
-            pose = self.context.pose()
-            check_now = reach_check(self, seen, [square(seen.position_W, base_m, "guess", SURFACE_AROUND_M)])
-
-            def chosen() -> tuple[list[float], FloatArray]:
-                check = check_now()
-                found = sorted(check.all(pose.transform, heights_m), key=lambda each: each.cost)
-                return [each.height_m for each in found][:_HEIGHTS_TRIED], check.arm_W(pose.transform, heights_m)
-
-            message = f"choosing how high to stand before the {seen.kind}"
-            return (yield from self.compute(chosen, latency_s=0.1, name="choose a height", message=message))
-
-        return (yield from choose_with_look(self, seen, choose)) or [heights_m[0]]
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
         """Views the object and its neighbours from 0.4 m, and from aside if a part of it is hidden.

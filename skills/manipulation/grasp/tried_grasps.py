@@ -2,18 +2,28 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.manipulation.grasp.candidates import GraspCandidate
-from skills.ports import TriedGrasp
+from skills.quantities import Coordinate, Cosine
 from skills.robot import FloatArray
 
 _SAME_TURN_RAD = 0.35
 """Grasps whose directions differ by less are the same."""
 _SAME_PLACE_M = 0.03
 """Grasps whose hands are nearer than this are the same."""
+
+
+@dataclass(frozen=True)
+class TriedGrasp:
+    """Grasp in the world's axes: directions of the fingers and of their closing, the hand from the object (m)."""
+
+    pointing_W: tuple[Cosine, Cosine, Cosine]
+    closing_W: tuple[Cosine, Cosine, Cosine]
+    hand_from_object_W: tuple[Coordinate, Coordinate, Coordinate]
 
 
 def tried_grasp(candidate: GraspCandidate, centre_B: tuple[float, float], X_WB: RigidTransform) -> TriedGrasp:

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
@@ -18,9 +18,9 @@ from skills.manipulation.arm.hold import Grip
 from skills.manipulation.hand_over.verification import HandOverVerification, Release, Seen, release_of
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
+from skills.navigate.surroundings import NavigateInputs
 from skills.perception.people import SeenPerson, people_in_scan
-from skills.ports import HandOverInputs, HandOverPorts, NavigateInputs
-from skills.quantities import Duration, Force, Height, Length
+from skills.quantities import Coordinate, Duration, Force, Height, Length
 from skills.robot import FloatArray
 from skills.routine import Patience, Routine, SkillFailure
 
@@ -43,6 +43,14 @@ _HOLD_OUT_RAD_S = 0.8
 
 
 @dataclass(frozen=True)
+class HandOverInputs:
+    """Names of the person and of the object, for messages; the skill takes the nearest person in sight."""
+
+    person: str
+    thing: str = "object"
+
+
+@dataclass(frozen=True)
 class HandOverOptions:
     """Positions of the robot and of the object, and the condition of the release.
 
@@ -60,9 +68,27 @@ class HandOverOptions:
     wait_s: Duration = 20.0
 
 
-class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
-    """Implementation of `HandOverPorts`."""
+class HandOver(HandOverVerification[HandOverInputs]):
+    """Finds a person by LiDAR, goes there, holds the object out, lets go when they take it, and checks who has it.
 
+    The output `released_W` is where the hand has let the object go, also after a failure; a failure before has none.
+    """
+
+    name = "hand_over"
+    Inputs = HandOverInputs
+    outputs: ClassVar[Mapping[str, type]] = {"released_W": tuple[Coordinate, Coordinate, Height]}
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "nothing is held, there is no new scan, or nobody is seen near",
+        Cause.PLANNING: "no free place before the person, or no free path for the arm",
+        Cause.EXECUTION: "the robot or its arm did not reach its goal",
+        Cause.POSTCONDITION: "the object was lost, is still in the gripper, or is not seen at rest with the person",
+        Cause.TIMEOUT: "the person did not take the object",
+    }
+    default_timeout_s = 180.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
+    changes_world = True
+    gripper_before = True
+    gripper_after = False
     Options: ClassVar[type] = HandOverOptions
     options: HandOverOptions
 

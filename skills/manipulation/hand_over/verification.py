@@ -15,10 +15,9 @@ from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
 from skills.perception.point_cloud import cloud_from_image
 from skills.perception.surface_segmentation import segment_surface
-from skills.ports import BackOffInputs
 from skills.robot import FloatArray, Image
 from skills.routine import Routine, SkillFailure
-from skills.small.back_off import BackOff
+from skills.small.back_off import BackOff, BackOffInputs
 from skills.world_model import PERSON
 
 LOOKS = 3

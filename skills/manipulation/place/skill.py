@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
@@ -37,9 +37,9 @@ from skills.manipulation.place.free_spots import (
 )
 from skills.manipulation.place.verification import PlaceVerification
 from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.surroundings import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
-from skills.ports import NavigateInputs, PlaceInputs, PlacePorts
-from skills.quantities import Length, Tries, TurnRate
+from skills.quantities import Coordinate, Height, Length, Tries, TurnRate
 from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure, planning_failure
 
@@ -80,6 +80,17 @@ _OVER_SPOT_M = 0.45
 
 
 @dataclass(frozen=True)
+class PlaceInputs:
+    """Surface to put the object on.
+
+    The object's centre comes to rest in none of the circles `clear_of` (x, y, radius) of the world.
+    """
+
+    surface: Surface
+    clear_of: tuple[tuple[Coordinate, Coordinate, Length], ...] = ()
+
+
+@dataclass(frozen=True)
 class PlaceOptions:
     """Speed of lowering, and limits of the search for a spot.
 
@@ -92,9 +103,26 @@ class PlaceOptions:
     moves: Tries = 5
 
 
-class Place(PlacePorts, PlaceVerification[PlaceInputs]):
-    """Implementation of `PlacePorts`."""
+class Place(PlaceVerification[PlaceInputs]):
+    """Puts the held object down on a surface and stows the arm. Goes nearer when no free spot is within reach.
 
+    The output `released_W` is where the hand has let the object go, also after a failure; a failure before has none.
+    """
+
+    name = "place"
+    Inputs = PlaceInputs
+    outputs: ClassVar[Mapping[str, type]] = {"released_W": tuple[Coordinate, Coordinate, Height]}
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "nothing is held",
+        Cause.PLANNING: "no free spot of the surface is seen within reach, or the arm finds no path to it",
+        Cause.EXECUTION: "the robot or its arm did not reach its goal",
+        Cause.POSTCONDITION: "it was let go and is not seen at rest where it was put down, or is still in the gripper",
+    }
+    default_timeout_s = 240.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
+    changes_world = True
+    gripper_before = True
+    gripper_after = False
     Options: ClassVar[type] = PlaceOptions
     options: PlaceOptions
 

@@ -14,8 +14,8 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
 from skills.api import Running, Skill, Succeeded
 from skills.faults.faulty_robot import inject_faults, parse_fault
+from skills.manipulation.posture import StowInputs
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.ports import StowInputs
 from skills.robot import Pose2D
 from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock

@@ -22,7 +22,7 @@ from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Running, Skill, Succeeded
 from skills.faults.fault_kinds import Effect
 from skills.faults.faulty_robot import Fault, inject_faults
-from skills.ports import StowInputs
+from skills.manipulation.posture import StowInputs
 from skills.robot import ArmTrajectory, DoorHandle, Gripper
 from skills.robot_wrapper import VERBS
 from skills.testing.clock import VirtualClock

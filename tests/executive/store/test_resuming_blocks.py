@@ -16,7 +16,7 @@ from executive.store.missions import MissionStore
 from executive.store.resuming import resumed_tree
 from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Running, Skill, Succeeded
-from skills.ports import StowInputs
+from skills.manipulation.posture import StowInputs
 from tests.tables import yaml_beside
 
 BLOCKS = yaml_beside(__file__, "blocks.yaml")

@@ -10,7 +10,6 @@ import tomllib
 from collections import defaultdict
 from collections.abc import Mapping
 from importlib.metadata import distributions
-from inspect import get_annotations
 from pathlib import Path
 from typing import ClassVar
 
@@ -90,14 +89,8 @@ def test_every_skill_in_the_skills_folder_is_registered_in_pyproject_and_install
 
 
 @pytest.mark.parametrize("name", sorted(built_in_skills()))
-def test_a_skill_is_as_its_ports_declare_it(name):
-    declared = built_in_skills()[name]
-    done_by = declared.loaded()
-    assert issubclass(done_by, declared) and not inspect.isabstract(done_by)
-    own = [each for each in get_annotations(Skill) if each not in ("Options", "checkpoint") and hasattr(declared, each)]
-    assert {"name", "Inputs", "uses"} <= set(own)
-    assert {each: getattr(done_by, each) for each in own} == {each: getattr(declared, each) for each in own}
-    assert list(faults_of(done_by, registered_as=name)) == []
+def test_our_skills_keep_the_rules_for_skills(name):
+    assert list(faults_of(built_in_skills()[name], registered_as=name)) == []
 
 
 def test_a_skill_of_another_distribution_is_found_beside_ours(others):
@@ -158,48 +151,6 @@ def test_a_broken_skill_affects_no_other_and_a_file_that_uses_it_is_refused_with
     assert "wave" not in found
     assert "distribution wavers" in missing_skill("wave", found)[0]
     assert "there is no skill" in missing_skill("wavy", found)[0]
-
-
-@pytest.fixture
-def declared(others, tmp_path):
-    """A distribution whose package declares the ports of its skill apart; its entry point."""
-    ports, _, work = GOOD.partition("    def begin")
-    (entry,) = others("", entry="wave = waving.skill:Wave")
-    package = tmp_path / "wavers" / "waving"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    ports = ports.replace("class Wave(", "class WavePorts(").replace(
-        "name = ", 'done_by = "waving.skill:Wave"\n    name = '
-    )
-    (package / "ports.py").write_text(ports)
-    (package / "skill.py").write_text(
-        "from skills.api import Succeeded\nfrom waving.ports import WavePorts\n"
-        f'class Wave(WavePorts):\n    """Waves."""\n    def begin{work}'
-    )
-    yield entry
-    for module in [name for name in sys.modules if name.split(".")[0] == "waving"]:
-        del sys.modules[module]
-
-
-def test_ports_declared_apart_are_read_without_the_module_of_the_skill(declared):
-    (found,) = skills_of([declared]).values()
-    assert (found.__name__, found.name, dict(found.outputs)) == ("WavePorts", "wave", {"waved": int})
-    assert "waving.skill" not in sys.modules
-    assert found.loaded().__name__ == "Wave"
-
-
-def test_a_class_that_only_declares_gives_the_skill_when_it_is_called(declared, context):
-    (found,) = skills_of([declared]).values()
-    skill = found(context)
-    assert type(skill).__name__ == "Wave" and skill.context is context
-    assert skill.step().outputs == {"waved": 1}
-
-
-def test_ports_that_name_a_class_of_another_skill_are_refused(declared):
-    (found,) = skills_of([declared]).values()
-    found.done_by = "skills.manipulation.posture:Stow"
-    with pytest.raises(TypeError, match=r"skills\.manipulation\.posture:Stow does not derive from WavePorts"):
-        found.loaded()
 
 
 def test_an_age_of_pictures_is_refused_with_what_to_declare_instead():

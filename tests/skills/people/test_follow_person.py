@@ -10,10 +10,9 @@ from planar_robot import Bench
 
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
 from skills.doorway import Doorway
-from skills.people.follow_person import FollowPerson, FollowPersonOptions
-from skills.people.followed_person import Target, TargetOptions, poses_to_search
+from skills.people.follow_person import FollowPerson, FollowPersonInputs
+from skills.people.followed_person import FollowPersonOptions, Target, TargetOptions, poses_to_search
 from skills.perception.people import SeenPerson
-from skills.ports import FollowPersonInputs
 from skills.robot import Pose2D
 from skills.world_model import Zone, ZoneKind
 

@@ -11,9 +11,8 @@ from planar_robot import TWO_ROOMS, Bench
 from executive.run.control import Control
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
 from skills.people.followed_person import Target, TargetOptions
-from skills.people.guide_person import GuidePerson, GuidePersonOptions, _places_of
+from skills.people.guide_person import GuidePerson, GuidePersonInputs, GuidePersonOptions, _places_of
 from skills.perception.people import SeenPerson
-from skills.ports import GuidePersonInputs
 from skills.robot import Pose2D
 
 START, GOAL = Pose2D(3.5, 5.4, math.pi), Pose2D(3.2, 2.0, -1.5)

@@ -8,8 +8,7 @@ from planar_people import person_at
 from planar_robot import TWO_ROOMS, Bench, Box
 
 from skills.api import Cause, Failed, Running, Succeeded
-from skills.people.meet_person import MeetPerson
-from skills.ports import MeetPersonInputs
+from skills.people.meet_person import MeetPerson, MeetPersonInputs
 from skills.robot import Pose2D
 
 START = Pose2D(1.2, 5.4, 0.0)

@@ -22,12 +22,12 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1581,
     "executive/testing": 849,
-    "executive/app": 8104,
-    "executive/cli": 3838,
-    "skills": 29932,
-    "plant": 11166,
+    "executive/app": 7864,
+    "executive/cli": 3781,
+    "skills": 28134,
+    "plant": 11146,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 426, 63, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 417, 62, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -15,6 +15,8 @@ PYTHON ?= $(shell command -v python3.11 || echo python3)
 VENV := .venv
 BIN := $(VENV)/bin
 PLUGINS := $(wildcard plugins/*)
+# Plug-ins as `make env` installs them, with the extras of theirs that it adds.
+EDITABLE := $(PLUGINS:%/errand-make=%/errand-make[mapping])
 # What the wheels need beyond Python: libraries of Drake, and software rendering through EGL for the cameras.
 DEBIAN := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libsm6 libx11-6
 # Voices that speak to the tests of speech; without them those are skipped.
@@ -38,7 +40,7 @@ endef
 env: $(VENV)/.ready
 
 $(VENV)/.ready: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,cluster,foxglove,test,browser,bench,dev]' $(PLUGINS:%=--editable %)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,cluster,foxglove,test,browser,bench,dev]' $(EDITABLE:%=--editable '%')
 	$(BIN)/errand warm-up
 	@touch $@
 

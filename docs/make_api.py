@@ -43,7 +43,7 @@ def public_names() -> dict[str, tuple[str, ...]]:
 
 def meaning(module: ModuleType, name: str) -> str:
     """The docstring of a public name; of a number its range, of another constant the text below it in the source."""
-    thing = getattr(module, name)
+    thing = inspect.unwrap(getattr(module, name))
     if inspect.isclass(thing) or inspect.isroutine(thing):
         return _doc(thing)
     if quantity_of(thing) is not None:
@@ -67,7 +67,7 @@ def api_page(note: str) -> str:
 
 
 def _section(module: ModuleType, name: str) -> str:
-    thing, text = getattr(module, name), meaning(module, name)
+    thing, text = inspect.unwrap(getattr(module, name)), meaning(module, name)
     if inspect.isroutine(thing):
         return f"### {name}\n\n```python\n{name}{_signature(thing)}\n```\n\n{text}\n"
     members = _members(thing) if inspect.isclass(thing) else ()

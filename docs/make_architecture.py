@@ -74,7 +74,7 @@ APP = Box(1010, ROW, 130, 550, "app", ("the application:", "one request,", "prep
 CLI = Box(1160, ROW, 120, 550, "cli", ("commands,", "options, output", "", "parse, check,", "tree, run,", "queue, resume,", "log, replay,", "evaluate"))  # fmt: skip  # noqa: E501
 PLUGINS = (
     Box(40, 716, 290, 80, "errand-spot", ("serves Spot's API in simulation;", "drives a real Spot: a backend")),
-    Box(350, 716, 290, 80, "errand-make", ("objects, worlds and robots", "of your own")),
+    Box(350, 716, 290, 80, "errand-make", ("objects, worlds and robots of your own;", "maps that the robot makes")),
     Box(660, 716, 290, 80, "errand-train", ("data sets, training, makers of the", "shipped models and worlds")),
     Box(970, 716, 290, 80, "yours", ("commands, backends, skills, components,", "robots, classes, doors, triggers")),
 )

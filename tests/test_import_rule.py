@@ -53,7 +53,6 @@ SKILL_ROOMS = (
     ("skills.perception",),
     ("skills.manipulation.arm",),
     ("skills.navigate",),
-    ("skills.mapping",),
     ("skills.detect",),
     ("skills.small",),
     ("skills.manipulation",),

@@ -16,7 +16,6 @@ OURS_ALONE = (
     "executive/tree/estimate.py",
     "plant/models/catalogue.py",
     "plant/sensors/camera_spec.py",
-    "skills/mapping/map_folder.py",
     "skills/perception/class_forms.py",
 )
 """Modules whose models describe files that come with the project, that Errand writes, or that other programs write."""

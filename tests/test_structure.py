@@ -22,12 +22,12 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1581,
     "executive/testing": 848,
-    "executive/app": 8105,
-    "executive/cli": 3838,
-    "skills": 29822,
-    "plant": 11166,
+    "executive/app": 7864,
+    "executive/cli": 3781,
+    "skills": 28024,
+    "plant": 11146,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 426, 61, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 417, 60, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -1,4 +1,4 @@
-"""Compiles the numeric code of driving, scans, arms and maps into numba's cache by short runs of each."""
+"""Compiles the numeric code of driving, scans and arms into numba's cache by short runs of each."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -12,7 +12,6 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 from executive.app.prepare.from_request import prepare
-from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import open_world
 from executive.app.runs.one_run import run_request
 from executive.app.runs.simulated import SimulatedBackend
@@ -35,9 +34,7 @@ _DRIVES: Final = (
     ("fetch", None),
 )
 """Kinds of robots, and the components in place of their default ones."""
-TICK_S: Final = 0.05
 _DRIVEN_S: Final = 2.5
-_SURVEYED_S: Final = 4.0
 _LIMIT_S: Final = 300.0
 """Time that a plug-in may take to compile its code."""
 
@@ -56,14 +53,14 @@ def newly_compiled() -> int:
 
 
 def kernel_steps() -> Sequence[Callable[[], None]]:
-    """Functions that run numeric code for a short time: drives, an arm, a survey, and those of plug-ins.
+    """Functions that run numeric code for a short time: drives, an arm, scans, and those of plug-ins.
 
     All together take some seconds if the cache holds their code already. A step of a plug-in raises InputError if it
     fails.
     """
     drives = (partial(_drive, kind, stack) for kind, stack in _DRIVES)
     of_plugins = (partial(_compile_plugin, entry) for entry in installed_plugins(KERNELS))
-    return (*drives, _solve_arm, _map_cells, _survey, _see_blocks, *of_plugins)
+    return (*drives, _solve_arm, _map_cells, _match_scan, _see_blocks, *of_plugins)
 
 
 def _compile_plugin(entry: EntryPoint) -> None:
@@ -123,24 +120,12 @@ def _map_cells() -> None:
     add_picture(np.empty((0, 3), dtype=np.int64), image, RigidTransform(), own)
 
 
-def _survey() -> None:
-    """Begins a map and localises in it; then localises in a world's map by scan matching."""
-    from executive.app.runs.simulated import simulate
+def _match_scan() -> None:
+    """Localises in a world's map by scan matching."""
     from skills.estimate.grid_map import load_grid_map
     from skills.estimate.matching import score_poses
-    from skills.mapping.mapper import Mapper
-    from skills.mapping.submap_matching import Window
-    from skills.mapping.survey import Survey
 
-    world, name = open_world(DEFAULT_WORLD), "Alice"
-    score_poses(load_grid_map(world.scan_map_path), np.ones((2, 3)), np.ones((1, 3)))
-    simulation = simulate(world, {name: only_robot(name, world)}, seed=1, record=False)
-    robot, clock, mapper = simulation.robots[name], simulation.clock, Mapper(world.start)
-    survey = Survey(robot, robot.acquire_lease("errand warm-up"), mapper, home=world.start)
-    while clock.now() < _SURVEYED_S and not survey.done:
-        clock.advance(TICK_S)
-        survey.tick(clock.now())
-    mapper.find_in(mapper.submaps[0], mapper.keyframes[0].points_F, mapper.pose, Window(0.5, 0.1))
+    score_poses(load_grid_map(open_world(DEFAULT_WORLD).scan_map_path), np.ones((2, 3)), np.ones((1, 3)))
 
 
 def _see_blocks() -> None:

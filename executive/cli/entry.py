@@ -69,7 +69,6 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "teleop": _Command("robot_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "stack": _Command("plugins_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
-    "map": _Command("map_command", "map_group", "Maps that the robot builds itself, by exploring or along a route."),
     "plugins": _Command(
         "plugins_command", "plugins", "List the installed plug-ins, what each registers, and errors in them."
     ),
@@ -97,6 +96,7 @@ class _PluginCommand:
 PLUGIN_COMMANDS: Final[Mapping[str, _PluginCommand]] = {
     "serve": _PluginCommand("errand-spot", "Serve Spot's API for a simulated Spot, for programs of its SDK."),
     "sdk": _PluginCommand("errand-spot", "Run a program of Spot's SDK, unchanged, with a simulated Spot."),
+    "map": _PluginCommand("errand-make", "Maps that the robot builds itself, by exploring or along a route."),
     "world": _PluginCommand("errand-make", "Worlds from any map, and drawings of worlds."),
     "object": _PluginCommand("errand-make", "Objects of your own: import any mesh as a model."),
     "new.robot": _PluginCommand("errand-make", "Write a package with a robot from a URDF."),

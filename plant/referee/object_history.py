@@ -1,6 +1,6 @@
 """The referee's record: histories of loose objects and paths of robots and people.
 
-An object's history has its resting places, lifts and drops; a path also gives the error of a trajectory.
+An object's history has its resting places, lifts and drops.
 """
 
 import math
@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform
 
 from plant.saved_state import Stateful
 from skills.inputs.errors import definite
-from skills.robot import FloatArray, Pose2D
+from skills.robot import FloatArray
 
 LIFT_M = 0.03
 AWAY_M = 0.3
@@ -350,23 +350,3 @@ def extend_stays(stays: list[tuple[float, float]], time_s: float) -> None:
     goes_on = bool(stays) and time_s - stays[-1][1] <= ON_TRAY_GAP_S
     first_s = stays.pop()[0] if goes_on else time_s
     stays.append((first_s, time_s))
-
-
-def trajectory_error_m(estimated: Sequence[Pose2D], true: Sequence[Pose2D]) -> float:
-    """Absolute trajectory error (m): root mean square distance after alignment (Umeyama, 1991, without scale)."""
-    moved = align(_positions(estimated), estimated, true)
-    return float(np.sqrt(np.mean(np.sum((moved - _positions(true)) ** 2, axis=1))))
-
-
-def align(points: FloatArray, estimated: Sequence[Pose2D], true: Sequence[Pose2D]) -> FloatArray:
-    """Transforms points (N, 2) of the estimate's frame by the best alignment of two trajectories."""
-    ours, theirs = _positions(estimated), _positions(true)
-    middle_ours, middle_theirs = ours.mean(axis=0), theirs.mean(axis=0)
-    a, b = ours - middle_ours, theirs - middle_theirs
-    yaw = math.atan2(float(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])), float(np.sum(a * b)))
-    c, s = math.cos(yaw), math.sin(yaw)
-    return np.asarray((points - middle_ours) @ np.array([[c, s], [-s, c]]) + middle_theirs)
-
-
-def _positions(poses: Sequence[Pose2D]) -> FloatArray:
-    return np.array([(pose.x_m, pose.y_m) for pose in poses], dtype=np.float64).reshape(-1, 2)

@@ -1,5 +1,7 @@
 """Scan matching: robust Gauss-Newton from a guess on any map of surfaces, and scores of many poses on a grid."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -17,14 +17,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from plant.referee.object_history import align, trajectory_error_m
+from errand_make.maps.map_folder import map_grids, save_graph, save_grids
+from errand_make.maps.mapper import Mapper
+from errand_make.maps.survey import Survey
+from errand_make.maps.trajectory import align, trajectory_error_m
 from plant.simulation import Simulation
 from plant.worlds.world import load_world
 from skills.estimate.grid_map import load_grid_map
 from skills.geometry import compose, relative_pose
-from skills.mapping.map_folder import map_grids, save_graph, save_grids
-from skills.mapping.mapper import Mapper
-from skills.mapping.survey import Survey
 from skills.robot import CommandId, CommandState, CommandStatus, Pose2D
 from tests.benchmarks.driving import within
 from tests.benchmarks.gliding import GlidingBase

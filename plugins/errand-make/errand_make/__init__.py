@@ -1,1 +1,1 @@
-"""Makes objects, worlds and robots of the user's own."""
+"""Makes maps, and objects, worlds and robots of the user's own."""

@@ -121,6 +121,7 @@ def nothing_installed(monkeypatch):
     ("words", "command", "plug_in"),
     [
         ("dataset render", "dataset", "errand-train"),
+        ("map build", "map", "errand-make"),
         ("object import", "object", "errand-make"),
         ("new robot x", "new robot", "errand-make"),
         ("sdk", "sdk", "errand-spot"),

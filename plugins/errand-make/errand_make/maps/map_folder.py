@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from errand_make.maps.mapper import Mapper, MapperOptions, Submap
+from errand_make.maps.occupancy import BANDS_M, LayeredOccupancy
+from errand_make.maps.pose_graph import Edge, Keyframe, PoseGraph
 from skills.inputs.errors import InputError
 from skills.inputs.outside import plain_file, read_text
 from skills.inputs.schema import first_error
-from skills.mapping.mapper import Mapper, MapperOptions, Submap
-from skills.mapping.occupancy import BANDS_M, LayeredOccupancy
-from skills.mapping.pose_graph import Edge, Keyframe, PoseGraph
 from skills.navigate.footprint import pose_array
 from skills.robot import Pose2D
 

@@ -13,21 +13,20 @@ import cv2
 import numpy as np
 from shapely import Polygon
 
+from errand_make.maps.map_folder import GRAPH_FILE, load_mapper, map_grids, save_graph, save_grids
+from errand_make.maps.mapper import Mapper
+from errand_make.maps.pose_graph import MappingExtraMissingError, PoseGraph, gtsam_module
+from errand_make.maps.survey import Survey
+from errand_make.maps.trajectory import trajectory_error_m
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.report.pictures import write_picture
 from executive.app.runs.simulated import simulate
-from plant.referee.object_history import trajectory_error_m
-from plant.simulation import Simulation
 from plant.worlds.world import World
 from skills.estimate.grid_map import GridMap
 from skills.geometry import compose
 from skills.inputs.errors import InputError
 from skills.inputs.outside import read_text, writing
 from skills.inputs.yaml_source import read_yaml
-from skills.mapping.map_folder import GRAPH_FILE, load_mapper, map_grids, save_graph, save_grids
-from skills.mapping.mapper import Mapper
-from skills.mapping.pose_graph import MappingExtraMissingError, PoseGraph, gtsam_module
-from skills.mapping.survey import Survey
 from skills.robot import Picture, Pose2D
 
 TICK_S: Final = 0.05
@@ -56,9 +55,7 @@ class MapDrive:
         self._mapper, self._out, self._tell_line = mapper, out, tell
         self._seed, self._world = seed, world
         self._name = "Alice"
-        self._simulation: Simulation = simulate(
-            world, {self._name: only_robot(self._name, world)}, seed=seed, record=False
-        )
+        self._simulation = simulate(world, {self._name: only_robot(self._name, world)}, seed=seed, record=False)
         self._robot = self._simulation.robots[self._name]
         route = None
         if points is not None:
@@ -166,7 +163,7 @@ def mapper_for(world: World, out: Path) -> Mapper:
     try:
         gtsam_module()
     except MappingExtraMissingError as error:
-        raise InputError(str(error), hint="pip install 'spot-errand[mapping]'") from error
+        raise InputError(str(error), hint="pip install 'errand-make[mapping]'") from error
     if not (out / GRAPH_FILE).exists():
         return Mapper(world.start)
     return load_mapper(out)

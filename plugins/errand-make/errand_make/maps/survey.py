@@ -2,23 +2,22 @@
 
 import enum
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from typing import Any, Final
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from skills.api import PlanningError
-from skills.estimate.costmap import CostmapOptions, LayeredCostmap
-from skills.estimate.grid_map import BoolGrid, GridMap
+from errand_make.maps.mapper import Mapper
+from errand_make.maps.occupancy import Frontier, Ground, LayeredOccupancy
+from skills.api import Costmap, PlanningError
+from skills.estimate.grid_map import GridMap
 from skills.geometry import relative_pose
-from skills.mapping.mapper import Mapper
-from skills.mapping.occupancy import Frontier, Ground, LayeredOccupancy
-from skills.navigate.follower import FollowerOptions, PathFollower
 from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
-from skills.navigate.planner import LatticePlanner
 from skills.robot import CommandState, FloatArray, Lease, Pose2D, Robot
+from skills.stack import LocalController, RobotStack, stack_of
 
 _ROUNDS = 1
 """Rounds, once back at the start, in which abandoned frontiers are tried again."""
@@ -28,6 +27,13 @@ _FRONTIER_CELLS = 8
 _FAR_STAND_M = 2.5
 """Greatest distance from which a frontier is viewed."""
 
+STACK: Final[Mapping[str, Any]] = {
+    "costmap": {"use": "layered", "explained_m": 0.3},
+    "planner": {"use": "lattice", "least_margin_m": 0.02},
+    "controller": {"use": "path_follower"},
+}
+"""Components that drive the robot, in the form of a stack file."""
+
 
 @dataclass(frozen=True)
 class SurveyOptions:
@@ -35,7 +41,7 @@ class SurveyOptions:
 
     Ground counts as explored within `explored_m`. The robot returns to a known place when the standard deviation of its
     position passes `unsure_m`, once `back_after_m` were driven since the last loop. Before a loop is closed, a known
-    wall may appear beside its place; the costmap's `explained_m` allows for that.
+    wall may appear beside its place; `explained_m` of the costmap in STACK allows for that.
     """
 
     resolution_m: float = 0.05
@@ -58,9 +64,7 @@ class SurveyOptions:
     stuck_s: float = 3.0
     blind_stop_s: float = 1.0
     blind_patience_s: float = 10.0
-    costmap: CostmapOptions = field(default_factory=partial(CostmapOptions, explained_m=0.3))
-    planner: LatticePlanner = field(default_factory=partial(LatticePlanner, least_margin_m=0.02))
-    controller: FollowerOptions = field(default_factory=FollowerOptions)
+    stack: RobotStack = field(default_factory=lambda: stack_of(STACK))
 
 
 _NO_PATH = "no free path leads on or back to the start"
@@ -110,13 +114,13 @@ class Survey:
         self._grid = LayeredOccupancy(self._options.resolution_m, self._options.explored_m)
         self._inserted: list[Pose2D] = []
         self._revision = 0
-        self._costmap: LayeredCostmap | None = None
-        self._whole: LayeredCostmap | None = None
+        self._costmap: Costmap | None = None
+        self._whole: Costmap | None = None
         self._looked_s = -math.inf
         self._begun_s: float | None = None
         self._refreshed = (-math.inf, -math.inf)
         self._goal: _Goal | None = None
-        self._follower: PathFollower | None = None
+        self._follower: LocalController | None = None
         self._last: FloatArray = np.zeros(3)
         self._tried: list[tuple[float, float]] = []
         self._refused: list[tuple[float, float]] = []
@@ -144,7 +148,7 @@ class Survey:
             self._looked_s = now_s
             self._costmap.update(self._robot, self.mapper.estimate())
         if corrected and self._goal is not None:
-            self._whole = LayeredCostmap(self.known_grid()[0])
+            self._whole = options.stack.costmap.build(self.known_grid()[0])
             self._begin(self._goal, now_s)
         if self._goal is None or self._is_explored(self._goal, now_s):
             self._choose(now_s)
@@ -187,7 +191,7 @@ class Survey:
             self._grid.insert(mapper.keyframes[index], mapper.graph.poses[index], stride=2)
             self._inserted.append(mapper.graph.poses[index])
         self._refreshed = mapper.driven_m, now_s
-        self._costmap = LayeredCostmap(self.known_grid(options.around_m)[0], options.costmap)
+        self._costmap = options.stack.costmap.build(self.known_grid(options.around_m)[0])
 
     def _moved(self) -> bool:
         """Returns whether keyframes were corrected by more than the grid for driving tolerates."""
@@ -197,7 +201,7 @@ class Survey:
         pairs = zip(self._inserted, self.mapper.graph.poses, strict=False)
         return any(math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) > self._options.moved_m for a, b in pairs)
 
-    def known_grid(self, around_m: float | None = None) -> tuple[GridMap, BoolGrid]:
+    def known_grid(self, around_m: float | None = None) -> tuple[GridMap, NDArray[np.bool_]]:
         """The keep-out grid so far, or its part about the robot, and whether each cell is explored.
 
         Explored cells were also seen near the floor. Cells where the robot stood are free.
@@ -233,7 +237,7 @@ class Survey:
         self._goal = None
         self._refresh(now_s, force=True)
         pose, (known, explored) = self.mapper.pose, self.known_grid()
-        self._whole = LayeredCostmap(known)
+        self._whole = self._options.stack.costmap.build(known)
         ground = Ground(known, explored, (pose.x_m, pose.y_m), clear_m=self._options.clear_m)
         if self._unsure() and (goal := self._loop_goal(ground)) is not None:
             self._explored_since_loop = False
@@ -328,7 +332,7 @@ class Survey:
         """Plans a path to a goal; returns whether there is one."""
         assert self._whole is not None
         options = self._options
-        problem = options.planner.problem(
+        problem = options.stack.planner.problem(
             self._whole, self._footprint, self.mapper.pose, goal.pose, max_speed_m_s=options.max_speed_m_s
         )
         try:
@@ -339,7 +343,7 @@ class Survey:
         if goal is not self._goal:
             self._failures = 0
         self._goal = goal
-        self._follower = options.controller.build(path, self._footprint, max_speed_m_s=options.max_speed_m_s)
+        self._follower = options.stack.controller.build(path, self._footprint, max_speed_m_s=options.max_speed_m_s)
         self._best_m, self._best_s = math.inf, now_s
         return True
 
@@ -356,7 +360,7 @@ class Survey:
         if drive.remaining_m < self._best_m - 0.05:
             self._best_m, self._best_s = drive.remaining_m, now_s
         stuck = now_s - self._best_s > self._options.stuck_s
-        if stuck or drive.off_path_m > self._options.controller.lost_path_m:
+        if stuck or drive.off_path_m > self._options.stack.controller.lost_path_m:
             self._replan(now_s)
             return
         self._last = np.array(drive.velocity)
@@ -390,7 +394,7 @@ class Survey:
         self._failures += 1
         self._last = np.zeros(3)
         self._refresh(now_s, force=True)
-        self._whole = LayeredCostmap(self.known_grid()[0])
+        self._whole = self._options.stack.costmap.build(self.known_grid()[0])
         if self._failures < 3 and self._begin(goal, now_s):
             return
         self._tried.append(goal.about)
@@ -406,7 +410,7 @@ class Survey:
 
 def _stood(
     poses: Sequence[Pose2D], shape: tuple[int, ...], origin_m: tuple[float, float], cell_m: float, radius_m: float
-) -> BoolGrid:
+) -> NDArray[np.bool_]:
     """The cells about the body's middle at some poses."""
     x, y, yaw = pose_array(poses).T
     marked = np.zeros(shape, dtype=np.uint8)

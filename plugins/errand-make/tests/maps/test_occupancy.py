@@ -3,9 +3,9 @@ import math
 import numpy as np
 import pytest
 
+from errand_make.maps.occupancy import Ground, LayeredOccupancy
+from errand_make.maps.pose_graph import Keyframe
 from skills.estimate.grid_map import GridMap
-from skills.mapping.occupancy import Ground, LayeredOccupancy
-from skills.mapping.pose_graph import Keyframe
 from skills.robot import Pose2D
 
 ELEVATIONS = np.radians(np.arange(-15.0, 16.0, 2.0))

@@ -6,7 +6,7 @@ import sys
 import cv2
 import pytest
 
-from executive.app.runs.map_drive import route_points
+from errand_make.maps.map_drive import route_points
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from tests.executive.cli.calls import done, errand, json_of, refusal, write_room
@@ -63,7 +63,7 @@ def test_a_file_that_is_no_route_is_refused(tmp_path, text):
 
 def test_without_its_extra_it_says_what_to_install(room, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "gtsam", None)
-    assert "pip install 'spot-errand[mapping]'" in refusal("map", "build", "--world", room, "--out", tmp_path / "map")
+    assert "pip install 'errand-make[mapping]'" in refusal("map", "build", "--world", room, "--out", tmp_path / "map")
 
 
 def test_a_damaged_map_is_refused(room, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +10,7 @@ import typer
 
 from executive.cli.number_options import quantity_option
 from executive.cli.options import AS_JSON
-from executive.cli.output import console_for, finish, plain_lines
+from executive.cli.output import console_for, finish
 from skills.quantities import LongDuration, Seed
 
 map_group = typer.Typer(name="map", help="Maps that the robot builds itself.", rich_markup_mode=None)
@@ -36,13 +37,13 @@ def build(
     as_json: AS_JSON = False,
 ) -> None:
     """Explores a world, or follows a route, and saves both grids and the pose graph."""
+    from errand_make.maps.map_drive import MapDrive, mapper_for, route_points
     from executive.app.prepare.worlds import open_world
-    from executive.app.runs.map_drive import MapDrive, mapper_for, route_points
     from executive.app.runs.signals import ended_by_signals
     from executive.app.runs.simulated import compile_first
     from executive.run.control import Control
 
-    tell = plain_lines(console_for(as_json))
+    tell = partial(console_for(as_json).print, markup=False)
     opened = open_world(world) if people else open_world(world).without_people()
     points = None if route is None else route_points(route)
     mapper = mapper_for(opened, out)

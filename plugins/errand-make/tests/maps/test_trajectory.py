@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from plant.referee.object_history import align, trajectory_error_m
+from errand_make.maps.trajectory import align, trajectory_error_m
 from skills.geometry import compose
 from skills.robot import Pose2D
 

@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planar_robot import TWO_ROOMS, Box, PlanarRobot, capabilities_of
 
+from errand_make.maps.map_folder import load_mapper, map_grids, save_graph, save_grids
+from errand_make.maps.mapper import Mapper
+from errand_make.maps.survey import Survey
 from skills.estimate.grid_map import load_grid_map
 from skills.geometry import relative_pose
 from skills.inputs.errors import InputError
-from skills.mapping.map_folder import load_mapper, map_grids, save_graph, save_grids
-from skills.mapping.mapper import Mapper
-from skills.mapping.survey import Survey
 from skills.robot import Pose2D
 from skills.testing.blocks import grid_of
 from skills.testing.clock import VirtualClock
+from tests.skills.planar_robot import TWO_ROOMS, Box, PlanarRobot, capabilities_of
 
 pytest.importorskip("gtsam")
 

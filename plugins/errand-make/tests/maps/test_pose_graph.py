@@ -4,8 +4,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from errand_make.maps.pose_graph import Edge, PoseGraph
 from skills.geometry import compose, relative_pose
-from skills.mapping.pose_graph import Edge, PoseGraph
 from skills.robot import Pose2D
 
 pytest.importorskip("gtsam")

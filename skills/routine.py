@@ -5,7 +5,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Final, TypeVar
+from typing import Any, Final, Self, TypeVar
 
 import numpy as np
 
@@ -41,7 +41,6 @@ OtherT = TypeVar("OtherT")
 Routine = Generator[Running, None, ResultT]
 
 ARM_EXPIRY_MARGIN_S = 3.0
-GRIPPER_EXPIRY_S = 4.0
 STAND_EXPIRY_S = 6.0
 HEIGHT_TOLERANCE_M = 0.02
 _PAUSE_S = 10.0
@@ -93,15 +92,21 @@ class CommandFailure(SkillFailure):
         self.why = why
 
 
-def planning_failure(routine: Routine[object]) -> Routine[SkillFailure | None]:
-    """Runs a routine; returns its failure when no plan was found, None when it is done. Raises other failures."""
-    try:
-        yield from routine
-    except SkillFailure as failure:
-        if failure.cause is not Cause.PLANNING:
-            raise
-        return failure
-    return None
+class PlanningAttempt:
+    """Context of a routine that may find no plan: `failure` holds its failure then; other failures are raised."""
+
+    failure: SkillFailure | None = None
+
+    def __enter__(self) -> Self:
+        """Returns the attempt."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> bool:
+        """Takes a failure with cause PLANNING."""
+        if not (isinstance(error, SkillFailure) and error.cause is Cause.PLANNING):
+            return False
+        self.failure = error
+        return True
 
 
 @dataclass(frozen=True)
@@ -319,27 +324,6 @@ class RoutineSkill(Skill[InputsT]):
                     raise
                 before = failure
                 yield from self.pause(_AGAIN_S, f"{failure.message}; {message} again")
-
-    def move_gripper(self, opening: float, force_n: float, message: str) -> Routine[None]:
-        """Moves the gripper with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
-
-        def attempt() -> Routine[None]:
-            stopped_s: float | None = 0.0
-            while stopped_s is not None:
-                until_s = self.context.clock.now() + GRIPPER_EXPIRY_S
-                command = self.issue(self.gripper_command(opening, force_n))
-                stopped_s = yield from self.finish(command, message, "the gripper", until_s=until_s)
-
-        yield from self.persist(attempt, message)
-
-    def gripper_command(self, opening: float, force_n: float) -> CommandId:
-        """Commands the gripper without waiting for it."""
-        context = self.context
-        if opening > context.robot.gripper().opening:
-            context.payload.corners_H = context.payload.R_BH = context.payload.kind = None
-            context.robot.carry(False, lease=context.lease)
-        until_s = context.clock.now() + GRIPPER_EXPIRY_S
-        return context.robot.set_gripper(opening, force_n, until_s=until_s, lease=context.lease)
 
     def stand_at(self, height_m: float, message: str) -> Routine[None]:
         """Brings the body to a height, level, unless it is there already.

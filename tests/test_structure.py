@@ -15,8 +15,8 @@ LINES = {
     "executive/language": 8240,
     "executive/speech": 1582,
     "executive/mission": 1577,
-    "executive/tree": 8553,
-    "executive/run": 3220,
+    "executive/tree": 8497,
+    "executive/run": 3275,
     "executive/record": 1403,
     "executive/store": 1629,
     "executive/conversation": 595,
@@ -24,7 +24,7 @@ LINES = {
     "executive/testing": 848,
     "executive/app": 7864,
     "executive/cli": 3781,
-    "skills": 28024,
+    "skills": 28040,
     "plant": 11146,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 417, 60, 7

@@ -6,7 +6,7 @@ Specs are compared, shown and checked without a robot; `executive.tree.compiler.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import import_module
@@ -14,10 +14,9 @@ from pkgutil import iter_modules
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained, ExplainedNode, Hook
+from executive.tree.behaviour import ExplainedNode
 from skills.api import Cause, Skill
 from skills.inputs.errors import SourceLine
 
@@ -113,59 +112,4 @@ class Change(NamedTuple):
 
 
 Snapshot = Mapping[str, NodeState]
-Visited = Callable[[Behaviour, bool], None]
-"""Receives each node that a tick has visited, and whether it was stopped from outside since its last visit."""
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
-
-
-class TreeObserver:
-    """Reads the states of a built tree after every tick. `states` holds the last state of each node, parents first.
-
-    A node's state changes only when it is ticked, here by `tick`, or stopped: only those nodes are read, so that a tick
-    costs nothing for the others.
-    """
-
-    def __init__(self, root: Behaviour, hook: Hook) -> None:
-        """`hook` is that of the tree's nodes."""
-        self.nodes: tuple[Behaviour, ...] = tuple(_walk(root))
-        self._explained = tuple(node for node in self.nodes if isinstance(node, Explained))
-        self._last = [_state(node) for node in self._explained]
-        named = zip(self._explained, self._last, strict=True)
-        self.states: Snapshot = {node.path_id: state for node, state in named}
-        self._index: Mapping[Behaviour, int] = {node: index for index, node in enumerate(self._explained)}
-        self._touched, self._stopped = hook.touched, hook.stopped
-
-    def tick(self, node: Behaviour, visited: Visited = lambda node, stopped: None) -> None:
-        """Ticks the tree, or a part of it, and calls `visited` for each node, after those below it."""
-        for each in node.tick():
-            self._touched.add(each)
-            visited(each, each in self._stopped)
-            self._stopped.discard(each)
-
-    def changes(self, *, of_all: bool = False) -> Sequence[Change]:
-        """Returns the changes since the last call, in the order of the tree, and updates `states`.
-
-        After an exception in a tick, and where a node was changed by hand, all nodes must be read (`of_all`).
-        """
-        touched = sorted(self._index[node] for node in self._touched if node in self._index)
-        self._touched.clear()
-        found = list[Change]()
-        for index in range(len(self._explained)) if of_all else touched:
-            node, last, state = self._explained[index], self._last[index], _state(self._explained[index])
-            if state != last:
-                self._last[index] = state
-                found.append(Change(node.path_id, last, state))
-        if found:
-            self.states = {**self.states, **{change.path_id: change.after for change in found}}
-        return found
-
-
-def _walk(root: Behaviour) -> Iterator[Behaviour]:
-    """Iterates over the node and all its descendants, parents first."""
-    yield root
-    for child in root.children:
-        yield from _walk(child)
-
-
-def _state(node: Explained) -> NodeState:
-    return NodeState(node.status, node.cause, node.message, node.progress)

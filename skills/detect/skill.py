@@ -39,7 +39,7 @@ from skills.perception.point_cloud import Coverage, in_plain_view
 from skills.perception.surface_segmentation import Cluster, loose_clusters, segment_3d, segment_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
 from skills.robot import FloatArray, Image
-from skills.routine import Routine, SkillFailure, planning_failure
+from skills.routine import PlanningAttempt, Routine, SkillFailure
 
 _LEAST_SEEN = 0.02
 _FITS_NEAR_M = 0.4
@@ -195,7 +195,8 @@ class Detect(LookingSkill[DetectInputs]):
             X_BW = self.X_WB().inverse()
             p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
             viewpoints = [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
-            yield from planning_failure(self.look(inputs, p_BO, viewpoints))
+            with PlanningAttempt():
+                yield from self.look(inputs, p_BO, viewpoints)
 
     def _old_result(self, inputs: DetectInputs) -> Track | None:
         """The track seen last, if it is sure and its picture is old."""
@@ -217,9 +218,10 @@ class Detect(LookingSkill[DetectInputs]):
     ) -> Routine[None]:
         """Views a point, and candidates again from the side. Adds a failure of the arm to `blocked`."""
         viewpoints = self._viewpoints(p_BT, shift_rad, close=close)
-        failure = yield from planning_failure(self.look(inputs, p_BT, viewpoints, raised_m))
-        if failure is not None:
-            blocked.append(failure)
+        with PlanningAttempt() as attempt:
+            yield from self.look(inputs, p_BT, viewpoints, raised_m)
+        if attempt.failure is not None:
+            blocked.append(attempt.failure)
             return
         while (track := self._candidate(inputs)) is not None:
             tries = self._tried[track.number] = self._tried.get(track.number, 0) + 1
@@ -227,7 +229,8 @@ class Detect(LookingSkill[DetectInputs]):
             other_m = _RAISED_M * (tries % 3)
             other_m = raised_m - other_m if raised_m > 0.0 else other_m
             viewpoints = self._confirming(track, tries, close=close)
-            yield from planning_failure(self.look(inputs, p_BO, viewpoints, other_m))
+            with PlanningAttempt():
+                yield from self.look(inputs, p_BO, viewpoints, other_m)
 
     def _viewpoints(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
         """Camera positions p_BC to view p_BT, turned by shift_rad about the shoulder; near ones first if close."""

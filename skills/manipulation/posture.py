@@ -9,7 +9,7 @@ import numpy as np
 from skills.api import Cause, Part, Succeeded
 from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.quantities import Angle, Turn
-from skills.routine import Routine, SkillFailure, planning_failure
+from skills.routine import PlanningAttempt, Routine, SkillFailure
 
 _NEAR_X_M = 0.05
 """Distance ahead of the carrying positions within which the hand is near the body."""
@@ -49,7 +49,8 @@ class Stow(ArmSkill[StowInputs]):
         yield from self.feel_arm("stowing the arm")
         usual_m = self.context.robot.capabilities().standing_height_m
         if self.context.robot.odometry().X_OB.translation()[2] > usual_m + _RAISED_M:
-            yield from planning_failure(self._come_near())
+            with PlanningAttempt():
+                yield from self._come_near()
         yield from self.stand_at(usual_m, "standing as usual")
         holding = self.context.robot.gripper().holding
         yield from self._come_near()

@@ -16,13 +16,14 @@ from pydrake.math import RigidTransform
 from executive.app.prepare import from_request, worlds
 from executive.record.event_log import EventLog
 from executive.run.runner import run
+from executive.run.tree_run import TreeObserver
 from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.store.database import Database
 from executive.tree.board import Board
 from executive.tree.compiler import compile_mission
 from executive.tree.context import RunContext
-from executive.tree.node import Change, TreeObserver
+from executive.tree.node import Change
 from executive.tree.registry import installed_skills
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge, load_knowledge

@@ -14,7 +14,7 @@ from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.skill import Navigate
 from skills.navigate.surroundings import NavigateInputs
 from skills.robot import ArmCapabilities, FloatArray, Pose2D
-from skills.routine import Routine, RoutineSkill, planning_failure
+from skills.routine import PlanningAttempt, Routine, RoutineSkill
 
 BEARINGS = 24
 """Number of directions from which a point is approached."""
@@ -117,7 +117,8 @@ def go_to_one(skill: RoutineSkill[Any], goals: Sequence[NavigateInputs]) -> Rout
     """Drives to the first of some goals to which there is a path. Raises SkillFailure."""
     *first, last = goals
     for goal in first:
-        if (yield from planning_failure(skill.perform(Navigate(skill.context), goal))) is None:
+        with PlanningAttempt():
+            yield from skill.perform(Navigate(skill.context), goal)
             return
         yield Running("choosing another place to stand")
     yield from skill.perform(Navigate(skill.context), last)

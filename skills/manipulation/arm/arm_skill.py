@@ -15,7 +15,7 @@ from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.manipulation.arm.poses import carry_configuration, hangs_below
 from skills.manipulation.arm.solid_cells import Outline, OwnSpace, solid_boxes, wall_boxes
 from skills.robot import ArmCapabilities, ArmTrajectory, CommandId, FloatArray, GripperCapabilities
-from skills.routine import Routine, RoutineSkill, SkillFailure, planning_failure
+from skills.routine import PlanningAttempt, Routine, RoutineSkill, SkillFailure
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
 """Chooses the goal configuration (J,) of a motion, given the scene and the present configuration (J,)."""
@@ -24,6 +24,7 @@ PlannedT = TypeVar("PlannedT")
 PLANNING_LATENCY_S = 0.3
 LINE_SPEED_RAD_S = 0.6
 CARRY_SPEED_RAD_S = 0.9
+GRIPPER_EXPIRY_S = 4.0
 GRIPPER_FORCE_N = 20.0
 """Force with which an empty gripper opens and closes."""
 CONTACT_LAG_M = 0.006
@@ -285,6 +286,27 @@ class ArmSkill(RoutineSkill[InputsT]):
         yield from self.move_gripper(turn.end, GRIPPER_FORCE_N, message)
         return q_goal_rad
 
+    def move_gripper(self, opening: float, force_n: float, message: str) -> Routine[None]:
+        """Moves the gripper with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
+
+        def attempt() -> Routine[None]:
+            stopped_s: float | None = 0.0
+            while stopped_s is not None:
+                until_s = self.context.clock.now() + GRIPPER_EXPIRY_S
+                command = self.issue(self.gripper_command(opening, force_n))
+                stopped_s = yield from self.finish(command, message, "the gripper", until_s=until_s)
+
+        yield from self.persist(attempt, message)
+
+    def gripper_command(self, opening: float, force_n: float) -> CommandId:
+        """Commands the gripper without waiting for it."""
+        context = self.context
+        if opening > context.robot.gripper().opening:
+            context.payload.corners_H = context.payload.R_BH = context.payload.kind = None
+            context.robot.carry(False, lease=context.lease)
+        until_s = context.clock.now() + GRIPPER_EXPIRY_S
+        return context.robot.set_gripper(opening, force_n, until_s=until_s, lease=context.lease)
+
     def _turning(self, turn: GripperTurn, after_s: float) -> Callable[[FloatArray], bool]:
         """A guard for `follow` that commands the gripper after a while and never stops the arm."""
         begins_s, given = self.context.clock.now() + after_s, list[CommandId]()
@@ -333,8 +355,9 @@ class ArmSkill(RoutineSkill[InputsT]):
     def try_shift_hand(self, offset_B: FloatArray, message: str, *, clear_of_boxes: bool = False) -> Routine[bool]:
         """Moves the hand straight by an offset (3,) in B; returns False when there is no straight path."""
         p_BH = self.model.X_BH(self.q_rad()).translation() + offset_B
-        motion = self.move_straight(p_BH, message, clear_of_boxes=clear_of_boxes)
-        return (yield from planning_failure(motion)) is None
+        with PlanningAttempt() as attempt:
+            yield from self.move_straight(p_BH, message, clear_of_boxes=clear_of_boxes)
+        return attempt.failure is None
 
     def shift_by_first(
         self, offsets_B: Iterable[FloatArray], message: str, *, clear_of_boxes: bool = False

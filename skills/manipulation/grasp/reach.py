@@ -26,7 +26,7 @@ from skills.manipulation.grasp.close_view import SURFACE_AROUND_M, square
 from skills.manipulation.grasp.placements import UPRIGHT_M, Target
 from skills.manipulation.grasp.planning import PREGRASPS_M, lifts, within_reach
 from skills.robot import Capabilities, FloatArray, GripperCapabilities, GripperKind
-from skills.routine import Routine, planning_failure
+from skills.routine import PlanningAttempt, Routine
 
 _LOW_SURFACE_M = 0.2
 """Height of an object below which the body goes to its lowest height."""
@@ -360,7 +360,9 @@ def look_into_unseen(skill: LookingSkill[Any], seen: ObjectObservation, arm_W: F
     if np.linalg.norm(p_BT - skill.model.p_BS) > _UNSEEN_FURTHEST_M:
         return False
     message = f"looking above the {seen.kind}"
-    if (yield from planning_failure(skill.look_at(p_BT, level_viewpoints(skill.model, p_BT), message))):
+    with PlanningAttempt() as attempt:
+        yield from skill.look_at(p_BT, level_viewpoints(skill.model, p_BT), message)
+    if attempt.failure is not None:
         return False
     yield from skill.picture(message)
     return True

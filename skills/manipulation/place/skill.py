@@ -41,7 +41,7 @@ from skills.navigate.surroundings import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
 from skills.quantities import Coordinate, Height, Length, Tries, TurnRate
 from skills.robot import FloatArray, Pose2D
-from skills.routine import Routine, SkillFailure, planning_failure
+from skills.routine import PlanningAttempt, Routine, SkillFailure
 
 _SURELY_FREE_M = 0.03
 """Height down to which the object moves fast, because it cannot touch the surface there."""
@@ -312,7 +312,9 @@ class Place(PlaceVerification[PlaceInputs]):
             motion = self.move_to(
                 lambda scene, q: tucked_configuration(scene, arm, R_BH, q), "drawing the object in", CARRY_SPEED_RAD_S
             )
-            return (yield from planning_failure(motion)) is None
+            with PlanningAttempt() as attempt:
+                yield from motion
+            return attempt.failure is None
         finally:
             self.held = ()
 

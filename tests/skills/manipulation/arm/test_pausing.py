@@ -8,8 +8,9 @@ import pytest
 from executive.testing.bench import SkillBench
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Running, Skill, Succeeded
+from skills.manipulation.arm.arm_skill import ArmSkill
 from skills.robot import ArmTrajectory
-from skills.routine import PATIENCE_S, RoutineSkill, rest_of
+from skills.routine import PATIENCE_S, rest_of
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
 
@@ -19,7 +20,7 @@ REACH = STOWED + np.array([0.6, 0.6, -0.6, 0.2, 0.2, 0.2])
 TICK_S = 0.05
 
 
-class Works(RoutineSkill):
+class Works(ArmSkill):
     """Stands higher, swings the arm, opens the gripper; `story` tells what was begun."""
 
     name = "works"

@@ -39,7 +39,6 @@ from executive.tree.node_view import node_view
 from executive.words.knowledge import BatteryFacts
 from plant.robots.robot_kind import PlacedRobot
 from skills.inputs.errors import listing
-from skills.robot import Pose2D
 
 LEFT_M: Final = 1.5
 """Distance from a hand-over table beyond which a robot leaves space for the next one."""
@@ -82,10 +81,6 @@ class Dispatch(Assigner):
             for name, placed in self.robots.items()
         }
         self._offers = self.offers(self._robots, self.battery, self.backend.clock.now, self._auction)
-        self._lost: dict[str, str] = {}
-        self._recalled: set[str] = set()
-        self._to_dock: list[str] = []
-        self._leaving: dict[str, tuple[int, Pose2D]] = {}
         self.over: list[EndedMission] = []
         self._stopped: str | None = None
 
@@ -112,10 +107,11 @@ class Dispatch(Assigner):
             entries.append(self._entry(award.robot, mission))
         if given.begun:
             self._log_missions()
-        self._to_dock += given.charging
+        for name in given.charging:
+            self._robots[name].to_dock = True
         if self._auction.waiting or self._auction.under_way:
-            entries += [self._dock_entry(name) for name in self._to_dock if name in self._auction.resting]
-            self._to_dock = []
+            resting = [name for name in self.robots if name in self._auction.resting]
+            entries += [self._dock_entry(name) for name in resting if self._robots[name].to_dock]
         return entries if len(refused) == len(given.refused) else [*entries, *self.assign()]
 
     def _split(self, number: int) -> bool:
@@ -152,17 +148,21 @@ class Dispatch(Assigner):
             if name in under_way and is_low and robot.dock and not each.holding and not robot.progress.begun:
                 low[name] = each
         idle = self._auction.resting if not under_way and not self._auction.waiting else ()
-        self._recalled = {*low, *idle}
+        for name, robot in self._robots.items():
+            robot.recalled = name in low or name in idle
         why = {name: f"its battery is at {each.charge:.0%}" for name, each in low.items()}
         return {**why, **dict.fromkeys(idle, "nothing is left to do")}
 
     def _release_following(self, seen: Mapping[str, RobotStatus]) -> None:
         """Lets a second part begin once the robot of the first has left the table or is no longer sent to its dock."""
-        for name, (number, from_W) in tuple(self._leaving.items()):
+        for name, robot in self._robots.items():
+            if robot.leaves is None:
+                continue
+            number, from_W = robot.leaves
             pose = seen[name].pose if name in seen else None
             away_m = 0.0 if pose is None else math.hypot(pose.x_m - from_W.x_m, pose.y_m - from_W.y_m)
             if name not in self._auction.resting or away_m > LEFT_M:
-                del self._leaving[name]
+                robot.leaves = None
                 self._auction.done(number)
 
     def tick(self, progress: Progress) -> None:
@@ -175,11 +175,11 @@ class Dispatch(Assigner):
     def mission_ended(self, end: MissionEnd) -> None:
         """Ends a robot's mission, or hands its rest to another robot."""
         name = end.result.robot_name
-        robot, recalled = self._robots[name], name in self._recalled
-        self._recalled.discard(name)
+        robot = self._robots[name]
+        recalled, robot.recalled = robot.recalled, False
         lost = self._update_robot(robot, end)
         if lost is not None:
-            self._lost[name] = lost
+            robot.lost = lost
             self._auction.lose(name)
             self.tell(f"{name} is given no more work: {lost}")
         if name not in self._auction.under_way:
@@ -246,7 +246,7 @@ class Dispatch(Assigner):
     def _send_to_dock(self, name: str) -> None:
         """Sends a robot to its dock at the next round."""
         self._auction.resting.add(name)
-        self._to_dock.append(name)
+        self._robots[name].to_dock = True
 
     def _update_robot(self, robot: FleetRobot, end: MissionEnd) -> str | None:
         """Updates a robot's state at the end of a mission; returns why it must stop working (None: it need not)."""
@@ -271,7 +271,8 @@ class Dispatch(Assigner):
         for number in self._auction.waiting if self._stopped is None else ():
             given = assigned.get(number)
             if given is not None and given.robot is not None:
-                why = {**self._lost, **self.missions[number].tried}
+                lost = {name: robot.lost for name, robot in self._robots.items() if robot.lost is not None}
+                why = {**lost, **self.missions[number].tried}
                 reasons = listing([f"{name}: {each}" for name, each in why.items()])
                 self._finish(number, MissionState.FAILURE, f"no robot went on with it ({reasons})")
 
@@ -283,6 +284,7 @@ class Dispatch(Assigner):
         """Begins a robot's charging mission."""
         robot = self._robots[name]
         assert robot.dock is not None
+        robot.to_dock = False
         robot.free_at_s = self._now_s + charging_time_s(robot.charge, self.battery.charged)
         robot.journal = None
         self.tell(f"{name} goes to its dock: its battery is at {robot.charge:.0%}")
@@ -383,7 +385,7 @@ class Dispatch(Assigner):
         name = share.tree.robot_name
         if following and name in self._auction.robots and self._robots[name].dock is not None:
             self._send_to_dock(name)
-            self._leaving[name] = (number, self._robots[name].pose)
+            self._robots[name].leaves = (number, self._robots[name].pose)
         if whole is not None and not following:
             self._given.judge(whole, seen)
 
@@ -392,7 +394,7 @@ class Dispatch(Assigner):
         self.store.finish(number, state, message)
         self.tell(f"Mission {number}: {state.value}: {message}")
         if state is MissionState.SUCCESS:
-            if all(number != part for part, _ in self._leaving.values()):
+            if all(robot.leaves is None or robot.leaves[0] != number for robot in self._robots.values()):
                 self._auction.done(number)
         else:
             self._auction.drop(number)

@@ -296,7 +296,9 @@ class ProgressJournal:
 class FleetRobot:
     """State of a robot of the fleet: its pose and charge when it is free next, at `free_at_s` (s on the robots' clock).
 
-    `dock` is its charging mission; None if it cannot charge.
+    `dock` is its charging mission; None if it cannot charge. A robot that is `lost`, for a reason, is given no more
+    work; one that is `recalled` stops its mission, and one that is `to_dock` charges at the next round. It `leaves` the
+    table of a split mission's first part, by its number, from a pose.
     """
 
     placed: PlacedRobot
@@ -308,6 +310,10 @@ class FleetRobot:
     dock: Prepared | None = None
     planner: RoutePlanner | None = None
     faults: tuple[str, ...] = ()
+    lost: str | None = None
+    recalled: bool = False
+    to_dock: bool = False
+    leaves: tuple[int, Pose2D] | None = None
 
     def ready_s(self, now_s: float, *, busy: bool) -> float:
         """Time until it is free (s); a robot that is already late is assumed to take as long again."""

@@ -15,19 +15,19 @@ LINES = {
     "executive/language": 8240,
     "executive/speech": 1582,
     "executive/mission": 1577,
-    "executive/tree": 8497,
-    "executive/run": 3275,
+    "executive/tree": 8534,
+    "executive/run": 3261,
     "executive/record": 1403,
     "executive/store": 1629,
     "executive/conversation": 595,
     "executive/view": 1581,
     "executive/testing": 848,
-    "executive/app": 7864,
+    "executive/app": 7872,
     "executive/cli": 3781,
     "skills": 28040,
     "plant": 11146,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 417, 60, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 417, 59, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

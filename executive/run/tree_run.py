@@ -11,16 +11,11 @@ from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.mission_history import Executions, Findings, claim, findings_in_words
 from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
-from executive.tree.behaviour import Explained, Hook, message_of, suspend
+from executive.tree.behaviour import Explained, ExplainedNode, Hook, message_of, suspend
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import Endings, RunContext
 from executive.tree.node import Change, NodeState, Snapshot
 from executive.tree.node_view import node_view
-from executive.tree.nodes.decision_nodes import Decide, buttons_of
-from executive.tree.nodes.policies import Skip
-from executive.tree.nodes.search import Answer
-from executive.tree.nodes.skill_leaf import SkillLeaf
-from executive.tree.nodes.wait import WaitFor
 from executive.words.goal import GoalKind
 from skills.api import Cause
 from skills.navigate.zone_map import zone_messages
@@ -50,13 +45,9 @@ class TreeRun:
         self._ended_early = self._suspended = False
         self._endings: list[str] = []
         self._observed = TreeObserver(self.root, context.hook)
-        self._leaves = tuple(node for node in self._observed.nodes if isinstance(node, SkillLeaf))
-        buttons = {node.path_id for node in tree.root.walk() if any(buttons_of(node))}
-        waits = (node for node in self._observed.nodes if isinstance(node, WaitFor))
-        self._for_buttons = tuple(
-            n for n in waits if isinstance(n.decorated, Decide) and n.decorated.path_id in buttons
-        )
-        self._skills = {leaf.path_id: leaf for leaf in self._leaves}
+        self._nodes = tuple(node for node in self._observed.nodes if isinstance(node, ExplainedNode))
+        self._for_buttons = tuple(node for node in self._nodes if node.waits_for_button())
+        self._skills = {node.path_id: node for node in self._nodes if node.runs_skill}
         self._running = {path_id: leaf for path_id, leaf in self._skills.items() if leaf.status is Status.RUNNING}
         self._changes: Sequence[Change] = ()
         self._pose_due_s = -math.inf
@@ -177,7 +168,7 @@ class TreeRun:
             attempt("stop what is done in the end", lambda node=node: node.stop(Status.INVALID))  # type: ignore[misc]
         if not self.finished and not self._ended_early:
             attempt("stop the tree", lambda: self.root.stop(Status.INVALID))
-        for leaf in self._leaves:
+        for leaf in self._skills.values():
             attempt(f"end {leaf.path_id}", leaf.abandon)
         self.log_changes(of_all=True)
 
@@ -193,15 +184,10 @@ class TreeRun:
             outcome, cause, message = ending.outcome, ending.cause, ending.message
         if self._endings:
             message = "; ".join((message, *self._endings))
-        answers = {
-            node.path_id: node.answer
-            for node in self._observed.nodes
-            if isinstance(node, Answer) and node.answer is not None
-        }
+        answers = {node.path_id: answer for node in self._nodes if (answer := node.answered()) is not None}
         findings, said = self._findings.findings, self._findings.said
         if findings and outcome is Outcome.SUCCESS:
-            skips = (node for node in self._observed.nodes if isinstance(node, Skip) and node.status is Status.SUCCESS)
-            skipped = [f"{node.step} ({node.skipped})" for node in skips if node.skipped is not None]
+            skipped = [omission for node in self._nodes if (omission := node.omission()) is not None]
             last = self.tree.parts[-1] if self.tree.parts else None
             only_answers = last is None or last.goal is None or last.goal.kind in _GOALS_WITHOUT_NEWS
             message = claim("" if only_answers else message, findings, skipped)

@@ -168,6 +168,26 @@ class ExplainedNode(_TakesKeywords, Explained):
         """Restores the status, cause and message from before a restart."""
         self.status, self.cause, self.message = status, cause, message
 
+    @property
+    def checkpoint(self) -> Mapping[str, Any]:
+        """Checkpoint of the running skill for a restart; empty without one."""
+        return {}
+
+    def abandon(self) -> None:
+        """Ends a running skill after the run; does nothing without one."""
+
+    def answered(self) -> bool | None:
+        """Returns the node's answer to a question of the mission; None without one."""
+        return None
+
+    def omission(self) -> str | None:
+        """Returns the step that the node has skipped, with the reason; None without one."""
+        return None
+
+    def waits_for_button(self) -> bool:
+        """Returns whether the node may wait for somebody to press a button."""
+        return False
+
     def fail(self, failure: Failed) -> Status:
         """Explains a failure of the node itself; returns FAILURE."""
         self.cause, self.message = failure.cause, failure.message

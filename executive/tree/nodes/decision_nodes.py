@@ -117,6 +117,11 @@ class Decision:
     keys: Keys = field(default_factory=dict)
     answers: tuple[str, ...] = ()
 
+    @property
+    def buttons(self) -> tuple[str, ...]:
+        """Operator's buttons in the condition."""
+        return tuple(part.button for part in parts_of(self.condition) if isinstance(part, ButtonPressed))
+
     def holds(self, view: View) -> bool | None:
         """Returns whether it holds now; None before a look that it needs. Raises ExpressionError for missing values."""
         return self._holds(self.condition, view, iter(self.answers))
@@ -147,12 +152,11 @@ class Decision:
         return tuple(zip(self.answers, looks, strict=True))
 
 
-def buttons_of(node: NodeSpec) -> Iterator[str]:
-    """Iterates over the buttons by which a node decides."""
+def buttons_of(node: NodeSpec) -> tuple[str, ...]:
+    """Returns the buttons by which a node decides."""
     condition = node.options.get("condition")
     decision = condition.decision if isinstance(condition, MustHold) else node.options.get("decision")
-    if isinstance(decision, Decision):
-        yield from (part.button for part in parts_of(decision.condition) if isinstance(part, ButtonPressed))
+    return decision.buttons if isinstance(decision, Decision) else ()
 
 
 @dataclass

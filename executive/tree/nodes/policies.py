@@ -138,6 +138,11 @@ class Skip(ExplainedDecorator):
             return status
         return self.skip()
 
+    def omission(self) -> str | None:
+        """Returns the skipped step with the reason."""
+        is_skipped = self.skipped is not None and self.status is Status.SUCCESS
+        return f"{self.step} ({self.skipped})" if is_skipped else None
+
     def skip(self) -> Status:
         """Returns SUCCESS, and notes the child's failure as the reason."""
         self.skipped, self.cause = self.message, None

@@ -75,6 +75,10 @@ class Answer(ExplainedDecorator):
     count_key: str = ""
     answer: bool | None = field(default=None, init=False)
 
+    def answered(self) -> bool | None:
+        """Returns the answer."""
+        return self.answer
+
     def restore(self, status: Status, cause: Cause | None, message: str) -> None:
         """Restores the answer as well."""
         super().restore(status, cause, message)

@@ -70,6 +70,10 @@ class WaitFor(ExplainedDecorator):
         if isinstance(self.decorated, Decide):
             self.decorated.view.forget_presses()
 
+    def waits_for_button(self) -> bool:
+        """Returns whether the decision may depend on a button."""
+        return isinstance(self.decorated, Decide) and any(self.decorated.decision.buttons)
+
     def _held_back(self) -> Status | None:
         return Status.RUNNING if self.clock.now() < self._due_s - 1e-9 else None
 

@@ -166,13 +166,24 @@ class PlanBuilder:
         part: str = "",
         forgets: tuple[str, ...] = (),
     ) -> NodeSpec:
-        """Builds at most `attempts` attempts with recoveries; the first clears the blackboard keys in `forgets`."""
+        """Builds at most `attempts` attempts with recoveries; the first clears the blackboard keys in `forgets`.
+
+        recover
+        ├── attempt                          again after each successful recovery
+        ├── recovery 1, if its rule fits     one after the other, until one succeeds
+        └── recovery 2, if its rule fits
+        """
         nodes, when = tuple(node for node, _ in recoveries), tuple(rule for _, rule in recoveries)
         options = {"recoveries": when, "attempts": attempts, "forgets": forgets}
         return self.node("recover", name, attempt, *nodes, part=part, **options)
 
     def stow_after(self, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:
-        """Builds work and stows the arm after it, after any result or `only_after_failure`."""
+        """Builds work and stows the arm after it, after any result or `only_after_failure`.
+
+        afterwards        the result of the work
+        ├── work
+        └── stow
+        """
         name = "stow the arm if it fails" if only_after_failure else "stow the arm in the end"
         return self.node("afterwards", name, work, self.skill(STOW), only_after_failure=only_after_failure)
 
@@ -191,6 +202,11 @@ class PlanBuilder:
         """Builds a drive to a pose, called `to`, with `NAVIGATE_RECOVERIES`; with `exactly`, within 8 cm of the pose.
 
         Poses at `nearby_m` from it, forward and left, are tried afterwards.
+
+            recover, up to 3 attempts
+            ├── navigate
+            ├── clear_costmap    once, after a failure with PLANNING or EXECUTION
+            └── back_off         once, the same
         """
         ports: dict[str, object] = {"goal": pose, **({"position_tolerance_m": 0.08} if exactly else {})}
         ports |= self.optional_ports("navigate", {"nearby_m": nearby_m}) if nearby_m else {}

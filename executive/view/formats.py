@@ -234,9 +234,7 @@ def _category(node: NodeView) -> str:
     """Name of a node's element: a built-in control node, or the category for its number of children."""
     if node.behaviour.control and node.children:
         return node.behaviour.control
-    if not node.children:
-        return "Condition" if node.behaviour.watches else "Action"
-    return "Decorator" if len(node.children) == 1 else "Control"
+    return ("Action", "Decorator", "Control")[min(len(node.children), 2)]
 
 
 def _model_id(node: NodeView) -> str:

@@ -285,6 +285,13 @@ def recover_fallen_plan(
 
     It does the same if a skill in `hands_on` has released the object and it is not at its goal. The carrying begins
     again at most `pick_ups` times, by the builder.
+
+        recover
+        ├── carry
+        └── sequence, after a broken guard or a missed goal
+            ├── fallen: where is it?
+            ├── selector: set it down if it is still held, or stow the arm
+            └── selector: it is in the gripper, or stand back, look and pick it up
     """
     if not builder.pick_ups:
         return carry

@@ -42,7 +42,13 @@ RECOVERIES: Final[Mapping[str, Recovery]] = {
 
 
 def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> NodeSpec:
-    """Drives to a pose, called `to`, or to one nearby in the same room if there is no path."""
+    """Drives to a pose, called `to`, or to one nearby in the same room if there is no path.
+
+    selector
+    ├── navigate to the pose
+    ├── navigate 0.5 m behind it
+    └── navigate 0.6 m to its left, then to its right
+    """
     nearby = _nearby(builder, pose)
     direct = builder.navigate(pose, to, nearby_m=tuple(nearby))
     others = [
@@ -80,6 +86,12 @@ def pick_up_plan(
 
     A failure ends with the arm stowed. With `seen`, an earlier node has just written `key`, and the search runs only
     before further attempts.
+
+        afterwards
+        ├── recover, up to 4 attempts
+        │   ├── sequence: search, approach, grasp, draw the arm in
+        │   └── each of `RECOVERIES`, in this order
+        └── stow, after a failure
     """
     near, tried, blocking = map(builder.key, ("near-detection", "tried-grasps", "in-the-way"))
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
@@ -121,7 +133,14 @@ def pick_up_plan(
 
 
 def tuck_plan(builder: PlanBuilder) -> NodeSpec:
-    """Draws the arm in, in two attempts; if both fail and the gripper holds the object, the arm stays out."""
+    """Draws the arm in, in two attempts; if both fail and the gripper holds the object, the arm stays out.
+
+    selector
+    ├── retry, 2 attempts
+    │   └── stow
+    └── only if holding
+        └── pause
+    """
     causes = frozenset({Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION})
     twice = builder.node(
         "retry", "draw in the arm, twice if need be", builder.skill("stow"), part="tuck-in", attempts=2, causes=causes

@@ -6,7 +6,6 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from executive.words.goal import GoalCondition, GoalKind, Region, When
 from plant.referee.object_history import TimedPath, Truth
@@ -120,6 +119,8 @@ def judge_greeted(condition: GoalCondition, truth: Truth) -> Finding:
 
     A person who came or left during the step may be greeted or not.
     """
+    from scipy.optimize import linear_sum_assignment  # takes half a second, and few missions have greetings
+
     from_s, until_s = condition.from_s, step_end_s(condition, truth)
     robots = [path for name, path in truth.robots.items() if condition.robot in (None, name)]
     among = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}

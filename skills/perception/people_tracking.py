@@ -105,12 +105,15 @@ class PeopleTracker:
 
     def _assigned(self, found: Sequence[SeenPerson]) -> dict[int, int]:
         """Assigns detections to tracks: the index of the track by the index of the detection."""
-        from scipy.optimize import linear_sum_assignment
-
         if not found or not self._tracks:
             return {}
         costs = np.array([[self._cost(track, one) for track in self._tracks] for one in found])
-        rows, columns = linear_sum_assignment(costs)
+        if 1 in costs.shape:
+            rows, columns = np.unravel_index([np.argmin(costs)], costs.shape)
+        else:
+            from scipy.optimize import linear_sum_assignment  # takes half a second
+
+            rows, columns = linear_sum_assignment(costs)
         return {int(i): int(j) for i, j in zip(rows, columns, strict=True) if costs[i, j] < _NO_MATCH}
 
     def _cost(self, track: _Track, one: SeenPerson) -> float:

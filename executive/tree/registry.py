@@ -10,14 +10,15 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from importlib.metadata import EntryPoint, entry_points
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from importlib.metadata import EntryPoint
 from typing import Any, Final
 
 from executive.tree.port_values import describe_type, field_types
 from skills.api import Cause, Skill
 from skills.inputs.errors import InputError, suggestion
-from skills.inputs.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
+from skills.inputs.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, installed_plugins, run_plugin
 
 GROUP: Final = "errand.skills"
 
@@ -25,13 +26,14 @@ SkillClass = type[Skill[Any]]
 
 
 class SkillRegistry(Mapping[str, SkillClass]):
-    """Skills by name. Skills of other distributions are loaded at first use.
+    """Skills by name, each loaded at its first use. Iteration loads all of them; `names` loads none.
 
-    Iteration loads all of them; `names` loads none.
+    A skill that cannot be loaded, breaks a rule for skills, or has the name of another is broken: it does not affect
+    the others, and never replaces a shipped one. A broken shipped skill raises InputError.
     """
 
-    def __init__(self, ours: Mapping[str, SkillClass], others: Mapping[str, tuple[EntryPoint, ...]]) -> None:
-        """`others` are the entry points of other distributions by name; several with one name are refused."""
+    def __init__(self, ours: Mapping[str, Sequence[EntryPoint]], others: Mapping[str, Sequence[EntryPoint]]) -> None:
+        """Takes the entry points of this project and of other distributions; several with one name are refused."""
         self._ours, self._others = ours, others
         self._loaded: dict[str, SkillClass | InputError] = {}
 
@@ -52,7 +54,7 @@ class SkillRegistry(Mapping[str, SkillClass]):
         return found if isinstance(found, InputError) else None
 
     def __getitem__(self, name: str) -> SkillClass:
-        found = self._ours.get(name) or self._of_others(name)
+        found = _shipped(*self._ours[name]) if name in self._ours else self._of_others(name)
         if found is None or isinstance(found, InputError):
             raise KeyError(name)
         return found
@@ -86,27 +88,20 @@ def missing_skill(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, s
 
 
 def installed_skills() -> SkillRegistry:
-    """Returns all registered skills in the order of their names.
-
-    A skill that cannot be loaded, breaks a rule for skills, or has the name of another is broken: it does not affect
-    the others, and never replaces a shipped one. Raises InputError when the shipped skills are not registered, or one
-    of them is broken.
-    """
-    found = tuple(entry_points(group=GROUP))
-    if not any(distribution_of(entry) == OURS for entry in found):
+    """Returns all registered skills. Raises InputError when the shipped skills are not registered."""
+    ours, others = dict[str, tuple[EntryPoint, ...]](), dict[str, tuple[EntryPoint, ...]]()
+    for entry in sorted(installed_plugins(GROUP), key=distribution_of):
+        named = ours if distribution_of(entry) == OURS else others
+        named[entry.name] = (*named.get(entry.name, ()), entry)
+    if not ours:
         hint = "install the project that these sources belong to: pip install --editable ."
         raise InputError(f"no skill of {OURS} is registered under '{GROUP}'", hint=hint)
-    ours = skills_of(entry for entry in found if distribution_of(entry) == OURS)
-    others: dict[str, tuple[EntryPoint, ...]] = {}
-    for entry in sorted(found, key=distribution_of):
-        if distribution_of(entry) != OURS:
-            others[entry.name] = (*others.get(entry.name, ()), entry)
     return SkillRegistry(ours, others)
 
 
 def built_in_skills() -> dict[str, SkillClass]:
-    """Returns the shipped skills by name. Raises InputError like `installed_skills`."""
-    return skills_of(entry for entry in entry_points(group=GROUP) if distribution_of(entry) == OURS)
+    """Returns the shipped skills by name. Raises InputError when one of them is broken."""
+    return skills_of(entry for entry in installed_plugins(GROUP) if distribution_of(entry) == OURS)
 
 
 def skills_of(entries: Iterable[EntryPoint], *, limit_s: float = LIMIT_S) -> dict[str, SkillClass]:
@@ -117,7 +112,7 @@ def skills_of(entries: Iterable[EntryPoint], *, limit_s: float = LIMIT_S) -> dic
     return {name: _only(same, {}, limit_s) for name, same in named.items()}
 
 
-def _only(entries: Sequence[EntryPoint], ours: Mapping[str, SkillClass], limit_s: float = LIMIT_S) -> SkillClass:
+def _only(entries: Sequence[EntryPoint], ours: Container[str], limit_s: float = LIMIT_S) -> SkillClass:
     """Loads and checks the skill of one name. Raises InputError when it is broken, or another has its name."""
     first, *others = entries
     owners = [OURS] if first.name in ours else []
@@ -126,6 +121,11 @@ def _only(entries: Sequence[EntryPoint], ours: Mapping[str, SkillClass], limit_s
         both = f"{owners[0]} and {owners[1]}"
         raise InputError(f"{both} both register a skill '{first.name}'", hint="uninstall one, or rename its skill")
     return _checked(first, limit_s)
+
+
+@cache
+def _shipped(*entries: EntryPoint) -> SkillClass:
+    return _only(entries, ())
 
 
 def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:

@@ -29,10 +29,11 @@ IMPORTS = [
         (["parse", "--open", "fetch me a drink"], "spacy"),
         (["parse", "Hey Alice, fetch me a drink"], "spacy"),
     ],
-    [(["queue", "--help"], "pydrake"), (["queue", "add", "--wake", "--say=go"], "pydrake"), (CHECK, "cv2 pydrake")],
+    [(["queue", "--help"], "pydrake"), (["queue", "add", "--wake", "--say=go"], "pydrake"), (CHECK, "pydrake")],
 ]
 PROGRAM = f"""
 import sys
+from importlib.metadata import entry_points
 from executive.cli.entry import command_line
 for words in %r:
     sys.argv = ["errand", *words]
@@ -43,6 +44,7 @@ for words in %r:
     assert not [name for name in sys.modules if name.startswith("errand_")]
     print("imported:", *sorted({{name.split(".")[0] for name in sys.modules}} & {HEAVY!r}))
 print(*sorted(name for name in sys.modules if name.startswith("executive.language.")))
+print(*sorted({{entry.module for entry in entry_points(group="errand.skills")}} & sys.modules.keys()))
 """
 
 
@@ -68,9 +70,12 @@ def test_a_command_imports_no_heavy_library_that_it_does_not_use(call_in_process
     assert errors.count("--no-wake") == sum("--wake" in words for words, _ in calls)
 
 
-def test_a_check_imports_nothing_that_understands_sentences(call_in_process):
-    language = call_in_process([CHECK])[0][-1].split()
+def test_a_check_imports_nothing_that_understands_sentences_and_only_skills_of_the_mission(call_in_process):
+    language, skills = (line.split() for line in call_in_process([CHECK])[0][-2:])
     assert language == ["executive.language.parser", "executive.language.questions"]
+    assert {"skills.navigate.skill", "skills.manipulation.grasp.skill"} < set(skills)
+    assert not {"skills.small.speak", "skills.small.doors"} & set(skills)
+    assert not [name for name in skills if name.startswith("skills.people.")]
 
 
 @pytest.mark.parametrize(("arguments", "code"), [(["--help"], 0), (["parse"], 2)])

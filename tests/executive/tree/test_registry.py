@@ -9,7 +9,7 @@ import textwrap
 import tomllib
 from collections import defaultdict
 from collections.abc import Mapping
-from importlib.metadata import distributions
+from importlib.metadata import distributions, entry_points
 from pathlib import Path
 from typing import ClassVar
 
@@ -48,6 +48,7 @@ class Wave(Skill[WaveInputs]):
 @pytest.fixture
 def others(tmp_path, monkeypatch):
     """Make a distribution `name` that registers `entry` from a module with `source`; gives its entry points."""
+    monkeypatch.setattr("skills.inputs.plugins._all_installed", entry_points)
 
     def make(source=GOOD, *, name="wavers", entry="wave = {module}:Wave", module="wavers_skill"):
         folder = tmp_path / name
@@ -126,7 +127,7 @@ def test_another_distribution_cannot_take_the_name_of_one_of_ours(others):
 def test_a_skill_of_another_distribution_is_not_loaded_before_it_is_used(others):
     others("import sys\nsys.modules['was_loaded'] = sys\n" + GOOD)
     found = installed_skills()
-    assert "navigate" in found and "wave" in found.names
+    assert "navigate" in found and found["navigate"].name == "navigate" and "wave" in found.names
     assert "was_loaded" not in sys.modules
     assert found["wave"].name == "wave"
     assert sys.modules.pop("was_loaded")

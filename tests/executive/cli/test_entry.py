@@ -29,7 +29,7 @@ IMPORTS = [
         (["parse", "--open", "fetch me a drink"], "spacy"),
         (["parse", "Hey Alice, fetch me a drink"], "spacy"),
     ],
-    [(["queue", "--help"], "pydrake"), (["queue", "add", "--wake", "--say=go"], "pydrake"), (CHECK, "pydrake")],
+    [(["queue", "--help"], "pydrake"), (["queue", "add", "--wake", "--say=go"], "pydrake"), (CHECK, "cv2 pydrake")],
 ]
 PROGRAM = f"""
 import sys

@@ -24,10 +24,10 @@ LINES = {
     "executive/testing": 848,
     "executive/app": 7847,
     "executive/cli": 3781,
-    "skills": 28043,
-    "plant": 11147,
+    "skills": 28033,
+    "plant": 11146,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 417, 59, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 416, 59, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -22,7 +22,7 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1579,
     "executive/testing": 848,
-    "executive/app": 7846,
+    "executive/app": 7842,
     "executive/cli": 3781,
     "skills": 28033,
     "plant": 11146,

@@ -14,7 +14,7 @@ LINES = {
     "executive/words": 3416,
     "executive/language": 8240,
     "executive/speech": 1582,
-    "executive/mission": 1577,
+    "executive/mission": 1569,
     "executive/tree": 8573,
     "executive/run": 3261,
     "executive/record": 1403,

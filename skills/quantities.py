@@ -210,7 +210,7 @@ def number_of(value: Any, hint: Any) -> float:
         seconds = seconds_in(value) if _unit(hint) == "s" else None
         if seconds is None:
             form = f", {DURATION_FORM}" if _unit(hint) == "s" else ""
-            raise QuantityError(f"{wanted}{form}", _text_hint(value, hint))
+            raise QuantityError(f"{wanted}{form}", correction(value, hint) or f"it reads {display_text(value)} now")
         value = seconds
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise QuantityError(wanted, f"it reads {display_text(value)} now")
@@ -276,8 +276,8 @@ def _digits(value: float) -> str:
     return f"{value:.6g}"
 
 
-def _text_hint(text: str, hint: Any) -> str:
-    """Returns the correction of a text that gives no number."""
+def correction(text: str, hint: Any) -> str | None:
+    """Returns a hint at the correction of a text that gives no number; None without one."""
     words = text.strip()
     if len(words) > MOST_DIGITS:
         return "write a shorter one"
@@ -296,7 +296,7 @@ def _text_hint(text: str, hint: Any) -> str:
     size = 1.0 if unit and unit == _unit(hint) else _OTHERS.get(_unit(hint), {}).get(unit)
     if match is not None and size is not None:
         return f"write {float(match[1]) * size:.3g} for {words}"
-    return f"it reads {display_text(text)} now"
+    return None
 
 
 def unit_hint(value: float, hint: Any) -> str:

@@ -18,7 +18,7 @@ from executive.words.mission import Parameter
 from skills.inputs.errors import InputError, listing, nearest_name, suggestion, with_article
 from skills.inputs.outside import json_object, plain_text
 from skills.inputs.yaml_source import KeyPath, YamlSource, scalar_of
-from skills.quantities import LARGEST, Number, QuantityError, display_text, number_of
+from skills.quantities import LARGEST, Number, correction, display_text
 
 _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -117,20 +117,12 @@ def _fitting(parameter: Parameter, value: Any, name: str, source: YamlSource, *,
     if not fits:
         wanted = "true or false" if parameter.type == "truth" else with_article(parameter.type or "text")
         what = f"parameter '{name}' must be {wanted}, not {str(value)[:60]!r}"
-        raise source.error(here, what, _number_hint(value) if kind == (int, float) else f"give it {wanted}")
+        corrected = correction(value, Number) if kind == (int, float) and isinstance(value, str) else None
+        raise source.error(here, what, corrected or f"give it {wanted}")
     if parameter.choices and value not in parameter.choices:
         what = f"parameter '{name}' cannot be {str(value)[:60]!r}"
         raise source.error(here, what, f"it is one of {listing(map(str, parameter.choices), last='or')}")
     return value
-
-
-def _number_hint(value: Any) -> str:
-    """Hint for a value that is no number."""
-    try:
-        number_of(value, Number)
-    except QuantityError as error:
-        return error.hint if error.hint.startswith("write") else "give it a number"
-    return "give it a number"
 
 
 def round_source(source: YamlSource, steps: KeyPath, data: Any, name: str, value: Value) -> YamlSource:

@@ -149,13 +149,14 @@ class TreeRun:
     def log_changes(self, *, of_all: bool = False) -> Sequence[Change]:
         """Logs and returns the transitions since the last call, and logs new actions of running skills."""
         changes = self._observed.changes(of_all=of_all)
-        transitions = [change for change in changes if change.is_transition]
+        transitions, repeated = [change for change in changes if change.is_transition], self.context.hook.repeated
         for path_id, before, after in transitions:
             states = {"from": before.status.value, "to": after.status.value, "cause": after.cause}
-            self.context.publish(TRANSITIONS, {**self._activity(path_id, after), **states})
-        for change in changes:
-            if change.path_id in self._skills and change.is_activity:
-                self.context.publish(ACTIVITY, self._activity(change.path_id, change.after))
+            restored = {"restored": True} if path_id in repeated and after.status in _OUTCOMES else {}
+            self.context.publish(TRANSITIONS, {**self._activity(path_id, after), **states, **restored})
+        repeated.clear()
+        for change in (each for each in changes if each.path_id in self._skills and each.is_activity):
+            self.context.publish(ACTIVITY, self._activity(change.path_id, change.after))
         return transitions
 
     def halt(self, attempt: Attempt) -> None:
@@ -182,8 +183,7 @@ class TreeRun:
             outcome = Outcome.ERROR
         if ending is not None and not self.finished:
             outcome, cause, message = ending.outcome, ending.cause, ending.message
-        if self._endings:
-            message = "; ".join((message, *self._endings))
+        message = "; ".join((message, *self._endings))
         answers = {node.path_id: answer for node in self._nodes if (answer := node.answered()) is not None}
         findings, said = self._findings.findings, self._findings.said
         if findings and outcome is Outcome.SUCCESS:

@@ -58,9 +58,9 @@ class FileKind:
         try:
             yield
         except sqlite3.OperationalError as error:
-            if "full" in str(error):
+            if (code := getattr(error, "sqlite_errorcode", 0) & 0xFF) == sqlite3.SQLITE_FULL:
                 raise self.full_disk_error(path) from error
-            if "locked" in str(error) or "busy" in str(error):
+            if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
                 hint = "end the program that keeps it open, then try again"
                 raise StoreError(f"another program has locked the {self.name}", hint=hint, file=path) from error
             raise StoreError(f"{what} ({error})", hint=hint, file=path) from error

@@ -55,7 +55,7 @@ class Recollection:
         self._last: str | None = None
         self._begun_s: float | None = None
         self._world_untouched = True
-        self.dropped: set[str] = set()
+        self.dropped, self.repeated = set[str](), set[str]()
         self.log: list[str] = []
 
     def restrict(self, path_ids: Sequence[str]) -> Recollection:
@@ -80,6 +80,7 @@ class Recollection:
     def note_use(self, path_id: str, sentence: str) -> None:
         """Notes that a result was returned instead of work."""
         self._ended.pop(path_id, None)
+        self.repeated.add(path_id)
         self.log.append(f"{path_id}: {sentence}")
 
     def checkpoint(self, path_id: str) -> Mapping[str, Any]:
@@ -91,6 +92,7 @@ class Recollection:
         later = {path for path in self._ended if self._place[path] > self._place[path_id]}
         for path in {path_id, *later}:
             self._ended.pop(path, None)
+        self.repeated.discard(path_id)
         self.dropped |= later
         if self._world_untouched:
             self.log.append(f"{path_id}: {sentence}")

@@ -19,10 +19,11 @@ from executive.tree.behaviour import Conditional, ExplainedDecorator, ExplainedN
 from executive.tree.compiler import CompiledTree, build, writes
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.skill_leaf import Remembered, SkillLeaf
-from skills.api import Cause, Failed, Running, Skill, SkillContext, Step
+from executive.tree.nodes.skill_leaf import SkillLeaf
+from skills.api import Cause, Failed, Running, Skill, SkillContext, Step, Succeeded
 
 BEFORE: Final = "before the restart"
+_MARK: Final = f" ({BEFORE})"
 _DECLARED: Final = tuple(name for name, hint in Skill.__annotations__.items() if str(hint).startswith("ClassVar"))
 
 
@@ -32,11 +33,13 @@ class ResumedTree(CompiledTree):
 
     board: Mapping[str, Any] = field(default_factory=dict)
     restore: Callable[[ExplainedNode], object] = field(default=lambda node: None)
+    repeated: set[str] = field(default_factory=set)
 
     def build(self, context: RunContext) -> Behaviour:
         """Builds the py_trees tree, and fills its blackboard."""
         for key, value in self.board.items():
             context.board.put(key, value)
+        context.hook.repeated = self.repeated
         root = build(self.root, context)
         for node in root.iterate():
             if isinstance(node, ExplainedNode):
@@ -69,8 +72,8 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
         keys.answered_before: frozenset(by_status[Status.SUCCESS] & asked_again - over),
         keys.ended_before: frozenset((by_status[Status.SUCCESS] | by_status[Status.FAILURE]) - over),
     }
-    past = _Past(memory, specs)
-    return _as_resumed(tree, past.restore, {**memory.board, **again}, root=root), recollection
+    restore, board = _Past(memory, specs).restore, {**memory.board, **again}
+    return _as_resumed(tree, restore, board, root=root, repeated=recollection.repeated), recollection
 
 
 def ended_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recollection] | None:
@@ -177,13 +180,8 @@ def _repeat(node: ExplainedNode, step: StepRecord) -> None:
     node.hook.restored[node.path_id] = (step.status, step.cause, _before(step.message))
 
 
-def is_from_before(message: str) -> bool:
-    """Returns whether a node's message belongs to a result from before a restart."""
-    return message.endswith(f"({BEFORE})")
-
-
 def _before(message: str) -> str:
-    return message if is_from_before(message) else f"{message} ({BEFORE})"
+    return f"{message.removesuffix(_MARK)}{_MARK}"
 
 
 def resumed_skill(
@@ -258,7 +256,7 @@ class _Resumed(Skill[Any]):
         self._recollection.note_use(self._path, f"{result.status.value.lower()} {BEFORE}: {result.message}")
         message = _before(result.message)
         if result.status is Status.SUCCESS:
-            return Remembered(message, self._ports)
+            return Succeeded(message, self._ports)
         return Failed(result.cause or Cause.EXECUTION, message)
 
     def _work(self, sentence: str) -> None:

@@ -51,7 +51,8 @@ class Hook:
 
     A node at one of the `breakpoints` waits in the tick that would begin it, once; the next tick lets it pass. After a
     restart, `restored` has the states that nodes take in their first tick, `applied` the first answers of conditions
-    (`Conditional`), and `unheld` the decorators whose first run ticks the child whatever would hold it back.
+    (`Conditional`), and `unheld` the decorators whose first run ticks the child whatever would hold it back; `repeated`
+    collects the nodes that ended with a result from before the restart, until the run has logged them.
     """
 
     def __init__(self) -> None:
@@ -60,6 +61,7 @@ class Hook:
         self.restored: dict[str, tuple[Status, Cause | None, str]] = {}
         self.applied: dict[str, bool] = {}
         self.unheld: set[str] = set()
+        self.repeated: set[str] = set()
         self.touched: set[Behaviour] = set()
         self.stopped: set[Behaviour] = set()
 
@@ -83,6 +85,7 @@ class Hook:
             yield from node._tick()
             return
         node.restore(*restored)
+        self.repeated.add(node.path_id)
         yield node
 
     def note_stop(self, node: Any, new_status: Status) -> None:

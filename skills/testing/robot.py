@@ -49,7 +49,6 @@ _BATTERY_RUNTIME_S = 5400.0
 _CHARGING_S = 600.0
 _FINGER_M = 0.03
 _LEAST_CLAMP_N = 2.0
-_LACKS = "there is no "
 
 BASE_ONLY = Capabilities(
     footprint_m=((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25)),
@@ -231,28 +230,27 @@ class ScriptedRobot:
 
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
         """Lowers the body to the floor."""
-        return self._begin("stand", (0.2, 0.0), until_s, lease, "", verb="sit")
+        return self._begin("stand", (0.2, 0.0), until_s, lease, verb="sit")
 
     def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
         """Refuses: there is no docking station."""
-        return self._begin("dock", station, until_s, lease, "there is no docking station")
+        return self._begin("dock", station, until_s, lease, lacks="there is no docking station")
 
     def undock(self, *, until_s: float, lease: Lease) -> CommandId:
         """Refuses: there is no docking station."""
-        return self._begin("undock", None, until_s, lease, "there is no docking station")
+        return self._begin("undock", None, until_s, lease, lacks="there is no docking station")
 
     def open_door(self, handle: DoorHandle, *, until_s: float, lease: Lease) -> CommandId:
         """Refuses: there is no door command."""
-        return self._begin("open_door", handle, until_s, lease, "there is no door command")
+        return self._begin("open_door", handle, until_s, lease, lacks="there is no door command")
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory that begins near the arm's angles."""
-        return self._begin("move_arm", (trajectory, self.q_rad.copy()), until_s, lease, self._arm_fault(trajectory))
+        lacks, goal = "there is no arm" if self._capabilities.arm is None else "", (trajectory, self.q_rad.copy())
+        return self._begin("move_arm", goal, until_s, lease, "" if lacks else self._arm_fault(trajectory), lacks=lacks)
 
     def _arm_fault(self, trajectory: ArmTrajectory) -> str:
         """Reason why the arm cannot follow a trajectory; empty when it can."""
-        if self._capabilities.arm is None:
-            return "there is no arm"
         if trajectory.positions_rad.shape[1] != len(self.q_rad):
             return f"the arm has {len(self.q_rad)} joints, not {trajectory.positions_rad.shape[1]}"
         off = float(np.max(np.abs(trajectory.positions_rad[0] - self.q_rad)))
@@ -262,17 +260,17 @@ class ScriptedRobot:
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Points the head, which arrives at once."""
         head = self._capabilities.head
-        fault = "there is no head" if head is None else ""
+        fault, lacks = "", "there is no head" if head is None else ""
         if head is not None:
             axes = (pan_rad, head.pan_range_rad), (tilt_rad, head.tilt_range_rad)
             within = all(low <= angle <= high for angle, (low, high) in axes)
             fault = "" if within else f"the head cannot turn to pan {pan_rad:.2f}, tilt {tilt_rad:.2f} rad"
-        return self._begin("point_head", (pan_rad, tilt_rad), until_s, lease, fault)
+        return self._begin("point_head", (pan_rad, tilt_rad), until_s, lease, fault, lacks=lacks)
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Moves the gripper, which stops at an object between its fingers."""
-        fault = "" if self._capabilities.gripper is not None else "there is no gripper"
-        return self._begin("set_gripper", (opening, force_n), until_s, lease, fault)
+        lacks = "" if self._capabilities.gripper is not None else "there is no gripper"
+        return self._begin("set_gripper", (opening, force_n), until_s, lease, lacks=lacks)
 
     def carry(self, holding: bool, *, lease: Lease) -> None:
         """Notes whether the gripper must keep its object."""
@@ -324,12 +322,14 @@ class ScriptedRobot:
         driving = ("drive",) if float(np.max(np.abs(self.velocity))) > 0.01 else ()
         return (*driving, *(part for part in self._commands.moving_parts if part != "drive"))
 
-    def _begin(self, part: str, goal: object, until_s: float, lease: Lease, fault: str, *, verb: str = "") -> CommandId:
-        verb = verb or part
-        self.calls.append(verb)
+    def _begin(
+        self, part: str, goal: object, until_s: float, lease: Lease, fault: str = "", *, lacks: str = "", verb: str = ""
+    ) -> CommandId:
+        self.calls.append(verb := verb or part)
         causes = (
             (CommandCause.NO_LEASE, "the lease was taken away" if lease != self._lease else ""),
-            (CommandCause.UNSUPPORTED if fault.startswith(_LACKS) else CommandCause.INVALID, fault),
+            (CommandCause.UNSUPPORTED, lacks),
+            (CommandCause.INVALID, fault),
             (self.refusal_cause, self.refuse_because.get(verb, "")),
         )
         for cause, refusal in causes:

@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 
 from executive.cli.entry import app
 from executive.record.history import read_events
-from executive.store.resuming import is_from_before
 from plant.diagram import TIME_STEP_S
 from plant.snapshot_file import SnapshotError, read_snapshot
 
@@ -52,7 +51,7 @@ def began_s(leaf, out):
 def done_leaves(out):
     """The leaves that came to a good end by their own work, in both lives."""
     events = [event.data for log in sorted(out.glob("log*.mcap")) for event in read_events(log) if "node" in event.data]
-    good = [event for event in events if event.get("to") == "SUCCESS" and not is_from_before(event["message"])]
+    good = [event for event in events if event.get("to") == "SUCCESS" and not event.get("restored", False)]
     return [event["node"].rsplit("/", 1)[-1] for event in good]
 
 

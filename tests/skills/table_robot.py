@@ -74,10 +74,10 @@ class TableRobot(ScriptedRobot):
         grey = colour.mean(axis=-1).astype(np.uint8)
         return Image(self.now_s, source, frame, lens, lens, colour, grey, depth_m, frames)
 
-    def _begin(self, part, goal, until_s, lease, fault, *, verb=""):
-        self.commands.append((verb or part, goal, until_s))
+    def _begin(self, part, goal, until_s, lease, fault="", **more):
+        self.commands.append((more.get("verb", part), goal, until_s))
         answer = self.arm_answers.get(len(self.arm_commands)) if part == "move_arm" else None
-        return self._commands.add(answer) if answer else super()._begin(part, goal, until_s, lease, fault, verb=verb)
+        return self._commands.add(answer) if answer else super()._begin(part, goal, until_s, lease, fault, **more)
 
     def _move_arm(self, active, dt_s):
         self.q_rad = active.goal[0].positions_rad[-1].copy()

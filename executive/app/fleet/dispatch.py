@@ -8,7 +8,6 @@ from typing import Any, Final
 from executive.app.fleet.auction import Auction
 from executive.app.fleet.chain import best_split, options_for
 from executive.app.fleet.fleet_mission import (
-    EndedMission,
     FleetMission,
     FleetRobot,
     MissionProgress,
@@ -37,7 +36,6 @@ from executive.store.missions import GivenMissions, MissionState, MissionStore
 from executive.tree.board import Sign
 from executive.tree.node_view import node_view
 from executive.words.knowledge import BatteryFacts
-from plant.robots.robot_kind import PlacedRobot
 from skills.inputs.errors import listing
 
 LEFT_M: Final = 1.5
@@ -52,16 +50,14 @@ def silence(line: str) -> None:
 class Dispatch(Assigner):
     """Assigner of a store's missions to robots of a backend.
 
-    A robot whose battery is low returns its mission once its gripper is empty, and charges by its mission in `docks`.
+    A robot whose battery is low returns its mission once its gripper is empty, and charges by its mission `dock`.
     `tell` shows a line; `offers` builds the bids of the robots.
     """
 
     store: MissionStore
     missions: dict[int, FleetMission]
-    robots: Mapping[str, PlacedRobot]
+    robots: Mapping[str, FleetRobot]
     backend: Backend
-    faults: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    docks: Mapping[str, Prepared] = field(default_factory=dict)
     battery: BatteryFacts = field(default_factory=BatteryFacts)
     tell: Callable[[str], None] = field(default=silence)
     log: EventLog | None = None
@@ -76,17 +72,12 @@ class Dispatch(Assigner):
         for number in self.missions:
             follows = given[number].follows if number in given else None
             self._auction.add(number, after=follows if follows in self.missions else None)
-        self._robots = {
-            name: FleetRobot(placed, placed.start, dock=self.docks.get(name), faults=tuple(self.faults.get(name, ())))
-            for name, placed in self.robots.items()
-        }
-        self._offers = self.offers(self._robots, self.battery, self.backend.clock.now, self._auction)
-        self.over: list[EndedMission] = []
-        self._stopped: str | None = None
+        self._offers = self.offers(self.robots, self.battery, self.backend.clock.now, self._auction)
+        self._stopped = False
 
     def stop(self, reason: str) -> None:
         """Ends the run; missions under way stay in the queue. Signal handlers may call it."""
-        self._stopped = reason
+        self._stopped = True
 
     def assign(self) -> Sequence[RunEntry]:
         """Runs a round of the auction; returns the missions that begin now."""
@@ -97,21 +88,19 @@ class Dispatch(Assigner):
         for number, why in refused.items():
             self._finish(number, MissionState.FAILURE, why)
         for award in given.begun:
-            robot, mission = self._robots[award.robot], self.missions[award.mission]
-            robot.free_at_s = self._now_s + award.ends_s
-            self._given.give(award.mission, award.robot)
-            self.store.begin(award.mission)
-            if mission.since_s is None:
-                self.missions[award.mission] = replace(mission, since_s=self._now_s)
-            self.tell(f"{award.robot} has mission {award.mission}: {mission.stored.request.name}")
-            entries.append(self._entry(award.robot, mission))
+            robot, mission = self.robots[award.robot], self.missions[award.mission]
+            robot.mission, robot.free_at_s = mission, self._now_s + award.ends_s
+            mission.since_s = min(mission.since_s, self._now_s)
+            self._given.give(mission.number, robot.name)
+            self.store.begin(mission.number)
+            self.tell(f"{robot.name} has mission {mission.number}: {mission.stored.request.name}")
+            entries.append(self._entry(robot, mission))
         if given.begun:
             self._log_missions()
         for name in given.charging:
-            self._robots[name].to_dock = True
+            self.robots[name].to_dock = True
         if self._auction.waiting or self._auction.under_way:
-            resting = [name for name in self.robots if name in self._auction.resting]
-            entries += [self._dock_entry(name) for name in resting if self._robots[name].to_dock]
+            entries += [self._dock_entry(robot) for robot in self.robots.values() if robot.to_dock]
         return entries if len(refused) == len(given.refused) else [*entries, *self.assign()]
 
     def _split(self, number: int) -> bool:
@@ -141,112 +130,101 @@ class Dispatch(Assigner):
     def recall(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
         """Returns the robots that must stop, with the reason: low battery and empty gripper, or nothing left to do."""
         self._release_following(seen)
-        under_way = self._auction.under_way
-        low: dict[str, RobotStatus] = {}
-        for name, each in seen.items():
-            robot, is_low = self._robots[name], each.charge is not None and each.charge < self.battery.low
-            if name in under_way and is_low and robot.dock and not each.holding and not robot.progress.begun:
-                low[name] = each
-        idle = self._auction.resting if not under_way and not self._auction.waiting else ()
-        for name, robot in self._robots.items():
-            robot.recalled = name in low or name in idle
-        why = {name: f"its battery is at {each.charge:.0%}" for name, each in low.items()}
-        return {**why, **dict.fromkeys(idle, "nothing is left to do")}
+        for name, robot in self.robots.items():
+            robot.recalled = self._why_recalled(robot, seen.get(name))
+        return {name: robot.recalled for name, robot in self.robots.items() if robot.recalled is not None}
+
+    def _why_recalled(self, robot: FleetRobot, seen: RobotStatus | None) -> str | None:
+        """Returns why a robot must stop; None if it need not."""
+        if robot.name in self._auction.resting:
+            return None if self._auction.under_way or self._auction.waiting else "nothing is left to do"
+        if robot.mission is None or robot.dock is None or seen is None or seen.charge is None:
+            return None
+        low = seen.charge < self.battery.low and not seen.holding and not robot.progress.begun
+        return f"its battery is at {seen.charge:.0%}" if low else None
 
     def _release_following(self, seen: Mapping[str, RobotStatus]) -> None:
         """Lets a second part begin once the robot of the first has left the table or is no longer sent to its dock."""
-        for name, robot in self._robots.items():
+        for name, robot in self.robots.items():
             if robot.leaves is None:
                 continue
-            number, from_W = robot.leaves
-            pose = seen[name].pose if name in seen else None
+            pose, from_W = seen[name].pose if name in seen else None, robot.pose
             away_m = 0.0 if pose is None else math.hypot(pose.x_m - from_W.x_m, pose.y_m - from_W.y_m)
             if name not in self._auction.resting or away_m > LEFT_M:
-                robot.leaves = None
-                self._auction.done(number)
+                part, robot.leaves = robot.leaves, None
+                self._auction.done(part)
 
     def tick(self, progress: Progress) -> None:
         """Takes the changes of each robot's tree."""
         for name, note in progress.notes.items():
-            journal = self._robots[name].journal
+            journal = self.robots[name].journal
             if journal is not None:
                 journal.note(note)
 
     def mission_ended(self, end: MissionEnd) -> None:
         """Ends a robot's mission, or hands its rest to another robot."""
-        name = end.result.robot_name
-        robot = self._robots[name]
-        recalled, robot.recalled = robot.recalled, False
-        lost = self._update_robot(robot, end)
-        if lost is not None:
-            robot.lost = lost
-            self._auction.lose(name)
-            self.tell(f"{name} is given no more work: {lost}")
-        if name not in self._auction.under_way:
-            self._auction.resting.discard(name)
-            if end.result.outcome is not Outcome.SUCCESS and not recalled:
+        result, robot = end.result, self.robots[end.result.robot_name]
+        mission = robot.mission
+        recalled, robot.recalled = robot.recalled is not None, None
+        robot.lost = self._update_robot(robot, end)
+        if robot.lost is not None:
+            self._auction.lose(robot.name)
+            self.tell(f"{robot.name} is given no more work: {robot.lost}")
+        if mission is None:
+            self._auction.resting.discard(robot.name)
+            if result.outcome is not Outcome.SUCCESS and not recalled:
                 robot.dock = None  # it could not charge, and is not sent there again
-            self.tell(f"{name} is at {robot.charge:.0%}: {end.result.message}")
+            self.tell(f"{robot.name} is at {robot.charge:.0%}: {result.message}")
             return
-        if self._stopped is not None and end.result.outcome is Outcome.CANCELLED:
-            self._leave_in_queue(name, end)
-            return
-        if end.result.outcome is Outcome.SUCCESS:
-            self._end(name, end.result)
-            return
-        if lost is None and not recalled:
-            if not self._try_another(name, end):
-                self._end(name, end.result)
-            return
-        why = self._stuck(name, holding=end.seen is not None and end.seen.holding)
-        if why is not None or not self._auction.robots:
-            reason = f"{name} failed ({lost})"
-            self._end(name, replace(end.result, message=f"{reason}; {why or 'there is no other robot'}"))
-            return
-        self._hand_on(name, end.result)
-        if lost is None:
-            self._send_to_dock(name)
+        why = self._stuck(robot, mission, holding=end.seen is not None and end.seen.holding)
+        if result.outcome is Outcome.SUCCESS:
+            self._end(robot, mission, result)
+        elif self._stopped and result.outcome is Outcome.CANCELLED:
+            if why is None:
+                self._requeue(robot, mission, result)
+                self.tell(f"Mission {mission.number} stays in the queue: {result.message}")
+            else:
+                self._end(robot, mission, replace(result, message=f"{result.message}; {why}"))
+        elif robot.lost is None and not recalled:
+            if not self._try_another(robot, mission, end):
+                self._end(robot, mission, result)
+        elif why is not None or not self._auction.robots:
+            reason = f"{robot.name} failed ({robot.lost}); {why or 'there is no other robot'}"
+            self._end(robot, mission, replace(result, message=reason))
+        else:
+            self._hand_on(robot, mission, result)
+            if robot.lost is None:
+                self._send_to_dock(robot)
 
-    def _leave_in_queue(self, name: str, end: MissionEnd) -> None:
-        """Leaves a robot's mission to the next run, or cancels it if its progress is unknown."""
-        why = self._stuck(name, holding=end.seen is not None and end.seen.holding)
-        if why is not None:
-            self._end(name, replace(end.result, message=f"{end.result.message}; {why}"))
-            return
-        number = self._requeue(name, end.result)
-        self.tell(f"Mission {number} stays in the queue: {end.result.message}")
-
-    def _try_another(self, name: str, end: MissionEnd) -> bool:
+    def _try_another(self, robot: FleetRobot, mission: FleetMission, end: MissionEnd) -> bool:
         """Offers a failed mission to the other robots, once; returns whether one of them can do it.
 
         The robot's gripper must be empty, and it must not have released an object.
         """
-        number, robot = self._auction.under_way[name], self._robots[name]
-        mission, known = self.missions[number], self._robots[name].last_known
-        let_go = robot.progress.put or (known is not None and known.sign is Sign.RELEASED)
+        let_go = robot.progress.put or (robot.last_known is not None and robot.last_known.sign is Sign.RELEASED)
         clear = end.seen is not None and not end.seen.holding and not let_go
-        again = replace(mission, tried={name: f"it tried: {end.result.message}"})
-        others = (other for other in self._auction.robots if other != name)
+        again = replace(mission, tried={robot.name: f"it tried: {end.result.message}"})
+        others = (other for other in self._auction.robots if other != robot.name)
         if (
             end.result.outcome is not Outcome.FAILURE
             or mission.tried
-            or not (clear and is_plain(mission.options[name].tree))
+            or not (clear and is_plain(mission.options[robot.name].tree))
             or all(self._offers.new(again, other).problems for other in others)
         ):
             return False
-        self.missions[number] = again
-        self._hand_on(name, end.result)
+        mission.tried = again.tried
+        self._hand_on(robot, mission, end.result)
         return True
 
-    def _hand_on(self, name: str, result: RobotResult) -> None:
+    def _hand_on(self, robot: FleetRobot, mission: FleetMission, result: RobotResult) -> None:
         """Queues the rest of a robot's mission for another robot."""
-        number = self._requeue(name, result)
-        self.tell(f"Mission {number} waits for another robot: {result.message}")
+        self._requeue(robot, mission, result)
+        self.tell(f"Mission {mission.number} waits for another robot: {result.message}")
 
-    def _send_to_dock(self, name: str) -> None:
+    def _send_to_dock(self, robot: FleetRobot) -> None:
         """Sends a robot to its dock at the next round."""
-        self._auction.resting.add(name)
-        self._robots[name].to_dock = True
+        self._auction.resting.add(robot.name)
+        robot.to_dock = True
 
     def _update_robot(self, robot: FleetRobot, end: MissionEnd) -> str | None:
         """Updates a robot's state at the end of a mission; returns why it must stop working (None: it need not)."""
@@ -258,8 +236,7 @@ class Dispatch(Assigner):
         if end.gone is not None or end.result.outcome is Outcome.SUCCESS:
             return end.gone
         states = end.result.states
-        number = self._auction.under_way.get(end.result.robot_name)
-        prepared = robot.dock if number is None else self.missions[number].options[end.result.robot_name]
+        prepared = robot.dock if robot.mission is None else robot.mission.options[robot.name]
         lost = prepared is not None and is_lost(
             prepared.tree, lambda path: states[path].status if path in states else None
         )
@@ -268,10 +245,10 @@ class Dispatch(Assigner):
     def close(self) -> None:
         """Fails the returned missions that no other robot took; the others stay in the queue."""
         assigned = self._given.all()
-        for number in self._auction.waiting if self._stopped is None else ():
+        lost = {robot.name: robot.lost for robot in self.robots.values() if robot.lost is not None}
+        for number in () if self._stopped else self._auction.waiting:
             given = assigned.get(number)
             if given is not None and given.robot is not None:
-                lost = {name: robot.lost for name, robot in self._robots.items() if robot.lost is not None}
                 why = {**lost, **self.missions[number].tried}
                 reasons = listing([f"{name}: {each}" for name, each in why.items()])
                 self._finish(number, MissionState.FAILURE, f"no robot went on with it ({reasons})")
@@ -280,21 +257,18 @@ class Dispatch(Assigner):
     def _now_s(self) -> float:
         return self.backend.clock.now()
 
-    def _dock_entry(self, name: str) -> RunEntry:
+    def _dock_entry(self, robot: FleetRobot) -> RunEntry:
         """Begins a robot's charging mission."""
-        robot = self._robots[name]
         assert robot.dock is not None
-        robot.to_dock = False
         robot.free_at_s = self._now_s + charging_time_s(robot.charge, self.battery.charged)
-        robot.journal = None
-        self.tell(f"{name} goes to its dock: its battery is at {robot.charge:.0%}")
+        robot.journal, robot.to_dock = None, False
+        self.tell(f"{robot.name} goes to its dock: its battery is at {robot.charge:.0%}")
         self._announce(robot.dock)
-        return replace(self._robot_entry(name, robot.dock), tree=robot.dock.tree)
+        return replace(self._robot_entry(robot, robot.dock), tree=robot.dock.tree)
 
-    def _entry(self, name: str, mission: FleetMission) -> RunEntry:
+    def _entry(self, robot: FleetRobot, mission: FleetMission) -> RunEntry:
         """Begins a mission of a robot."""
-        robot, prepared = self._robots[name], mission.options[name]
-        number = mission.stored.id
+        prepared, number = mission.options[robot.name], mission.number
         done_before = self._given.all()[number].done
 
         def note(progress: MissionProgress) -> None:
@@ -302,19 +276,18 @@ class Dispatch(Assigner):
             self._given.progress(number, done_before + progress.done, "it was begun" if progress.begun else None)
 
         robot.journal = ProgressJournal(prepared.tree, note)
-        speaker_W = next(iter(self.robots.values())).start
-        entry = self._robot_entry(name, prepared)
+        speaker_W = next(iter(self.robots.values())).placed.start
+        entry = self._robot_entry(robot, prepared)
         self._announce(prepared)
         return replace(entry, tree=prepared.tree, speaker_W=speaker_W)
 
     def spare(self) -> Sequence[RunEntry]:
         """Returns the robots as they stand before their first mission."""
         options = next((mission.options for mission in self.missions.values()), {})
-        return [self._robot_entry(name, options[name]) for name in self.robots if name in options]
+        return [self._robot_entry(robot, options[name]) for name, robot in self.robots.items() if name in options]
 
-    def _robot_entry(self, name: str, prepared: Prepared) -> RunEntry:
+    def _robot_entry(self, robot: FleetRobot, prepared: Prepared) -> RunEntry:
         """Returns the robot with its faults and estimators, which are built once for all its missions."""
-        robot = self._robots[name]
         if robot.entry is None:
             disturbed = replace(prepared.request, scenario=Scenario(robot.faults))
             robot.entry = entry_for(replace(prepared, request=disturbed), self.backend, None)
@@ -323,14 +296,13 @@ class Dispatch(Assigner):
     def _announce(self, prepared: Prepared) -> None:
         if self.log is not None:
             world, seed = prepared.world.name, prepared.request.seed
-            kinds = {name: robot.kind for name, robot in self.robots.items()}
+            kinds = {name: robot.placed.kind for name, robot in self.robots.items()}
             tree, clock, known = prepared.tree, self.backend.clock, prepared.knowledge
             announce(self.log, clock, tree.robot_name, tree.commands, known, world=world, seed=seed, robots=kinds)
 
-    def _stuck(self, name: str, *, holding: bool) -> str | None:
+    def _stuck(self, robot: FleetRobot, mission: FleetMission, *, holding: bool) -> str | None:
         """Returns why no other robot can continue a robot's mission; None if one can."""
-        robot, mission = self._robots[name], self.missions[self._auction.under_way[name]]
-        progress = robot.progress
+        progress, name = robot.progress, robot.name
         if not progress.begun:
             return None
         commands = mission.options[name].tree.commands[progress.done :]
@@ -339,53 +311,48 @@ class Dispatch(Assigner):
             return f"the {held or 'object'} is in {name}'s gripper"
         return f"{name} had begun it, and it is not known how far it came"
 
-    def _requeue(self, name: str, result: RobotResult) -> int:
-        """Queues the rest of a robot's mission; returns its number."""
-        number = self._auction.hand_back(name)
-        mission, robot = self.missions[number], self._robots[name]
+    def _requeue(self, robot: FleetRobot, mission: FleetMission, result: RobotResult) -> None:
+        """Queues the rest of a robot's mission."""
+        robot.mission = None
+        self._auction.hand_back(robot.name)
         done, known = robot.progress.done, robot.last_known
-        shares = (Share(mission.options[name].tree, result, done),) if done else ()
-        options = {other: rest_of(each, done, known) for other, each in mission.options.items()}
-        self.missions[number] = replace(mission, options=options, shares=(*mission.shares, *shares))
-        self._given.hand_back(number, known)
-        self.store.finish(number, MissionState.QUEUED, "")
+        if done:
+            mission.shares = (*mission.shares, Share(mission.options[robot.name].tree, result, done))
+        mission.options = {other: rest_of(each, done, known) for other, each in mission.options.items()}
+        self._given.hand_back(mission.number, known)
+        self.store.finish(mission.number, MissionState.QUEUED, "")
         self._log_missions()
-        return number
 
-    def _end(self, name: str, result: RobotResult) -> None:
+    def _end(self, robot: FleetRobot, mission: FleetMission, result: RobotResult) -> None:
         """Judges and ends a robot's mission."""
-        number = self._auction.under_way.pop(name)
-        mission = self.missions[number]
-        tree, since_s = mission.options[name].tree, mission.since_s or 0.0
-        report = self.backend.judge(tree, result, before=mission.shares, since_s=since_s)
+        robot.mission = None
+        number = self._auction.under_way.pop(robot.name)
+        tree = mission.options[robot.name].tree
+        report = self.backend.judge(tree, result, before=mission.shares, since_s=mission.since_s)
         seen = None if report is None else {key: value for key, value in vars(report).items() if key != "events"}
         self._given.judge(number, seen)
-        ended = EndedTree(
-            tree, node_view(tree.root, result.states), robot_report(result, self.robots[name].kind, report)
-        )
-        self.over.append(EndedMission(number, ended, since_s, self._now_s))
-        self._end_part(number, Share(tree, result, len(tree.parts)), seen)
+        own_report = robot_report(result, robot.placed.kind, report)
+        mission.ended, mission.until_s = EndedTree(tree, node_view(tree.root, result.states), own_report), self._now_s
+        self._end_part(robot, mission, Share(tree, result, len(tree.parts)), seen)
         tried = {} if result.outcome is Outcome.SUCCESS else mission.tried
-        known, reasons = self._robots[name].last_known, (f"{other} before: {why}" for other, why in tried.items())
+        known, reasons = robot.last_known, (f"{other} before: {why}" for other, why in tried.items())
         lies = known is not None and known.sign is not Sign.SEEN and result.outcome is not Outcome.SUCCESS
         message = "; ".join([result.message, *([str(known)] if lies else []), *reasons])
         self._finish(number, MissionState(result.outcome.value), message)
 
-    def _end_part(self, number: int, share: Share, seen: Mapping[str, Any] | None) -> None:
+    def _end_part(self, robot: FleetRobot, mission: FleetMission, share: Share, seen: Mapping[str, Any] | None) -> None:
         """Ends a part of a mission: the robot leaves the table to the next one; the last part judges the whole.
 
         Does nothing for a mission that is no part.
         """
         given = self._given.all()
-        mission, whole = self.missions[number], given[number].part_of
-        following = [part for part, each in given.items() if each.follows == number]
+        whole = given[mission.number].part_of
+        following = [self.missions[part] for part, each in given.items() if each.follows == mission.number]
         for part in following:
-            shares = (*mission.shares, share)
-            self.missions[part] = replace(self.missions[part], since_s=mission.since_s, shares=shares)
-        name = share.tree.robot_name
-        if following and name in self._auction.robots and self._robots[name].dock is not None:
-            self._send_to_dock(name)
-            self._robots[name].leaves = (number, self._robots[name].pose)
+            part.since_s, part.shares = mission.since_s, (*mission.shares, share)
+        if following and robot.lost is None and robot.dock is not None:
+            self._send_to_dock(robot)
+            robot.leaves = mission.number
         if whole is not None and not following:
             self._given.judge(whole, seen)
 
@@ -394,7 +361,7 @@ class Dispatch(Assigner):
         self.store.finish(number, state, message)
         self.tell(f"Mission {number}: {state.value}: {message}")
         if state is MissionState.SUCCESS:
-            if all(robot.leaves is None or robot.leaves[0] != number for robot in self._robots.values()):
+            if all(robot.leaves != number for robot in self.robots.values()):
                 self._auction.done(number)
         else:
             self._auction.drop(number)

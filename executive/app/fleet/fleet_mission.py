@@ -46,20 +46,27 @@ _HEADINGS: Final = 16
 NOT_GIVEN: Final = GivenMission()
 
 
-@dataclass(frozen=True)
+@dataclass
 class FleetMission:
     """Queued mission, prepared for each robot that may do it: `options` hold the remaining commands.
 
-    It began at `since_s` (s on the robots' clock; None: not yet). `shares` are the parts that other robots did;
-    `tried` maps a robot that failed to the reason. The store holds the rest of its state
-    (`executive.store.missions.GivenMission`).
+    It runs from `since_s` to `until_s` (s on the robots' clock; infinite: not yet), and `ended` is its last tree.
+    `shares` are the parts that other robots did; `tried` maps a robot that failed to the reason. The store holds the
+    rest of its state (`executive.store.missions.GivenMission`).
     """
 
     stored: StoredMission
     options: Mapping[str, Prepared]
-    since_s: float | None = None
+    since_s: float = math.inf
+    until_s: float = math.inf
     shares: tuple[Share, ...] = ()
     tried: Mapping[str, str] = field(default_factory=dict)
+    ended: EndedTree | None = None
+
+    @property
+    def number(self) -> int:
+        """Number of the mission in the store."""
+        return self.stored.id
 
 
 def fleet_mission(
@@ -154,15 +161,15 @@ def charging_missions(world: World, knowledge: Knowledge, robots: Mapping[str, P
 
 def bid_for(mission: FleetMission, now: FleetRobot, low: float) -> Bid:
     """Returns a free robot's bid for a mission: problems, duration, and the charge left, at least `low`."""
-    robot, planner = now.placed.name, now.routes(mission)
+    robot, planner = now.name, now.routes(mission)
     prepared = mission.options.get(robot)
     if prepared is None:
         other = next(iter(mission.options))
-        return Bid(mission.stored.id, robot, 0.0, 0.0, problems=(f"it is for {other}",))
+        return Bid(mission.number, robot, 0.0, 0.0, problems=(f"it is for {other}",))
     checked = _checked_from(now.pose, prepared, planner)
     taken, left = checked.estimate, now.charge - checked.estimate.charge
     problems = (*(error.message for error in checked.errors), *_out_of_reach(prepared, now.pose, planner))
-    bid = Bid(mission.stored.id, robot, 0.0, taken.duration_s, left, problems=problems)
+    bid = Bid(mission.number, robot, 0.0, taken.duration_s, left, problems=problems)
     if left >= low or problems:
         return bid
     charged = prepared.knowledge.battery.charged
@@ -296,9 +303,15 @@ class ProgressJournal:
 class FleetRobot:
     """State of a robot of the fleet: its pose and charge when it is free next, at `free_at_s` (s on the robots' clock).
 
-    `dock` is its charging mission; None if it cannot charge. A robot that is `lost`, for a reason, is given no more
-    work; one that is `recalled` stops its mission, and one that is `to_dock` charges at the next round. It `leaves` the
-    table of a split mission's first part, by its number, from a pose.
+    `dock` is its charging mission; None if it cannot charge.
+
+    | the robot | its record |
+    |---|---|
+    | works | `mission` is the mission under way |
+    | goes to its dock in the next round | `to_dock`; the auction lets it rest until it is charged |
+    | leaves a table to another robot meanwhile | `leaves` is the number of the part that it has done there |
+    | must stop | `recalled` is the reason |
+    | gets no more work | `lost` is the reason |
     """
 
     placed: PlacedRobot
@@ -310,10 +323,16 @@ class FleetRobot:
     dock: Prepared | None = None
     planner: RoutePlanner | None = None
     faults: tuple[str, ...] = ()
-    lost: str | None = None
-    recalled: bool = False
+    mission: FleetMission | None = None
     to_dock: bool = False
-    leaves: tuple[int, Pose2D] | None = None
+    leaves: int | None = None
+    recalled: str | None = None
+    lost: str | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+        return self.placed.name
 
     def ready_s(self, now_s: float, *, busy: bool) -> float:
         """Time until it is free (s); a robot that is already late is assumed to take as long again."""
@@ -357,8 +376,8 @@ class Offers:
         """Returns a robot's bid for a mission of the queue, computed before if nothing has changed."""
         robot = self._robots[name]
         if (tried := wanted.tried.get(name)) is not None:
-            return Bid(wanted.stored.id, name, 0.0, 0.0, problems=(tried,))
-        key = (wanted.stored.id, name, len(wanted.shares), robot.pose, robot.charge, name in self._auction.resting)
+            return Bid(wanted.number, name, 0.0, 0.0, problems=(tried,))
+        key = (wanted.number, name, len(wanted.shares), robot.pose, robot.charge, name in self._auction.resting)
         if key not in self._known:
             self._known[key] = self.new(wanted, name)
         return replace(self._known[key], ready_s=self._ready_s(name))
@@ -393,16 +412,6 @@ class Offers:
             for d_m in arm.standing_m
             for yaw in yaws
         )
-
-
-@dataclass(frozen=True)
-class EndedMission:
-    """Mission that a robot has ended, with its tree; it ran between two times (s on the robots' clock)."""
-
-    number: int
-    ended: EndedTree
-    since_s: float
-    until_s: float
 
 
 def missions_json(store: MissionStore, numbers: Sequence[int]) -> list[dict[str, Any]]:

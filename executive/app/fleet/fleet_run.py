@@ -12,6 +12,7 @@ from executive.app.fleet.dispatch import Dispatch, silence
 from executive.app.fleet.fleet_mission import (
     NOT_GIVEN,
     FleetMission,
+    FleetRobot,
     charging_missions,
     fleet_mission,
     missions_json,
@@ -157,16 +158,13 @@ def simulated_fleet(
     if not missions:
         left_out.raise_any()
     compile_first()
-    return Dispatch(
-        store,
-        missions,
-        robots,
-        SimulatedBackend(where, robots, seed=seed, record=record),
-        faults or {},
-        charging_missions(where, knowledge, robots),
-        knowledge.battery,
-        tell,
-    )
+    docks, faults = charging_missions(where, knowledge, robots), faults or {}
+    fleet = {
+        name: FleetRobot(placed, placed.start, dock=docks.get(name), faults=tuple(faults.get(name, ())))
+        for name, placed in robots.items()
+    }
+    backend = SimulatedBackend(where, robots, seed=seed, record=record)
+    return Dispatch(store, missions, fleet, backend, knowledge.battery, tell)
 
 
 def _world_of(queued: Sequence[StoredMission]) -> World:
@@ -183,7 +181,7 @@ def _write_report(
     dispatch: Dispatch, out: Path, artifacts: Artifacts, events: Sequence[Event], facts: Sequence[tuple[str, str]]
 ) -> None:
     """Writes the report of a fleet's run into the folder `out`."""
-    kinds = {name: robot.kind for name, robot in dispatch.robots.items()}
+    kinds = {name: robot.placed.kind for name, robot in dispatch.robots.items()}
     values = missions_json(dispatch.store, list(dispatch.missions))
     rows: list[MissionRow] = []
     for row, full in zip(missions_message(dispatch.store, values)["missions"], values, strict=True):
@@ -193,11 +191,12 @@ def _write_report(
         number, robot = row["id"], row["robot"] or ""
         rows.append(MissionRow(number, row["sentence"], robot, good, word, row["reassigned"], row["message"]))
     parts: list[ReportPart] = []
-    for each in dispatch.over:
-        tree, kind = each.ended.tree, each.ended.report.kind
-        own = [event for event in events if each.since_s <= event.stamp_s <= each.until_s]
-        title = f"Mission {each.number}, {tree.robot_name} ({kind}): {tree.mission_name}"
-        parts.append(part_of(each.ended, tuple(kinds), artifacts, own, title=title))
+    for each in sorted(dispatch.missions.values(), key=lambda each: each.until_s):
+        if each.ended is not None:
+            tree, kind = each.ended.tree, each.ended.report.kind
+            own = [event for event in events if each.since_s <= event.stamp_s <= each.until_s]
+            title = f"Mission {each.number}, {tree.robot_name} ({kind}): {tree.mission_name}"
+            parts.append(part_of(each.ended, tuple(kinds), artifacts, own, title=title))
     page = ReportPage(
         title="Fleet",
         request=f"{sum(row.good is True for row in rows)} of {len(rows)} missions done",

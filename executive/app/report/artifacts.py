@@ -14,7 +14,6 @@ import numpy as np
 from executive.record.history import Event
 from executive.record.schemas import DESTINATION, TRANSITIONS, TREE
 from executive.run.visitor import RunVisitor
-from executive.store.resuming import is_from_before
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.view.map_picture import newest_zones
 from executive.view.text import ROBOT_COLOURS, rgb_of
@@ -87,7 +86,7 @@ class Artifacts(RunVisitor):
             own.detection = own.detection or own.seen
         if topic == ANSWER_TOPIC:
             message = self._with_picture(message, own)
-        if topic == TRANSITIONS and message["to"] == "SUCCESS" and not is_from_before(str(message["message"])):
+        if topic == TRANSITIONS and message["to"] == "SUCCESS" and not message.get("restored", False):
             name = _MOMENTS.get(str(message["node"]).rsplit("/", 1)[-1])
             if name is not None:
                 own.moments[name] = float(message["t"])

@@ -52,10 +52,11 @@ _MOST_STARTS: Final = 1000
 
 @dataclass(frozen=True)
 class FinishedRun:
-    """Report of an ended run, and the last state of its tree."""
+    """Report of an ended run, the last state of its tree, and whether the terminal was closed meanwhile."""
 
     report: RunReport
     tree: NodeView
+    hung_up: bool = False
 
 
 def run_request(
@@ -103,7 +104,7 @@ def run_request(
         if profile is not None:
             watching.append(RunProfile(profile, backend, (artifacts, log), journals))
         watching += backend.visitors(control := control or Control(pace=None))
-        with ended_by_signals(control.cancel), closing(worker or LockStepWorker(clock)) as jobs:
+        with ended_by_signals(control.cancel) as ending, closing(worker or LockStepWorker(clock)) as jobs:
             at = jobs if profile is None else TimedWorker(jobs, partial(profile.timed, "planning"))
             result = run(
                 entries, clock=clock, worker=at, visitors=watching, settings=settings, control=control, spare=spare
@@ -117,7 +118,7 @@ def run_request(
     finished, recording = _conclude(prepared, backend, result, log, artifacts, counts)
     if page is not None:
         page.offer(recording)
-    return finished
+    return replace(finished, hung_up=ending.hung_up)
 
 
 def _conclude(

@@ -15,7 +15,6 @@ from executive.app.report.run_report import RunReport
 from executive.app.runs.backend import Durable
 from executive.app.runs.one_run import FinishedRun, log_name, return_memory, run_request
 from executive.app.runs.page_view import PageView
-from executive.app.runs.signals import HUNG_UP
 from executive.language.questions import Answerer
 from executive.record.work import Profile
 from executive.run.control import Control
@@ -63,7 +62,7 @@ class Screen(Protocol):
 class MissionResult:
     """Result of a stored mission. A mission that was set aside has no report.
 
-    `past` has a line for each restored part of a resumed mission.
+    `past` has a line for each restored part of a resumed mission; `hung_up` says that the terminal was closed.
     """
 
     mission: int
@@ -72,11 +71,7 @@ class MissionResult:
     message: str = ""
     report: RunReport | None = None
     past: tuple[str, ...] | None = None
-
-    @property
-    def hung_up(self) -> bool:
-        """True if it ended because its terminal was closed."""
-        return self.message == HUNG_UP
+    hung_up: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """Returns its report as JSON values, with the mission's number."""
@@ -219,11 +214,11 @@ class MissionRuns:
                 finished = self._run_prepared(prepared, durable=durable, **vars(options))
             self._screen.conclude(finished)
             ended(finished.report)
-        report, past = finished.report, None if resumed is None else resumed.lines
+        report, past, hung_up = finished.report, None if resumed is None else resumed.lines, finished.hung_up
         if past is not None:
             self._screen.tell("\n  ".join(["What it did before:", *past]))
         self._screen.name_files(prepared.request.out)
-        return MissionResult(mission.id, report.outcome, report.achieved, report.message, report, past)
+        return MissionResult(mission.id, report.outcome, report.achieved, report.message, report, past, hung_up)
 
     @contextmanager
     def _cancelling(self, control: Control) -> Iterator[None]:

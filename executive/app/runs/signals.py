@@ -1,5 +1,7 @@
 """Signals that end a run in order: Ctrl-C, SIGTERM, and the end of the terminal."""
 
+from __future__ import annotations
+
 import os
 import signal
 import threading
@@ -9,51 +11,49 @@ from types import FrameType
 from typing import Final
 
 _OUTPUTS: Final = (1, 2)
-_REASON: Final = "cancelled by {}"
-HUNG_UP: Final = _REASON.format(signal.SIGHUP.name)
-"""Reason of a run that ended because its terminal was closed."""
 
 
 @contextmanager
-def ended_by_signals(end: Callable[[str], None]) -> Iterator[None]:
-    """Calls `end` with the reason at Ctrl-C, SIGTERM and the end of the terminal; nested blocks call the inner first.
+def ended_by_signals(end: Callable[[str], None]) -> Iterator[Ending]:
+    """Yields a handler that calls `end` with the reason at Ctrl-C, SIGTERM and the end of the terminal.
 
-    A second Ctrl-C raises KeyboardInterrupt. Output after the end of the terminal is dropped. Under `nohup` the end of
-    the terminal ends nothing.
+    Nested blocks call the inner first. A second Ctrl-C raises KeyboardInterrupt. Output after the end of the terminal
+    is dropped. Under `nohup` the end of the terminal ends nothing.
     """
+    ending = Ending(end, [output for output in _OUTPUTS if os.isatty(output)])
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield ending
         return
     numbers = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         numbers.append(signal.SIGHUP)
-    ending = _Ending(end, [output for output in _OUTPUTS if os.isatty(output)])
     before = {number: signal.signal(number, ending) for number in numbers}
-    ending.outer = next((each for each in before.values() if isinstance(each, _Ending)), None)
+    ending.outer = next((each for each in before.values() if isinstance(each, Ending)), None)
     try:
-        yield
+        yield ending
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
-class _Ending:
-    """Handler of the signals."""
+class Ending:
+    """Handler of the signals; `hung_up` says that the terminal was closed."""
 
     def __init__(self, end: Callable[[str], None], terminals: Sequence[int]) -> None:
         self._end, self._terminals = end, terminals
-        self._asked = False
-        self.outer: _Ending | None = None
+        self._asked = self.hung_up = False
+        self.outer: Ending | None = None
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Handles a signal."""
         if number == signal.SIGHUP:
+            self.hung_up = True
             _drop_output(self._terminals)
         elif self._asked:
             raise KeyboardInterrupt
         else:
             self._asked = True
-        self._end(_REASON.format(signal.Signals(number).name))
+        self._end(f"cancelled by {signal.Signals(number).name}")
         if self.outer is not None:
             self.outer(number, frame)
 

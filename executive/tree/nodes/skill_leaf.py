@@ -41,10 +41,6 @@ _DRIVES: Final = frozenset({"navigate", "guide_person"})
 _SIGNS: Final = {"observation": Sign.SEEN, "released_W": Sign.RELEASED}
 
 
-class Remembered(Succeeded):
-    """Success from before a restart, whose data was fresh then."""
-
-
 class SkillLeaf(ExplainedLeaf):
     """Leaf that runs one skill.
 
@@ -241,7 +237,7 @@ class SkillLeaf(ExplainedLeaf):
         limit_s = self.limit_s * (self.context.zone_map().slowdown if drives else 1.0)
         if self._time.elapsed_s() > limit_s and not isinstance(step, Failed):
             return Failed(Cause.TIMEOUT, f"{self.name} took longer than {limit_s:g} s ({step.message})")
-        if isinstance(step, Succeeded):
+        if isinstance(step, Succeeded) and self.path_id not in self.hook.repeated:
             success = step
             return self._guarded(lambda: refuse_stale(self.skill, success, self.context))
         return step
@@ -291,8 +287,6 @@ def _drive_goal(node: NodeSpec, walk: Walk) -> Pose2D | None:
 
 def refuse_stale(skill: type[Skill[Any]], success: Succeeded, context: RunContext) -> Succeeded | Failed:
     """Returns the success, or a failed postcondition if its data is older than the skill allows."""
-    if isinstance(success, Remembered):
-        return success
     for source, most_s in skill.max_data_age_s.items():
         stamp_s = _stamp_s(source, success.outputs, context)
         if stamp_s is None:

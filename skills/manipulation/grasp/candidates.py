@@ -1,10 +1,11 @@
-"""Grasp candidates from the shape of an observed object, and the reasons for a lack of them.
+"""Grasp candidates from the shape of an observed object, the reasons for a lack of them, and those tried before.
 
 The gripper closes along the hand's z axis, which is kept level: from the side with the wrist rolled for upright
 objects, from above for low ones and for the tops of upright ones.
 """
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -15,6 +16,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from skills.manipulation.arm.poses import hand_rotation
 from skills.manipulation.grasp.placements import Placement, Target, placements
 from skills.perception.class_forms import class_form
+from skills.quantities import Coordinate, Cosine
 from skills.robot import FloatArray, GripperCapabilities, GripperKind
 from skills.world_model import ObjectKind
 
@@ -59,6 +61,10 @@ _AHEAD_OF_PALM_M = 0.008
 """Gap between the palm and an upright object that is grasped from the side."""
 _TIPS_UP_M = 0.012
 """Least height of the fingertips over the surface when an upright object is grasped from above."""
+_SAME_TURN_RAD = 0.35
+"""Grasps whose directions differ by less are the same."""
+_SAME_PLACE_M = 0.03
+"""Grasps whose hands are nearer than this are the same."""
 
 
 @dataclass(frozen=True)
@@ -253,3 +259,48 @@ def why_no_candidates(target: Target, p_BS: FloatArray, gripper: GripperCapabili
             f"and the fingers need {1000 * least_m:.0f} mm"
         )
     return f"the fingers find no hold on the {name}: no straight part of its outline is as wide as they are"
+
+
+@dataclass(frozen=True)
+class TriedGrasp:
+    """Grasp in the world's axes: directions of the fingers and of their closing, the hand from the object (m)."""
+
+    pointing_W: tuple[Cosine, Cosine, Cosine]
+    closing_W: tuple[Cosine, Cosine, Cosine]
+    hand_from_object_W: tuple[Coordinate, Coordinate, Coordinate]
+
+
+def tried_grasp(candidate: GraspCandidate, centre_B: tuple[float, float], X_WB: RigidTransform) -> TriedGrasp:
+    """Returns a candidate as a tried grasp; `centre_B` is the object's centre (x, y), X_WB the body's pose then."""
+    R_WH = X_WB.rotation().matrix() @ candidate.X_BH.rotation().matrix()
+    p_B = candidate.X_BH.translation() - np.array([*centre_B, 0.0])
+    return TriedGrasp(_vector(R_WH[:, 0]), _vector(R_WH[:, 2]), _vector(X_WB.rotation().matrix() @ p_B))
+
+
+def others_first(
+    candidates: Sequence[GraspCandidate],
+    tried: Sequence[TriedGrasp],
+    centre_B: tuple[float, float],
+    X_WB: RigidTransform,
+) -> list[GraspCandidate]:
+    """Returns the candidates in their order, with those like a tried grasp last."""
+
+    def was_tried(candidate: GraspCandidate) -> bool:
+        now = tried_grasp(candidate, centre_B, X_WB)
+        return any(same_grasp(now, before) for before in tried)
+
+    return sorted(candidates, key=was_tried)
+
+
+def same_grasp(one: TriedGrasp, other: TriedGrasp) -> bool:
+    """Returns whether two grasps are the same but for small differences; the gripper may be turned over."""
+    least = math.cos(_SAME_TURN_RAD)
+    pointing = float(np.dot(one.pointing_W, other.pointing_W))
+    closing = abs(float(np.dot(one.closing_W, other.closing_W)))
+    apart_xy_m = float(np.linalg.norm(np.subtract(one.hand_from_object_W, other.hand_from_object_W)[:2]))
+    return pointing > least and closing > least and apart_xy_m < _SAME_PLACE_M
+
+
+def _vector(values: FloatArray) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)

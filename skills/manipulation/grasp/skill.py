@@ -16,19 +16,20 @@ from skills.manipulation.arm.collision import ArmScene, box_corners
 from skills.manipulation.arm.held_object import held_box, square_hand_pose
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import TALL_M, close_viewpoints, overview_viewpoints, sees_closely
-from skills.manipulation.grasp.candidates import THIN_M, GraspCandidate, least_mass_kg, why_no_candidates, why_too_heavy
+from skills.manipulation.grasp.candidates import (
+    THIN_M,
+    GraspCandidate,
+    TriedGrasp,
+    least_mass_kg,
+    others_first,
+    tried_grasp,
+    why_no_candidates,
+    why_too_heavy,
+)
 from skills.manipulation.grasp.close_view import LOOK_HALF_SIDE_M, CloseView, examine, square
 from skills.manipulation.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, pull_back_B
-from skills.manipulation.grasp.reach import (
-    WIDE,
-    heights_to_grasp,
-    openings,
-    passing,
-    space_about,
-    up_B,
-)
+from skills.manipulation.grasp.reach import WIDE, heights_to_grasp, openings, passing, space_about, up_B
 from skills.manipulation.grasp.servo import Aim, aim_approach, measure_shift
-from skills.manipulation.grasp.tried_grasps import TriedGrasp, others_first, tried_grasp
 from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image

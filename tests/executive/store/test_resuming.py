@@ -51,6 +51,7 @@ class World:
         self.grasps = self.places = 0
         self.in_the_way = ()
         self.work = []
+        self.transitions = []
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,9 +148,9 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
             tree, recollection = resumed_tree(tree, store.memory(mission.id))
             journal.use_recollection(recollection)
         store.begin(mission.id)
-        ticks = Ticks(journal, kill_after, kill_when, lag)
-        script.begun.clear()
-        world.work.clear()
+        ticks = Ticks(journal, kill_after, kill_when, lag, world.transitions)
+        for each in (script.begun, world.work, world.transitions):
+            each.clear()
         robot.holder = None
         entry = RunEntry(tree, robot, make.StillLocaliser(), make.EmptyCostmap())
         try:
@@ -166,8 +167,14 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
 class Ticks(RunVisitor):
     """Passes notes on, the last few excepted, and kills."""
 
-    def __init__(self, journal, kill_after, kill_when, lag):
+    def __init__(self, journal, kill_after, kill_when, lag, transitions):
         self.journal, self.kill_after, self.kill_when, self.lag, self.count = journal, kill_after, kill_when, lag, 0
+        self.transitions = transitions
+
+    def message(self, topic, message):
+        if topic == "transitions":
+            self.transitions.append(message)
+        return message
 
     def tick(self, progress):
         self.count += 1
@@ -279,6 +286,14 @@ def test_finished_steps_are_reported_and_not_repeated(resumed, script):
     told = "\n".join(recollection.log)
     assert "find/counter-1/detect: success before the restart: seen" in told
     assert "goes on here" in told
+
+
+def test_the_log_marks_the_transitions_that_repeat_results_from_before(resumed, world):
+    resumed(FETCH_AND_ASK, kill_after=12)
+    ended = [each for each in world.transitions if each["to"] in ("SUCCESS", "FAILURE")]
+    restored = {(each["node"].rsplit("/", 1)[-1], each["to"]) for each in ended if each.get("restored")}
+    assert restored >= {("remember-start", "SUCCESS"), ("detect", "FAILURE"), ("detect", "SUCCESS")}
+    assert [each["node"] for each in ended if each["node"].endswith("hand-over") and "restored" not in each]
 
 
 def test_a_look_that_found_nothing_anywhere_is_not_repeated(resumed):

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from executive.app.fleet.auction import Bid
 from executive.app.fleet.dispatch import Dispatch
-from executive.app.fleet.fleet_mission import FleetMission, Offers, missions_json
+from executive.app.fleet.fleet_mission import FleetMission, FleetRobot, Offers, missions_json
 from executive.app.fleet.fleet_run import run_fleet
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.page_view import PageView
@@ -128,21 +128,21 @@ class Fleet:
         self.since_s.append(since_s)
 
     def run(self, page=None, live=None):
-        placed = {name: PlacedRobot(name, "spot", START) for name in ROBOTS}
-        docks = {name: self._docking(name) for name in ROBOTS}
-        bidding = partial(ScriptedOffers, self)
-        dispatch = Dispatch(self.store, dict(self.missions), placed, self, self.faults, docks, offers=bidding)
+        robots = {name: self._robot(name) for name in ROBOTS}
+        missions = {number: replace(mission) for number, mission in self.missions.items()}
+        dispatch = Dispatch(self.store, missions, robots, self, offers=partial(ScriptedOffers, self))
         ended = partial(self._note_end, dispatch)
         run_fleet(dispatch, out=self.out, seed=3, page=page, live=live, ended=ended)
         self.rows = rows = missions_json(self.store, list(self.missions))
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
 
     def _note_end(self, dispatch):
-        self.ended.append(len(dispatch.over))
+        self.ended.append(sum(mission.ended is not None for mission in dispatch.missions.values()))
 
-    def _docking(self, name):
-        step = Do.from_command(Command(task=Task.CHARGE))
-        return self._prepared(Request(), Mission(name="charge", robot=name, steps=(step,)))
+    def _robot(self, name):
+        step, placed = Do.from_command(Command(task=Task.CHARGE)), PlacedRobot(name, "spot", START)
+        dock = self._prepared(Request(), Mission(name="charge", robot=name, steps=(step,)))
+        return FleetRobot(placed, START, dock=dock, faults=tuple(self.faults.get(name, ())))
 
     def hold(self, skill):
         self.robots[skill.context.robot.name].holding = True

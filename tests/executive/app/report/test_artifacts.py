@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from executive.app.report.artifacts import MOST_SHOWN, Artifacts, draw_answer
 from executive.app.report.report_page import _pictures
@@ -63,6 +64,14 @@ def test_without_a_question_there_is_no_picture(tmp_path):
     artifacts.message("detections", looked((10, 10, 40, 30)))
     assert draw_answer(artifacts, tmp_path) is None
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("restored", "moments"), [({}, {"place": 5.0}), ({"restored": True}, {})])
+def test_a_placement_from_before_a_restart_is_no_moment_of_this_run(restored, moments):
+    artifacts = Artifacts()
+    placed = {"robot": "Alice", "node": "alice/tidy/place", "t": 5.0, "to": "SUCCESS", "message": "put it down"}
+    artifacts.message("transitions", {**placed, **restored})
+    assert artifacts.of_robot("Alice").moments == moments
 
 
 def test_only_the_last_views_before_an_answer_are_kept():

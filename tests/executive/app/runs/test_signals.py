@@ -55,7 +55,8 @@ RUN = """
 
     with MissionStore(out / "missions.sqlite") as store:
         mission = store.add(prepared.request, queued=False)
-        MissionRuns(store, screen.ConsoleScreen(Console(), quiet=False), run=run).run(mission, prepared)
+        ended = MissionRuns(store, screen.ConsoleScreen(Console(), quiet=False), run=run).run(mission, prepared)
+    assert ended.hung_up
     (out / "stopped").write_text(next(call for call in reversed(robot.robot.calls) if call in ("stop", "drive")))
 """
 
@@ -63,8 +64,9 @@ RUN = """
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_cancels_and_the_handlers_are_put_back(number):
     control, before = Control(pace=None), signal.getsignal(number)
-    with ended_by_signals(control.cancel):
+    with ended_by_signals(control.cancel) as ending:
         signal.raise_signal(number)
+    assert ending.hung_up is (number == signal.SIGHUP)
     assert control.poll().cancel == f"cancelled by {signal.Signals(number).name}"
     assert signal.getsignal(number) == before
 

@@ -7,10 +7,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from table_robot import GRIPPER, MODEL, TableRobot, context_of, outcome
 
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation
-from skills.manipulation.grasp.candidates import grasp_candidates
+from skills.manipulation.grasp.candidates import grasp_candidates, others_first, same_grasp, tried_grasp
 from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
-from skills.manipulation.grasp.tried_grasps import others_first, same_grasp, tried_grasp
 from skills.routine import SkillFailure
 
 CENTRE = (0.85, 0.0)

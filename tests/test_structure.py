@@ -17,7 +17,7 @@ LINES = {
     "executive/mission": 1577,
     "executive/tree": 8497,
     "executive/run": 3275,
-    "executive/record": 1403,
+    "executive/record": 1294,
     "executive/store": 1629,
     "executive/conversation": 595,
     "executive/view": 1581,

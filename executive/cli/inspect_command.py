@@ -86,7 +86,7 @@ def _to_ros2(history: History, out: Path) -> int:
     if out.suffix == LOG_SUFFIX:
         return write_ros2(history.events, out)
     with new_folder(out) as folder:
-        return write_bag(history.events, folder, out.name)
+        return write_bag(history.events, folder, out.resolve().name)
 
 
 def _show(history: History, console: Console, *, every_node: bool) -> None:

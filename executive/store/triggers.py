@@ -76,7 +76,7 @@ class Schedule:
 
     def _around(self, moment: datetime, offsets: Iterable[int], zone: tzinfo | None) -> list[datetime]:
         """Returns the occurrences on the days at these offsets from the day of a moment."""
-        today = local(moment, zone).date()
+        today = moment.astimezone(zone).date()
         dates = (today + timedelta(days=offset) for offset in offsets)
         on = [each for each in dates if Day(each.weekday()) in self.days]
         return [_moment(each, at, zone) for each in on for at in self.times]
@@ -226,11 +226,6 @@ _HINTS: Final = {
     "call": "give 'call' one name of letters, digits, _ and -, at most 64",
     "topic": "write 'topic KIND:TOPIC', as in 'topic mqtt:home/door'",
 }
-
-
-def local(moment: datetime, zone: tzinfo | None) -> datetime:
-    """Converts a moment (aware) to local wall time; `zone` None is the system's."""
-    return moment.astimezone(zone)
 
 
 def _moment(day: date, at: time, zone: tzinfo | None) -> datetime:

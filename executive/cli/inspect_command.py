@@ -129,18 +129,13 @@ def replay(
         with writing(out):
             out.write_text(log_page(history.events, recording), encoding="utf-8")
         return
-    _serve(history, recording, port, view_for)
-
-
-def _serve(history: History, recording: Path | None, port: int, view_for_s: float | None) -> None:
-    """Serves the replay page."""
     from executive.view.html import feed_of
     from executive.view.server import PageContent, serve, wait
 
     content = PageContent(feed_of(history.events), recording=recording)
     with serve(content, port) as server:
         console_for(False).print(f"{server.url}\n(Ctrl-C ends it)", markup=False)
-        wait(view_for_s)
+        wait(view_for)
 
 
 TreeFormat = Literal["text", "svg", "mermaid", "xml", "json"]

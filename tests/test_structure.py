@@ -11,20 +11,20 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3416,
+    "executive/words": 3381,
     "executive/language": 8240,
-    "executive/speech": 1582,
+    "executive/speech": 1571,
     "executive/mission": 1577,
-    "executive/tree": 8497,
+    "executive/tree": 8492,
     "executive/run": 3275,
-    "executive/record": 1294,
-    "executive/store": 1629,
-    "executive/conversation": 595,
-    "executive/view": 1581,
+    "executive/record": 1288,
+    "executive/store": 1598,
+    "executive/conversation": 591,
+    "executive/view": 1561,
     "executive/testing": 848,
     "executive/app": 7864,
-    "executive/cli": 3781,
-    "skills": 28040,
+    "executive/cli": 3740,
+    "skills": 28035,
     "plant": 11146,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 417, 60, 7

@@ -11,20 +11,20 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3416,
+    "executive/words": 3381,
     "executive/language": 8240,
-    "executive/speech": 1582,
+    "executive/speech": 1571,
     "executive/mission": 1569,
-    "executive/tree": 8573,
+    "executive/tree": 8568,
     "executive/run": 3261,
-    "executive/record": 1403,
-    "executive/store": 1629,
-    "executive/conversation": 595,
-    "executive/view": 1579,
+    "executive/record": 1288,
+    "executive/store": 1598,
+    "executive/conversation": 591,
+    "executive/view": 1559,
     "executive/testing": 848,
     "executive/app": 7842,
-    "executive/cli": 3781,
-    "skills": 28033,
+    "executive/cli": 3740,
+    "skills": 28028,
     "plant": 11147,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 416, 59, 7

@@ -36,46 +36,38 @@ EXIT_CODES: Final = "Exit codes: 0 success; 1 the mission was not achieved; 2 ba
 
 @dataclass(frozen=True)
 class _Command:
-    """Command of Errand: its module, the function or `typer.Typer` in it, and its help."""
+    """Command of Errand: the module with the function or `typer.Typer` of its name, and its help."""
 
     module: str
-    attribute: str
     help: str
 
 
 COMMANDS: Final[Mapping[str, _Command]] = {
-    "run": _Command("run_command", "run", "Run a sentence or a mission file in the simulated world."),
+    "run": _Command("run_command", "Run a sentence or a mission file in the simulated world."),
     "check": _Command(
-        "check_command", "check", "Check mission files without running them: commands, tree, paths, time and battery."
+        "check_command", "Check mission files without running them: commands, tree, paths, time and battery."
     ),
-    "missions": _Command("missions_command", "missions", "List the missions that come with Errand."),
-    "init": _Command("missions_command", "init", "Copy the missions that come with Errand into a folder."),
-    "parse": _Command("parse_command", "parse", "Show the commands that a sentence means."),
-    "tree": _Command("inspect_command", "tree", "Show the tree of a sentence, a mission file or a log."),
-    "listen": _Command(
-        "listen_command", "listen", "Recognise what is said in wav files or at the microphone, and its commands."
-    ),
-    "log": _Command("inspect_command", "log", "Print what each node of a run did and why, detections and the outcome."),
-    "replay": _Command("inspect_command", "replay", "Show a run at any time of it: tree, map, pictures, events, 3D."),
-    "queue": _Command("queue_command", "queue", "Store missions, and run them one after another."),
-    "fleet": _Command("fleet_command", "fleet", "Run the queued missions with several robots."),
-    "resume": _Command("queue_command", "resume", "Resume the mission that was interrupted; then run its queue."),
+    "missions": _Command("missions_command", "List the missions that come with Errand."),
+    "init": _Command("missions_command", "Copy the missions that come with Errand into a folder."),
+    "parse": _Command("parse_command", "Show the commands that a sentence means."),
+    "tree": _Command("inspect_command", "Show the tree of a sentence, a mission file or a log."),
+    "listen": _Command("listen_command", "Recognise what is said in wav files or at the microphone, and its commands."),
+    "log": _Command("inspect_command", "Print what each node of a run did and why, detections and the outcome."),
+    "replay": _Command("inspect_command", "Show a run at any time of it: tree, map, pictures, events, 3D."),
+    "queue": _Command("queue_command", "Store missions, and run them one after another."),
+    "fleet": _Command("fleet_command", "Run the queued missions with several robots."),
+    "resume": _Command("queue_command", "Resume the mission that was interrupted; then run its queue."),
     "evaluate": _Command(
         "evaluate_command",
-        "evaluate",
         "Run an evaluation file, or a mission at many seeds; count claims and the referee's verdicts.",
     ),
-    "report": _Command("evaluate_command", "report", "Report the results of an evaluation: rates, causes, failures."),
-    "teleop": _Command("robot_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
-    "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
-    "stack": _Command("plugins_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
-    "plugins": _Command(
-        "plugins_command", "plugins", "List the installed plug-ins, what each registers, and errors in them."
-    ),
-    "warm-up": _Command(
-        "robot_command", "warm_up", "Compile the numeric code for this machine, so that runs begin at once."
-    ),
-    "new": _Command("new_command", "new", "Write an installable package with a skill, or with a robot."),
+    "report": _Command("evaluate_command", "Report the results of an evaluation: rates, causes, failures."),
+    "teleop": _Command("robot_command", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
+    "detect": _Command("detect_command", "Find objects of the nine classes in pictures."),
+    "stack": _Command("plugins_command", "What a robot uses: localiser, planners, controller, detector."),
+    "plugins": _Command("plugins_command", "List the installed plug-ins, what each registers, and errors in them."),
+    "warm-up": _Command("robot_command", "Compile the numeric code for this machine, so that runs begin at once."),
+    "new": _Command("new_command", "Write an installable package with a skill, or with a robot."),
 }
 """Commands of Errand by name, in the order of the help; commands of plug-ins follow them."""
 
@@ -107,8 +99,8 @@ PLUGIN_COMMANDS: Final[Mapping[str, _PluginCommand]] = {
 
 def shipped_command(name: str) -> Any:
     """Imports and returns the command of a name. Raises KeyError."""
-    entry = COMMANDS[name]
-    return as_command(name, getattr(import_module(f"executive.cli.{entry.module}"), entry.attribute))
+    module = import_module(f"executive.cli.{COMMANDS[name].module}")
+    return as_command(name, getattr(module, name.replace("-", "_")))
 
 
 def as_command(name: str, found: Any) -> Any:

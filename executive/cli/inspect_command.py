@@ -7,9 +7,8 @@ import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
 import typer
 from rich.console import Console
@@ -32,21 +31,13 @@ RECORDING: Final = "recording.html"
 LOG_SUFFIX: Final = ".mcap"
 
 
-class LogFormat(StrEnum):
-    """Formats of `errand log`."""
-
-    TEXT = "text"
-    MAP = "map"
-    ROS2 = "ros2"
-
-
 def log(
     file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
     as_json: Annotated[bool, typer.Option("--json", help="All transitions as one JSON list.")] = False,
     form: Annotated[
-        LogFormat,
+        Literal["text", "map", "ros2"],
         typer.Option("--format", help="map draws map, trajectory, path and particles as PNG; ros2 writes a bag."),
-    ] = LogFormat.TEXT,
+    ] = "text",
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="The picture; the folder of the bag, or its file *.mcap.")
     ] = None,
@@ -57,10 +48,10 @@ def log(
     """Prints the timeline of a run: nodes with causes, detections, outcome, tracebacks of defects."""
     history = read_history(file)
     history = history if robot is None else history.of_robot(robot)
-    if (form is LogFormat.TEXT) != (out is None):
-        what = "--out is for --format map and ros2" if out is not None else f"--format {form.value} writes a file"
+    if (form == "text") != (out is None):
+        what = "--out is for --format map and ros2" if out is not None else f"--format {form} writes a file"
         raise InputError(what, hint="name both: --format map --out map.png")
-    if form is LogFormat.ROS2 and out is not None:
+    if form == "ros2" and out is not None:
         typer.echo(f"{_to_ros2(history, out)} messages in {out}", err=True)
         return
     if out is not None:
@@ -86,7 +77,7 @@ def _to_ros2(history: History, out: Path) -> int:
     if out.suffix == LOG_SUFFIX:
         return write_ros2(history.events, out)
     with new_folder(out) as folder:
-        return write_bag(history.events, folder, out.name)
+        return write_bag(history.events, folder, out.resolve().name)
 
 
 def _show(history: History, console: Console, *, every_node: bool) -> None:
@@ -138,37 +129,23 @@ def replay(
         with writing(out):
             out.write_text(log_page(history.events, recording), encoding="utf-8")
         return
-    _serve(history, recording, port, view_for)
-
-
-def _serve(history: History, recording: Path | None, port: int, view_for_s: float | None) -> None:
-    """Serves the replay page."""
     from executive.view.html import feed_of
     from executive.view.server import PageContent, serve, wait
 
     content = PageContent(feed_of(history.events), recording=recording)
     with serve(content, port) as server:
         console_for(False).print(f"{server.url}\n(Ctrl-C ends it)", markup=False)
-        wait(view_for_s)
+        wait(view_for)
 
 
-class TreeFormat(StrEnum):
-    """Formats of `errand tree`."""
-
-    TEXT = "text"
-    SVG = "svg"
-    MERMAID = "mermaid"
-    XML = "xml"
-    JSON = "json"
-
-
+TreeFormat = Literal["text", "svg", "mermaid", "xml", "json"]
 _FORMS: Final[Mapping[TreeFormat, Callable[[NodeView], str]]] = {
-    TreeFormat.SVG: to_svg,
-    TreeFormat.MERMAID: to_mermaid,
-    TreeFormat.XML: to_btcpp,
-    TreeFormat.JSON: lambda view: json.dumps(to_json(view), ensure_ascii=False) + "\n",
+    "svg": to_svg,
+    "mermaid": to_mermaid,
+    "xml": to_btcpp,
+    "json": lambda view: json.dumps(to_json(view), ensure_ascii=False) + "\n",
 }
-_MOST: Final = {TreeFormat.TEXT: MANY_NODES, TreeFormat.SVG: DRAWN_NODES, TreeFormat.MERMAID: DRAWN_NODES}
+_MOST: Final[Mapping[TreeFormat, int]] = {"text": MANY_NODES, "svg": DRAWN_NODES, "mermaid": DRAWN_NODES}
 """Largest number of nodes in the formats for people."""
 
 
@@ -176,7 +153,7 @@ _MOST: Final = {TreeFormat.TEXT: MANY_NODES, TreeFormat.SVG: DRAWN_NODES, TreeFo
 def tree(
     request: Request,
     file: Annotated[str | None, typer.Argument(metavar="FILE|SENTENCE|LOG", show_default=False)] = None,
-    form: Annotated[TreeFormat, typer.Option("--format", help="Output format.")] = TreeFormat.TEXT,
+    form: Annotated[TreeFormat, typer.Option("--format", help="Output format.")] = "text",
     depth: Annotated[int | None, quantity_option(Tries, help="Number of levels below the root to show.")] = None,
     most: Annotated[
         int | None, quantity_option(Count, help="Number of nodes to show; folds nodes that have ended or not begun.")

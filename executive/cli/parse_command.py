@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -21,13 +20,6 @@ from skills.inputs.errors import InputError
 from skills.inputs.outside import read_text, writing
 
 
-class ParseFormat(StrEnum):
-    """Formats of `errand parse`."""
-
-    TEXT = "text"
-    SVG = "svg"
-
-
 def parse(
     sentence: Annotated[str | None, typer.Argument(help="The sentence.", show_default=False)] = None,
     file: Annotated[Path | None, typer.Option(help="A file with one sentence on each line.")] = None,
@@ -39,14 +31,14 @@ def parse(
     ] = False,
     explained: Annotated[bool, typer.Option("--explain", help="Show each step from words to commands.")] = False,
     form: Annotated[
-        ParseFormat, typer.Option("--format", help="svg draws the dependency arcs of the one sentence.")
-    ] = ParseFormat.TEXT,
+        Literal["text", "svg"], typer.Option("--format", help="svg draws the dependency arcs of the one sentence.")
+    ] = "text",
     out: Annotated[Path | None, typer.Option("-o", "--out", help="The file of the drawing.")] = None,
 ) -> None:
     """Shows the commands that a sentence means."""
     if (sentence is None) == (file is None):
         raise InputError("errand parse takes one sentence or --file", hint='try: errand parse "go to the kitchen"')
-    if (form is ParseFormat.SVG) != (out is not None) or (out is not None and sentence is None):
+    if (form == "svg") != (out is not None) or (out is not None and sentence is None):
         hint = 'try: errand parse "go to the kitchen" --format svg --out arcs.svg'
         raise InputError("--format svg draws one sentence into the file --out", hint=hint)
     knowledge = None if open_words else knowledge_of(open_world(world or DEFAULT_WORLD))

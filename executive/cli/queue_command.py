@@ -20,8 +20,8 @@ from executive.mission.load import load_stack
 from executive.mission.request import Request
 from executive.store.missions import MissionState, MissionStore, StoredMission, store_in, utc_now
 from executive.store.standing_missions import StandingMission, StandingMissions
-from executive.store.trigger_source import refuse_missing_source
-from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, local, schedule_of
+from executive.store.trigger_source import installed_source
+from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, schedule_of
 from executive.store.wakeup import WakeupPipe, wake_server
 from skills.inputs.errors import InputError, listing
 from skills.quantities import Count, Port, Wait
@@ -197,7 +197,7 @@ def _mission_json(mission: StoredMission, standing: Mapping[int, StandingMission
 def _due(standing: StandingMission) -> datetime | None:
     """Next time of a standing mission, in local time."""
     due = standing.due_next(utc_now(), None)
-    return None if due is None else local(due, None)
+    return None if due is None else due.astimezone()
 
 
 def _trigger(at: str | None, every: str | None, on: str | None, missed: Missed | None) -> Trigger | None:
@@ -214,7 +214,7 @@ def _trigger(at: str | None, every: str | None, on: str | None, missed: Missed |
         hint = hint if trigger else "give --at, --every or --on as well"
         raise InputError(f"--missed has no meaning {what}", hint=hint)
     if isinstance(trigger, OnTopic):
-        refuse_missing_source(trigger.kind)
+        installed_source(trigger.kind)
     return trigger
 
 

@@ -103,10 +103,8 @@ class Keys:
 
     def _answer(self, question: OpenQuestion, text: str) -> None:
         """Answers the question, unless its time is just over."""
-        try:
+        with suppress(ValueError):
             self._control.answer(question.id, text)
-        except ValueError:
-            return
 
     def _toggle_stop_button(self) -> None:
         if self._control.state.mode is Mode.STOPPED:

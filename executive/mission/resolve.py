@@ -184,10 +184,10 @@ class _Resolver:
                 return tuple(self._part(scope, error, each, (*path, n)) for n, each in enumerate(value))
             case dict():
                 return {key: self._part(scope, error, each, (*path, key)) for key, each in value.items()}
-            case Strict():
-                return value.model_copy(update=self._parts(scope, error, value, path))
             case ZoneFacts():
                 return self._zone(error, value, path)
+            case Strict():
+                return value.model_copy(update=self._parts(scope, error, value, path))
         return value
 
     def _zone(self, error: _Error, zone: ZoneFacts, path: KeyPath) -> ZoneFacts:

@@ -159,15 +159,11 @@ def read_history(path: Path) -> History:
     return History(path, read_events(path))
 
 
-def logged_state(transition: dict[str, Any]) -> NodeState:
-    """State of a node after a logged transition."""
-    cause = transition.get("cause")
-    return NodeState(Status(transition["to"]), None if not cause else Cause(cause), transition.get("message") or "")
-
-
-def logged_activity(activity: dict[str, Any]) -> NodeState:
-    """State of a running node with its latest logged message."""
-    return NodeState(Status.RUNNING, None, activity.get("message") or "")
+def logged_state(data: Mapping[str, Any]) -> NodeState:
+    """State of a node after a logged transition; that of a running node by its latest activity, which has no `to`."""
+    cause = data.get("cause")
+    status = Status(data.get("to", Status.RUNNING.value))
+    return NodeState(status, Cause(cause) if cause else None, data.get("message") or "")
 
 
 @dataclass(frozen=True)
@@ -187,8 +183,7 @@ def _apply(event: Event, found: list[_LoggedTree]) -> None:
     if event.topic == TREE:
         found.append(_LoggedTree(event.data))
     elif event.topic in (TRANSITIONS, ACTIVITY) and found:
-        changed = logged_state if event.topic == TRANSITIONS else logged_activity
-        _latest(found, event.data.get("robot")).states[event.data["node"]] = changed(event.data)
+        _latest(found, event.data.get("robot")).states[event.data["node"]] = logged_state(event.data)
 
 
 def _latest(found: Sequence[_LoggedTree], robot: Any) -> _LoggedTree:
@@ -248,7 +243,7 @@ def _entries(events: Iterable[Event], leaves_only: bool) -> Iterator[tuple[Event
             if not leaves_only or entry.about not in inner or (entry.state is not None and entry.state.cause_text):
                 yield event, entry
         elif event.topic == ACTIVITY:
-            state = logged_activity(event.data)
+            state = logged_state(event.data)
             yield event, Entry(event.data.get("t", event.stamp_s), event.data["node"], state.message, state)
         elif event.topic == TASK:
             yield event, Entry(event.stamp_s, event.topic, _task(event.data, commands))

@@ -9,62 +9,23 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-from mcap_ros2.writer import Writer
+import numpy as np
+import rosbags.typesys.stores.ros2_humble as ros
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 
 from executive.record.history import Event
-from executive.record.other_tools import body_frame, grey_map, occupancies, origin_pose, ros_name, transform_of
+from executive.record.other_tools import body_frame, grey_map, occupancies, origin_pose, ros_name
 from executive.record.schemas import DERIVED, JOINTS, MAP, PATH, POSE, SCAN, WALL, stamp
-from skills.inputs.errors import InputError
-from skills.inputs.yaml_source import yaml_of
+from skills.inputs.outside import writing
 
-_RULE: Final = "=" * 80
-_TIME: Final = f"{_RULE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
-_HEADER: Final = f"{_RULE}\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n{_TIME}"
-_QUATERNION: Final = f"{_RULE}\nMSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
-_POSE: Final = (
-    f"{_RULE}\nMSG: geometry_msgs/Pose\ngeometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"
-    f"{_RULE}\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n{_QUATERNION}"
-)
-_POSE_STAMPED: Final = "std_msgs/Header header\ngeometry_msgs/Pose pose\n"
-_TEXT, _POSES, _PATH = "std_msgs/msg/String", "geometry_msgs/msg/PoseStamped", "nav_msgs/msg/Path"
-_GRID, _TF, _SCAN = "nav_msgs/msg/OccupancyGrid", "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/LaserScan"
-_JOINTS, _PICTURE = "sensor_msgs/msg/JointState", "sensor_msgs/msg/CompressedImage"
-DEFINITIONS: Final[Mapping[str, str]] = {
-    _TEXT: "string data\n",
-    _POSES: f"{_POSE_STAMPED}{_HEADER}{_POSE}",
-    _PATH: (
-        "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n"
-        f"{_RULE}\nMSG: geometry_msgs/PoseStamped\n{_POSE_STAMPED}{_HEADER}{_POSE}"
-    ),
-    _PICTURE: f"std_msgs/Header header\nstring format\nuint8[] data\n{_HEADER}",
-    _GRID: (
-        "std_msgs/Header header\nnav_msgs/MapMetaData info\nint8[] data\n"
-        f"{_RULE}\nMSG: nav_msgs/MapMetaData\nbuiltin_interfaces/Time map_load_time\nfloat32 resolution\n"
-        f"uint32 width\nuint32 height\ngeometry_msgs/Pose origin\n{_HEADER}{_POSE}"
-    ),
-    _TF: (
-        "geometry_msgs/TransformStamped[] transforms\n"
-        f"{_RULE}\nMSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\n"
-        f"geometry_msgs/Transform transform\n{_HEADER}{_RULE}\nMSG: geometry_msgs/Transform\n"
-        "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"
-        f"{_RULE}\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n{_QUATERNION}"
-    ),
-    _SCAN: (
-        "std_msgs/Header header\nfloat32 angle_min\nfloat32 angle_max\nfloat32 angle_increment\n"
-        "float32 time_increment\nfloat32 scan_time\nfloat32 range_min\nfloat32 range_max\n"
-        f"float32[] ranges\nfloat32[] intensities\n{_HEADER}"
-    ),
-    _JOINTS: (
-        f"std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n{_HEADER}"
-    ),
-}
 TF: Final = "/tf"
 TF_STATIC: Final = "/tf_static"
 _ROOT: Final = "map"
@@ -72,36 +33,38 @@ _ROOT: Final = "map"
 _LONGEST_RANGE_M: Final = 100.0
 _LEAST_RANGE_M: Final = 0.05
 _LATCHED: Final = frozenset({f"/{MAP}", TF_STATIC})
-_FOREVER: Final = {"sec": 9223372036, "nsec": 854775807}
-_IDENTITY: Final = {"translation": {"x": 0.0, "y": 0.0, "z": 0.0}, "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
-_RELIABLE: Final = 1
-"""Policies of rmw, by their numbers."""
-_KEEP_LAST: Final = 1
-_TRANSIENT_LOCAL: Final = 1
-_VOLATILE: Final = 2
-_AUTOMATIC: Final = 1
+"""Topics whose last message stays for late listeners."""
+_VERSION: Final = 8
+"""Version of the metadata that ROS 2 Humble and all later releases read."""
+_FOREVER: Final = QosTime(9223372036, 854775807)
+_QOS: Final = Qos(
+    history=QosHistory.KEEP_LAST,
+    depth=10,
+    reliability=QosReliability.RELIABLE,
+    durability=QosDurability.VOLATILE,
+    deadline=_FOREVER,
+    lifespan=_FOREVER,
+    liveliness=QosLiveliness.AUTOMATIC,
+    liveliness_lease_duration=_FOREVER,
+    avoid_ros_namespace_conventions=False,
+)
+_IDENTITY: Final = ros.geometry_msgs__msg__Transform(
+    ros.geometry_msgs__msg__Vector3(0.0, 0.0, 0.0), ros.geometry_msgs__msg__Quaternion(0.0, 0.0, 0.0, 1.0)
+)
 
 Data = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class BagMessage:
-    """Message of a bag: topic, type and fields."""
-
-    topic: str
-    kind: str
-    fields: Data
+Message = tuple[str, Any]
+"""Topic and message."""
 
 
 def write_bag(events: Iterable[Event], folder: Path, name: str) -> int:
-    """Writes the events as a ROS 2 bag with `metadata.yaml` into an existing folder; returns the number of messages.
-
-    Raises InputError when it cannot be written.
-    """
-    file = f"{name}_0.mcap"
-    written = _write(events, folder / file)
-    (folder / "metadata.yaml").write_text(yaml_of(_metadata(written, file), flow_style=False), encoding="utf-8")
-    return written.count
+    """Writes the events as a ROS 2 bag with `metadata.yaml` into an existing folder; returns the number of messages."""
+    bag = folder / name
+    count = _write(events, bag)
+    for file in bag.iterdir():
+        file.rename(folder / file.name)
+    bag.rmdir()
+    return count
 
 
 def write_ros2(events: Iterable[Event], path: Path) -> int:
@@ -109,103 +72,30 @@ def write_ros2(events: Iterable[Event], path: Path) -> int:
 
     Raises InputError when it cannot be written.
     """
-    return _write(events, path).count
+    with writing(path), TemporaryDirectory(dir=path.parent, prefix=f".{path.name}-") as folder:
+        count = write_bag(events, Path(folder), path.stem)
+        (Path(folder) / f"{path.stem}.mcap").replace(path)
+    return count
 
 
-@dataclass
-class _Written:
-    """Messages of a bag by topic and type, and its first and last time (ns since 1970)."""
-
-    counts: Counter[tuple[str, str]] = field(default_factory=Counter)
-    first_ns: int = 0
-    last_ns: int = 0
-
-    @property
-    def count(self) -> int:
-        """Number of messages."""
-        return self.counts.total()
-
-
-class _BagWriter(Writer):
-    """Writer of ROS 2 messages whose channels name their quality of service."""
-
-    def write_message(self, topic: str, schema: Any, *rest: Any) -> None:
-        """Writes a message; the first one of a topic registers the channel."""
-        if topic not in self._channel_ids:
-            qos = {"offered_qos_profiles": _qos(topic)}
-            self._channel_ids[topic] = self._writer.register_channel(topic, "cdr", schema.id, qos)
-        super().write_message(topic, schema, *rest)
-
-
-def _write(events: Iterable[Event], path: Path) -> _Written:
-    written, events = _Written(), tuple(events)
+def _write(events: Iterable[Event], bag: Path) -> int:
+    events, store = tuple(events), get_typestore(Stores.ROS2_HUMBLE)
     starts_s = (each.data["start_s"] for each in events if each.topic == WALL and "start_s" in each.data)
     converter = _Converter(next(starts_s, 0.0))
-    try:
-        with path.open("wb") as file:
-            writer: Any = _BagWriter(file)
-            schemas = {name: writer.register_msgdef(name, text) for name, text in DEFINITIONS.items()}
-            for event in events:
-                time_ns = round((converter.start_s + event.stamp_s) * 1e9)
-                for message in converter.messages(event):
-                    schema = schemas[message.kind]
-                    writer.write_message(message.topic, schema, message.fields, time_ns, time_ns, written.count)
-                    written.first_ns = written.first_ns if written.count else time_ns
-                    written.last_ns = max(written.last_ns, time_ns)
-                    written.counts[message.topic, message.kind] += 1
-            writer.finish()
-    except OSError as error:
-        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=path) from error
-    return written
-
-
-def _qos(topic: str) -> str:
-    """Quality of service of a topic, as a bag has it: the map and static transforms stay for late listeners."""
-    profile = {
-        "history": _KEEP_LAST,
-        "depth": 10,
-        "reliability": _RELIABLE,
-        "durability": _TRANSIENT_LOCAL if topic in _LATCHED else _VOLATILE,
-        "deadline": dict(_FOREVER),
-        "lifespan": dict(_FOREVER),
-        "liveliness": _AUTOMATIC,
-        "liveliness_lease_duration": dict(_FOREVER),
-        "avoid_ros_namespace_conventions": False,
-    }
-    return yaml_of([profile], flow_style=False)
-
-
-def _metadata(written: _Written, file: str) -> dict[str, Any]:
-    """Content of `metadata.yaml` in the form of ROS 2 Humble, which later releases read, too."""
-    times = {
-        "duration": {"nanoseconds": written.last_ns - written.first_ns},
-        "starting_time": {"nanoseconds_since_epoch": written.first_ns},
-        "message_count": written.count,
-    }
-    topics = [
-        {
-            "topic_metadata": {
-                "name": topic,
-                "type": kind,
-                "serialization_format": "cdr",
-                "offered_qos_profiles": _qos(topic),
-            },
-            "message_count": count,
-        }
-        for (topic, kind), count in written.counts.items()
-    ]
-    return {
-        "rosbag2_bagfile_information": {
-            "version": 5,
-            "storage_identifier": "mcap",
-            **times,
-            "topics_with_message_count": topics,
-            "compression_format": "",
-            "compression_mode": "",
-            "relative_file_paths": [file],
-            "files": [{"path": file, **deepcopy(times)}],
-        }
-    }
+    writer = Writer(bag, version=_VERSION, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    with writer:
+        connections: dict[str, Any] = {}
+        for event in events:
+            time_ns = round((converter.start_s + event.stamp_s) * 1e9)
+            for topic, message in converter.messages(event):
+                kind = message.__msgtype__
+                if topic not in connections:
+                    qos = _QOS._replace(durability=QosDurability.TRANSIENT_LOCAL) if topic in _LATCHED else _QOS
+                    added = writer.add_connection(topic, kind, typestore=store, offered_qos_profiles=[qos])
+                    connections[topic] = added
+                writer.write(connections[topic], time_ns, store.serialize_cdr(message, kind))
+    return sum(writer.counts.values())
 
 
 @dataclass
@@ -213,91 +103,92 @@ class _Converter:
     """Converts events to ROS 2 messages; `start_s` is the wall time (s since 1970) at which the robot's clock began."""
 
     start_s: float
-    statics: dict[str, Data] = field(default_factory=dict)
+    statics: dict[str, ros.geometry_msgs__msg__TransformStamped] = field(default_factory=dict)
 
-    def messages(self, event: Event) -> Iterator[BagMessage]:
+    def messages(self, event: Event) -> Iterator[Message]:
         """Iterates over the messages of an event; none for one that repeats another."""
         data, robot = event.data, str(event.data.get("robot") or "")
         space = f"/{ros_name(robot)}" if robot else "/errand"
-        header = self._header(data, event.stamp_s)
+        when, frame = self._stamp(data, event.stamp_s), str(data.get("frame_id", "world"))
+        header = ros.std_msgs__msg__Header(when, frame)
         if event.topic in DERIVED:
             return
         if not self.statics:
-            yield self._static(self._transform(header, {**_IDENTITY, "child_frame_id": "world"}, _ROOT))
+            yield self._static(_transform(when, _ROOT, "world", _IDENTITY))
         if event.topic == POSE:
-            yield BagMessage(f"{space}/{POSE}", _POSES, {"header": header, "pose": data["pose"]})
-            moved = transform_of(data)
-            yield BagMessage(TF, _TF, {"transforms": [self._transform(header, moved, moved["parent_frame_id"])]})
+            pose = _pose(data["pose"])
+            yield f"{space}/{POSE}", ros.geometry_msgs__msg__PoseStamped(header, pose)
+            yield TF, ros.tf2_msgs__msg__TFMessage([_transform(when, frame, body_frame(robot), _moved(pose))])
         elif event.topic == PATH:
-            poses = [{"header": header, "pose": pose} for pose in data["poses"]]
-            yield BagMessage(f"{space}/{PATH}", _PATH, {"header": header, "poses": poses})
+            poses = [ros.geometry_msgs__msg__PoseStamped(header, _pose(pose)) for pose in data["poses"]]
+            yield f"{space}/{PATH}", ros.nav_msgs__msg__Path(header, poses)
         elif event.topic == JOINTS:
-            yield BagMessage(f"{space}/joint_states", _JOINTS, _joint_state(header, data))
+            yield f"{space}/joint_states", _joint_state(header, data)
         elif event.topic == SCAN:
-            yield from self._scan(header, data, robot, space)
+            lidar = f"{ros_name(robot)}/lidar"
+            if lidar not in self.statics:
+                yield self._static(_transform(when, body_frame(robot), lidar, _moved(_pose(data["pose"]))))
+            yield f"{space}/{SCAN}", _laser_scan(ros.std_msgs__msg__Header(when, lidar), data)
         elif event.topic == MAP and "data" in data:
-            yield BagMessage(f"/{MAP}", _GRID, _occupancy_grid(header, data))
+            yield f"/{MAP}", _occupancy_grid(header, data)
         elif data.get("format") == "jpeg" and "data" in data:
-            fields = {"header": header, "format": data["format"], "data": base64.b64decode(data["data"])}
-            yield BagMessage(f"{space}/{event.topic}/compressed", _PICTURE, fields)
+            content = np.frombuffer(base64.b64decode(data["data"]), np.uint8)
+            picture = ros.sensor_msgs__msg__CompressedImage(header, data["format"], content)
+            yield f"{space}/{event.topic}/compressed", picture
         else:
-            yield BagMessage(f"/errand/{event.topic}", _TEXT, {"data": json.dumps(data, ensure_ascii=False)})
+            yield f"/errand/{event.topic}", ros.std_msgs__msg__String(json.dumps(data, ensure_ascii=False))
 
-    def _header(self, data: Data, stamp_s: float) -> Data:
+    def _stamp(self, data: Data, stamp_s: float) -> ros.builtin_interfaces__msg__Time:
         own = data.get("timestamp")
         when = stamp(self.start_s + (stamp_s if own is None else own["sec"] + own["nsec"] * 1e-9))
-        return {"stamp": {"sec": when["sec"], "nanosec": when["nsec"]}, "frame_id": data.get("frame_id", "world")}
+        return ros.builtin_interfaces__msg__Time(when["sec"], when["nsec"])
 
-    def _scan(self, header: Data, data: Data, robot: str, space: str) -> Iterator[BagMessage]:
-        """Scan in the frame of the LiDAR, and the transform of this frame, if it is new."""
-        lidar = f"{ros_name(robot)}/lidar"
-        if lidar not in self.statics:
-            at = {"translation": data["pose"]["position"], "rotation": data["pose"]["orientation"]}
-            yield self._static(self._transform(header, {**at, "child_frame_id": lidar}, body_frame(robot)))
-        yield BagMessage(f"{space}/{SCAN}", _SCAN, _laser_scan({**header, "frame_id": lidar}, data))
-
-    def _static(self, transform: Data) -> BagMessage:
+    def _static(self, transform: ros.geometry_msgs__msg__TransformStamped) -> Message:
         """All static transforms, with a new one; listeners that come late get the last message alone."""
-        self.statics[str(transform["child_frame_id"])] = transform
-        return BagMessage(TF_STATIC, _TF, {"transforms": list(self.statics.values())})
-
-    @staticmethod
-    def _transform(header: Data, moved: Data, parent: str) -> Data:
-        return {
-            "header": {**header, "frame_id": parent},
-            "child_frame_id": moved["child_frame_id"],
-            "transform": {"translation": moved["translation"], "rotation": moved["rotation"]},
-        }
+        self.statics[transform.child_frame_id] = transform
+        return TF_STATIC, ros.tf2_msgs__msg__TFMessage(list(self.statics.values()))
 
 
-def _occupancy_grid(header: Data, data: Data) -> Data:
+def _pose(pose: Data) -> ros.geometry_msgs__msg__Pose:
+    position = ros.geometry_msgs__msg__Point(**pose["position"])
+    return ros.geometry_msgs__msg__Pose(position, ros.geometry_msgs__msg__Quaternion(**pose["orientation"]))
+
+
+def _moved(pose: ros.geometry_msgs__msg__Pose) -> ros.geometry_msgs__msg__Transform:
+    """The transform that moves a frame to a pose."""
+    at = pose.position
+    return ros.geometry_msgs__msg__Transform(ros.geometry_msgs__msg__Vector3(at.x, at.y, at.z), pose.orientation)
+
+
+def _transform(
+    stamp: ros.builtin_interfaces__msg__Time, parent: str, child: str, moved: ros.geometry_msgs__msg__Transform
+) -> ros.geometry_msgs__msg__TransformStamped:
+    return ros.geometry_msgs__msg__TransformStamped(ros.std_msgs__msg__Header(stamp, parent), child, moved)
+
+
+def _occupancy_grid(header: ros.std_msgs__msg__Header, data: Data) -> ros.nav_msgs__msg__OccupancyGrid:
     cells = occupancies(grey_map(data))
-    info = {
-        "map_load_time": header["stamp"],
-        "resolution": data["resolution_m"],
-        "width": cells.shape[1],
-        "height": cells.shape[0],
-        "origin": origin_pose(data),
-    }
-    return {"header": header, "info": info, "data": cells.ravel().tolist()}
+    (height, width), origin = cells.shape, _pose(origin_pose(data))
+    info = ros.nav_msgs__msg__MapMetaData(header.stamp, data["resolution_m"], width, height, origin)
+    return ros.nav_msgs__msg__OccupancyGrid(header, info, cells.ravel())
 
 
-def _laser_scan(header: Data, data: Data) -> Data:
-    ranges = [value or math.inf for value in data["ranges"]]
-    return {
-        "header": header,
-        "angle_min": data["start_angle"],
-        "angle_max": data["end_angle"],
-        "angle_increment": (data["end_angle"] - data["start_angle"]) / max(len(ranges) - 1, 1),
-        "time_increment": 0.0,
-        "scan_time": 0.0,
-        "range_min": _LEAST_RANGE_M,
-        "range_max": _LONGEST_RANGE_M,
-        "ranges": ranges,
-        "intensities": [],
-    }
+def _laser_scan(header: ros.std_msgs__msg__Header, data: Data) -> ros.sensor_msgs__msg__LaserScan:
+    ranges = np.array([value or math.inf for value in data["ranges"]], np.float32)
+    return ros.sensor_msgs__msg__LaserScan(
+        header,
+        angle_min=data["start_angle"],
+        angle_max=data["end_angle"],
+        angle_increment=(data["end_angle"] - data["start_angle"]) / max(len(ranges) - 1, 1),
+        time_increment=0.0,
+        scan_time=0.0,
+        range_min=_LEAST_RANGE_M,
+        range_max=_LONGEST_RANGE_M,
+        ranges=ranges,
+        intensities=np.zeros(0, np.float32),
+    )
 
 
-def _joint_state(header: Data, data: Data) -> Data:
-    columns = {name: [joint[name] for joint in data["joints"]] for name in ("name", "position", "velocity", "effort")}
-    return {"header": header, **columns}
+def _joint_state(header: ros.std_msgs__msg__Header, data: Data) -> ros.sensor_msgs__msg__JointState:
+    columns = (np.array([each[name] for each in data["joints"]], float) for name in ("position", "velocity", "effort"))
+    return ros.sensor_msgs__msg__JointState(header, [joint["name"] for joint in data["joints"]], *columns)

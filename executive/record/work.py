@@ -27,11 +27,10 @@ class Work:
         with self._lock:
             self._counts[name] += amount
 
-    def totals(self, more: Mapping[str, int] = MappingProxyType({})) -> Mapping[str, int]:
-        """Returns all counters above 0 in the order of their names, with `more` added."""
+    def totals(self) -> Mapping[str, int]:
+        """Returns all counters above 0 in the order of their names."""
         with self._lock:
-            both = self._counts + Counter(dict(more))
-        return MappingProxyType(dict(sorted(both.items())))
+            return MappingProxyType(dict(sorted((+self._counts).items())))
 
 
 class CountedDetector(DetectorWrapper):

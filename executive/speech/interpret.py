@@ -35,11 +35,10 @@ _PER_SOUND: Final = 3.0
 
 @dataclass(frozen=True)
 class Interpretation(Generic[Meaning]):
-    """Chosen reading and its meaning, and the recogniser's first reading."""
+    """Chosen reading and its meaning."""
 
     text: str
     meaning: Meaning
-    first_text: str
 
 
 def interpret(
@@ -52,14 +51,13 @@ def interpret(
     transcripts = recognition.transcripts
     if not transcripts:
         return None
-    first = transcripts[0]
-    text = remove_repetitions(first.text)
+    text = remove_repetitions(transcripts[0].text)
     heard = [Candidate(text, 0.0, read(text))]
     if not heard[0].reading.correctable or heard[0].reading.fits:
-        return Interpretation(text, heard[0].reading.meaning, first.text)
+        return Interpretation(text, heard[0].reading.meaning)
     fitting = _fitting(recognition, heard, read, alikes)
     best = _likeliest(recognition, heard[0], fitting) or heard[0]
-    return Interpretation(best.text, best.reading.meaning, first.text)
+    return Interpretation(best.text, best.reading.meaning)
 
 
 def _fitting(

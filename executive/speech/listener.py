@@ -16,7 +16,7 @@ from executive.language.understand import Part, Status, Understanding
 from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Utterance
 from executive.speech.hearing import Reader
 from executive.speech.interpret import choose_opening, interpret
-from executive.speech.recogniser import Recogniser, Vocabulary
+from executive.speech.recogniser import Recogniser
 from executive.speech.sound import RATE_HZ, Loudness, Samples, concatenate, level_db, read_wav
 from executive.words.command import Command
 from skills.inputs.errors import InputError
@@ -46,11 +46,6 @@ class Listener:
     alikes: SoundAlikes
     rules: PauseRules = field(default_factory=PauseRules)
 
-    @property
-    def vocabulary(self) -> Vocabulary:
-        """Names that the recogniser expects."""
-        return self.reader.vocabulary
-
     def hear_file(self, wav: Path) -> Recording:
         """Listens to a recording of any length, of which only seconds are in memory.
 
@@ -79,7 +74,7 @@ class Listener:
 
     def hear(self, utterance: Utterance) -> HeardUtterance | None:
         """Recognises and understands an utterance; None when it is no speech."""
-        recognition = self.recogniser.transcribe(utterance.samples, self.vocabulary)
+        recognition = self.recogniser.transcribe(utterance.samples, self.reader.vocabulary)
         best = interpret(recognition, self.reader.read, self.alikes)
         if best is None:
             return None
@@ -209,10 +204,8 @@ def follow(blocks: Iterable[Samples], listener: Listener, *, partial_every_s: fl
         if not endpointer.speaking:
             partial, read_s = "", time_s
         elif time_s - read_s >= partial_every_s:
-            partial, read_s = (
-                listener.recogniser.partial_transcript(endpointer.current_sound(), listener.vocabulary),
-                time_s,
-            )
+            sound, words = endpointer.current_sound(), listener.reader.vocabulary
+            partial, read_s = listener.recogniser.partial_transcript(sound, words), time_s
         yield from (Hearing(time_s, level_db(block), False, finished=one) for one in ended if one is not None)
         yield Hearing(time_s, level_db(block), endpointer.speaking, partial)
     for utterance in endpointer.flush():

@@ -72,9 +72,9 @@ def concatenate(blocks: Iterable[Samples]) -> Samples:
 
 def _runs(flags: npt.NDArray[np.bool_]) -> int:
     """Number of flags in runs of at least _CLIP_RUN."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    lengths = edges[1::2] - edges[::2]
-    return int(lengths[lengths >= _CLIP_RUN].sum())
+    from scipy.ndimage import binary_opening
+
+    return int(binary_opening(flags, np.ones(_CLIP_RUN)).sum())
 
 
 _OPEN_END: Final = 0x7FFF_F000
@@ -108,42 +108,40 @@ def read_wav(file: Path) -> Iterator[Samples]:
     except OSError as error:
         raise InputError(f"cannot read it ({error.strerror})", hint="name a wav file", file=file) from error
     except LibsndfileError as error:
-        raise _error(file, *_unreadable(head, error.error_string)) from error
+        raise _unreadable(file, head, error.error_string) from error
 
 
 def _blocks(file: Path, head: bytes, sound: SoundFile) -> Iterator[Samples]:
     """Blocks of one second, at the file's own rate."""
     rate_hz, there_s = sound.samplerate, sound.frames / sound.samplerate
     if rate_hz not in _RATES_HZ:
-        raise _error(file, f"{rate_hz} samples per second are not read", "record at 16 kHz in one channel")
+        hint = "record at 16 kHz in one channel"
+        raise InputError(f"{rate_hz} samples per second are not read", hint=hint, file=file)
     size = int.from_bytes(head[4:8], "little")
     missing = 0 if size >= _OPEN_END else size + 8 - file.stat().st_size
     if missing > 1:
         missing_s = missing / (rate_hz * sound.channels * _SAMPLE_BYTES.get(sound.subtype, 1))
         what = f"it ends after {there_s:.1f} s, and its head says {there_s + missing_s:.1f} s"
-        raise _error(file, what, "copy the whole file, or record again")
+        raise InputError(what, hint="copy the whole file, or record again", file=file)
     if sound.frames == 0:
-        raise _error(file, "it holds no sound", "record again")
+        raise InputError("it holds no sound", hint="record again", file=file)
     for at_s, frames in enumerate(sound.blocks(rate_hz, dtype="float64", always_2d=True)):
         block = frames.mean(axis=1)
         bad = np.flatnonzero(~np.isfinite(block))
         if bad.size:
             where = at_s + bad[0] / rate_hz
-            raise _error(file, f"the sample at {where:.3f} s is no number", "record again, or export it again")
+            what = f"the sample at {where:.3f} s is no number"
+            raise InputError(what, hint="record again, or export it again", file=file)
         yield np.asarray(np.clip(block, -1.0, 1.0), np.float32)
 
 
-def _unreadable(head: bytes, reason: str) -> tuple[str, str]:
-    """Message and hint for a file without sound."""
+def _unreadable(file: Path, head: bytes, reason: str) -> InputError:
+    """Error of a file without sound."""
     if not head:
-        return "the file is empty", "record again"
+        return InputError("the file is empty", hint="record again", file=file)
     if head[:4] == b"RIFF" and len(head) < _HEAD_BYTES:
-        return "the file ends before its sound", "copy the whole file, or record again"
-    return f"this is no wav file ({reason.rstrip('.')})", _HINT
-
-
-def _error(file: Path, message: str, hint: str) -> InputError:
-    return InputError(message, hint=hint, file=file)
+        return InputError("the file ends before its sound", hint="copy the whole file, or record again", file=file)
+    return InputError(f"this is no wav file ({reason.rstrip('.')})", hint=_HINT, file=file)
 
 
 def _resampled(blocks: Iterator[Samples], rate_hz: int) -> Generator[Samples, None, None]:

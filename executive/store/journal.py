@@ -110,7 +110,7 @@ class StoreJournal(RunVisitor):
 
     def _take_steps(self, note: TickNote) -> None:
         for change in note.changes:
-            if self._recollection is None or not self._recollection.is_pending(change.path_id):
+            if self._recollection is None or self._recollection.result(change.path_id) is None:
                 after = change.after
                 self._checkpoints.pop(change.path_id, None)
                 self._steps[change.path_id] = StepRecord(after.status, after.cause, after.message, note.now_s)

@@ -65,12 +65,8 @@ class Recollection:
         self._last = max(successes, key=lambda path: (self._ended[path].clock_s, self._place[path]), default=None)
         return self
 
-    def is_pending(self, path_id: str) -> bool:
-        """Returns whether a node's result is still unused, so that it must not be overwritten."""
-        return path_id in self._ended
-
     def result(self, path_id: str) -> StepRecord | None:
-        """Returns the unused result of a node from before the restart, or None."""
+        """Returns the unused result of a node from before the restart, which must not be overwritten, or None."""
         return self._ended.get(path_id)
 
     def is_last(self, path_id: str) -> bool:

@@ -4,11 +4,14 @@ import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta, tzinfo
-from typing import Final
+from typing import Annotated, Final
+
+from pydantic import BeforeValidator, Json
 
 from executive.mission.request import Request
+from executive.store.database import form
 from executive.store.missions import MissionState, MissionStore, StoredMission, insert
-from executive.store.triggers import Every, Missed, OnBatteryFull, Once, Schedule, Timed, Trigger, local, trigger_of
+from executive.store.triggers import Every, Missed, OnBatteryFull, Once, Schedule, Timed, Trigger, trigger_of
 from skills.inputs.errors import InputError
 
 LATE: Final = timedelta(seconds=90)
@@ -27,8 +30,8 @@ class StandingMission:
     """
 
     id: int
-    request: Request
-    trigger: Trigger
+    request: Json[Request]
+    trigger: Annotated[Trigger, BeforeValidator(trigger_of)]
     missed: Missed
     anchor: datetime
     since: datetime
@@ -60,7 +63,7 @@ class StandingMissions:
     def missions(self) -> tuple[StandingMission, ...]:
         """Returns all standing missions in the order in which they came."""
         rows = self._store.rows("SELECT * FROM mission WHERE trigger IS NOT NULL ORDER BY id")
-        return tuple(map(_standing, rows))
+        return tuple(form(StandingMission).validate_python(dict(row)) for row in rows)
 
     def fire(self, chosen: Sequence[tuple[StandingMission, Request]], why: str) -> tuple[StoredMission, ...]:
         """Queues these requests, each as a copy of its standing mission: all of them or none.
@@ -90,7 +93,7 @@ class StandingMissions:
                 continue
             begun = waiting_since if isinstance(each.trigger, Timed) else serving_since
             missed = at <= begun or now - at > LATE
-            due = f", due {local(at, self._zone):%Y-%m-%d %H:%M}" if isinstance(each.trigger, Timed) else ""
+            due = f", due {at.astimezone(self._zone):%Y-%m-%d %H:%M}" if isinstance(each.trigger, Timed) else ""
             why = f"{each.trigger}{due}{', missed' if missed else ''}"
             numbers += self._handle(each, now, why if not missed or each.missed is Missed.ONCE else None)
         return tuple(map(self._store.mission, numbers))
@@ -137,14 +140,3 @@ class TooManyError(InputError):
 
 def _queue(connection: sqlite3.Connection, standing: int, request: Request, why: str) -> int:
     return insert(connection, request, state=MissionState.QUEUED, queued=True, standing=standing, why=why)
-
-
-def _standing(row: sqlite3.Row) -> StandingMission:
-    return StandingMission(
-        id=row["id"],
-        request=Request.from_json(row["request"]),
-        trigger=trigger_of(row["trigger"]),
-        missed=Missed(row["missed"]),
-        anchor=datetime.fromisoformat(row["anchor"]),
-        since=datetime.fromisoformat(row["since"]),
-    )

@@ -34,14 +34,9 @@ class TriggerSource(Protocol):
         """Stops listening and closes what it opened; `fire` is not called after it returns. Idempotent."""
 
 
-def refuse_missing_source(kind: str) -> None:
-    """Raises InputError unless exactly one installed distribution registers a trigger source of this kind."""
-    _entry(kind)
-
-
 def trigger_source(kind: str) -> TriggerSource:
     """Creates a trigger source of a kind. Raises InputError when there is none, or it cannot be created."""
-    entry = _entry(kind)
+    entry = installed_source(kind)
     try:
         source: Any = run_plugin(entry, lambda: entry.load()())
     except PluginDefect as defect:
@@ -55,7 +50,8 @@ def trigger_source(kind: str) -> TriggerSource:
     return found
 
 
-def _entry(kind: str) -> EntryPoint:
+def installed_source(kind: str) -> EntryPoint:
+    """Returns the trigger source of a kind. Raises InputError unless exactly one installed distribution has it."""
     known = entry_points(group=GROUP)
     found = {entry.value: entry for entry in known if entry.name == kind}
     if len(found) > 1:

@@ -38,32 +38,22 @@ class Missed(enum.Enum):
     ONCE = "once"
 
 
-class Day(enum.Enum):
-    """Day of the week; the value is Python's number of it."""
-
-    MONDAY = 0
-    TUESDAY = 1
-    WEDNESDAY = 2
-    THURSDAY = 3
-    FRIDAY = 4
-    SATURDAY = 5
-    SUNDAY = 6
-
-
-_SETS: Final = {"day": tuple(Day), "weekday": tuple(Day)[:5], "weekend": tuple(Day)[5:]}
-_DAYS: Final = {spelled: day for day in Day for name in [day.name.lower()] for spelled in (name, f"{name}s", name[:3])}
+_NAMES: Final = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
+"""Days of the week by Python's number of them."""
+_SETS: Final = {"day": tuple(range(_WEEK)), "weekday": (0, 1, 2, 3, 4), "weekend": (5, 6)}
+_DAYS: Final = {spelled: day for day, name in enumerate(_NAMES) for spelled in (name, f"{name}s", name[:3])}
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """Trigger at some local times of day on some days of the week, both in order and without repetition."""
+    """Trigger at some local times of day on some days (0 is Monday), both in order and without repetition."""
 
-    days: tuple[Day, ...]
+    days: tuple[int, ...]
     times: tuple[time, ...]
 
     def __str__(self) -> str:
         named = next((name for name, days in _SETS.items() if days == self.days), None)
-        days = named or listing(day.name.lower() for day in self.days)
+        days = named or listing(_NAMES[day] for day in self.days)
         return f"every {days} {listing(each.strftime('%H:%M') for each in self.times)}"
 
     def after(self, moment: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
@@ -76,9 +66,9 @@ class Schedule:
 
     def _around(self, moment: datetime, offsets: Iterable[int], zone: tzinfo | None) -> list[datetime]:
         """Returns the occurrences on the days at these offsets from the day of a moment."""
-        today = local(moment, zone).date()
+        today = moment.astimezone(zone).date()
         dates = (today + timedelta(days=offset) for offset in offsets)
-        on = [each for each in dates if Day(each.weekday()) in self.days]
+        on = [each for each in dates if each.weekday() in self.days]
         return [_moment(each, at, zone) for each in on for at in self.times]
 
 
@@ -201,7 +191,7 @@ def schedule_of(text: str) -> Schedule | Once:
         raise InputError(f"'{text}' says no times", hint=f"write {_EXAMPLES}")
     days = {day for word in named[:at] for day in _days(word)}
     times = {_time(word, text) for word in named[at:]}
-    return Schedule(tuple(sorted(days, key=lambda day: day.value)), tuple(sorted(times)))
+    return Schedule(tuple(sorted(days)), tuple(sorted(times)))
 
 
 def event_of(text: str) -> OnBatteryFull | OnCall | OnTopic:
@@ -228,11 +218,6 @@ _HINTS: Final = {
 }
 
 
-def local(moment: datetime, zone: tzinfo | None) -> datetime:
-    """Converts a moment (aware) to local wall time; `zone` None is the system's."""
-    return moment.astimezone(zone)
-
-
 def _moment(day: date, at: time, zone: tzinfo | None) -> datetime:
     """Converts a local date and time to UTC."""
     wall = datetime.combine(day, at)
@@ -245,10 +230,10 @@ def _moment(day: date, at: time, zone: tzinfo | None) -> datetime:
     return (wall - before).replace(tzinfo=UTC)
 
 
-def _days(word: str) -> Sequence[Day]:
+def _days(word: str) -> Sequence[int]:
     if word in _DAYS:
         return (_DAYS[word],)
-    known = (*_SETS, *(day.name.lower() for day in Day))
+    known = (*_SETS, *_NAMES)
     if word not in _SETS:
         hint = suggestion(word, known, f"write {listing(_SETS, last='or')}, or the names of days")
         raise InputError(f"'{word}' is no day", hint=hint)

@@ -12,7 +12,7 @@ import math
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from types import MappingProxyType
+from types import MappingProxyType, NoneType
 from typing import Any, Final, Union
 
 from executive.words.command import parse_object
@@ -38,8 +38,6 @@ def conforms(value: Any, hint: Any) -> bool:
         return fits and all(map(conforms, value, kinds))
     if hint is float:
         return isinstance(value, int | float) and not isinstance(value, bool)
-    if hint is None or hint is type(None):
-        return value is None
     return isinstance(value, origin or hint)
 
 
@@ -78,15 +76,15 @@ def describe_type(hint: Any) -> str:
     return _TYPE_NAMES.get(hint) or (hint.__name__ if plain else str(hint).replace("typing.", ""))
 
 
-_TYPE_NAMES: Final[Mapping[Any, str]] = types.MappingProxyType(
-    {float: "number", int: "whole number", str: "text", bool: "true or false", type(None): "nothing", Any: "any value"}
+_TYPE_NAMES: Final[Mapping[Any, str]] = MappingProxyType(
+    {float: "number", int: "whole number", str: "text", bool: "true or false", NoneType: "nothing", Any: "any value"}
 )
 
 
 @functools.lru_cache(maxsize=512)
 def field_types(record: type) -> Mapping[str, Any]:
     """Returns the resolved type hints of a dataclass, including ranges, by field name."""
-    return types.MappingProxyType(typing.get_type_hints(record, include_extras=True))
+    return MappingProxyType(typing.get_type_hints(record, include_extras=True))
 
 
 FROM_KEY: Final = "from"
@@ -183,10 +181,10 @@ def _is_record(hint: Any) -> bool:
 
 def _union(value: Any, options: tuple[Any, ...], knowledge: Knowledge, path: Path) -> Any:
     """Converts the value to the first type that takes it. Raises the most specific PortValueError if none does."""
-    if value is None and type(None) in options:
+    if value is None and NoneType in options:
         return None
     refusals = []
-    for option in (option for option in options if option is not type(None)):
+    for option in (each for each in options if each is not NoneType):
         try:
             return port_value(value, option, knowledge, path)
         except PortValueError as error:
@@ -240,17 +238,13 @@ def _word(value: Any, words: type[enum.Enum], path: Path) -> enum.Enum:
 
 def _plain(value: Any, hint: Any, path: Path) -> Any:
     """Checks a number, a text, a truth value or null."""
-    if hint is None or hint is type(None):
-        if value is None:
-            return None
-        raise _refusal(value, "nothing (null)", path)
-    kinds = _PLAIN.get(hint)
-    if kinds is None:
-        hint = f"let an earlier step give it, and write {{{FROM_KEY}: NAME}}"
-        raise PortValueError(path, "such a value cannot be written in a file", hint)
-    fits = isinstance(value, kinds[0]) and (hint is bool or not isinstance(value, bool))
+    if hint not in _PLAIN:
+        how = f"let an earlier step give it, and write {{{FROM_KEY}: NAME}}"
+        raise PortValueError(path, "such a value cannot be written in a file", how)
+    kinds, wanted = _PLAIN[hint]
+    fits = isinstance(value, kinds) and (hint is bool or not isinstance(value, bool))
     if not fits or (isinstance(value, float) and not math.isfinite(value)):
-        raise _refusal(value, kinds[1], path)
+        raise _refusal(value, wanted, path)
     return float(value) if hint is float else value
 
 
@@ -315,6 +309,7 @@ _PLAIN: Final[Mapping[Any, tuple[tuple[type, ...], str]]] = {
     bool: ((bool,), "true or false"),
     int: ((int,), "a whole number"),
     float: ((int, float), "a number"),
+    NoneType: ((NoneType,), "nothing (null)"),
 }
 _SPECIAL: Final[Mapping[type, Callable[[Any, Knowledge, Path], Any]]] = {
     Pose2D: _pose,

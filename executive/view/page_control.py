@@ -11,6 +11,7 @@ from typing import Any, Final
 from py_trees.common import Status
 
 from executive.conversation.replies import Waiting
+from executive.record.event_log import plain_values
 from executive.run.control import Control
 from executive.run.control_state import ControlState, Mode
 from executive.run.visitor import Progress, RunVisitor
@@ -64,26 +65,12 @@ def robot_of(values: Mapping[str, Any]) -> str | None:
 
 def control_json(state: ControlState) -> dict[str, Any]:
     """Returns the state of a run's control as JSON values for the page."""
-    return {
-        "mode": state.mode.value,
-        "reason": state.reason,
-        "at": state.at,
-        "buttons": list(state.buttons),
-        "breakpoints": sorted(state.breakpoints),
-        "missions": {robot: list(names) for robot, names in state.missions.items()},
-        "questions": [
-            {
-                "id": each.id,
-                "text": each.question.text,
-                "options": list(each.options),
-                "default": each.question.default,
-                "until_s": each.until_s,
-                "robot": each.robot,
-            }
-            for each in state.questions
-        ],
-        "robots": {name: {"mode": each.mode.value, "reason": each.reason} for name, each in state.robots.items()},
-    }
+    plain = plain_values(state)
+    del plain["version"]
+    for each in plain["questions"]:
+        each |= each.pop("question")
+        del each["limit_s"]
+    return {**plain, "breakpoints": sorted(state.breakpoints)}
 
 
 def asked_json(waiting: Waiting | None, robot: str = "") -> dict[str, Any]:

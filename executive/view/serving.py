@@ -8,7 +8,7 @@ import socket
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from http import HTTPStatus
-from typing import Any, Final, Protocol, Self
+from typing import Any, Final, Self
 
 import uvicorn
 from starlette.applications import Starlette
@@ -78,11 +78,8 @@ class CallError(Exception):
         self.status = status
 
 
-class CallHandler(Protocol):
-    """Handler of calls."""
-
-    def __call__(self, name: str, body: bytes) -> Mapping[str, Any]:
-        """Handles a call in a thread of its own; returns the answer's JSON object. Raises CallError."""
+CallHandler = Callable[[str, bytes], Mapping[str, Any]]
+"""Handles the call of a name with its body, in a thread of its own; returns a JSON object. Raises CallError."""
 
 
 class CallServer(Server):

@@ -74,22 +74,18 @@ _BY_STATUS = {Status.RUNNING: Styles.RUNNING, Status.SUCCESS: Styles.SUCCESS, St
 
 def to_text(root: NodeView, *, ascii_only: bool = False) -> str:
     """Formats the tree as plain lines."""
-    lines = _lines(root, "", "", _ASCII_BRANCHES if ascii_only else _BRANCHES, False)
-    text = "\n".join(
-        f"{branches}{style.ascii if ascii_only else style.symbol} {label}{note}"
-        for branches, style, label, note in lines
-    )
+    text = to_rich(root, collapsed=False, ascii_only=ascii_only).plain
     return text.encode("ascii", "replace").decode() if ascii_only else text
 
 
-def to_rich(root: NodeView, *, collapsed: bool = True) -> Text:
+def to_rich(root: NodeView, *, collapsed: bool = True, ascii_only: bool = False) -> Text:
     """Formats the tree with colours; `collapsed` hides the nodes below a node that succeeded or has not begun."""
     text = Text(no_wrap=True, overflow="ellipsis")
-    for n, (branches, style, label, note) in enumerate(_lines(root, "", "", _BRANCHES, collapsed)):
+    pieces = _ASCII_BRANCHES if ascii_only else _BRANCHES
+    for n, (branches, style, label, note) in enumerate(_lines(root, "", "", pieces, collapsed)):
         text.append("\n" if n else "")
         text.append(branches, style="dim")
-        text.append(f"{style.symbol} ", style=style.rich)
-        text.append(label, style=style.rich)
+        text.append(f"{style.ascii if ascii_only else style.symbol} {label}", style=style.rich)
         text.append(note, style="italic")
     return text
 

@@ -104,24 +104,6 @@ class Command:
             "verb": self.verb,
         }
 
-    @classmethod
-    def from_json(cls, values: Mapping[str, Any]) -> Command:
-        """Reads a command from JSON values; missing keys have defaults.
-
-        Raises ValueError for an unknown task or a bad name.
-        """
-        item, target, task = values.get("item"), values.get("object"), values.get("task")
-        return cls(
-            item=None if item is None else parse_object(item),
-            goal=values.get("goal"),
-            goal_at=values.get("goal_at"),
-            task=None if task is None else Task(task),
-            object=None if target is None else parse_object(target),
-            item_count=1 if item is None else values.get("item_count", 1),
-            object_count=1 if target is None else values.get("object_count", 1),
-            verb=values.get("verb", ""),
-        )
-
 
 def is_attribute(word: str) -> bool:
     """Returns whether a leading `word` is an attribute of the words behind it ("red", "biggest")."""

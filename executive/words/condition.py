@@ -7,7 +7,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Final, Union
 
-from pydantic import BeforeValidator, Field, WrapValidator, model_validator
+from pydantic import BeforeValidator, Field, WrapValidator
 from typing_extensions import TypeAliasType
 
 from executive.words.command import Command, Task, command_of_parts, parts_of_command
@@ -113,17 +113,11 @@ class LookFor(_Looking):
 class DoorOpen(_Looking):
     """Condition that a door is open; the robot goes there and looks."""
 
-    door: Annotated[tuple[Name, ...], Field(min_length=1, max_length=2)] = Field(
-        description="The two rooms that it joins, or a room with only one door."
-    )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _one_room(cls, data: Any) -> Any:
-        """Accepts a door that is given by one room."""
-        if isinstance(data, dict) and isinstance(data.get("door"), str):
-            return {**data, "door": [data["door"]]}
-        return data
+    door: Annotated[
+        tuple[Name, ...],
+        Field(min_length=1, max_length=2, description="The two rooms that it joins, or a room with only one door."),
+        BeforeValidator(lambda rooms: [rooms] if isinstance(rooms, str) else rooms),
+    ]
 
     @property
     def between(self) -> tuple[str, str]:

@@ -61,14 +61,16 @@ def unpack(value: Any) -> Any:
     return _KINDS[value[_KIND]][2](value)
 
 
-def _class_of(name: str) -> Any:
-    """Finds the loaded class "module:Class.Inner". Raises ValueError when there is none."""
+def _class_of(name: str, fits: Callable[[Any], bool], kind: str) -> Any:
+    """Finds the loaded class "module:Class.Inner" of a kind. Raises ValueError when there is none."""
     module, _, path = name.partition(":")
     found: Any = sys.modules.get(module)
     for part in path.split("."):
         found = getattr(found, part, None)
     if not isinstance(found, type):
         raise ValueError(f"there is no class {name} any more")
+    if not fits(found):
+        raise ValueError(f"{name} is no {kind}")
     return found
 
 
@@ -82,18 +84,12 @@ def _pack_dataclass(value: Any) -> dict[str, Any]:
 
 
 def _unpack_dataclass(packed: Mapping[str, Any]) -> Any:
-    found = _class_of(packed["class"])
-    if not dataclasses.is_dataclass(found):
-        raise ValueError(f"{packed['class']} is no dataclass")
-    make: Any = found
-    return make(**{name: unpack(item) for name, item in packed["fields"].items()})
+    found = _class_of(packed["class"], dataclasses.is_dataclass, "dataclass")
+    return found(**{name: unpack(item) for name, item in packed["fields"].items()})
 
 
-def _unpack_enum(packed: Mapping[str, Any]) -> Any:
-    found = _class_of(packed["class"])
-    if not issubclass(found, enum.Enum):
-        raise ValueError(f"{packed['class']} is no enum")
-    return found[packed["name"]]
+def _is_enum(of: Any) -> bool:
+    return issubclass(of, enum.Enum)
 
 
 def _pack_array(value: Any) -> dict[str, Any]:
@@ -105,9 +101,9 @@ def _pack_array(value: Any) -> dict[str, Any]:
 _Kind = tuple[Callable[[Any], bool], Callable[[Any], dict[str, Any]], Callable[[Mapping[str, Any]], Any]]
 _KINDS: Final[Mapping[str, _Kind]] = {
     "enum": (
-        lambda of: issubclass(of, enum.Enum),
+        _is_enum,
         lambda v: {"class": _class_name(v), "name": v.name},
-        _unpack_enum,
+        lambda p: _class_of(p["class"], _is_enum, "enum")[p["name"]],
     ),
     "number": (lambda of: issubclass(of, np.generic), lambda v: {"item": v.item()}, lambda p: p["item"]),
     "array": (

@@ -6,9 +6,10 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from executive.words.command import Task
+from executive.words.forms import Strict
 from executive.words.outlines import Corner, Polygon
 from executive.words.robot_config import RobotsFile
 from executive.words.zone import ZoneFacts, with_files
@@ -33,11 +34,7 @@ _UNNAMED: Final = {
 DOCK: Final = "dock"
 
 
-class _Facts(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-
-class Pose(_Facts):
+class Pose(Strict):
     """Planar pose in the world frame: x, y in metres, yaw in radians, counter-clockwise from x."""
 
     x: Coordinate = Field(description="metres")
@@ -45,7 +42,7 @@ class Pose(_Facts):
     yaw: Angle = Field(default=0.0, description="radians")
 
 
-class RobotFacts(_Facts):
+class RobotFacts(Strict):
     """Facts about the robot: its name, the names of others, and whether typed sentences must begin with its name."""
 
     name: Name = Field(description='as in "Hey Alice"')
@@ -53,7 +50,7 @@ class RobotFacts(_Facts):
     require_wake: bool = Field(default=False, description="typed sentences, too, begin with the wake phrase")
 
 
-class BatteryFacts(_Facts):
+class BatteryFacts(Strict):
     """States of charge (0 to 1) at which the robot goes to the dock and leaves it."""
 
     low: Annotated[float, Quantity(ge=0.0, lt=1.0)] = Field(
@@ -68,7 +65,7 @@ class BatteryFacts(_Facts):
         return self
 
 
-class Place(_Facts):
+class Place(Strict):
     """Room: other names, the pose of a robot in it, its outline (world frame, m)."""
 
     pose: Pose = Field(description="pose of a robot in it")
@@ -76,7 +73,7 @@ class Place(_Facts):
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
 
 
-class Door(_Facts):
+class Door(Strict):
     """Narrow passage between two rooms: its middle (world frame, m) and clear width (m)."""
 
     between: tuple[str, str] = Field(description="the rooms on its two sides")
@@ -87,7 +84,7 @@ class Door(_Facts):
     )
 
 
-class SurfaceFacts(_Facts):
+class SurfaceFacts(Strict):
     """Flat top in a room: other names, height above the floor (m), outline, poses from which a robot sees it whole."""
 
     place: str = Field(description="the room that it is in")
@@ -97,7 +94,7 @@ class SurfaceFacts(_Facts):
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
 
 
-class ObjectFacts(_Facts):
+class ObjectFacts(Strict):
     """Facts about a class of objects: other names, its categories, the surfaces where such objects usually are."""
 
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
@@ -105,7 +102,7 @@ class ObjectFacts(_Facts):
     usual: tuple[str, ...] = Field(default=(), description="surfaces where it usually is, likeliest first")
 
 
-class Person(_Facts):
+class Person(Strict):
     """Person: other names, the usual place, and the exact pose when it is known."""
 
     at: str = Field(description="the place where they usually are")
@@ -113,7 +110,7 @@ class Person(_Facts):
     pose: Pose | None = Field(default=None, description="exact pose, when it is known")
 
 
-class TagFacts(_Facts):
+class TagFacts(Strict):
     """AprilTag of family 36h11 with the side of its black square (m), on an object, at the dock, or on a wall or door.
 
     A tag on an object stands `on` its class; any other one has a place and a heading in the world frame.
@@ -132,7 +129,7 @@ class TagFacts(_Facts):
         return self
 
 
-class Knowledge(_Facts):
+class Knowledge(Strict):
     """All knowledge of one world. Names match without regard to case."""
 
     robot: RobotFacts = Field(default=RobotFacts(name="Alice"), description="the robot")

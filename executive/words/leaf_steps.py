@@ -113,14 +113,17 @@ def steps_of_commands(commands: Sequence[Command]) -> tuple[Do, ...]:
     return tuple(map(Do.from_command, commands))
 
 
+_With = Annotated[
+    dict[str, Any] | None,
+    Field(alias="with", description="The skill's input ports, or the parameters of the used file."),
+]
+
+
 class CallSkill(Step):
     """Step that calls a skill with its ports."""
 
     skill: Name = Field(description="The name of a registered skill.")
-    values: Annotated[
-        dict[str, Any] | None,
-        Field(alias="with", description="The skill's input ports, or the parameters of the used file."),
-    ] = None
+    values: _With = None
     gives: dict[str, Name] | None = Field(default=None, description=_GIVES)
 
     @property
@@ -133,10 +136,7 @@ class UseMission(Step):
     """Step that runs another mission file."""
 
     use: Name = Field(description="Another mission file, as seen from this file's folder.")
-    values: Annotated[
-        dict[str, Any] | None,
-        Field(alias="with", description="The skill's input ports, or the parameters of the used file."),
-    ] = None
+    values: _With = None
     _mission: Any = PrivateAttr(default=None)
 
     @property

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Final
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
+from executive.words.forms import Strict
 from skills.inputs.errors import InputError, SourceLine, known_names, suggestion
 from skills.inputs.schema import Name
 from skills.inputs.yaml_source import YamlSource
@@ -44,10 +45,8 @@ class RobotConfig:
         return f"{self.name}={self.kind}{at}"
 
 
-class NamedRobot(BaseModel):
+class NamedRobot(Strict):
     """Robot of a file: its kind, start, dock and stack."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     kind: Name = Field(description="The kind of robot: spot, fetch, or one that a package adds.")
     at: tuple[Coordinate, Coordinate, Angle] | None = Field(

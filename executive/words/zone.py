@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from executive.words.forms import Strict
 from executive.words.outlines import Polygon
 from skills.api import FilterType, Zone, ZoneKind, ZoneMask
 from skills.inputs.errors import InputError
@@ -19,11 +20,7 @@ from skills.quantities import Angle, Number, Quantity, Speed
 _ROS: Final = "ros__parameters"
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-
-class FilterInfo(_Frozen):
+class FilterInfo(Strict):
     """Filter info of a Nav2 mask: what its values mean. A value v, in percent, stands for base + multiplier * v."""
 
     type: FilterType = Field(description="0 keep-out, 1 speed limit in percent of full speed, 2 speed limit in m/s")
@@ -31,7 +28,7 @@ class FilterInfo(_Frozen):
     multiplier: Number = Field(default=1.0, description="of the limit, for each percent of a cell's value")
 
 
-class ZoneFacts(_Frozen):
+class ZoneFacts(Strict):
     """Zone of the map. Its ground is a room (`place`), a `polygon`, or a `mask` of Nav2.
 
     A mask of kind `keep_out` or `speed_limit` is read with its filter info, or without one as Nav2's examples write it:

@@ -8,7 +8,7 @@ import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
 
 from skills.inputs.errors import InputError
 
@@ -53,26 +53,17 @@ def read_bytes(file: Path, *, most_bytes: int, hint: str = "name a file that exi
         InputError: the file is missing, no plain file, too large, or a pointer of Git LFS. `hint` is for a missing
             file, `line` for files that have lines.
     """
-    try:
-        _refuse_special(file.stat().st_mode, file, line)
-        with os.fdopen(os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as stream:
-            content = stream.read(most_bytes + 1)
-    except (OSError, ValueError) as error:
-        raise _unreadable(file, error, hint) from error
+    with _opened(file, hint, line) as stream:
+        content = stream.read(most_bytes + 1)
     _refuse_content(content, file, most_bytes, line)
     return content
 
 
 def plain_file(file: Path, *, most_bytes: int, hint: str = "name a file that exists") -> None:
     """Checks a file that a library will read. Raises InputError as `read_bytes` does."""
-    try:
-        found = file.stat()
-        _refuse_special(found.st_mode, file)
-        with file.open("rb") as stream:
-            head = stream.read(len(_LARGE_FILE))
-    except (OSError, ValueError) as error:
-        raise _unreadable(file, error, hint) from error
-    if found.st_size > most_bytes:
+    with _opened(file, hint) as stream:
+        head, size = stream.read(len(_LARGE_FILE)), os.fstat(stream.fileno()).st_size
+    if size > most_bytes:
         raise _too_large(file, most_bytes)
     _refuse_content(head, file, most_bytes)
 
@@ -117,11 +108,22 @@ def file_beside(naming: Path, name: str, *, home: Path | None = None) -> Path:
     return naming.parent / name
 
 
-def _refuse_special(mode: int, file: Path, line: int | None = None) -> None:
-    if stat.S_ISDIR(mode):
-        raise InputError("it is a folder", hint="name a file in it", file=file)
-    if not stat.S_ISREG(mode):
-        raise InputError("it is a pipe or a device", hint="name a plain file", file=file, line=line)
+@contextmanager
+def _opened(file: Path, hint: str, line: int | None = None) -> Iterator[BinaryIO]:
+    """Opens a plain file. Raises InputError for a missing file, a folder, a pipe or a device."""
+    try:
+        mode = file.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise InputError("it is a folder", hint="name a file in it", file=file)
+        if not stat.S_ISREG(mode):
+            raise InputError("it is a pipe or a device", hint="name a plain file", file=file, line=line)
+        with os.fdopen(os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as stream:
+            yield stream
+    except FileNotFoundError as error:
+        raise InputError("there is no such file", hint=hint, file=file) from error
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else "its name is no name of a file"
+        raise InputError(f"cannot read it ({why})", hint=hint, file=file) from error
 
 
 def _refuse_content(content: bytes, file: Path, most_bytes: int, line: int | None = None) -> None:
@@ -135,13 +137,6 @@ def _refuse_content(content: bytes, file: Path, most_bytes: int, line: int | Non
 def _too_large(file: Path, most_bytes: int, line: int | None = None) -> InputError:
     what = f"it is too large (at most {most_bytes} bytes are read)"
     return InputError(what, hint="make it smaller", file=file, line=line)
-
-
-def _unreadable(file: Path, error: Exception, hint: str) -> InputError:
-    if isinstance(error, FileNotFoundError):
-        return InputError("there is no such file", hint=hint, file=file)
-    why = error.strerror if isinstance(error, OSError) else "its name is no name of a file"
-    return InputError(f"cannot read it ({why})", hint=hint, file=file)
 
 
 LONGEST_TEXT: Final = 2000

@@ -18,7 +18,8 @@ from tests.executive.cli.calls import refusal
 def functions(name: str) -> Iterator[Any]:
     """The functions of a command, or of all commands of a group."""
     entry = COMMANDS.get(name)
-    found = dataset if entry is None else getattr(import_module(f"executive.cli.{entry.module}"), entry.attribute)
+    own = name.replace("-", "_")
+    found = dataset if entry is None else getattr(import_module(f"executive.cli.{entry.module}"), own)
     if isinstance(found, typer.Typer):
         groups = [found, *(group.typer_instance for group in found.registered_groups)]
         yield from (each.callback for group in groups if group is not None for each in group.registered_commands)

@@ -10,6 +10,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.reader import read_ros2_messages
 from pydrake.math import RigidTransform
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
 
 from executive.record.announce import map_message
 from executive.record.event_log import EventLog
@@ -51,7 +53,7 @@ def bag(tmp_path, events):
 @pytest.fixture
 def decoded(bag):
     """Messages of the bag: (schema name, topic, time in ns, message)."""
-    with (bag / "bag_0.mcap").open("rb") as file:
+    with (bag / "bag.mcap").open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         assert reader.get_header().profile == "ros2"
         return [(schema.name, channel.topic, message.log_time, told)
@@ -118,7 +120,7 @@ def test_times_are_those_of_the_wall_clock(events, decoded):
 
 
 def test_late_listeners_get_the_map_and_static_transforms(bag):
-    with (bag / "bag_0.mcap").open("rb") as file:
+    with (bag / "bag.mcap").open("rb") as file:
         channels = make_reader(file).get_summary().channels.values()
     latched = {each.topic for each in channels if "durability: 1" in each.metadata["offered_qos_profiles"]}
     assert latched == {"/map", "/tf_static"}
@@ -126,7 +128,7 @@ def test_late_listeners_get_the_map_and_static_transforms(bag):
 
 def test_the_metadata_say_what_the_bag_holds(bag, decoded):
     told = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    assert (told["storage_identifier"], told["relative_file_paths"]) == ("mcap", ["bag_0.mcap"])
+    assert (told["storage_identifier"], told["relative_file_paths"]) == ("mcap", ["bag.mcap"])
     assert told["starting_time"]["nanoseconds_since_epoch"] == decoded[0][2]
     assert told["duration"]["nanoseconds"] == decoded[-1][2] - decoded[0][2]
     counts = [each["message_count"] for each in told["topics_with_message_count"]]
@@ -134,11 +136,9 @@ def test_the_metadata_say_what_the_bag_holds(bag, decoded):
 
 
 def test_rosbags_reads_the_folder_as_a_bag(bag, decoded):
-    rosbag2 = pytest.importorskip("rosbags.rosbag2")
-    typesys = pytest.importorskip("rosbags.typesys")
-    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    store = get_typestore(Stores.ROS2_HUMBLE)
     kinds = {}
-    with rosbag2.Reader(bag) as reader:
+    with Reader(bag) as reader:
         for connection, _, data in reader.messages():
             kinds.setdefault(connection.topic, store.deserialize_cdr(data, connection.msgtype))
         map_qos = next(each.ext.offered_qos_profiles for each in reader.connections if each.topic == "/map")

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from executive.store.trigger_source import refuse_missing_source, trigger_source
+from executive.store.trigger_source import installed_source, trigger_source
 from skills.inputs.errors import InputError
 from tests.executive.distribution import write_distribution
 
@@ -32,7 +32,7 @@ def installed(tmp_path, monkeypatch):
 
 
 def test_a_source_is_made_by_the_name_of_its_kind(installed):
-    refuse_missing_source("bell")
+    installed_source("bell")
     source = trigger_source("bell")
     source.start(("door",), print)
     assert source.topics == ("door",)
@@ -41,7 +41,7 @@ def test_a_source_is_made_by_the_name_of_its_kind(installed):
 
 def test_a_missing_source_is_one_error_that_names_the_group(installed):
     with pytest.raises(InputError) as error:
-        refuse_missing_source("mqtt")
+        installed_source("mqtt")
     assert str(error.value) == (
         "there is no trigger source 'mqtt'; install a package that registers 'mqtt' in the entry-point group "
         "'errand.triggers'; installed are bell, broken, gone and half"
@@ -64,4 +64,4 @@ def test_a_source_that_cannot_be_used_says_why(installed, kind, words):
 def test_two_sources_of_one_kind_are_refused(installed, tmp_path):
     write_distribution(tmp_path, "more", "errand.triggers", "bell = more:Source")
     with pytest.raises(InputError, match="bells:Source and more:Source both are trigger source 'bell'"):
-        refuse_missing_source("bell")
+        installed_source("bell")

@@ -57,8 +57,8 @@ def test_every_command_parses_back_from_its_text(command):
 @given(commands())
 def test_json_keeps_the_text_form_of_plain_names(command):
     values = command.to_json()
-    assert (values["goal"], values["item"] is None) == (command.goal, command.item is None)
-    assert Command.from_json(values).goal_at == command.goal_at
+    assert (values["goal"], values["goal_at"]) == (command.goal, command.goal_at)
+    assert (values["item"] is None) == (command.item is None)
 
 
 def test_json_has_null_for_nothing_and_zero_for_its_count():
@@ -67,11 +67,6 @@ def test_json_has_null_for_nothing_and_zero_for_its_count():
     )
     there = {"goal": "kitchen", "task": "grasp", "object": "red wrench", "object_count": 2, "verb": "get"}
     assert command.to_json() == there | {"item": None, "goal_at": None, "item_count": 0}
-
-
-def test_json_reads_back():
-    command = Command(item=ObjectKind("wrench", ("red",)), item_count=2, goal="Robin", goal_at="hall", verb="bring")
-    assert Command.from_json(command.to_json()) == command
 
 
 @pytest.mark.parametrize(*table(__file__, "no_commands"))

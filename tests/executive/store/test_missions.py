@@ -206,6 +206,15 @@ def test_an_error_while_a_store_is_claimed_is_no_store_error(path):
         pass
 
 
+def test_a_store_that_another_program_has_locked_says_so(path):
+    with MissionStore(path) as store, MissionStore(path) as other:
+        store._connection.execute("PRAGMA busy_timeout = 10")
+        other._connection.execute("BEGIN EXCLUSIVE")
+        with pytest.raises(InputError, match="another program has locked the store; end the program"):
+            store.add(REQUEST, queued=True)
+        other._connection.rollback()
+
+
 def test_a_full_disk_names_how_to_continue(path):
     with MissionStore(path) as store:
         number = store.add(REQUEST, queued=True).id

@@ -1,4 +1,4 @@
-"""Grasps of earlier attempts, so that the next attempt takes another."""
+"""Grasps tried in earlier attempts, so that the next attempt tries another."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ _SAME_PLACE_M = 0.03
 
 @dataclass(frozen=True)
 class TriedGrasp:
-    """Grasp in the world's axes: directions of the fingers and of their closing, the hand from the object (m)."""
+    """Grasp in world coordinates: directions of the fingers and of their closing, and the object-to-hand vector (m)."""
 
     pointing_W: tuple[Cosine, Cosine, Cosine]
     closing_W: tuple[Cosine, Cosine, Cosine]
@@ -27,7 +27,7 @@ class TriedGrasp:
 
 
 def tried_grasp(candidate: GraspCandidate, centre_B: tuple[float, float], X_WB: RigidTransform) -> TriedGrasp:
-    """Returns a candidate as a tried grasp; `centre_B` is the object's centre (x, y), X_WB the body's pose then."""
+    """Converts a candidate to a tried grasp; `centre_B` is the object's centre (x, y), X_WB the body's pose then."""
     R_WH = X_WB.rotation().matrix() @ candidate.X_BH.rotation().matrix()
     p_B = candidate.X_BH.translation() - np.array([*centre_B, 0.0])
     return TriedGrasp(_vector(R_WH[:, 0]), _vector(R_WH[:, 2]), _vector(X_WB.rotation().matrix() @ p_B))
@@ -39,7 +39,7 @@ def others_first(
     centre_B: tuple[float, float],
     X_WB: RigidTransform,
 ) -> list[GraspCandidate]:
-    """Returns the candidates in their order, with those like a tried grasp last."""
+    """Returns the candidates in their order, but those similar to a tried grasp last."""
 
     def was_tried(candidate: GraspCandidate) -> bool:
         now = tried_grasp(candidate, centre_B, X_WB)
@@ -49,7 +49,7 @@ def others_first(
 
 
 def same_grasp(one: TriedGrasp, other: TriedGrasp) -> bool:
-    """Returns whether two grasps are the same but for small differences; the gripper may be turned over."""
+    """Returns whether two grasps are equal within tolerances; the gripper may be flipped."""
     least = math.cos(_SAME_TURN_RAD)
     pointing = float(np.dot(one.pointing_W, other.pointing_W))
     closing = abs(float(np.dot(one.closing_W, other.closing_W)))

@@ -122,7 +122,7 @@ class MovingSkill(RoutineSkill[InputsT]):
         yield from self.pause(settle_s, "coming to rest")
 
     def drive(self, velocity: tuple[float, float, float], running: Running) -> Routine[float]:
-        """Moves at a body velocity for one tick; returns how long (s) the robot refused. May raise SkillFailure."""
+        """Moves at a body velocity for one tick; returns how long (s) the robot refused. Fails after patience."""
         self._base.drive(velocity)
         yield running
         begun_s = self.context.clock.now()

@@ -189,7 +189,7 @@ class Grasp(LookingSkill[GraspInputs]):
         return {"tried": self._tried, IN_THE_WAY: ()}
 
     def _take_where_it_is(self, inputs: GraspInputs) -> Routine[tuple[CloseView, GraspPlan]]:
-        """Views, plans and grasps; once more when the object has moved meanwhile. May raise SkillFailure."""
+        """Views, plans and grasps; retries once when the object has moved. Fails when the retry fails too."""
         seen = inputs.observation
         heights_m = yield from heights_to_grasp(self, seen)
         attempt = partial(self._look_and_plan, seen, inputs.avoid)

@@ -401,7 +401,7 @@ class Place(PlaceVerification[PlaceInputs]):
             yield from self.try_shift_hand(_RELAX_M * UP_B, message)
 
     def _press_down(self, message: str) -> Routine[bool]:
-        """Presses the object slowly onto the surface; returns whether contact stopped it. May raise SkillFailure."""
+        """Presses the object slowly down; returns whether contact stopped it. Fails when no line is feasible."""
         why: PlanningError | None = None
         for part in (1.0, 0.85, 0.7, 0.5):
             try:

@@ -132,10 +132,7 @@ class Worker(Protocol):
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
     ) -> Job[ResultT]:
-        """Starts `work` on the value of `read`.
-
-        In lock-step `read` runs at once; it may block, as `Robot.image` may.
-        """
+        """Starts `work` on the value of `read`, which in lock-step runs at once; `read` may block."""
 
 
 @dataclass(frozen=True)

@@ -329,10 +329,7 @@ def _options_of(name: str) -> type | None:
 
 
 def _options(name: str, given: Any) -> Any:
-    """Returns the options that a stack gives to a skill.
-
-    Raises StackError when the skill has no options or cannot be loaded.
-    """
+    """Returns a skill's options in a stack. Raises StackError when the skill has none or cannot be loaded."""
     entries = installed_plugins(SKILL_GROUP).select(name=name)
     kind = _options_of(name) if entries else None
     if kind is None:

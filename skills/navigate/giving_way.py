@@ -198,10 +198,7 @@ class GivingWay:
     def waiting_pose(
         self, costmap: FreeSpace, footprint: Footprint, here: Pose2D, tried: Sequence[Pose2D] = ()
     ) -> Pose2D | None:
-        """The nearest reachable pose off all reserved paths; None when there is none.
-
-        Omits positions close to the `tried` poses.
-        """
+        """The nearest reachable pose off all reserved paths and away from the `tried` poses; None without any."""
         paths = with_outlines(NoObstacles(), [(one.discs, _thinned(one)) for one in self.robots_with_priority()])
         return pose_aside(self.costmap(costmap, Avoided.BODIES), paths, footprint, here, self._options, tried)
 

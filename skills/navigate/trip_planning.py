@@ -110,10 +110,7 @@ class TripPlanning:
             raise SkillFailure(Cause.PLANNING, sentence, final=all(map(self._around.forbidding_zones, self._goals)))
 
     def path(self) -> Path | None:
-        """The path of a finished plan, returned once; None when there is none to follow.
-
-        Raises PlanningError when the plan failed.
-        """
+        """The path of a finished plan, returned once, or None. Raises PlanningError when the plan has failed."""
         if self._job is None or not self._job.done():
             return None
         job, self._job = self._job, None

@@ -96,10 +96,7 @@ class _Told(Exception):  # noqa: N818 - no program error
 
 
 class FollowPerson(ListeningSkill[FollowPersonInputs]):
-    """Keeps behind a walking person by LiDAR and body cameras; searches for a lost person, and asks.
-
-    The navigate skill drives.
-    """
+    """Keeps behind a walking person by LiDAR and body cameras; searches for a lost person, and asks. Uses navigate."""
 
     name = "follow_person"
     Inputs = FollowPersonInputs

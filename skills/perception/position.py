@@ -76,10 +76,7 @@ class Position:
 
 
 def locate(image: Image, detection: Detection, taken: Mask | None = None) -> Position | None:
-    """Locates the object of a detection; None when there is no depth.
-
-    `taken` (H, W) marks the pixels that belong to other objects.
-    """
+    """Locates a detection's object without the pixels `taken` (H, W) by other objects; None when there is no depth."""
     form = class_form(detection.class_name)
     window = window_about(image, detection.box, taken)
     if window is None:

@@ -8,10 +8,7 @@ STEP_S = 0.01
 
 
 class VirtualClock:
-    """Clock that only `advance` moves; it calls the attached functions in steps of 0.01 s.
-
-    Implements `skills.robot.Clock`.
-    """
+    """Clock that only `advance` moves, in steps of 0.01 s with calls of what is attached; a `skills.robot.Clock`."""
 
     def __init__(self) -> None:
         self._now_s = 0.0

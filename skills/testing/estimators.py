@@ -47,10 +47,7 @@ class KnownPlace:
 
 
 class BlockCostmap:
-    """Costmap of the blocks that the body could touch (heights 0.05 to 1.0 m).
-
-    Implements `skills.api.Costmap`.
-    """
+    """Costmap of the blocks that the body could touch (heights 0.05 to 1.0 m). Implements `skills.api.Costmap`."""
 
     def __init__(self, blocks: Sequence[Block] = ()) -> None:
         self._blocks = block_array([block for block in blocks if block.z0 < 1.0 and block.z1 > 0.05])

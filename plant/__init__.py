@@ -1,1 +1,1 @@
-"""Plant: the simulated robots and worlds, a Drake Diagram behind the Robot protocol."""
+"""Plant: simulated robots and worlds, built as a Drake Diagram behind the Robot protocol."""

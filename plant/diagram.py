@@ -1,6 +1,6 @@
 """Builds the Drake Diagram of a world with its robots, people and loose objects.
 
-A link welded to the world is still a body for Drake, and costs time in every step. So the builder reads the directives
+A link welded to the world is still a body for Drake, and costs time in every step. So the builder parses the directives
 into a temporary plant, and registers the shapes of its welded models, the scenery, on the world body. A model with a
 moving part stays a model.
 """
@@ -102,7 +102,7 @@ def add_model(parser: Parser, path: Path) -> ModelInstanceIndex:
 
 
 def _refused(file: Path, error: Exception) -> InputError:
-    """Error with Drake's message about a file, in one line."""
+    """Error that quotes Drake's message about a file, in one line."""
     reason = " ".join(str(error).split()) or type(error).__name__
     return InputError(f"the simulation cannot use it: {reason[:300]}", hint="correct the file", file=file)
 
@@ -113,7 +113,7 @@ def _only(instances: Sequence[ModelInstanceIndex]) -> ModelInstanceIndex:
 
 
 def _process(directives: Sequence[ModelDirective], plant: MultibodyPlant, parser: Parser) -> None:
-    """Carries out directives one by one."""
+    """Processes directives one by one."""
     for each in directives:
         model, weld = each.add_model, each.add_weld
         if model is not None and not (model.default_joint_positions or model.default_free_body_pose):
@@ -130,7 +130,7 @@ def _process(directives: Sequence[ModelDirective], plant: MultibodyPlant, parser
 def _copy_fixed(
     scratch: MultibodyPlant, inspector: SceneGraphInspector, moving: set[str], plant: MultibodyPlant
 ) -> dict[GeometryId, str]:
-    """Registers the shapes of all fixed models on the world body of `plant`; returns their models."""
+    """Registers the shapes of all fixed models on the world body of `plant`; returns the model name of each shape."""
     context, world, pieces = scratch.CreateDefaultContext(), plant.world_body(), {}
     for geometry in inspector.GetAllGeometryIds():
         body = scratch.GetBodyFromFrameId(inspector.GetFrameId(geometry))
@@ -193,7 +193,7 @@ def _scope(name: str) -> str:
 
 
 def _model_of(plant: MultibodyPlant, body: BodyIndex) -> str:
-    """Name of the model in the directives that a body belongs to."""
+    """Name, in the directives, of the model to which a body belongs."""
     instance = plant.get_body(body).model_instance()
     return str(plant.GetModelInstanceName(instance)).partition("::")[0]
 
@@ -212,9 +212,9 @@ X_PT_HOME = RigidTransform(
 
 @dataclass(frozen=True)
 class LooseModel:
-    """A model put into the world at the beginning: X_WM is the pose of its base.
+    """A model added to the world at the start: X_WM is the pose of its base.
 
-    A fixed model is welded there. A walking person has a `route`, slides upright in x, y and yaw, and passes through
+    A fixed model is welded there. A walking person has a `route`, moves upright in x, y and yaw, and passes through
     fixed shapes. A person who takes objects from robots is `receiving` and has a tray.
     """
 
@@ -230,8 +230,8 @@ class LooseModel:
 class DiagramConfig:
     """Contents of a Diagram: the directives of a world (None: an empty one), models, robots and doors.
 
-    `visuals` draws robots with meshes if these are installed. `render` makes the scene for cameras, with the light and
-    sky of `renderer_parameters`. `friction` multiplies the friction coefficients of all moving bodies.
+    `visuals` draws robots with meshes if these are installed. `render` creates the scene for cameras, with light and
+    sky from `renderer_parameters`. `friction` multiplies the friction coefficients of all moving bodies.
     """
 
     directives: Path | None = None
@@ -246,10 +246,10 @@ class DiagramConfig:
 
 @dataclass(frozen=True)
 class WorldDiagram:
-    """The finished Diagram of a `config`, with its parts by name.
+    """The finished Diagram built from a `config`, with its parts by name.
 
-    `models` includes the panels of doors. `trays` has the people's trays by name. `scenery` maps each collision shape
-    of the world body to its model's name. `scene` renders the Diagram if the config requests it.
+    `models` includes the panels of doors. `trays` are the people's trays by name. `scenery` maps each collision shape
+    on the world body to its model's name. `scene` renders the Diagram if the config requests it.
     """
 
     config: DiagramConfig
@@ -264,10 +264,10 @@ class WorldDiagram:
 
 
 def build_diagram(config: DiagramConfig, meshcat: Meshcat | None = None) -> WorldDiagram:
-    """Builds the Diagram of a world with its models, robots and doors, and shows it in `meshcat`.
+    """Builds the Diagram of a world with its models, robots and doors, and publishes it to `meshcat`.
 
-    The plant uses SAP with point contact at `TIME_STEP_S`. Sampled outputs would double the cost of a step and are off,
-    so evaluating contact results solves again. Default positions place the models; the engine places the robots.
+    The plant uses SAP with point contact at `TIME_STEP_S`. Sampled output ports would double the cost of a step and are
+    off, so evaluating contact results solves again. Default positions place the models; the engine places the robots.
     """
     builder = DiagramBuilder()
     plant_config = MultibodyPlantConfig(
@@ -319,7 +319,7 @@ def _filter_collisions(
 
 
 def try_geometry(directives: Path | None, models: Iterable[Path]) -> None:
-    """Builds a world's geometry and models for a check alone. Raises InputError when Drake cannot use a file."""
+    """Builds a world's geometry and models only to check them. Raises InputError when Drake cannot use a file."""
     plant, _ = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
     parser, logger = parser_of(plant), logging.getLogger("drake")
     level = logger.level
@@ -354,7 +354,7 @@ def _add_model(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> Mode
 
 
 def _add_tray(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> RigidBody:
-    """Adds the tray of a person: hidden in the torso and without weight, because its pose is prescribed."""
+    """Adds a person's tray: hidden in the torso and without gravity, because its pose is prescribed."""
     instance = add_model(parser, TRAY_PATH)
     plant.RenameModelInstance(instance, f"{model.name}'s tray")
     plant.set_gravity_enabled(instance, False)
@@ -365,7 +365,7 @@ def _add_tray(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> Rigid
 
 
 def _let_slide(plant: MultibodyPlant, frame: Frame, model: LooseModel) -> None:
-    """Lets a model slide upright at its height, by a planar joint."""
+    """Lets a model move upright at its height, by a planar joint."""
     x, y, z = model.X_WM.translation()
     level = RigidTransform(np.array([0.0, 0.0, z]))
     floor = plant.AddFrame(FixedOffsetFrame(f"{model.name}_floor", plant.world_frame(), level))
@@ -380,7 +380,7 @@ def _shapes(plant: MultibodyPlant, bodies: Iterable[RigidBody]) -> list[Geometry
 
 
 def _floor_geometries(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[GeometryId]:
-    """Collision boxes and half spaces that are fixed to the world and end at the height of the floor."""
+    """Collision boxes and half spaces that are fixed to the world and whose top is at floor height."""
     inspector = scene_graph.model_inspector()
     context = plant.CreateDefaultContext()
     floor = []

@@ -1,8 +1,8 @@
-"""The engine: steps the Diagram, commands and senses for the robots, and is the only clock.
+"""The engine: steps the Diagram, applies commands and samples sensors for the robots, and is the only clock.
 
 In a pipeline, the plant steps towards the next tick while the executive computes the present tick. A tick's command
-begins at the end of the current step: one period late, as over a radio link. Readings are those of the tick's start.
-The same calls give the same run, with a thread for the steps or without.
+takes effect at the end of the current step: one period late, as over a radio link. Measurements are those of the tick's
+start. The same calls give the same run, whether or not a thread does the steps.
 """
 
 from collections import Counter
@@ -39,9 +39,9 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
     """A Diagram in motion with the robots in it; implements the Clock protocol."""
 
     def __init__(self, world: WorldDiagram, *, seed: int = 0) -> None:
-        """Places the robots at their starts at time 0; `seed` gives the noise of their sensors.
+        """Places the robots at their starts at time 0; `seed` determines the noise of their sensors.
 
-        Raises WorldError when a person's route leads through something that is fixed.
+        Raises WorldError when a person's route leads through a fixed shape.
         """
         self.world = world
         self._simulator = Simulator(world.diagram)
@@ -73,7 +73,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
 
     @property
     def asleep(self) -> frozenset[str]:
-        """Names of the sleeping loose objects; these do not move."""
+        """Names of the sleeping loose objects, which do not move."""
         return self._sleepers.asleep
 
     def observe(self, observer: Callable[[float], None], *, every: int = 1) -> None:
@@ -85,12 +85,12 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         return self._steps * TIME_STEP_S
 
     def advance(self, dt_s: float) -> None:
-        """Steps the plant by dt_s, rounded to whole steps (at least one), and takes readings."""
+        """Steps the plant by dt_s, rounded to whole steps (at least one), and updates the sensors."""
         self.step(dt_s)
         self.sense()
 
     def step(self, dt_s: float) -> None:
-        """Steps the plant by dt_s, rounded to whole steps (at least one); takes no readings."""
+        """Steps the plant by dt_s, rounded to whole steps (at least one), without updating the sensors."""
         holding = [name for name, robot in self.robots.items() if robot.gripper().holding]
         until = self._steps + max(1, round(dt_s / TIME_STEP_S))
         while self._steps < until:
@@ -108,7 +108,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
             self._do_steps(steps, holding)
 
     def _before_step(self, later: int, holding: Sequence[str]) -> None:
-        """Moves people, doors and objects before the next step, or before a `later` one."""
+        """Moves people, doors and objects before the next step; `later` is the number of steps in between."""
         now_s = (self._steps + later) * TIME_STEP_S
         self.walkers.before_step(TIME_STEP_S, self.receivers.busy, self.doors.barriers)
         self.receivers.before_step(now_s, TIME_STEP_S, holding)
@@ -123,7 +123,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         return still and not observed and not holding and self._sleepers.all_asleep
 
     def _do_steps(self, steps: int, holding: Sequence[str]) -> None:
-        """Advances the plant by some steps at once, corrects loose objects, and calls the observers."""
+        """Advances the plant by `steps` steps at once, corrects loose objects, and calls the observers."""
         self._steps += steps
         self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
         if not self._sleepers.all_asleep:
@@ -136,14 +136,14 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
                 observer(self.now())
 
     def sense(self) -> None:
-        """Takes the readings of all robots and calls the listeners of `after_advance`."""
+        """Updates the sensors of all robots and calls the listeners of `after_advance`."""
         for robot in self.robots.values():
             robot.sense(self.now())
         for listener in self._after_advance:
             listener()
 
     def after_advance(self, listener: Callable[[], None]) -> None:
-        """Calls `listener` after each advance, once all robots have sensed."""
+        """Calls `listener` after each advance, once the sensors of all robots are updated."""
         self._after_advance.append(listener)
 
     def world_state(self) -> Mapping[str, FloatArray]:
@@ -157,7 +157,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         return {**super().state(), "robots": robots, "moves": None if self.moves is None else self.moves.state()}
 
     def resume(self, state: State, world: Mapping[str, FloatArray]) -> None:
-        """Restores a state, and powers the robots up in it. Raises ValueError for another Diagram's state."""
+        """Restores a state, and powers the robots up in it. Raises ValueError when it belongs to another Diagram."""
         if set(world) != set(self.world_state()):
             raise ValueError("the world has other parts")
         self._sleepers.wake_all()
@@ -186,7 +186,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         return {name: np.array(X_WH.translation()) for name, X_WH in poses.items()}
 
     def _outlines_W(self) -> Iterator[FloatArray]:
-        """Outlines (K, 2) of robots, their hands and walking people, from above."""
+        """Outlines (K, 2), from above, of robots, their hands and walking people."""
         for robot in self.world.robots.values():
             yield robot.outline_W(self.context)
         yield from (p_W[:2] + HAND_OUTLINE_M for p_W in self._hands_W().values())
@@ -207,7 +207,7 @@ _LEAST_S = 1e-6
 
 
 class Pipeline:
-    """Clock of an engine that steps ahead, with its robots; implements the Clock protocol."""
+    """Clock of an engine that steps ahead of the ticks, with its robots; implements the Clock protocol."""
 
     def __init__(self, engine: Engine, background: Background | None = None) -> None:
         """`background` does the steps in parallel to the ticks; without it `advance` does them."""
@@ -218,22 +218,22 @@ class Pipeline:
 
     @property
     def words(self) -> Sequence[tuple[float, str, str]]:
-        """Words of people to a robot near them until now: the time (s), the person's name and the words."""
+        """Words that people have said to a robot near them: the time (s), the person's name and the words."""
         return [each for each in self._engine.words if each[0] <= self.now() + _EXACT_S]
 
     @property
     def events(self) -> Sequence[tuple[float, str]]:
-        """Events of doors and moved objects until now: the time (s) and a sentence for each."""
+        """Events of doors and moved objects so far: the time (s) and a sentence for each."""
         return [(time_s, sentence) for time_s, sentence in self._engine.events if time_s <= self.now() + _EXACT_S]
 
     def now(self) -> float:
-        """Simulated seconds since the start, as of the last readings."""
+        """Simulated seconds since the start, as of the last measurements."""
         return self._engine.now() if self._now_s is None else self._now_s
 
     def advance(self, dt_s: float) -> None:
-        """Advances by dt_s: waits for the current step, takes readings, begins commands and starts the next step.
+        """Advances by dt_s: waits for the current step, updates the sensors, begins commands and starts the next step.
 
-        Raises the exception of the current step. Raises ValueError when that step is longer than dt_s.
+        Raises the exception of the current step, and ValueError when that step is longer than dt_s.
         """
         until_s = self.now() + dt_s
         self.settle()
@@ -249,11 +249,11 @@ class Pipeline:
         self._under_way = self._background(partial(self._engine.step, dt_s))
 
     def reached_s(self) -> float:
-        """Time (s) of the plant; call it only between steps."""
+        """Time (s) that the plant has reached; call it only between steps."""
         return self._engine.now()
 
     def settle(self) -> None:
-        """Waits until no step is under way. Raises the exception of that step."""
+        """Waits until no step is running. Raises the exception of that step."""
         if (under_way := self._under_way) is not None:
             wait([under_way])  # an alarm may interrupt this: the step is still under way then
             self._under_way = None
@@ -263,7 +263,7 @@ class Pipeline:
 class PipelinedRobot(RobotWrapper):
     """A robot whose commands begin at the end of the current step, and count as running until then.
 
-    Verbs of the lease wait for this step, because they return a result. The time of an arm's trajectory counts from its
+    Verbs of the lease wait for this step, because they return a result. The time of an arm trajectory counts from its
     command: the arm begins at the trajectory's point for the present time.
     """
 
@@ -275,7 +275,7 @@ class PipelinedRobot(RobotWrapper):
         self._running: dict[CommandId, CommandId] = {}  # by the ids given here, those of the robot
 
     def begin_commands(self) -> None:
-        """Passes the waiting commands to the robot; no step may be under way."""
+        """Passes the queued commands to the robot; no step may be running."""
         for command, begin in self._commanded:
             self._running[command] = begin()
         self._commanded = []
@@ -291,17 +291,17 @@ class PipelinedRobot(RobotWrapper):
         return command
 
     def _settled(self) -> Robot:
-        """Returns the robot, once no step is under way and its waiting commands have begun."""
+        """Returns the robot, once no step is running and its queued commands have begun."""
         self._pipeline.settle()
         self.begin_commands()
         return self._robot
 
     def _command(self, verb: str, call: Callable[..., CommandId], *arguments: Any, **options: Any) -> CommandId:
-        """Begins the command later."""
+        """Queues the command."""
         return self._later(partial(call, *arguments, **options))
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
-        """Follows a joint trajectory; done when its end is reached and the arm is still."""
+        """Follows a joint trajectory; done when the arm rests at its end."""
         commanded_s = self._pipeline.now()
 
         def begin() -> CommandId:
@@ -320,7 +320,7 @@ class PipelinedRobot(RobotWrapper):
         return self._later(begin)
 
     def command_status(self, command: CommandId) -> CommandStatus:
-        """Returns the status of a command as of the last readings. Raises KeyError for an unknown id."""
+        """Returns the status of a command as of the last measurements. Raises KeyError for an unknown id."""
         return self._statuses.status(command)
 
     def acquire_lease(self, holder: str) -> Lease:
@@ -328,11 +328,11 @@ class PipelinedRobot(RobotWrapper):
         return self._settled().acquire_lease(holder)
 
     def take_lease(self, holder: str) -> Lease:
-        """Takes the lease from its holder; the robot stops."""
+        """Takes the lease away from its holder; the robot stops."""
         return self._settled().take_lease(holder)
 
     def return_lease(self, lease: Lease) -> None:
-        """Returns the lease; the robot stops. A lease that no longer counts is ignored."""
+        """Returns the lease; the robot stops. Ignores a lease that is no longer valid."""
         self._settled().return_lease(lease)
 
 

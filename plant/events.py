@@ -1,4 +1,4 @@
-"""Events of a run without a robot's action: sliding doors close and open, and people move objects.
+"""Events that no robot causes: sliding doors close and open, and people move objects.
 
 The panel of a door slides on a planar joint, like a walking person: its pose and velocity are set before each step. It
 touches robots and loose objects, passes through the scenery, and waits while a robot or a person is in the doorway. A
@@ -69,14 +69,14 @@ def _closed_at(door: DoorRule, now_s: float) -> bool:
 
 
 def _pose(door: DoorRule, share: float) -> FloatArray:
-    """Pose (x, y, yaw) of the panel's middle when the door is closed to a share (0 to 1)."""
+    """Pose (x, y, yaw) of the panel's centre at a closed fraction (0 to 1)."""
     open_m = (1.0 - share) * door.width
     x, y = door.at
     return np.array([x + open_m * math.cos(door.yaw), y + open_m * math.sin(door.yaw), door.yaw])
 
 
 def _doorway(door: DoorRule) -> tuple[Point, Point]:
-    """Ends (x, y) of a doorway's middle line."""
+    """Ends (x, y) of a doorway's centre line."""
     x, y, dx, dy = *door.at, 0.5 * door.width * math.cos(door.yaw), 0.5 * door.width * math.sin(door.yaw)
     return (x - dx, y - dy), (x + dx, y + dy)
 
@@ -84,7 +84,7 @@ def _doorway(door: DoorRule) -> tuple[Point, Point]:
 def slide(
     plant: MultibodyPlant, context: Context, instance: ModelInstanceIndex, pose: FloatArray, velocity: FloatArray
 ) -> None:
-    """Sets the pose (x, y, yaw) and the rates of a model on a planar joint, if they differ from the present ones."""
+    """Sets the pose (x, y, yaw) and the velocity of a model on a planar joint, if they differ from the present ones."""
     if np.abs(plant.GetPositions(context, instance) - pose).max() > _MOVED:
         plant.SetPositions(context, instance, pose)
     if np.abs(plant.GetVelocities(context, instance) - velocity).max() > _MOVED:
@@ -93,7 +93,7 @@ def slide(
 
 @dataclass
 class _Panel(Stateful):
-    """Panel of a door: the closed share of the doorway (0 to 1), and whether the panel `closes` now.
+    """Panel of a door: the closed fraction of the doorway (0 to 1), and whether the panel `closes` now.
 
     A door that is `called` opens, and stays open. The history has the time (s) of each change and the new state: 0
     (open), 1 (closed) or 0.5 (moving).
@@ -105,7 +105,7 @@ class _Panel(Stateful):
     called: bool = False
 
     def move_to(self, share: float, now_s: float) -> None:
-        """Closes the door to a `share` (0 to 1), and records when it becomes open, closed or moving."""
+        """Closes the door to a fraction (0 to 1), and records when it becomes open, closed or moving."""
         self.share = share
         state = share if share in (0.0, 1.0) else 0.5
         if state != self.history[-1][1]:
@@ -113,7 +113,7 @@ class _Panel(Stateful):
 
 
 class Doors(Stateful, saved=("_panels",)):
-    """Doors of one plant; call `before_step` before each step. A door waits for the `outlines` in its doorway."""
+    """Doors in one plant; call `before_step` before each step. A door waits while an outline is in its doorway."""
 
     def __init__(
         self,
@@ -132,7 +132,7 @@ class Doors(Stateful, saved=("_panels",)):
 
     @property
     def still(self) -> bool:
-        """Returns whether the plant has no doors that could move."""
+        """Returns whether the plant has no door that could move."""
         return not self._doors
 
     def history(self) -> Mapping[tuple[float, float], Sequence[tuple[float, float]]]:
@@ -146,7 +146,7 @@ class Doors(Stateful, saved=("_panels",)):
         return [_doorway(door) for door in ajar]
 
     def call(self, at_W: tuple[float, float]) -> None:
-        """Opens the door nearest to a position (x, y) from the next step on, like its drive; from any thread."""
+        """Opens the door nearest to a position (x, y) from the next step on, like its motor; from any thread."""
         name = min(self._doors, key=lambda name: math.dist(self._doors[name].at, at_W))
         self._panels[name].called = True
 
@@ -164,7 +164,7 @@ class Doors(Stateful, saved=("_panels",)):
             slide(self._plant, self._context, self._instances[name], pose, (_pose(door, after) - pose) / dt_s)
 
     def _next(self, door: DoorRule, panel: _Panel, dt_s: float) -> float:
-        """Share to which a door is closed after dt_s."""
+        """Closed fraction of a door after dt_s."""
         share, step = panel.share, SPEED_M_S * dt_s / door.width
         if not panel.closes:
             return max(0.0, share - step)
@@ -185,7 +185,7 @@ Hands = Mapping[str, FloatArray]
 
 
 class Moves(Stateful, saved=("_done",)):
-    """Moves of objects in one plant at their times; call `before_step` before each step."""
+    """Moves of objects by people in one plant, at their times; call `before_step` before each step."""
 
     def __init__(
         self,
@@ -197,7 +197,7 @@ class Moves(Stateful, saved=("_done",)):
         seed: int,
         tell: Callable[[str], None],
     ) -> None:
-        """`placed` are the loose objects; `tell` gets a sentence on each move, or the reason why it is not done."""
+        """`placed` are the loose objects; `tell` is called with a sentence on each move, or why it is not made."""
         self._plant, self._context, self._world, self._seed, self._tell = plant, context, world, seed, tell
         self._forms = {each.name: each.form for each in placed}
         self._bodies = {
@@ -211,7 +211,7 @@ class Moves(Stateful, saved=("_done",)):
         self._listeners.append(listener)
 
     def before_step(self, now_s: float, hands_W: Callable[[], Hands], holding: Sequence[str]) -> None:
-        """Does the due moves; `holding` names the robots with an object in their `hands_W`."""
+        """Makes the due moves; `holding` names the robots with an object in their hand (`hands_W`)."""
         for number, move in enumerate(self._world.moves):
             if number not in self._done and now_s >= move.at:
                 self._done |= {number}
@@ -255,7 +255,7 @@ class Moves(Stateful, saved=("_done",)):
         return None
 
     def _candidates(self, surface: SurfaceTop, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
-        """Random centres and yaws: along the fronts of the surface if it has fronts, else anywhere on it."""
+        """Yields random centres and yaws: along the fronts of the surface if it has fronts, else anywhere on it."""
         if self._world.seed_rules.fronts.get(surface.name):
             yield from candidates(self._world, surface, rng)
             return
@@ -265,7 +265,7 @@ class Moves(Stateful, saved=("_done",)):
             yield (float(x), float(y)), float(rng.uniform(-np.pi, np.pi))
 
     def _outlines_W(self, without: str) -> Iterator[FloatArray]:
-        """Present outlines (K, 2) of the other objects, from above."""
+        """Present outlines (K, 2), from above, of all objects except `without`."""
         for name, body in self._bodies.items():
             if name != without:
                 X_WO = self._plant.EvalBodyPoseInWorld(self._context, body)

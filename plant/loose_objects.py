@@ -51,10 +51,10 @@ _REACH_M = 2.0
 class SleepLimits:
     """Limits at which objects fall asleep and wake.
 
-    An object is still while its pose (metres, quaternion) changes by less than `still` per second, and falls asleep
-    after `still_s`. It wakes when a bounding sphere comes closer than `margin_m`, a distance that no link crosses
-    between two updates. Objects with spheres closer than `beside_m` sleep and wake together. A hand falls asleep at
-    twice the margin.
+    `still` and `still_s`: an object falls asleep once its pose (metres, quaternion) has changed by less than `still`
+    per second for this time. `margin_m`: it wakes when a bounding sphere comes closer, a distance that no link covers
+    between two updates; a hand falls asleep at twice this. `beside_m`: objects with spheres closer than this sleep and
+    wake together.
     """
 
     still: float = 0.004
@@ -65,7 +65,7 @@ class SleepLimits:
 
 @dataclass(frozen=True)
 class _Object:
-    """A loose object of one body: its collision shapes with their properties, and its slice of the velocities."""
+    """A loose object with one body: its collision shapes with their properties, and its slice of the velocities."""
 
     name: str
     body: RigidBody
@@ -74,7 +74,7 @@ class _Object:
 
 
 class _Spheres:
-    """Bounding spheres of bodies, one around the collision shapes of each; bodies without shapes have none."""
+    """Bounding spheres of bodies, one around the collision shapes of each body; bodies without shapes have none."""
 
     def __init__(self, plant: MultibodyPlant, inspector: SceneGraphInspector, bodies: Sequence[RigidBody]) -> None:
         self._plant = plant
@@ -97,7 +97,7 @@ class _Hand:
     def __init__(
         self, robot: RobotBody, inspector: SceneGraphInspector, fixed: ShapeArrays, objects: Collection[int]
     ) -> None:
-        """`fixed` are the immobile shapes, `objects` the loose objects; `is_near` takes the objects' positions."""
+        """`fixed` are the immobile shapes, `objects` the loose objects whose positions `is_near` receives."""
         plant, own = robot.plant, set(map(int, robot.instances()))
         links = [plant.GetBodyByName(link, robot.instance) for link in robot.kind.gripper_links]
         found = [shape for link in links for shape in plant.GetCollisionGeometriesForBody(link)]
@@ -111,9 +111,9 @@ class _Hand:
         self._measured = np.full((len(links), 3), np.inf), np.zeros(len(links))
 
     def is_near(self, context: Context, margin_m: float, objects_W: FloatArray, radii_m: FloatArray) -> bool:
-        """Returns whether anything but the robot itself comes within a margin of the hand.
+        """Returns whether anything except the robot itself is within a margin of the hand.
 
-        `objects_W` (N, 3) and `radii_m` are the spheres around the loose objects.
+        `objects_W` (N, 3) and `radii_m` are the bounding spheres of the loose objects.
         """
         centres_W, reach_m = self._spheres.centres_W(context), self._spheres.radii_m + margin_m
         for others_W, sizes_m in ((objects_W, radii_m), (self._others.centres_W(context), self._others.radii_m)):
@@ -128,10 +128,10 @@ class _Hand:
 
 
 class Sleepers:
-    """Puts loose objects and hands of one plant to sleep and wakes them; call `update` regularly, before it steps."""
+    """Puts loose objects and hands in one plant to sleep and wakes them; call `update` regularly, before it steps."""
 
     def __init__(self, world: WorldDiagram, root_context: Context, limits: SleepLimits | None = None) -> None:
-        """All objects are awake at first; `all_asleep` says whether every loose body of the plant sleeps."""
+        """All objects are awake at first; `all_asleep` is True while every loose body in the plant sleeps."""
         plant, inspector = world.plant, world.scene_graph.model_inspector()
         self._plant, self._limits = plant, limits or SleepLimits()
         self._context = plant.GetMyMutableContextFromRoot(root_context)
@@ -205,7 +205,7 @@ class Sleepers:
         self._last = None
 
     def _reached(self, centres_W: FloatArray) -> NDArray[np.bool_]:
-        """Flags (N,) of the objects that a link is about to reach."""
+        """Mask (N,) of the objects that a link is about to reach."""
         bases = [self._plant.EvalBodyPoseInWorld(self._context, body).translation() for body in self._known]
         if self._only_known_move and all(np.abs(centres_W - p_WB).max(axis=1).min() > _REACH_M for p_WB in bases):
             return np.zeros(len(centres_W), dtype=bool)
@@ -215,20 +215,20 @@ class Sleepers:
     def _near(
         self, centres_W: FloatArray, others_W: FloatArray, radii_m: FloatArray, margin_m: float
     ) -> NDArray[np.bool_]:
-        """Flags (N,) of the objects whose sphere is within a margin of another sphere (M, 3)."""
+        """Mask (N,) of the objects whose sphere is within a margin of another sphere (M, 3)."""
         apart_m = np.linalg.norm(centres_W[:, None] - others_W[None], axis=-1)
         near: NDArray[np.bool_] = (apart_m < self._bounds.radii_m[:, None] + radii_m + margin_m).any(axis=1)
         return near
 
     def _turn_hand(self, hand: _Hand) -> None:
-        """Wakes a sleeping hand, or puts a hand that is awake to sleep."""
+        """Toggles whether a hand sleeps."""
         hand.asleep = not hand.asleep
         self._give_role(hand.shapes, not hand.asleep)
         if not hand.asleep:  # a filter forgets the shapes that lose their role
             self._scene_graph.collision_filter_manager(self._geometry_context).Apply(hand.apart)
 
     def _give_role(self, shapes: Mapping[GeometryId, ProximityProperties], awake: bool) -> None:
-        """Gives shapes their proximity role, or takes it away."""
+        """Assigns the proximity role to shapes, or removes it."""
         graph, source = self._scene_graph, self._plant.get_source_id()
         for shape, properties in shapes.items():
             if awake:
@@ -237,7 +237,7 @@ class Sleepers:
                 graph.RemoveRole(self._geometry_context, source, shape, Role.kProximity)
 
     def _turn(self, number: int) -> None:
-        """Wakes a sleeping object, or puts an object that is awake to sleep."""
+        """Toggles whether an object sleeps."""
         each, plant = self._objects[number], self._plant
         self._give_role(each.shapes, bool(self._asleep[number]))
         if self._asleep[number]:
@@ -255,7 +255,7 @@ class Sleepers:
 def _objects(
     plant: MultibodyPlant, inspector: SceneGraphInspector, models: Mapping[str, ModelInstanceIndex]
 ) -> Iterator[_Object]:
-    """Loose objects of one body each; models with moving parts stay awake."""
+    """Yields loose objects with one body each; models with moving parts stay awake."""
     for name, instance in models.items():
         bodies = [plant.get_body(index) for index in plant.GetBodyIndices(instance)]
         if len(bodies) == 1 and bodies[0].is_floating_base_body():
@@ -281,7 +281,7 @@ def _fixed_shapes(plant: MultibodyPlant, inspector: SceneGraphInspector) -> Shap
 
 
 def _clearance_m(shapes: ShapeArrays, points_W: FloatArray) -> FloatArray:
-    """Distance (m) of each point (K, 3) from the nearest of the boxes around some shapes."""
+    """Distance (m) from each point (K, 3) to the nearest bounding box of the shapes."""
     off_W = points_W[:, None] - shapes.positions_m
     off_G = np.abs(np.einsum("nji,knj->kni", shapes.rotations, off_W))
     gaps_m = np.linalg.norm(np.maximum(off_G - shapes.half_extents_m, 0.0), axis=-1)
@@ -289,7 +289,7 @@ def _clearance_m(shapes: ShapeArrays, points_W: FloatArray) -> FloatArray:
 
 
 def _bound(inspector: SceneGraphInspector, shapes: Sequence[GeometryId]) -> tuple[FloatArray, float] | None:
-    """Centre and radius of a sphere around shapes, in the frame of their body."""
+    """Centre and radius of a bounding sphere of shapes, in the frame of their body; None without shapes."""
     rows = [shape_row(inspector, shape) for shape in shapes]
     if not rows:
         return None
@@ -308,7 +308,7 @@ _AT_HAND_M: Final = 0.5
 
 
 class CarriedObjects:
-    """Correction of the loose bodies that a hand carries; call `after_step` after each step of the plant."""
+    """Corrects the loose bodies that a hand carries; call `after_step` after each step of the plant."""
 
     def __init__(self, plant: MultibodyPlant, context: Context, loose: Sequence[RigidBody]) -> None:
         self._plant, self._context = plant, context
@@ -337,7 +337,7 @@ class CarriedObjects:
                 plant.SetPositions(context, q)
 
     def _bias_m_s2(self, hand: RigidBody, p_WO: FloatArray) -> FloatArray:
-        """Acceleration (m/s^2) of the hand's point at p_WO while no joint changes its rate."""
+        """Acceleration (m/s^2) of the hand's point at p_WO while all joint rates stay constant."""
         plant, context, world = self._plant, self._context, self._plant.world_frame()
         p_HO = plant.EvalBodyPoseInWorld(context, hand).inverse() @ p_WO
         rates = JacobianWrtVariable.kV

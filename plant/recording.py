@@ -32,10 +32,10 @@ class Frame:
 
 
 class Recorder:
-    """Recorder of the plant's positions at a fixed rate; call it after every step.
+    """Records the plant's positions at a fixed rate; call it after every step.
 
-    When there are too many frames, it drops the frames that their neighbours interpolate best: few frames remain of
-    times with little motion, many of a robot at work.
+    When there are too many frames, it drops those that their neighbours interpolate best: few frames remain from times
+    with little motion, many from times of work.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Recorder:
 
 
 def thin_out(frames: Sequence[Frame]) -> list[Frame]:
-    """Drops a quarter of the frames: of every second frame, the half that its neighbours interpolate best.
+    """Drops a quarter of the frames: among every second frame, the half that the neighbours interpolate best.
 
     The first and the last frame stay.
     """
@@ -84,7 +84,7 @@ def thin_out(frames: Sequence[Frame]) -> list[Frame]:
 
 @dataclass(frozen=True)
 class View:
-    """View of a camera: its position and its target, in the world frame (m)."""
+    """Camera view: position and target, in the world frame (m)."""
 
     p_WCamera: tuple[float, float, float]
     p_WTarget: tuple[float, float, float]
@@ -99,7 +99,7 @@ class View:
 
     @staticmethod
     def close_up(p_W: FloatArray) -> View:
-        """Returns a view of a point; a robot of about a metre fills the picture."""
+        """Returns a view of a point in which a robot of about a metre fills the picture."""
         x, y, z = (float(value) for value in p_W)
         dx, dy, dz = BESIDE_M
         return View((x + dx, y + dy, z + dz), (x, y, z))
@@ -142,7 +142,7 @@ EASY_PERIOD_WALL_S = 0.7
 
 
 class LiveScene:
-    """Live scene of the plant in browsers; call it after every tick, from the thread that made it.
+    """Live scene of the plant in browsers; call it after every tick, from the thread that created it.
 
     It only reads the plant's context, so a run is the same with and without it.
     """
@@ -162,17 +162,17 @@ class LiveScene:
 
     @property
     def url(self) -> str:
-        """Address of the scene; its different host name gives it a browser process of its own."""
+        """Address of the scene; its host name differs, so that a browser gives the scene a process of its own."""
         return f"http://localhost:{self._meshcat.port()}"
 
     def __call__(self, now_s: float) -> None:
-        """Refreshes the scene when it is due in wall time."""
+        """Refreshes the scene when a refresh is due in wall-clock time."""
         if time.perf_counter() - self._published_s >= self._period_s:
             self._root_context.SetTime(now_s)
             self.publish()
 
     def refresh_seldom(self) -> None:
-        """Refreshes less often, for a browser without a graphics processor; callable from any thread."""
+        """Refreshes less often, for a browser without a GPU; callable from any thread."""
         self._period_s = EASY_PERIOD_WALL_S
 
     def follow(self, wanted: bool) -> None:

@@ -17,7 +17,7 @@ MESA_THREADS: Final = "LP_NUM_THREADS"
 
 
 class Scene:
-    """Renderer of a Diagram at any positions, in a context of its own.
+    """Renders a Diagram at any positions, in a context of its own.
 
     The renderer exists only in this context: in the stepped context it would follow every step, at a third of the time.
     """
@@ -39,9 +39,9 @@ class Scene:
         self._rendering = False
 
     def query_at(self, positions: NDArray[np.float64]) -> QueryObject:
-        """Returns the scene with the plant at all its `positions`; it is valid until the next call.
+        """Returns the scene with the plant at `positions`; it is valid until the next call.
 
-        The first call makes the renderer, which loads all meshes. Without a graphics card it draws in the calling
+        The first call creates the renderer, which loads all meshes. Without a graphics card it draws in the calling
         thread, unless the environment says otherwise: for small pictures, other threads cost as much as the drawing.
         """
         if not self._rendering:
@@ -65,7 +65,7 @@ _BEAMS = (
 
 
 def lights(light: Light = DAY_LIGHT) -> list[LightParameter]:
-    """Directional lights of a world: day light from above, softer from the sides and the floor, changed by `light`.
+    """Directional lights of a world: daylight from above, softer from the sides and the floor, scaled by `light`.
 
     Rooms have no ceiling and rendering casts no shadows, so a few directions are enough.
     """

@@ -11,7 +11,7 @@ State = dict[str, Any]
 
 
 class Stateful:
-    """A part of the plant whose state is saved and restored by attributes.
+    """Part of the plant whose state is saved and restored by attributes.
 
     A class names its attributes in `saved`, in addition to those of its bases; a dataclass without `saved` saves all
     its fields. An attribute may be stateful itself, or a mapping of stateful parts.
@@ -24,11 +24,11 @@ class Stateful:
         cls._saved = (*cls._saved, *saved)
 
     def state(self) -> State:
-        """Returns the saved attributes as values of JSON."""
+        """Returns the saved attributes as JSON values."""
         return {key: _state(getattr(self, name)) for key, name in self._saved_names().items()}
 
     def restore(self, state: State) -> None:
-        """Restores the saved attributes. Raises KeyError when one of them is missing."""
+        """Restores the saved attributes. Raises KeyError when the state lacks one of them."""
         for key, name in self._saved_names().items():
             value = getattr(self, name)
             if isinstance(value, Stateful):
@@ -42,7 +42,7 @@ class Stateful:
     @classmethod
     @cache
     def _saved_names(cls) -> Mapping[str, str]:
-        """The names of the attributes, by their keys in the state."""
+        """Names of the attributes, by their keys in the state."""
         names = cls._saved or [field.name for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
         return {name.lstrip("_"): name for name in names}
 

@@ -33,7 +33,7 @@ _SUBPIXEL_BITS = 4
 
 @dataclass(frozen=True)
 class MapView:
-    """Picture of the world from above with its camera: the world's y points up, its x right."""
+    """Picture of the world from above, with its camera: the world's y points up, its x right."""
 
     picture: Picture
     X_WC: RigidTransform
@@ -107,7 +107,7 @@ def best_view(
 
 
 def _clear_share(query_object: QueryObject, X_WC: RigidTransform, target_W: FloatArray, renderer: str) -> float:
-    """Share of the lines of sight around the target that no nearer surface blocks."""
+    """Fraction of the lines of sight around the target that no nearer surface occludes."""
     intrinsics = _centred_intrinsics((48, 48), 90.0)
     distance = float(np.linalg.norm(X_WC.translation() - target_W))
     camera = depth_render_camera(intrinsics, renderer, (NEAR_M, distance + 5.0))
@@ -150,7 +150,7 @@ def draw_map(
 ) -> Picture:
     """Draws paths (N, 2 or more columns: x, y), labels and marked points on a copy of a map, with a legend below it.
 
-    Each path has the text of its legend and a colour. No name covers another one or a mark. The zones, in the form of
+    Each path has a legend text and a colour. No label covers another one or a mark. The zones, in the form of
     `skills.navigate.zone_map.zone_messages`, are drawn first.
     """
     picture = view.picture.copy()
@@ -213,7 +213,7 @@ def png_bytes(picture: Picture, compression: int = 1) -> bytes:
 
 
 def save_png(path: Path, picture: Picture, compression: int = 1) -> None:
-    """Writes an RGB picture as PNG, making its folder. Raises OSError when it cannot be written."""
+    """Writes an RGB picture as PNG, creating its folder. Raises OSError when it cannot be written."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(png_bytes(picture, compression))
 
@@ -225,7 +225,7 @@ def _centred_intrinsics(size: tuple[int, int], focal_px: float) -> Intrinsics:
 def _render(
     query_object: QueryObject, X_WC: RigidTransform, intrinsics: Intrinsics, renderer: str, near_m: float, far_m: float
 ) -> Picture:
-    """Renders at twice the size and shrinks the picture, because the renderer leaves jagged edges."""
+    """Renders at twice the size and downsamples, because the renderer draws jagged edges."""
     k = intrinsics
     double = Intrinsics(2 * k.width, 2 * k.height, 2 * k.fx, 2 * k.fy, 2 * k.cx + 0.5, 2 * k.cy + 0.5)
     camera = colour_render_camera(double, renderer, near_m=near_m, far_m=far_m)

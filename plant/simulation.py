@@ -1,4 +1,4 @@
-"""The simulation: a world with robots, objects and people in motion, and the referee who observes the true state."""
+"""The simulation: a moving world with robots, objects and people, and the referee who observes the true state."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ SETTLING_S = 1.5
 
 
 class Simulation:
-    """A world with its robots at a seed: clock, robots, referee and, on request, a recording."""
+    """A world with its robots, built from a seed: clock, robots, referee and, on request, a recording."""
 
     def __init__(
         self,
@@ -45,8 +45,8 @@ class Simulation:
         """Builds the plant of `world`; the seed places objects and people.
 
         Without `robots`, Alice the Spot stands at the world's start. `extra_models` are on no map. `variation` changes
-        light, clutter (of none of the classes in `spared`) and friction; its people are part of `world` already.
-        Raises WorldError when the objects do not fit into the world, or a person's route leads through an obstacle.
+        light, friction and clutter, which contains no class in `spared`; its people are part of `world` already. Raises
+        WorldError when the objects do not fit into the world, or a person's route leads through an obstacle.
         """
         self.seed, self.world = seed, world
         robots = [PlacedRobot("Alice", "spot", world.start, world.dock)] if robots is None else robots
@@ -100,7 +100,7 @@ class Simulation:
     def save_snapshots(self, path: Path, *, label: str = "") -> Callable[[], None]:
         """Writes the whole state to a file now and once a second; the returned function writes it at once.
 
-        `label` names the run of the state.
+        `label` names the run to which the state belongs.
         """
         writer = SnapshotWriter(path, self.engine, self.referee, {**self._facts(), "label": label})
         writer()
@@ -110,8 +110,8 @@ class Simulation:
     def restore(self, path: Path, *, label: str | None = "") -> None:
         """Restores the state in a file, as after a power failure: no command runs, and the robots come to a stop.
 
-        With `label` None the state of any run fits, and the referee judges only later events. Raises SnapshotError when
-        the file cannot be read, is damaged, or belongs to another simulation.
+        With `label` None the state of any run is accepted, and the referee judges only later events. Raises
+        SnapshotError when the file cannot be read, is damaged, or belongs to another simulation.
         """
         facts = self._facts() if label is None else {**self._facts(), "label": label}
         restore(read_snapshot(path), self.engine, self.referee, facts)
@@ -120,7 +120,7 @@ class Simulation:
         self.engine.advance(SETTLING_S)
 
     def _facts(self) -> State:
-        """Facts that must match in the restoring simulation."""
+        """Facts that must be equal in the simulation that restores a snapshot."""
         plant = self.engine.world.plant
         return {
             "world": self.world.name,
@@ -131,7 +131,7 @@ class Simulation:
         }
 
     def query_at(self, time_s: float) -> QueryObject:
-        """Returns the scene at a recorded time, for pictures afterwards. Raises LookupError without a recording."""
+        """Returns the scene at a recorded time, to render it afterwards. Raises LookupError without a recording."""
         positions, scene = self._positions_at(time_s), self.engine.world.scene
         assert scene is not None
         return scene.query_at(positions)

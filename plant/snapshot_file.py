@@ -36,7 +36,7 @@ _ROW_FILES: Final = (".c", ".d")
 
 
 class SnapshotError(ValueError):
-    """Error of an unusable snapshot, with the reason and a hint."""
+    """Error of a snapshot that cannot be used, with the reason and a hint."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,9 @@ class Rows:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """State of a plant: values as in JSON, arrays by name, and the rows (N, width) up to then.
+    """State of a plant: JSON values, arrays by name, and all rows (N, width) up to then.
 
-    `number` increases from one snapshot to the next; `stored` has the place of the rows.
+    `number` increases from one snapshot to the next; `stored` describes where the rows are stored.
     """
 
     number: int
@@ -69,7 +69,7 @@ def encode(
     arrays: Mapping[str, tuple[tuple[int, ...], bytes]],
     rows: Rows | None = None,
 ) -> bytes:
-    """Returns the content of a snapshot file; an array is its shape and its doubles."""
+    """Returns the content of a snapshot file; an array is given as its shape and its doubles."""
     shapes = [[name, shape] for name, (shape, _) in arrays.items()]
     stored = None if rows is None else astuple(rows)
     head = {"number": number, "values": values, "arrays": shapes, "rows": stored}
@@ -97,13 +97,13 @@ def decode(content: bytes) -> Snapshot:
 
 
 class SnapshotFile:
-    """Writer of snapshots, each over the last but one, and of rows of `width` doubles.
+    """Writes snapshots, each over the one before the last, and rows of `width` doubles.
 
     `rows` describes the rows so far; `bytes_written` counts all bytes.
     """
 
     def __init__(self, path: Path, *, width: int = 1) -> None:
-        """`path` has no suffix. An older snapshot there stays until the second one is written."""
+        """`path` has no suffix. An older snapshot there stays until the second new one is written."""
         path.parent.mkdir(parents=True, exist_ok=True)
         old = {slot: _try_read(path, slot) for slot in _SLOTS}
         numbers = {slot: each.number if isinstance(each, Snapshot) else 0 for slot, each in old.items()}
@@ -153,9 +153,9 @@ def read_snapshot(path: Path) -> Snapshot:
 
 
 class SnapshotWriter:
-    """Writer of a plant's whole state, once for each call. `facts` identify the simulation.
+    """Writes a plant's whole state, once per call. `facts` identify the simulation.
 
-    The file stands in for a real world, which stays while the executive is away; the journal stores the mission itself.
+    The file represents a real world, which stays while the executive is away; the journal stores the mission itself.
     """
 
     def __init__(self, path: Path, engine: Engine, referee: Referee, facts: Mapping[str, Any]) -> None:
@@ -182,14 +182,14 @@ class SnapshotWriter:
             self()
 
     def content(self) -> bytes:
-        """Returns the content of a snapshot now, without the points of the paths."""
+        """Returns the content of a snapshot taken now, without the path points."""
         world = {_WORLD + name: (array.shape, array.tobytes()) for name, array in self._engine.world_state().items()}
         paths = {"names": self._names, "from": self._from}
         values = {"facts": self._facts, "engine": self._engine.state(), "referee": self._referee.state()}
         return encode(self._file.next_number, {**values, "paths": paths}, world, self._file.rows)
 
     def _append_points(self) -> None:
-        """Appends the new points of the paths; all paths are appended as a whole when one has become shorter."""
+        """Appends the new points of the paths; appends all paths again when one has become shorter."""
         if any(len(self._referee.points(name)) < count for name, count in self._points.items()):
             self._from = self._file.rows.count
             self._points = dict.fromkeys(self._names, 0)

@@ -1,9 +1,9 @@
-"""Interface of a skill. Skills, ours and others', import only this module and `skills.robot`.
+"""Interface of a skill. The project's skills and those of others import only this module and `skills.robot`.
 
-`skills.robot.quantities` are types of ports with ranges.
+`skills.robot.quantities` has the port types that carry a range.
 
-A skill is a plain object with the life `begin -> step, step, ... -> end`. It never blocks, sleeps or ticks. The
-executive's leaf wraps it once, turns exceptions into failures with cause ERROR, and calls `end` on every exit.
+A skill is a plain object with the lifecycle `begin -> step, step, ... -> end`. It never blocks, sleeps or ticks. One
+leaf of the executive wraps each skill, turns exceptions into failures with cause ERROR, and calls `end` on every exit.
 """
 
 from __future__ import annotations
@@ -93,8 +93,8 @@ class Succeeded:
 class Failed:
     """Failure: the cause and one plain sentence.
 
-    `outputs` may fill some of the skill's output ports, for the next attempt. A failure is `final` when another attempt
-    from here would only end in the same failure: then the tree tries no recovery and no pose nearby.
+    `outputs` may fill output ports of the skill, for the next attempt. A failure is `final` when another attempt from
+    the same state would fail in the same way: then the tree tries no recovery and no pose nearby.
     """
 
     cause: Cause
@@ -120,7 +120,7 @@ class Job(Protocol[ResultT_co]):
 
 
 class Worker(Protocol):
-    """Runs long jobs beside the ticks, one after the other, in the order in which they are submitted.
+    """Runs long jobs in the background, one after the other, in the order in which they are submitted.
 
     A job may use only inputs that were read before: no robot, clock, estimator or costmap. It changes nothing that a
     tick uses. In lock-step the result appears after `latency_s` on the robot's clock.
@@ -132,19 +132,16 @@ class Worker(Protocol):
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
     ) -> Job[ResultT]:
-        """Starts `work` on the value of `read`.
-
-        In lock-step `read` runs at once; it may block, as `Robot.image` may.
-        """
+        """Starts `work` on the value of `read`, which in lock-step runs at once; `read` may block."""
 
 
 @dataclass(frozen=True)
 class Question:
     """Question to the operator.
 
-    `id` (a path id) is unique among the open questions. With `options`, nothing else is an answer. `default` counts
-    when nobody answers within `limit_s` of the robot's clock; an empty default means that nobody answered. Raises
-    ValueError when the default is none of the options.
+    `id` (a path id) is unique among the open questions. With `options`, only an option is an answer. `default` becomes
+    the answer when nobody answers within `limit_s` on the robot's clock; it may be empty. The constructor raises
+    ValueError when a default that is not empty is none of the options.
     """
 
     id: str
@@ -159,7 +156,7 @@ class Question:
 
 
 Asked = Job[str]
-"""Open question to the operator. Its `result` is the answer, or the default once its time is over."""
+"""Open question to the operator. Its `result` is the answer, or the question's default once the time limit is over."""
 
 
 class Ask(Protocol):
@@ -171,7 +168,7 @@ class Ask(Protocol):
 
 @dataclass(frozen=True)
 class _Unheard:
-    """Question that nobody hears: its default is the answer."""
+    """Open question without an operator: the default is the answer."""
 
     question: Question
 
@@ -202,7 +199,7 @@ Returns at once; the job is done when a person has spoken, and its result is the
 
 @dataclass(frozen=True)
 class _Silence:
-    """Remark that nobody makes."""
+    """Remark that never comes: the job is never done."""
 
     def done(self) -> bool:
         """Returns False."""
@@ -217,7 +214,7 @@ class _Silence:
 
 
 def nobody_speaks() -> Job[str]:
-    """Waits for a remark that nobody makes; serves as a `Listen`."""
+    """Returns a job that is never done; serves as a `Listen`."""
     return _Silence()
 
 
@@ -229,19 +226,19 @@ class Publish(Protocol):
 
 
 PICTURES: Final = "pictures"
-"""Topic of the pictures of `SkillContext.show_picture`."""
+"""Topic of the messages that `SkillContext.show_picture` publishes."""
 
 
 @dataclass
 class Payload:
-    """Object in the gripper, noted by the skill that took it: its size as corners (N, 3) in the hand frame (m).
+    """Object in the gripper, noted by the skill that grasped it.
 
-    `R_BH` is the rotation of the hand when it took the object, which stood or lay level then; `kind` is the kind that
-    the skill was to take. Fields are None while they are unknown, as after a restart. The payload counts only while the
-    gripper holds an object.
+    `corners_H` is its bounding box as corners (N, 3) in the hand frame (m). `R_BH` is the rotation of the hand when it
+    grasped the object, which stood or lay level then. `kind` is the kind of object that the skill was to grasp. A field
+    is None while it is unknown, as after a restart. The payload counts only while the gripper holds an object.
 
-    While the payload is `offered`, somebody may pull it out of the closed gripper, or a skill lets it go; that skill
-    checks who has it.
+    While the payload is `offered`, a person may pull it out of the closed gripper, or a skill may release it; that
+    skill verifies who has it.
     """
 
     corners_H: NDArray[np.float64] | None = None
@@ -252,9 +249,9 @@ class Payload:
 
 @dataclass
 class SeenSolid:
-    """Solid cells (N, 3) of the world near the robot, from its depth images (`skills.manipulation.arm.solid_cells`).
+    """Solid cells (N, 3) near the robot, from its depth images (`skills.manipulation.arm.solid_cells`).
 
-    `views` are the last depth pictures at a reduced resolution, each with the X_WO of its time.
+    `views` are the last depth images at a reduced resolution, each with X_WO at its capture time.
     """
 
     cells: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
@@ -272,11 +269,11 @@ class _LastPose:
 class SkillContext:
     """Robot, estimators and services that a skill may use. `seed` derives from the run's seed and the leaf's path id.
 
-    Where the body goes, a skill asks `free_space` rather than `costmap`, which does not know the zones.
+    For the motion of the base, a skill queries `free_space` rather than `costmap`, which ignores the zones.
 
-    `doors` and `zones` are those on the robot's map, with `door_memory` of the doors' states; `tags` are the AprilTags
-    that it knows. `walls` are the map's columns (N, 2) of cells that are solid at the arm's heights
-    (`skills.manipulation.arm.solid_cells`).
+    `doors` and `zones` are those on the robot's map; `door_memory` has the last known state of each door. `tags` are
+    the AprilTags whose poses or carriers the robot knows. `walls` are the columns (N, 2) of the map that are solid at
+    the heights of the arm (`skills.manipulation.arm.solid_cells`).
     """
 
     robot: Robot
@@ -303,14 +300,14 @@ class SkillContext:
     _last_pose: _LastPose = field(default_factory=_LastPose, init=False, repr=False, compare=False)
 
     def zone_map(self) -> ZoneMap:
-        """Returns the zones drawn on the ground. Raises InputError for a mask that cannot be read."""
+        """Returns the zones as layers on the ground. Raises InputError when a mask cannot be read."""
         from skills.navigate.zone_map import zone_map
 
         full_m_s = min(self.robot.capabilities().max_speed_m_s, self.stack.controller.max_speed_m_s)
         return zone_map(self.zones, full_m_s)
 
     def free_space(self) -> FreeSpace:
-        """Returns the costmap with the keep-out zones as obstacles; one in which the robot stands, as far as it may."""
+        """Returns the costmap with the keep-out zones as obstacles; a robot inside such a zone may still leave it."""
         if not self.zones:
             return self.costmap
         from skills.navigate.footprint import Footprint
@@ -319,7 +316,7 @@ class SkillContext:
         return KeepOut(self.zone_map()).space(self.costmap, Footprint.of(self.robot.capabilities()), self.pose())
 
     def silent_zone(self) -> str | None:
-        """Returns the name of the silent zone in which the robot stands, or None."""
+        """Returns the name of the silent zone in which the robot stands; None when it stands in none."""
         is_any = any(zone.kind is ZoneKind.SILENT for zone in self.zones)
         return next(iter(self.zone_map().names_at(ZoneKind.SILENT, self.pose()) if is_any else ()), None)
 
@@ -328,11 +325,11 @@ class SkillContext:
         return self.localiser.estimate().X_WO @ self.robot.odometry().X_OB
 
     def show_picture(self, picture: Picture, caption: str) -> None:
-        """Puts a picture (RGB or grey, uint8) with its caption into the log and into the report of the run."""
+        """Puts a picture (RGB or grey, uint8) with its caption into the log and into the report."""
         self.publish(PICTURES, {"caption": caption, "image": picture})
 
     def pose(self) -> Pose2D:
-        """Returns the planar part of X_WB, computed once for each estimate and reading."""
+        """Returns the planar part of X_WB; caches it until the estimate or the odometry changes."""
         X_WO, X_OB = self.localiser.estimate().X_WO, self.robot.odometry().X_OB
         last = self._last_pose.known
         if last is None or last[0] is not X_WO or last[1] is not X_OB:
@@ -346,7 +343,7 @@ class NoOptions:
 
 
 class Part(enum.Enum):
-    """Part of the robot that one skill at a time may use."""
+    """Resource of the robot that only one skill at a time may use."""
 
     BASE = "base"
     ARM = "arm"
@@ -359,18 +356,21 @@ WHOLE_ROBOT: Final = frozenset({Part.BASE, Part.ARM})
 class Skill(ABC, Generic[InputsT]):
     """Base of all skills.
 
-    `Inputs` is a frozen dataclass whose fields are the input ports (defaults allowed); `outputs` names the output ports
-    and their types; `causes` documents the causes of its failures. `default_timeout_s` counts the robot's clock.
-    `checkpoint` holds, as JSON values, what a later `resume` needs beyond the inputs; the store saves it durably.
+    `Inputs` is a frozen dataclass whose fields are the input ports (defaults allowed). `outputs` maps the name of each
+    output port to its type. `causes` says, for each cause, when the skill fails with it. `default_timeout_s` is on the
+    robot's clock. `checkpoint` holds, as JSON values, what a later `resume` needs beyond the inputs; the store writes
+    it to disk.
 
-    `changes_world` marks a skill that must not run twice: after a restart it gets `resume`, and checks first.
-    `gripper_before` says whether the gripper must hold an object (False: must be empty) when the skill begins,
-    `gripper_after` whether it holds one after success; None means that it does not matter, or does not change. `uses`
-    are the parts of the robot that the skill uses: skills that share none may run side by side. `Options` is a frozen
-    dataclass of the skill's settings in a stack file, all with defaults.
+    `changes_world` marks a skill that must not run twice: after a restart the tree calls `resume`, which first checks
+    what is done. `gripper_before` says whether the gripper must hold an object when the skill begins (True), must be
+    empty (False), or either (None). `gripper_after` says whether the gripper holds an object after success; None means
+    that the skill does not change this. `uses` are the resources that the skill occupies: skills that share none may
+    run in parallel. `Options` is a frozen dataclass with the skill's settings in a stack file; every field has a
+    default.
 
-    `max_data_age_s` is the largest age (s) of the data on which a success rests, by name: a sense verb (not `image`),
-    "localisation", or an output port whose value has a `stamp_s`. A success on older data is a failed postcondition.
+    `max_data_age_s` is the largest age (s) of the data on which a success rests. Its keys are sense verbs (not
+    `image`), "localisation", or output ports whose values have a `stamp_s`. A success on older data is a failed
+    postcondition.
     """
 
     name: ClassVar[str]
@@ -392,7 +392,7 @@ class Skill(ABC, Generic[InputsT]):
 
     @abstractmethod
     def begin(self, inputs: InputsT) -> None:
-        """Starts and forgets any earlier attempt. May not command motion that outlives `end`."""
+        """Starts an attempt and forgets any earlier one. May not command motion that continues after `end`."""
 
     @abstractmethod
     def step(self) -> Step:
@@ -402,9 +402,9 @@ class Skill(ABC, Generic[InputsT]):
         """Cleans up on every exit; idempotent. Stops only this skill's own commands (`Robot.stop(only=...)`)."""
 
     def suspend(self) -> None:
-        """Stops this skill's motion for a while and keeps its state. `resume` or `end` follows.
+        """Stops this skill's motion and keeps its state, until `resume` or `end` is called.
 
-        By default this ends the attempt.
+        The default implementation ends the attempt.
         """
         self.end()
 
@@ -412,14 +412,14 @@ class Skill(ABC, Generic[InputsT]):
         """Continues after `suspend`. Time has passed, and the robot may have moved.
 
         After a restart of the executive this is called on a new object in place of `begin`, with the last `checkpoint`
-        set. By default the attempt starts again. Override it where that would undo or repeat finished work.
+        set. The default implementation begins a new attempt. Override it where a new attempt would undo or repeat
+        finished work.
         """
         self.begin(inputs)
 
     def undone(self, inputs: InputsT) -> str | None:
-        """Returns, after a restart, why the effect of an earlier success no longer holds, or None.
+        """Returns, after a restart, why an earlier success no longer holds; None when it holds or that is unknown.
 
-        Reads sensors and moves nothing. None means that the effect holds or is unknown. The reason is half a sentence,
-        such as "the gripper is empty".
+        Reads sensors and commands no motion. The reason is a clause, such as "the gripper is empty".
         """
         return None

@@ -1,4 +1,4 @@
-"""Capabilities: the geometry and the limits of a robot, as a skill sees them through `skills.robot`."""
+"""Capabilities: the geometry and the limits of a robot, as skills read them through `skills.robot`."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ if TYPE_CHECKING:  # Drake takes a third of a second to import; commands that mo
 
 
 class BaseKind(enum.Enum):
-    """Kind of a base's motion."""
+    """Kind of motion that a base is capable of."""
 
     OMNIDIRECTIONAL = "omnidirectional"  # moves in any direction and turns: legs, mecanum wheels
     DIFFERENTIAL = "differential"  # drives ahead or back, and turns on the spot: two driven wheels
 
 
 InverseKinematics = Callable[["RigidTransform"], Sequence[NDArray[np.float64]]]
-"""Inverse kinematics of an arm: from X_BH, joint angles (J,) of every branch; the caller checks the joint limits."""
+"""Inverse kinematics of an arm: maps X_BH to joint angles (J,) of every IK solution; the caller checks joint limits."""
 
 
 @dataclass(frozen=True)
 class ArmCapabilities:
-    """Arm: joint names from the shoulder on, its largest reach from the first joint (m), its payload (kg).
+    """Arm: `joint_names` from the shoulder on, `max_reach_m` from the first joint, and `max_payload_kg`.
 
-    `standing_m` are distances of the body's origin from an object to grasp or a spot to place on, the best first, and
-    `nearer_m` those for an object that is held from above. `carry_x_m` and `carry_z_m` are positions in B of a hand
-    that carries, best at `carry_best_x_m` and low. An arm that sticks out over furniture while it carries is drawn in
-    to the first of `tuck_x_m` and turned to a side; `tuck_x_m` is empty for an arm that carries within the body's
-    outline.
+    `standing_m`: distances from the body's origin to an object to grasp or a spot to place on, the best first.
+    `nearer_m`: the same for an object that is grasped from above. `carry_x_m` and `carry_z_m`: positions in B of the
+    hand while it carries; the best has x nearest to `carry_best_x_m` and a low z. `tuck_x_m`: where an arm that
+    overhangs furniture while it carries is drawn in to (the first of these x) and turned aside; empty for an arm that
+    carries within the body's outline.
 
-    Joints without limits are `continuous` in the description. `inverse` solves the inverse kinematics; None for the
-    families whose closed form `skills.manipulation.arm.kinematics` reads from the description.
+    Joints without limits are `continuous` in the description. `inverse` solves the inverse kinematics; it is None for
+    the arm families whose closed form `skills.manipulation.arm.kinematics` derives from the description.
     """
 
     joint_names: tuple[str, ...]
@@ -54,7 +54,7 @@ class ArmCapabilities:
 
     @property
     def comfortable_m(self) -> tuple[float, float]:
-        """Range of distances (m) from which the robot need not drive elsewhere."""
+        """Range of distances (m) to an object at which the robot need not drive nearer or farther."""
         return min(self.standing_m) - 0.01, max(self.standing_m) - 0.04
 
 
@@ -69,11 +69,12 @@ class GripperKind(enum.Enum):
 class GripperCapabilities:
     """Gripper. Its opening is 0 closed and `widest` fully open, in the unit of its kind.
 
-    `finger_joints` are the joints of its fingers and how far each goes for an opening of one. Geometry in the hand
-    frame H (x along the fingers, z along the closing, m): the palm at `palm_x_m`, the tip of a moving finger at
-    `tip_x_m` and of the fixed one at `fixed_tip_x_m`, whose inner face is at `fixed_z_m` (for two moving fingers: when
-    closed). Tips are 2 `half_breadth_m` wide and `tip_thickness_m` thick. The middle of a gripped object is about
-    `grip_x_m` ahead of H; an object is at most `max_grasp_m` wide and ends by `length_m`.
+    `finger_joints`: each finger joint with its position at an opening of 1. Geometry is in the hand frame H (x along
+    the fingers, z along the closing direction, m). `palm_x_m`, `tip_x_m` and `fixed_tip_x_m`: the palm, the tip of a
+    moving finger and the tip of the fixed one. `fixed_z_m`: the inner face of the fixed finger (of two moving fingers:
+    when closed). `half_breadth_m` and `tip_thickness_m`: half the width of a tip, and its thickness. `grip_x_m`: about
+    where the centre of a gripped object lies. `max_grasp_m`: largest width of an object; `length_m`: x beyond which an
+    object must not extend.
     """
 
     finger_joints: tuple[tuple[str, float], ...]
@@ -97,9 +98,9 @@ class GripperCapabilities:
         return {name: share * opening for name, share in self.finger_joints}
 
     def like_turn(self, turn_rad: float) -> float:
-        """Returns the change of the opening that corresponds to a turn of a hinged finger.
+        """Returns the change of the opening that corresponds to a rotation of a hinged finger by `turn_rad`.
 
-        A hinged finger opens to about a right angle.
+        The full opening of a parallel gripper corresponds to a right angle.
         """
         return turn_rad if self.kind is GripperKind.HINGED else self.widest * turn_rad / (0.5 * math.pi)
 
@@ -118,7 +119,7 @@ class Mount(enum.Enum):
 
 @dataclass(frozen=True)
 class CameraCapabilities:
-    """Camera: its source for `image`, the frame F that it is mounted on, and its pose X_FC in F."""
+    """Camera: its `source` for `image`, the frame F on which it is mounted, and its pose X_FC in F."""
 
     source: str
     X_FC: RigidTransform
@@ -131,21 +132,21 @@ class CameraCapabilities:
 
     @property
     def heading_rad(self) -> float:
-        """Direction of the optical axis in its frame, counter-clockwise from ahead."""
+        """Direction of the optical axis in frame F, counter-clockwise from its x axis."""
         axis = self.X_FC.rotation().matrix()[:, 2]
         return math.atan2(axis[1], axis[0])
 
     def looks_towards(self, heading_rad: float, within_rad: float = math.pi / 4) -> bool:
-        """Returns whether the optical axis is within an angle of a direction in the body frame, with the head ahead."""
+        """Returns whether the optical axis is within an angle of a heading in the body frame, with the head ahead."""
         return abs(math.remainder(self.heading_rad - heading_rad, math.tau)) < within_rad
 
 
 @dataclass(frozen=True)
 class HeadCapabilities:
-    """Head that pans (z up, positive to the left) and then tilts (y, positive looks down), rad.
+    """Head that pans (about z up, positive to the left) and then tilts (about y, positive looks down), rad.
 
-    p_BP_m is the pan axis in the body frame, p_PT_m the tilt axis in the panned frame; the frame `head` lies on the
-    tilt axis and turns with it. `joint_names` are pan and tilt in the description.
+    `p_BP_m` is the pan axis in the body frame, `p_PT_m` the tilt axis in the panned frame. The frame `head` lies on the
+    tilt axis and turns with the head. `joint_names` are the pan and tilt joints in the description.
     """
 
     joint_names: tuple[str, str]
@@ -155,7 +156,7 @@ class HeadCapabilities:
     tilt_range_rad: tuple[float, float]
 
     def X_BF(self, pan_rad: float, tilt_rad: float) -> RigidTransform:
-        """Pose of the frame `head` in the body frame at pan and tilt."""
+        """Pose of the frame `head` in the body frame at a pan and a tilt angle."""
         from pydrake.math import RigidTransform, RotationMatrix
 
         X_BP = RigidTransform(RotationMatrix.MakeZRotation(pan_rad), np.array(self.p_BP_m))
@@ -166,14 +167,14 @@ class HeadCapabilities:
 class Capabilities:
     """Geometry and limits of a robot; `arm`, `gripper` or `head` is None on a robot without one.
 
-    `lift_joint` is the joint of a torso that slides up from the lowest of `height_range_m` while the base stays.
-    `footprint_m` is the standing outline in the body frame as (x, y) corners. `description` is the robot's URDF text
-    with collision shapes and a free base (link `body`). `height_range_m` is the range of the body origin's height while
-    the robot walks. `lidar_height_m` is the LiDAR's height over the floor while the robot stands as usual: maps differ
-    by it. Joints and gripper give a new reading every `sensor_period_s`. A drive that is renewed at each tick expires
-    after `drive_expiry_s`: longer than a tick and the way of a command to the robot, and no longer than is safe. With
-    `docks` the robot drives onto a docking station and off it by itself, with `opens_doors` it opens doors, and with
-    `localises` it knows its place in a map of its own.
+    `footprint_m`: outline of the standing robot in the body frame, as (x, y) corners. `description`: URDF text with
+    collision shapes and a floating base (link `body`). `height_range_m`: range of the body origin's height while the
+    robot walks. `lift_joint`: joint of a torso that slides up from the lower end of `height_range_m` while the base
+    stays. `lidar_height_m`: height of the LiDAR above the floor at the standing height; a map is valid for one such
+    height. `sensor_period_s`: period at which joints and gripper are measured. `drive_expiry_s`: lifetime of a drive
+    command that is renewed at each tick; longer than a tick plus the transmission, and short enough to be safe.
+    `docks`: the robot docks and undocks by itself. `opens_doors`: it opens doors. `localises`: it localises itself in a
+    map of its own.
     """
 
     footprint_m: tuple[tuple[float, float], ...]
@@ -208,7 +209,7 @@ class Capabilities:
 
     @property
     def object_camera(self) -> CameraCapabilities | None:
-        """Camera that looks for objects: on the hand, else on the head, else ahead on the body; None without one."""
+        """Camera that searches for objects: on the hand, else the head, else ahead on the body; None without any."""
         on_head = (camera for camera in self.cameras if camera.mount is Mount.HEAD)
         ahead = (camera for camera in self.cameras if camera.mount is Mount.BODY and camera.looks_towards(0.0))
         return self.hand_camera or next(on_head, None) or next(ahead, None)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Detection:
     """Detected object in a picture: class, score (0 to 1), and box (u0, v0, u1, v1) in pixels of that picture.
 
-    `alternatives` are the other classes that it may be, with their scores, the likeliest first.
+    `alternatives` are competing classes with their scores, the most likely first.
     """
 
     class_name: str
@@ -34,11 +34,11 @@ AnswerT = TypeVar("AnswerT")
 class Detector(Protocol):
     """Detects objects of known classes in pictures.
 
-    A detector of your own inherits from this class, has `class_names` and `detect`, and overrides what it does better.
+    A detector inherits from this class, implements `class_names` and `detect`, and may override the other methods.
     """
 
     models: Mapping[str, ObjectModel] = MappingProxyType({})
-    """Models of own objects by name, with which the skills compare segments."""
+    """Object models by name, for objects that the user has added; skills match segments against them."""
 
     @property
     @abstractmethod
@@ -54,25 +54,25 @@ class Detector(Protocol):
         """
 
     def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[Detections]:
-        """Returns the detections of one known class in each picture; a detector may have a quick search for it."""
+        """Returns the detections of one class in each picture; a detector may override this with a faster search."""
         return [tuple(one for one in found if one.class_name == class_name) for found in self.detect(pictures)]
 
     def detect_in_views(self, picture: Picture, least_score: float | None = None) -> Detections:
-        """Returns the detections in one picture; in several views, and from `least_score` on, if the detector can."""
+        """Returns the detections in one picture; may use several views and keep scores from `least_score` on."""
         return self.detect([picture])[0]
 
     def detect_with_depth(self, image: Image, found: Detections) -> Detections:
-        """Returns the detections in an image, of which `found` are those in its picture."""
+        """Returns `found`, the detections in the image's picture, which a detector may refine by the depth."""
         return found
 
 
 class NoDetectorError(RuntimeError):
-    """Error of a detection without a detector."""
+    """Error raised when a skill asks a context without a detector for detections."""
 
 
 @dataclass(frozen=True)
 class NoDetector(Detector):
-    """Stand-in where there is no detector: knows no classes, and raises an error when it is used."""
+    """Placeholder for a missing detector: has no classes, and raises NoDetectorError when a picture is given to it."""
 
     class_names: tuple[str, ...] = ()
 
@@ -85,41 +85,41 @@ NO_DETECTOR: Final = NoDetector()
 
 
 class DetectorWrapper(Detector):
-    """Detector around another one: what judges pictures goes through `_call`; a subclass overrides it, or methods."""
+    """Detector that wraps another one; calls that judge pictures go through `_call`, which a subclass may override."""
 
     def __init__(self, detector: Detector) -> None:
         self._detector = with_defaults(detector)
         self.models = self._detector.models
 
     def _call(self, method: str, pictures: int, call: Callable[..., AnswerT], *arguments: Any) -> AnswerT:
-        """Makes a call of a method for a number of pictures: `call` is the wrapped detector's."""
+        """Calls `call`, a method of the wrapped detector; `pictures` is the number of pictures."""
         return call(*arguments)
 
     @property
     def class_names(self) -> tuple[str, ...]:
-        """Classes that the other detector knows."""
+        """Classes that the wrapped detector knows."""
         return self._detector.class_names
 
     def detect(self, pictures: Sequence[Picture]) -> list[Detections]:
-        """Returns the detections of the other detector."""
+        """Returns the detections of the wrapped detector."""
         return self._call("detect", len(pictures), self._detector.detect, pictures)
 
     def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[Detections]:
-        """Returns the detections of one class by the other detector."""
+        """Returns the wrapped detector's detections of one class."""
         return self._call("detect_class", len(pictures), self._detector.detect_class, pictures, class_name)
 
     def detect_in_views(self, picture: Picture, least_score: float | None = None) -> Detections:
-        """Returns the detections of the other detector in one picture."""
+        """Returns the wrapped detector's detections in one picture."""
         return self._call("detect_in_views", 1, self._detector.detect_in_views, picture, least_score)
 
     def detect_with_depth(self, image: Image, found: Detections) -> Detections:
-        """Returns the detections of the other detector in an image."""
+        """Returns the wrapped detector's detections in an image with depth."""
         return self._detector.detect_with_depth(image, found)
 
 
 @dataclass(frozen=True)
 class _PlainDetector(Detector):
-    """Detector that has only `class_names` and `detect` of its own."""
+    """Adds the default methods to a detector that implements only `class_names` and `detect`."""
 
     detector: Detector
 
@@ -132,7 +132,7 @@ class _PlainDetector(Detector):
 
 
 def with_defaults(detector: Detector) -> Detector:
-    """Returns the detector itself, or one around it that adds the methods which a detector need not have."""
+    """Returns the detector itself, or a wrapper that adds the optional methods when the detector lacks them."""
     return detector if hasattr(detector, "detect_in_views") else _PlainDetector(detector)
 
 

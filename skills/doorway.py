@@ -1,4 +1,4 @@
-"""Doorways, the width that a LiDAR scan shows to be open, and the memory of their states."""
+"""Doorways, the open width measured by the LiDAR, and the memory of door states."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 _STRIP_M = 0.05
 _HEIGHTS_M = (0.1, 1.9)
 _IN_PLANE_M = 0.2
-"""Distance from the plane of a door at which a ray ends in it."""
+"""Largest distance from the door's plane at which a ray counts as ending in the doorway."""
 _IN_PLANE_SHARE = 0.3
-"""The same along a flat ray, as a share of the door's width: jambs are no farther along it."""
+"""The same limit along the floor, as a fraction of the door's width: jambs are no farther along a ray."""
 _BEYOND_M = 0.5
 _FEWEST = 5
 _CLEARLY = 0.8
@@ -32,17 +32,17 @@ Counts = NDArray[np.int64]
 
 
 class DoorOpener(Protocol):
-    """Plug-in that opens a door which moves by itself; a frozen dataclass whose fields are its options."""
+    """Plug-in that opens a motorised door; a frozen dataclass whose fields are its options."""
 
     def open(self, door_name: str, between: tuple[str, str]) -> None:
-        """Asks the door to open; may block for some seconds. Raises an exception whose text says why it does not."""
+        """Asks the door to open; may block for seconds. Raises an exception whose text says why it stays closed."""
 
 
 @dataclass(frozen=True)
 class Doorway:
-    """A doorway: its middle (x, y) in the world (m), its clear width (m), and the direction through it (rad).
+    """Doorway: its centre (x, y) in the world (m), its clear width (m), and the direction through it (rad).
 
-    The direction may lead either way. `between` names the two rooms that it joins, `opener` the plug-in that opens it.
+    The direction may point either way. `between` names the two rooms that it joins, `opener` the plug-in that opens it.
     """
 
     middle_W: tuple[float, float]
@@ -52,22 +52,22 @@ class Doorway:
     opener: DoorOpener | None = field(default=None, compare=False)
 
     def distance_m(self, place_W: tuple[float, float]) -> float:
-        """Distance of its middle from a point (m)."""
+        """Distance from the doorway's centre to a point (m)."""
         return math.dist(self.middle_W, place_W)
 
     def axis(self, far_m: float, every_m: float) -> FloatArray:
-        """Points (N, 2) on the line through it, far_m to both sides."""
+        """Points (N, 2) on the line through the doorway, up to `far_m` on both sides."""
         steps = np.arange(-far_m, far_m + every_m, every_m)
         through = np.array([math.cos(self.through_rad), math.sin(self.through_rad)])
         return np.asarray(np.array(self.middle_W) + steps[:, None] * through)
 
     def ends(self) -> FloatArray:
-        """Its two sides (2, 2)."""
+        """Both ends (2, 2) of the doorway's clear width."""
         along = np.array([-math.sin(self.through_rad), math.cos(self.through_rad)])
         return np.asarray(np.array(self.middle_W) + np.array([[-0.5], [0.5]]) * self.width_m * along)
 
     def view_angle_rad(self, place_W: tuple[float, float]) -> float:
-        """Angle between its direction and the view from a point: 0 straight before it, pi/2 from within its wall."""
+        """Angle between the direction through the doorway and the view from a point: 0 in front, pi/2 in its wall."""
         bearing = math.atan2(self.middle_W[1] - place_W[1], self.middle_W[0] - place_W[0])
         off = abs(math.remainder(bearing - self.through_rad, math.tau))
         return min(off, math.pi - off)
@@ -75,7 +75,7 @@ class Doorway:
 
 @dataclass(frozen=True)
 class Opening:
-    """Open width of a doorway in one piece (m): `least_m` as seen, `most_m` if all unseen strips were free.
+    """Widest contiguous open part of a doorway (m): `least_m` as seen, `most_m` with unseen strips counted as open.
 
     `rays` is the number of rays that crossed the doorway.
     """
@@ -86,7 +86,7 @@ class Opening:
 
 
 class DoorState(enum.Enum):
-    """State of a door as the robot knows it. A gap that the robot cannot use leaves it unknown."""
+    """State of a door as the robot knows it. A gap too narrow for the robot leaves the state unknown."""
 
     OPEN = "open"
     CLOSED = "closed"
@@ -95,7 +95,7 @@ class DoorState(enum.Enum):
 
 @dataclass(frozen=True)
 class SeenDoor:
-    """State of a door, and the time on the robot's clock when the robot saw it (s)."""
+    """State of a door, and the time (s) on the robot's clock when the robot observed it."""
 
     state: DoorState = DoorState.UNKNOWN
     seen_s: float = -math.inf
@@ -103,24 +103,24 @@ class SeenDoor:
 
 @dataclass
 class DoorMemory:
-    """States of the doors when the robot last saw them; one memory lasts for all missions of a run."""
+    """Last observed state of each door; one memory lasts for all missions of a run."""
 
     _seen: dict[tuple[float, float], SeenDoor] = field(default_factory=dict)
 
     def note(self, door: Doorway, state: DoorState, now_s: float) -> None:
-        """Notes what the robot sees of a door now."""
+        """Records the state in which the robot sees a door now."""
         self._seen[door.middle_W] = SeenDoor(state, now_s)
 
     def last_seen(self, door: Doorway) -> SeenDoor:
-        """The state in which the robot last saw a door."""
+        """State in which the robot last saw a door."""
         return self._seen.get(door.middle_W, SeenDoor())
 
 
 def measure_opening(door: Doorway, scans: Iterable[tuple[Scan, RigidTransform]]) -> Opening:
     """Measures how wide a door is open, from scans with the pose X_WL of the LiDAR.
 
-    A strip of the doorway is free when its rays go clearly beyond the doorway, and shut when they end in it. Shut
-    strips that reach neither side of the doorway, such as a person who stands in it, count as unseen.
+    A strip of the doorway is free when the rays through it end clearly beyond the doorway, and shut when they end in
+    the doorway. Shut strips that touch neither side, such as a person who stands in the doorway, count as unseen.
     """
     strips = max(1, round(door.width_m / _STRIP_M))
     counts: Counts = np.array([_counts(door, strips, scan, X_WL) for scan, X_WL in scans]).sum(axis=0)
@@ -131,7 +131,7 @@ def measure_opening(door: Doorway, scans: Iterable[tuple[Scan, RigidTransform]])
 
 
 def _counts(door: Doorway, strips: int, scan: Scan, X_WL: RigidTransform) -> Counts:
-    """Counts the rays (3, strips) towards each strip that go through, end in the doorway, or end elsewhere."""
+    """Counts, for each strip, the rays (3, strips) that pass through, end in the doorway, or end elsewhere."""
     origin, middle = X_WL.translation(), np.array(door.middle_W)
     through = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
     through = through if (middle - origin[:2]) @ through > 0.0 else -through

@@ -33,17 +33,17 @@ def inverse(X_AB: Pose2D) -> Pose2D:
 
 
 def relative_pose(X_WA: Pose2D, X_WB: Pose2D) -> Pose2D:
-    """Returns X_AB of two poses in one frame."""
+    """Returns X_AB, from the poses of A and B in one frame."""
     return compose(inverse(X_WA), X_WB)
 
 
 def bearing_rad(here: Pose2D, place_W: tuple[float, float]) -> float:
-    """Direction of a point (x, y) from the heading of a pose."""
+    """Direction to a point (x, y), relative to the heading of a pose."""
     return wrap(math.atan2(place_W[1] - here.y_m, place_W[0] - here.x_m) - here.yaw_rad)
 
 
 def facing_poses(point_W: tuple[float, float], here: Pose2D, stand_off_m: float, count: int = 24) -> list[Pose2D]:
-    """Returns poses at a distance from a point that face it, the nearest first."""
+    """Returns poses at distance `stand_off_m` from a point that face it, the nearest to `here` first."""
     poses = []
     for k in range(count):
         yaw = math.atan2(point_W[1] - here.y_m, point_W[0] - here.x_m) + 2 * math.pi * k / count
@@ -68,7 +68,7 @@ def line_of_sight(space: FreeSpace, from_W: FloatArray, points_W: FloatArray, *,
 def grid_inside(
     polygon: tuple[tuple[float, float], ...], step_m: float, *, first_m: float = 0.0, margin_m: float = 0.0
 ) -> FloatArray:
-    """Points (N, 2) of a grid within a convex polygon grown by margin_m, from first_m inside its lowest corner on."""
+    """Points (N, 2) of a grid in a convex polygon grown by margin_m; the grid starts first_m from its lowest corner."""
     corners = np.asarray(polygon, dtype=float)
     axes = (np.arange(a + first_m, b, step_m) for a, b in zip(corners.min(axis=0), corners.max(axis=0), strict=True))
     grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
@@ -78,7 +78,7 @@ def grid_inside(
 def inside_polygon(
     xy: FloatArray, polygon: tuple[tuple[float, float], ...], margin_m: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Mask (N,) of the rows of xy (N, 2) in a convex polygon grown by margin_m; corners in either order."""
+    """Mask (N,) of the rows of xy (N, 2) inside a convex polygon grown by `margin_m`; corners in either order."""
     import shapely  # commands that move nothing do without
 
     grown = shapely.Polygon(polygon).buffer(margin_m, join_style="mitre", mitre_limit=100.0)

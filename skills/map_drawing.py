@@ -1,6 +1,6 @@
-"""Drawing on maps: names where they cover no other name and little else, and a legend with a scale below the map.
+"""Drawing on maps: labels that overlap as little as possible, and a legend with a scale bar below the map.
 
-Pictures are (H, W, 3) uint8 arrays; colours have the order of the picture's channels.
+Pictures are (H, W, 3) uint8 arrays; colours have the channel order of the picture.
 """
 
 import unicodedata
@@ -38,18 +38,18 @@ _LENGTHS_M: Final = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
 
 class Names:
-    """Writer of names on a picture: each near its point, off the other names, off marks and off `lines` (N, 2 each)."""
+    """Writes labels on a picture, each near its point and clear of other labels, marks and `lines` (N, 2 each)."""
 
     def __init__(self, picture: Picture, lines: Iterable[FloatArray]) -> None:
         self._picture, self._lines = picture, np.vstack([np.zeros((0, 2)), *map(_dense, lines)])
         self._taken: list[NDArray[np.float64]] = []
 
     def keep_clear(self, centre: Sequence[float], radius_px: float) -> None:
-        """Keeps names off a mark."""
+        """Keeps labels off a mark, a disc in pixels."""
         self._taken.append(np.array([*np.subtract(centre, radius_px), *np.add(centre, radius_px)], dtype=np.float64))
 
     def write(self, name: str, centre: Sequence[float], *, ground: Colour = PLATE) -> None:
-        """Writes a name as near to a pixel (column, row) as there is room."""
+        """Writes a label as near to a pixel (column, row) as other labels and lines allow."""
         size = np.array(text_size(name, self._picture), dtype=np.float64) + 2 * _PAD_PX
         most = np.maximum(np.array(self._picture.shape[1::-1]) - size, 0.0)
         shifts = (np.array(shift) * (0.6 * size[0], size[1]) for shift in product(_SHIFTS, _SHIFTS))
@@ -60,7 +60,7 @@ class Names:
         label(self._picture, name, (round(best[0]) + _PAD_PX, round(best[3]) - _PAD_PX), ground=ground)
 
     def _cost(self, box: NDArray[np.float64], centre: NDArray[np.float64], height: float) -> float:
-        """Cost of a place for a name: what it covers, and its distance from its point."""
+        """Cost of a label's box: the area that it covers, and its distance from the label's point."""
         overlaps = (np.maximum(np.minimum(box[2:], one[2:]) - np.maximum(box[:2], one[:2]), 0.0) for one in self._taken)
         covered = sum(float(np.prod(overlap)) for overlap in overlaps)
         on_lines = np.all((self._lines >= box[:2]) & (self._lines <= box[2:]), axis=1).sum() if len(self._lines) else 0
@@ -69,7 +69,7 @@ class Names:
 
 
 def _dense(line: FloatArray) -> FloatArray:
-    """Returns points of a line, a few pixels apart."""
+    """Resamples a polyline to points a few pixels apart."""
     if len(line) < 2:
         return line
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
@@ -108,7 +108,7 @@ def with_legend(picture: Picture, pixels_per_m: float, entries: Sequence[tuple[s
 def draw_zone(
     picture: Picture, outlines: Sequence[NDArray[np.int32]], kind: str, colour: Colour, ahead: float | None
 ) -> None:
-    """Tints a zone with these outlines (pixels, N x 2 each); hatches a keep-out zone, and draws `ahead` (rad)."""
+    """Tints a zone within outlines (N x 2 pixels each); hatches a keep-out zone; draws an arrow to `ahead` (rad)."""
     inside = cv2.fillPoly(np.zeros(picture.shape[:2], np.uint8), list(outlines), 1).astype(bool)
     share = np.full(picture.shape[:2], _ZONE_SHARE)
     if kind == "keep_out":
@@ -124,13 +124,13 @@ def draw_zone(
 
 
 def _text(strip: Picture, text: str, left_middle: tuple[int, int], like: Picture) -> None:
-    """Writes a text in the size that belongs to the picture `like`."""
+    """Writes a text in the font size that suits the picture `like`."""
     origin = (left_middle[0], left_middle[1] + text_size("X", like)[1] // 2)
     cv2.putText(strip, drawable(text), origin, _FONT, _font_scale(like), INK, _stroke(like), cv2.LINE_AA)
 
 
 def label(picture: Picture, text: str, origin: tuple[int, int], *, ground: Colour = PLATE) -> None:
-    """Writes text on a plate with its lower left corner at a pixel, moved inside the picture if needed."""
+    """Writes text on a filled box whose lower left corner is at a pixel; shifts the box to lie inside the picture."""
     (width, height), pad = text_size(text, picture), _PAD_PX
     x = int(np.clip(origin[0], pad, max(pad, picture.shape[1] - width - pad)))
     y = int(np.clip(origin[1], height + pad, max(height + pad, picture.shape[0] - 2 * pad)))
@@ -139,13 +139,13 @@ def label(picture: Picture, text: str, origin: tuple[int, int], *, ground: Colou
 
 
 def text_size(text: str, picture: Picture) -> tuple[int, int]:
-    """Width and height (pixels) of a text in the size that belongs to a picture."""
+    """Width and height (pixels) of a text in the font size that suits a picture."""
     (width, height), _ = cv2.getTextSize(drawable(text), _FONT, _font_scale(picture), _stroke(picture))
     return int(width), int(height)
 
 
 def drawable(text: str) -> str:
-    """Returns the text in the letters that OpenCV can draw: accents are left out."""
+    """Returns the text without accents, because OpenCV draws only ASCII letters."""
     return unicodedata.normalize("NFKD", text.replace("ß", "ss")).encode("ascii", "ignore").decode() or "?"
 
 

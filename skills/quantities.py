@@ -1,8 +1,8 @@
 """Quantities: numbers with unit and range, checked by one mechanism wherever a user can type them.
 
-Each quantity is a `float` or `int` with a `Quantity` mark. pydantic models, the options of components and skills, and
-the options of the command line check it by `number_of`; a `QuantityError` names the range and the likely mistake. A
-field's name ends in its unit. Code that fills the same dataclass is not checked.
+Each quantity is a `float` or `int` with a `Quantity` annotation. `number_of` checks pydantic models, the options of
+components and skills, and the options of the command line; its `QuantityError` names the range and the likely mistake.
+A field's name ends in its unit. Code that constructs the same dataclass is not checked.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MOST_DIGITS: Final = 100
 LARGEST: Final = 10**300
 DURATION_FORM: Final = 'seconds, or as in "2 min", "1 h 30 min" or "PT5M"'
 DURATION_PATTERN: Final = r"^(\d+(\.\d+)?[ ]?[a-z]+,?[ ]?(and )?)+$|^P[0-9.DTHMS]+$"
-"""Pattern of a duration that is a text, for editors."""
+"""JSON-schema pattern of a duration given as text, for editors."""
 _MOST_LETTERS: Final = 60
 _UNIT_WORDS: Final = {
     0.001: ("ms", "millisecond", "milliseconds"),
@@ -44,7 +44,7 @@ _ISO: Final = re.compile(
 
 
 def seconds_in(text: str) -> float | None:
-    """Returns the seconds of a text; None where it is no duration. Each unit may stand once."""
+    """Returns the duration in seconds that a text states; None when the text is no duration or repeats a unit."""
     words = " ".join(text.split()).lower()
     if not words or len(words) > _MOST_LETTERS:
         return None
@@ -63,7 +63,7 @@ def seconds_in(text: str) -> float | None:
 
 
 class QuantityError(ValueError):
-    """Error of a value that does not fit: `what` it should be, with the range, and a `hint` at the likely mistake."""
+    """Error of a value that is no number or out of range: `what` it should be, and a `hint` at the likely mistake."""
 
     def __init__(self, what: str, hint: str) -> None:
         super().__init__(f"{what}; {hint}")
@@ -72,7 +72,7 @@ class QuantityError(ValueError):
 
 @dataclass(frozen=True)
 class Quantity:
-    """Mark of a number with its range and unit; `mistake` replaces the hint at a likely mistake of units."""
+    """Annotation of a number with its range and unit; `mistake`, if given, replaces the computed hint."""
 
     ge: float | None = None
     gt: float | None = None
@@ -82,7 +82,7 @@ class Quantity:
     mistake: str = ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], CoreSchema]) -> CoreSchema:
-        """Checks a field of this quantity by `number_of`; its JSON schema has the range."""
+        """Returns a schema that checks a field by `number_of` and states the range in its JSON schema."""
         from pydantic_core import core_schema
 
         hint = Annotated[source, self]
@@ -132,9 +132,9 @@ LongDuration = Annotated[float, Quantity(gt=0.0, le=604_800.0, unit="s")]
 Wait = Annotated[float, Quantity(ge=0.0, le=1e9, unit="s")]
 """Time for which a page or a queue is served."""
 Share = Annotated[float, Quantity(ge=0.0, le=1.0)]
-"""Part of a whole: a charge, a score."""
+"""Fraction of a whole: a charge, a score."""
 Cosine = Annotated[float, Quantity(ge=-1.0, le=1.0)]
-"""Component of a direction of length 1."""
+"""Component of a unit vector."""
 Factor = Annotated[float, Quantity(gt=0.0, le=1_000.0)]
 """Gain or weight."""
 Force = Annotated[float, Quantity(gt=0.0, le=2_000.0, unit="N")]
@@ -153,9 +153,9 @@ Seed = Annotated[int, Quantity(ge=0, le=2**31 - 1)]
 Port = Annotated[int, Quantity(ge=0, le=65_535)]
 """Port of this machine; 0 takes a free one."""
 Number = Annotated[float, Quantity()]
-"""Number of any size: a value of a mission."""
+"""Number without limits: a value in a mission."""
 Whole = Annotated[int, Quantity()]
-"""Whole number of any size: a value of a mission."""
+"""Whole number without limits: a value in a mission."""
 
 _UNIT: Final = re.compile(r"_(m|rad|s|n|m_s|rad_s|kg|deg)$")
 _WORDS: Final[Mapping[str, str]] = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
@@ -170,7 +170,7 @@ _OTHERS: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
         "s": {"ms": 0.001},
     }
 )
-"""Units that people write in place of a quantity's own, and their size in it."""
+"""Units that people write in place of a quantity's own unit, with the conversion factor to that unit."""
 _SPELLED: Final[Mapping[str, str]] = {
     "deg": "degrees",
     "degree": "degrees",
@@ -201,8 +201,8 @@ _COUNTED: Final = (
 def number_of(value: Any, hint: Any) -> float:
     """Returns the number that a file gives for a quantity. A duration may be a text with units.
 
-    Raises QuantityError when the value is no number, is not finite, is no whole number where one is wanted, or is out
-    of range.
+    Raises QuantityError when the value is no number, is not finite, is not whole although the quantity is, or is out of
+    range.
     """
     whole = base_type(hint) is int
     wanted = "should be a whole number" if whole else "should be a number"
@@ -229,7 +229,7 @@ def number_of(value: Any, hint: Any) -> float:
 
 
 def number_in(text: str, hint: Any) -> float:
-    """Returns the number that a word of the command line gives for a quantity. Raises QuantityError as `number_of`."""
+    """Returns the number that a command-line word gives for a quantity. Raises QuantityError when `number_of` would."""
     words = text.strip()
     if _unit(hint) == "s" or not _NUMBER.fullmatch(words) or re.match(r"[+-]?0\d", words):
         finite = words.lower().lstrip("+-") not in ("inf", "nan", "infinity")
@@ -241,7 +241,7 @@ def number_in(text: str, hint: Any) -> float:
 
 
 def clock_text(value: Any) -> str:
-    """Returns a time of day as "08:30". Raises QuantityError when the value is none from 00:00 to 23:59."""
+    """Returns a time of day as "08:30". Raises QuantityError when the value is no time from 00:00 to 23:59."""
     match = _CLOCK.fullmatch(value.strip()) if isinstance(value, str) else None
     if match is not None and int(match[1]) < 24 and int(match[2]) < 60:
         return f"{int(match[1]):02d}:{match[2]}"
@@ -254,7 +254,7 @@ def clock_text(value: Any) -> str:
 
 
 def display_text(value: Any) -> str:
-    """Returns a value as the user wrote it: text in quotes, `true`, `nothing`, `a list`; never longer than a line."""
+    """Returns a value for an error message: text in quotes, `true`, `nothing`, `a list`; shortened to fit a line."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -300,7 +300,7 @@ def correction(text: str, hint: Any) -> str | None:
 
 
 def unit_hint(value: float, hint: Any) -> str:
-    """Returns the number in the quantity's own unit, if that brings it into the range; else nothing."""
+    """Returns a hint with the value converted to the quantity's unit; empty when no conversion fits the range."""
     quantity = quantity_of(hint)
     if quantity is not None and quantity.mistake:
         return quantity.mistake
@@ -313,7 +313,7 @@ def unit_hint(value: float, hint: Any) -> str:
 
 
 def quantity_of(hint: Any) -> Quantity | None:
-    """Returns the mark of an annotated type; None where it has none."""
+    """Returns the `Quantity` of an annotated type; None when it has none."""
     return next((mark for mark in _marks(hint) if isinstance(mark, Quantity)), None)
 
 
@@ -323,14 +323,14 @@ def _unit(hint: Any) -> str:
 
 
 def bounds(hint: Any) -> dict[str, Any]:
-    """Bounds of an annotated type by the names that pydantic gives them: {"gt": 0.0, "le": 3.0}."""
+    """Bounds of an annotated type, under pydantic's names: {"gt": 0.0, "le": 3.0}."""
     marks = list(_marks(hint))
     found = {name: getattr(mark, name, None) for name in _WORDS for mark in marks if hasattr(mark, name)}
     return {name: limit for name, limit in found.items() if limit is not None}
 
 
 def _marks(hint: Any) -> Iterator[Any]:
-    """Yields the marks of an annotated type one by one; an interval and pydantic's `Field` hold several."""
+    """Yields the annotations of a type one by one; unpacks an interval and pydantic's `Field`, which hold several."""
     for mark in getattr(hint, "__metadata__", ()):
         if not isinstance(mark, Quantity) and isinstance(mark, GroupedMetadata):
             yield from mark
@@ -344,12 +344,12 @@ def base_type(hint: Any) -> Any:
 
 
 def unitless_name(name: str) -> str:
-    """Returns a field's name without the unit that it ends in: "max_speed_m_s" is "max_speed"."""
+    """Returns a field's name without its unit suffix: "max_speed_m_s" becomes "max_speed"."""
     return _UNIT.sub("", name)
 
 
 def in_range(value: float, hint: Any) -> bool:
-    """Returns whether a number keeps the bounds of an annotated type; NaN keeps none."""
+    """Returns whether a number is within the bounds of an annotated type; NaN never is."""
     return all(getattr(operator, name)(value, limit) for name, limit in bounds(hint).items())
 
 

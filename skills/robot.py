@@ -1,13 +1,13 @@
-"""Robot protocol: the interface through which skills see a robot. Its verbs follow the Spot SDK.
+"""Robot protocol: the interface through which skills use a robot. Its verbs follow the Spot SDK.
 
-Every motion command carries an expiry time on the robot's clock: a robot that hears nothing stops by itself. Sense
-verbs return the latest immutable stamped snapshot and never block, except `image` (ask for it through the `Worker`).
+Every motion command carries an expiry time on the robot's clock: a robot that receives no new command stops by itself.
+Sense verbs return the latest immutable stamped snapshot and never block, except `image` (call it through the `Worker`).
 
-Frames: `odom` (O) is fixed to the floor where the robot woke up and drifts against the world (W); `body` (B) is x
-forward, y left, z up at the centre of the hips, or at the centre of a wheeled base's axle and moving up and down with
-its torso; `hand` (H) is the last arm link, x along the fingers, z along their closing; `head` (on a robot with one)
-turns with it; `<source>_camera` (C) is z forward, x right, y down; `lidar` (L). `X_AB` is the pose of frame B in frame
-A. SI units throughout.
+Frames: `odom` (O) is fixed to the floor where the robot started and drifts against the world (W). `body` (B) is x
+forward, y left, z up; its origin is the centre of the hips, or the centre of a wheeled base's axle, raised by the
+stroke of the torso. `hand` (H) is the last arm link, x along the fingers, z along the closing direction. `head` turns
+with the head, if there is one. `<source>_camera` (C) is z forward, x right, y down. `lidar` is L. `X_AB` is the pose of
+frame B in frame A. SI units throughout.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ FloatArray = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 """Picture, (H, W) grey or (H, W, 3) RGB."""
 CommandId = NewType("CommandId", int)
-"""Number of a motion command, by which its status is asked for."""
+"""Number of a motion command, to query its status."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Pose2D:
     yaw_rad: Angle
 
     def transform(self, z_m: float = 0.0) -> RigidTransform:
-        """Returns the same pose as a RigidTransform at height z_m."""
+        """Returns this pose as a RigidTransform at height `z_m`."""
         import pydrake.math as drake  # faster at each call than the import of its names
 
         return drake.RigidTransform(drake.RotationMatrix.MakeZRotation(self.yaw_rad), [self.x_m, self.y_m, z_m])
@@ -118,7 +118,7 @@ class OwnLocalisation:
 
 @dataclass(frozen=True)
 class Scan:
-    """LiDAR revolution: ranges_m[ring, azimuth] with NaN for no return, angles in the lidar frame, X_BL."""
+    """LiDAR revolution: ranges_m[ring, azimuth], NaN for no return; angles in the lidar frame; X_BL and X_OB."""
 
     stamp_s: float
     ranges_m: NDArray[np.float32]
@@ -128,7 +128,7 @@ class Scan:
     X_OB: RigidTransform
 
     def repeats(self, other: Scan) -> bool:
-        """Returns whether all ranges equal those of another scan, noise included."""
+        """Returns whether all ranges, noise included, equal those of another scan, as from a frozen sensor."""
         ranges, others = self.ranges_m, other.ranges_m
         if ranges is others:
             return True
@@ -137,14 +137,14 @@ class Scan:
         return all(equal)
 
     def points_B(self) -> FloatArray:
-        """Returns the valid returns as an (N, 3) array in the body frame."""
+        """Returns the points (N, 3) of all valid returns in the body frame."""
         ranges = self.ranges_m.astype(np.float64)
         points_L = (unit_rays(self.elevations_rad, self.azimuths_rad) * ranges[..., None])[np.isfinite(ranges)]
         return np.asarray(points_L @ self.X_BL.rotation().matrix().T + self.X_BL.translation())
 
 
 def unit_rays(elevations_rad: FloatArray, azimuths_rad: FloatArray) -> FloatArray:
-    """Unit vectors (rings, azimuths, 3) of a LiDAR's rays in its frame."""
+    """Unit vectors (rings, azimuths, 3) along a LiDAR's rays, in the lidar frame."""
     e, a = elevations_rad[:, None], azimuths_rad[None, :]
     return np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e) + 0.0 * a], axis=-1)
 
@@ -165,9 +165,9 @@ class Intrinsics:
 class Image:
     """Picture with depth, taken at `stamp_s` from frame `camera_frame`.
 
-    `colour` is (H, W, 3) RGB, or None for a grey camera; `grey` is (H, W). `depth_m` is in metres along the optical
-    axis, 0 where there is none, registered to the picture by `depth_intrinsics` (same pose, perhaps fewer pixels).
-    `frames` is the frame tree at capture time. Arrays that were not asked for have the shape (0, 0).
+    `colour` is (H, W, 3) RGB, or None for a grey camera; `grey` is (H, W). `depth_m` is the depth in metres along the
+    optical axis, 0 where it is unknown. `depth_intrinsics` registers it to the picture: same pose, perhaps fewer
+    pixels. `frames` is the frame tree at capture time. Arrays that were not requested have the shape (0, 0).
     """
 
     stamp_s: float
@@ -193,7 +193,7 @@ class Joints:
 
 @dataclass(frozen=True)
 class Gripper:
-    """Opening (0 closed; see `GripperKind`), clamp force at the tips (N), whether it believes to hold an object."""
+    """Opening (0 closed; see `GripperKind`), force at the tips (N), and whether it reports that it holds an object."""
 
     stamp_s: float
     opening: float
@@ -211,9 +211,10 @@ class Battery:
 
 @dataclass(frozen=True)
 class DoorHandle:
-    """Handle of a door before the robot: its position (x, y, z) in the body frame (m), as the robot faces the door.
+    """Handle of a door that the robot faces: its position (x, y, z) in the body frame (m).
 
-    The door's hinges are on the left (`hinge_left`) or on the right, and it opens towards the robot (`pull`) or away.
+    `hinge_left`: the hinges are on the left, else on the right. `pull`: the door opens towards the robot, else away
+    from it.
     """
 
     p_BH: tuple[float, float, float]
@@ -223,7 +224,10 @@ class DoorHandle:
 
 @dataclass(frozen=True)
 class ArmTrajectory:
-    """Joint positions (K, arm joints) at times from the start (K,), interpolated linearly. Raises ValueError."""
+    """Joint positions (K, arm joints) at times from the start (K,), interpolated linearly.
+
+    The constructor raises ValueError when shapes do not match, times do not increase or positions are not finite.
+    """
 
     times_s: FloatArray
     positions_rad: FloatArray
@@ -245,7 +249,7 @@ class CommandState(enum.Enum):
 
 
 class CommandCause(enum.Enum):
-    """Cause for which a command did not succeed; it says what can be done about it."""
+    """Cause for which a command did not succeed; it decides how a caller can react."""
 
     NONE = "none"  # it runs, or it succeeded
     INVALID = "invalid"  # its values are not allowed: command something else
@@ -263,7 +267,7 @@ class CommandCause(enum.Enum):
 
 @dataclass(frozen=True)
 class CommandStatus:
-    """State of a command, with the reason and its cause when it did not succeed."""
+    """State of a command; when it did not succeed, also the reason in words and the cause."""
 
     state: CommandState
     reason: str = ""
@@ -272,9 +276,9 @@ class CommandStatus:
 
 @dataclass(frozen=True)
 class Lease:
-    """Right to move a robot. Of an epoch the one with the highest `number` counts.
+    """Right to move a robot. Within an epoch, only the lease with the highest `number` is valid.
 
-    The robot's computer chooses another `epoch` whenever it starts: a lease of an earlier one never counts again.
+    The robot's computer chooses a new `epoch` whenever it starts: leases of earlier epochs stay invalid.
     """
 
     robot_name: str
@@ -284,7 +288,7 @@ class Lease:
 
 
 class Clock(Protocol):
-    """Clock of the robot. A plant's clock steps the simulation, a real robot's waits."""
+    """Clock of the robot. A plant's clock steps the simulation; a real robot's clock waits."""
 
     def now(self) -> float:
         """Returns the seconds since the clock began."""
@@ -298,7 +302,7 @@ class Robot(Protocol):
 
     @property
     def name(self) -> str:
-        """Name of the robot, as in "Hey Alice"."""
+        """Name of the robot, as a person addresses it: "Hey Alice"."""
 
     def capabilities(self) -> Capabilities:
         """Returns the robot's geometry and limits."""
@@ -307,18 +311,18 @@ class Robot(Protocol):
         """Returns the latest dead reckoning."""
 
     def own_localisation(self) -> OwnLocalisation | None:
-        """Returns the robot's place in its own map, None while it knows none; only where `Capabilities.localises`."""
+        """Returns the pose in the robot's own map, None while unlocalised; only with `Capabilities.localises`."""
 
     def imu(self) -> Imu | None:
-        """Returns the latest inertial measurement; None if the robot gives none."""
+        """Returns the latest inertial measurement; None when the robot has no IMU."""
 
     def scan(self) -> Scan | None:
-        """Returns the latest LiDAR revolution, None before the first."""
+        """Returns the latest LiDAR revolution; None before the first one."""
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        """Takes a picture with depth now, or only one of the two; may block.
+        """Takes a picture with depth, or only one of the two (`visual`, `depth`); may block.
 
-        Raises ValueError when there is no such source, NoImageError when the camera gives no picture just now.
+        Raises ValueError when there is no such source, and NoImageError when the camera returns no picture this time.
         """
 
     def joints(self) -> Joints:
@@ -331,69 +335,69 @@ class Robot(Protocol):
         """Returns the latest battery state."""
 
     def faults(self) -> tuple[str, ...]:
-        """Returns the present faults, an empty tuple when there are none."""
+        """Returns the present faults; an empty tuple when there are none."""
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Drives at a body-frame velocity (m/s, m/s, rad/s) until the clock reads until_s.
+        """Drives at a body-frame velocity (m/s, m/s, rad/s) until the clock reads `until_s`.
 
-        The body keeps the posture that was last asked for.
+        The body keeps the posture of the last `stand`.
         """
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Holds the body origin at a height above the floor and a pitch (positive looks down).
 
-        A drive that comes later takes the posture over; a robot may end an earlier one.
+        A later `drive` keeps this posture; on receiving `stand`, a robot may end a drive that is still running.
         """
 
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
         """Lowers the body to the floor."""
 
     def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
-        """Docks at the docking station of a number, nearby; only where `Capabilities.docks`, else refused."""
+        """Docks at the nearby docking station with this number; refused without `Capabilities.docks`."""
 
     def undock(self, *, until_s: float, lease: Lease) -> CommandId:
-        """Stands up and leaves the docking station; refused like `dock`."""
+        """Stands up and leaves the docking station; refused without `Capabilities.docks`."""
 
     def open_door(self, handle: DoorHandle, *, until_s: float, lease: Lease) -> CommandId:
-        """Opens a door with the arm and walks through; only where `Capabilities.opens_doors`, else refused."""
+        """Opens a door with the arm and walks through; refused without `Capabilities.opens_doors`."""
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
-        """Follows a joint trajectory; done when the arm is still at its end."""
+        """Follows a joint trajectory; done when the arm rests at the last position."""
 
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Turns the head to angles of `HeadCapabilities`; done when it is there and still."""
+        """Turns the head to pan and tilt angles (see `HeadCapabilities`); done when the head rests there."""
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Moves the gripper to an opening with at most force_n at its tip, which stays; done when there or blocked."""
+        """Moves the gripper to an opening with at most force_n at its tip and keeps it; done when there or blocked."""
 
     def carry(self, holding: bool, *, lease: Lease) -> None:
-        """Says whether the gripper holds an object that it must keep when the communication is lost."""
+        """Tells the robot whether the gripper holds an object that it must keep when communication is lost."""
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
-        """Stops all motion, or only the given command if it still runs; the gripper keeps its clamp force."""
+        """Stops all motion, or only the command `only` if it still runs; the gripper keeps its clamp force."""
 
     def command_status(self, command: CommandId) -> CommandStatus:
         """Returns the status of a command. Raises KeyError for an unknown id."""
 
     def lease_holder(self) -> Lease | None:
-        """Returns the lease that counts now; None while it is free."""
+        """Returns the valid lease; None while nobody holds one."""
 
     def acquire_lease(self, holder: str) -> Lease:
         """Takes a free lease. Raises LeaseError when another holds it."""
 
     def take_lease(self, holder: str) -> Lease:
-        """Takes the lease from its holder; the robot stops."""
+        """Takes the lease away from its holder; the robot stops."""
 
     def return_lease(self, lease: Lease) -> None:
-        """Returns the lease; the robot stops. Ignores a lease that was taken away."""
+        """Returns the lease; the robot stops. Ignores a lease that is no longer valid."""
 
 
 @dataclass(frozen=True)
 class ConnectedRobot:
-    """Robot that a backend has connected, its clock, and what the report says about its sensors.
+    """Robot that a backend has connected, its clock, and `notes` on its sensors for the report.
 
-    `make_ready` lets it stand. It is called just before a run, because a robot that is ready must hear something all
-    the time, and planning and loading take long.
+    `make_ready` makes the robot stand. It is called just before a run, because a standing robot needs commands all the
+    time, while planning and loading take long.
     """
 
     robot: Robot
@@ -403,12 +407,12 @@ class ConnectedRobot:
 
 
 class NoImageError(RuntimeError):
-    """Error of a camera that gives no picture just now; it may do so again."""
+    """Error of a camera that returns no picture this time; a later call may succeed."""
 
 
 class LeaseError(RuntimeError):
-    """Error of a lease that another holds."""
+    """Error raised when another client holds the lease."""
 
 
 class RobotStoppedError(RuntimeError):
-    """Error of a robot that has stopped for good, by its E-stop for example; the run ends."""
+    """Error of a robot that has stopped for good, for example by its E-stop; the run ends."""

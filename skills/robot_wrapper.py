@@ -1,4 +1,4 @@
-"""Base class of robots that wrap another robot, and change what some of its verbs do."""
+"""Base class of robots that wrap another robot and change the behaviour of single verbs."""
 
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
@@ -27,20 +27,20 @@ VERBS: Final = tuple(name for name in vars(Robot) if not name.startswith("_") an
 
 
 class RobotWrapper(Robot):
-    """Robot around another one: every verb goes through `_call`, and those that move the robot through `_command`.
+    """Robot that wraps another one: every verb goes through `_call`, and verbs that move the robot through `_command`.
 
-    Both make the call; a subclass overrides them, or single verbs.
+    By default both make the call unchanged; a subclass overrides them, or single verbs.
     """
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
 
     def _call(self, verb: str, call: Callable[..., AnswerT], *arguments: Any, **options: Any) -> AnswerT:
-        """Makes a call of a verb: `call` is the wrapped robot's."""
+        """Calls `call`, the wrapped robot's method for a verb."""
         return call(*arguments, **options)
 
     def _command(self, verb: str, call: Callable[..., CommandId], *arguments: Any, **options: Any) -> CommandId:
-        """Makes a call of a verb that moves the robot."""
+        """Calls `call`, the wrapped robot's method for a verb that moves the robot."""
         return self._call(verb, call, *arguments, **options)
 
     @property
@@ -57,7 +57,7 @@ class RobotWrapper(Robot):
         return self._call("odometry", self._robot.odometry)
 
     def own_localisation(self) -> OwnLocalisation | None:
-        """Returns the robot's place in its own map."""
+        """Returns the pose in the robot's own map."""
         return self._call("own_localisation", self._robot.own_localisation)
 
     def imu(self) -> Imu | None:
@@ -125,7 +125,7 @@ class RobotWrapper(Robot):
         return self._command("set_gripper", self._robot.set_gripper, opening, force_n, until_s=until_s, lease=lease)
 
     def carry(self, holding: bool, *, lease: Lease) -> None:
-        """Says whether the gripper holds an object."""
+        """Tells the robot whether the gripper holds an object."""
         return self._call("carry", self._robot.carry, holding, lease=lease)
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
@@ -137,7 +137,7 @@ class RobotWrapper(Robot):
         return self._call("command_status", self._robot.command_status, command)
 
     def lease_holder(self) -> Lease | None:
-        """Returns the lease that counts now."""
+        """Returns the valid lease."""
         return self._call("lease_holder", self._robot.lease_holder)
 
     def acquire_lease(self, holder: str) -> Lease:

@@ -14,25 +14,25 @@ from skills.geometry import wrap
 from skills.robot import ArmTrajectory, Clock, CommandCause, CommandId, CommandState, FloatArray, NoImageError, Pose2D
 
 PATIENCE_S: Final = 6.5
-"""Duration (s) up to which trouble ends no skill."""
+"""Duration (s) of a disturbance up to which no skill fails."""
 
 
 @dataclass
 class Patience:
-    """Timer of trouble that may pass; starts again after `reset`."""
+    """Timeout for a disturbance that may pass; starts again after `reset`."""
 
     clock: Clock
     lasts_s: float = PATIENCE_S
     _since_s: float | None = field(default=None, init=False)
 
     def is_left(self) -> bool:
-        """Notes that there is trouble now; returns whether it may still pass."""
+        """Notes that the disturbance is present now; returns whether it has lasted no longer than `lasts_s`."""
         now_s = self.clock.now()
         self._since_s = now_s if self._since_s is None else self._since_s
         return now_s - self._since_s <= self.lasts_s
 
     def reset(self) -> None:
-        """Notes that there is no trouble now."""
+        """Notes that the disturbance has passed."""
         self._since_s = None
 
 
@@ -46,25 +46,25 @@ HEIGHT_TOLERANCE_M = 0.02
 _PAUSE_S = 10.0
 """Longest pause after which a routine continues."""
 _STAYED_M = 0.15
-"""Largest motion of the body during such a pause."""
+"""Largest displacement of the body during such a pause."""
 _STAYED_RAD = 0.2
-"""Largest turn of the body or of an arm joint during such a pause."""
+"""Largest rotation of the body or of an arm joint during such a pause."""
 _RESTART_RAD_S = 0.8
-"""Joint speed towards the rest of a trajectory."""
+"""Joint speed towards the remaining part of a trajectory."""
 _LEAST_S = 0.05
-"""Least duration of that motion."""
+"""Shortest duration of that motion."""
 _AGAIN_S = 0.4
-"""Pause before a command that was refused, stopped or lost is given again."""
+"""Pause before a refused, stopped or lost command is issued again."""
 _OLD_S = 0.45
-"""Age beyond which readings of the arm are not used."""
+"""Age beyond which measurements of the arm are not used."""
 _LOST_S = 0.5
 """Time after its expiry from which on a running command counts as lost."""
 _OFF_PATH_RAD = 0.2
-"""Largest distance of an arm from a trajectory that it continues."""
+"""Largest joint error between an arm and the trajectory that it continues."""
 
 
 ENDED_EARLY: Final = Succeeded("ended early")
-"""Result of a skill that another one ended, because enough was done."""
+"""Result of an inner skill that `RoutineSkill.perform` ended because its condition `enough` held."""
 
 
 class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program error
@@ -81,11 +81,11 @@ class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program er
 
 
 class OffPathError(Exception):
-    """Error of an arm that is too far from an interrupted motion to continue it."""
+    """Error of an arm that is too far from an interrupted trajectory to continue it."""
 
 
 class CommandFailure(SkillFailure):
-    """Failure of a command that was refused, stopped or lost; cause EXECUTION. A repetition may succeed."""
+    """Failure of a command that was refused, stopped or lost; cause EXECUTION. Issuing it again may succeed."""
 
     def __init__(self, message: str, why: CommandCause = CommandCause.NO_ANSWER) -> None:
         super().__init__(Cause.EXECUTION, message)
@@ -93,7 +93,7 @@ class CommandFailure(SkillFailure):
 
 
 class PlanningAttempt:
-    """Context of a routine that may find no plan: `failure` holds its failure then; other failures are raised."""
+    """Context manager that keeps a SkillFailure with cause PLANNING in `failure`; other failures propagate."""
 
     failure: SkillFailure | None = None
 
@@ -102,7 +102,7 @@ class PlanningAttempt:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> bool:
-        """Takes a failure with cause PLANNING."""
+        """Suppresses and keeps a failure with cause PLANNING."""
         if not (isinstance(error, SkillFailure) and error.cause is Cause.PLANNING):
             return False
         self.failure = error
@@ -120,10 +120,10 @@ class _Stance:
 
 
 class RoutineSkill(Skill[InputsT]):
-    """Skill whose attempt is one generator, `run`. `end` stops the commands that it has given.
+    """Skill whose attempt is one generator, `run`. `end` stops the commands that the attempt has issued.
 
-    After a short pause in which the robot stayed as it was, the routine continues from its last yield, and the stopped
-    motion is resumed. Otherwise `run_again` first checks what is done already.
+    After a short pause in which body, arm and grip stayed as they were, the routine continues from its last yield, and
+    the stopped motion is resumed. Otherwise `run_again` first checks what is done already.
     """
 
     def __init__(self, context: SkillContext, options: Any = None) -> None:
@@ -137,7 +137,7 @@ class RoutineSkill(Skill[InputsT]):
 
     @abstractmethod
     def run(self, inputs: InputsT) -> Routine[Succeeded]:
-        """Makes one attempt. Raises SkillFailure."""
+        """Makes one attempt. Raises SkillFailure when the attempt fails."""
 
     def begin(self, inputs: InputsT) -> None:
         """Forgets an earlier attempt and prepares a new one."""
@@ -145,11 +145,11 @@ class RoutineSkill(Skill[InputsT]):
         self._routine = self.run(inputs)
 
     def run_again(self, inputs: InputsT) -> Routine[Succeeded]:
-        """Continues an interrupted attempt; first checks what is done already. Raises SkillFailure."""
+        """Continues an interrupted attempt after a check of what is done. Raises SkillFailure when it fails."""
         return self.run(inputs)
 
     def suspend(self) -> None:
-        """Stops the present motion; the routine stays where it is."""
+        """Stops the present motion; the routine stays at its last yield."""
         if self._routine is None:
             return
         self._stance = self._stance_now()
@@ -192,11 +192,11 @@ class RoutineSkill(Skill[InputsT]):
         )
 
     def trouble(self) -> SkillFailure | None:
-        """Returns a failure to raise where the routine waits; asked for before each step."""
+        """Returns a failure to raise inside the routine, or None; each step calls this first."""
         return None
 
     def step(self) -> Step:
-        """Runs the routine to its next yield. Raises RuntimeError before `begin`."""
+        """Runs the routine to its next yield. Raises RuntimeError when called before `begin`."""
         if self._routine is None:
             raise RuntimeError(f"skill {self.name}: step before begin")
         trouble = self.trouble()
@@ -226,16 +226,16 @@ class RoutineSkill(Skill[InputsT]):
         return self.context.robot.command_status(command).state
 
     def issue(self, command: CommandId) -> CommandId:
-        """Notes a command as this attempt's own."""
+        """Registers a command as this attempt's own."""
         self._commands.append(command)
         return command
 
     def compute(self, work: Callable[[], ResultT], *, latency_s: float, name: str, message: str) -> Routine[ResultT]:
-        """Lets the Worker do `work`. A PlanningError becomes a SkillFailure with cause PLANNING."""
+        """Runs `work` on the Worker. A PlanningError becomes a SkillFailure with cause PLANNING."""
         return (yield from self._awaited(self.context.worker.submit(work, latency_s=latency_s, name=name), message))
 
     def _awaited(self, job: Job[ResultT], message: str) -> Routine[ResultT]:
-        """Waits for a job's result; an abandoned routine withdraws the job."""
+        """Waits for a job's result; withdraws the job when the routine is closed."""
         try:
             while not job.done():
                 yield Running(message)
@@ -246,9 +246,9 @@ class RoutineSkill(Skill[InputsT]):
             job.withdraw()
 
     def sense(self, read: Callable[[], ResultT], *, latency_s: float, name: str, message: str) -> Routine[ResultT]:
-        """Lets the Worker call `read`, which may block; repeats it while it raises NoImageError and patience lasts.
+        """Calls `read` on the Worker, because it may block; repeats it after a NoImageError while patience lasts.
 
-        Raises SkillFailure with cause EXECUTION when a camera gives no picture.
+        Raises SkillFailure with cause EXECUTION when the camera still returns no picture.
         """
         patience = Patience(self.context.clock)
         while True:
@@ -261,9 +261,9 @@ class RoutineSkill(Skill[InputsT]):
                 yield from self.pause(_AGAIN_S, f"{error}; {message}")
 
     def feel_arm(self, message: str) -> Routine[None]:
-        """Waits, while patience lasts, until the readings of the arm's joints and of the gripper are recent.
+        """Waits, while patience lasts, until the measurements of the arm's joints and of the gripper are recent.
 
-        Readings that stay old are left to the limit on the age of data on which a success rests.
+        If they stay old, `Skill.max_data_age_s` makes a success fail.
         """
         robot, clock, patience = self.context.robot, self.context.clock, Patience(self.context.clock)
         while min(robot.joints().stamp_s, robot.gripper().stamp_s) < clock.now() - _OLD_S and patience.is_left():
@@ -272,11 +272,11 @@ class RoutineSkill(Skill[InputsT]):
     def follow(
         self, trajectory: ArmTrajectory, message: str, guard: Callable[[FloatArray], bool] | None = None
     ) -> Routine[bool]:
-        """Moves the arm along a trajectory; returns whether `guard` stopped it before its end.
+        """Moves the arm along a trajectory; returns whether `guard` stopped it before the end.
 
-        `guard` gets, at each tick, the joint angles that the arm should have then. After a command that was stopped or
-        lost the arm continues from where it is. Raises SkillFailure with cause EXECUTION when the arm does not get
-        there.
+        `guard` receives, at each tick, the joint angles that the trajectory has then. After a stopped or lost command
+        the arm continues from its present angles. Raises SkillFailure with cause EXECUTION when the arm does not reach
+        the end.
         """
         context, begun_s = self.context, -math.inf
 
@@ -297,7 +297,7 @@ class RoutineSkill(Skill[InputsT]):
         return (yield from self.persist(attempt, message))
 
     def _left_of(self, trajectory: ArmTrajectory, elapsed_s: float) -> ArmTrajectory:
-        """Returns the rest of a trajectory after a failed command, from the arm's present angles.
+        """Returns the rest of a trajectory after a failed command, starting from the arm's present angles.
 
         Raises OffPathError when the arm is not on the trajectory.
         """
@@ -310,8 +310,9 @@ class RoutineSkill(Skill[InputsT]):
     def persist(self, attempt: Callable[[], Routine[ResultT]], message: str) -> Routine[ResultT]:
         """Makes an attempt; repeats it, while patience lasts, when its command is refused, stopped or lost.
 
-        Patience begins with the first such failure. Without the lease it is repeated once: a run suspends the skill
-        until the robot has its lease again. Raises SkillFailure.
+        Patience begins with the first such failure. An attempt refused for lack of the lease is repeated only once,
+        because the run suspends the skill until the robot has its lease again. Raises SkillFailure when the attempt
+        fails for good.
         """
         patience, before = Patience(self.context.clock), CommandFailure(message)
         while True:
@@ -326,9 +327,9 @@ class RoutineSkill(Skill[InputsT]):
                 yield from self.pause(_AGAIN_S, f"{failure.message}; {message} again")
 
     def stand_at(self, height_m: float, message: str) -> Routine[None]:
-        """Brings the body to a height, level, unless it is there already.
+        """Brings the body to a height, level, unless it is at that height already.
 
-        Raises SkillFailure with cause EXECUTION when the body does not get there.
+        Raises SkillFailure with cause EXECUTION when the body does not reach the height.
         """
         context = self.context
 
@@ -344,9 +345,9 @@ class RoutineSkill(Skill[InputsT]):
     def perform(
         self, skill: Skill[OtherT], inputs: OtherT, enough: Callable[[], bool] = lambda: False
     ) -> Routine[Succeeded]:
-        """Lets another skill do its work as part of this one; returns `ENDED_EARLY` once `enough` holds.
+        """Runs another skill inside this one; returns `ENDED_EARLY` once `enough` holds.
 
-        Raises SkillFailure with its cause and message.
+        Raises SkillFailure with the inner skill's cause and message when that skill fails.
         """
         skill.begin(inputs)
         self._inner_skill, self._inner = skill, lambda: skill.resume(inputs)
@@ -365,11 +366,11 @@ class RoutineSkill(Skill[InputsT]):
     def finish(
         self, command: CommandId, message: str, what: str, enough: Callable[[], bool] | None = None, *, until_s: float
     ) -> Routine[float | None]:
-        """Waits until a command is done; returns None, or the last tick's time (s) when a pause stopped the command.
+        """Waits until a command is done; returns None then.
 
-        Once `enough` holds, stops the command and returns the time as well. Raises SkillFailure with cause EXECUTION
-        when the command expired at `until_s`; CommandFailure when it was stopped otherwise, was refused, or is lost: a
-        robot ends an expired command.
+        Returns the time (s) of the last tick when a suspension stopped the command, and when `enough` held, which stops
+        it. Raises SkillFailure with cause EXECUTION when the command expired at `until_s`, and CommandFailure when it
+        was refused, stopped for another reason, or lost (still running after its expiry).
         """
         last_s = self.context.clock.now()
         while (status := self.context.robot.command_status(command)).state is CommandState.RUNNING:
@@ -392,20 +393,20 @@ class RoutineSkill(Skill[InputsT]):
         raise CommandFailure(sentence, status.cause)
 
     def pause(self, duration_s: float, message: str) -> Routine[None]:
-        """Waits on the robot's clock."""
+        """Waits for a duration on the robot's clock."""
         end_s = self.context.clock.now() + duration_s
         while self.context.clock.now() < end_s:
             yield Running(message)
 
 
 def _meets(guard: Callable[[FloatArray], bool], trajectory: ArmTrajectory, clock: Clock, begun_s: float) -> bool:
-    """Returns whether a guard wants the arm stopped at the angles that a trajectory has now."""
+    """Returns whether `guard` asks to stop the arm at the angles that the trajectory has now."""
     elapsed_s, times = clock.now() - begun_s, trajectory.times_s
     return guard(np.array([np.interp(elapsed_s, times, joint) for joint in trajectory.positions_rad.T]))
 
 
 def nearest_on(trajectory: ArmTrajectory, within_s: float, q_rad: FloatArray) -> tuple[float, float]:
-    """Returns the time (s) along a trajectory that is nearest to an arm, and the arm's distance from it (rad).
+    """Returns the time (s) on a trajectory at which it is nearest to an arm, and the largest joint error there.
 
     The arm has followed the trajectory for `within_s`.
     """
@@ -417,7 +418,7 @@ def nearest_on(trajectory: ArmTrajectory, within_s: float, q_rad: FloatArray) ->
 
 
 def rest_of(trajectory: ArmTrajectory, elapsed_s: float, q_rad: FloatArray) -> ArmTrajectory:
-    """Returns the rest of a trajectory after elapsed_s, from the present angles of the arm, with a slow start."""
+    """Returns the rest of a trajectory after `elapsed_s`, starting slowly from the arm's present angles."""
     times, positions = trajectory.times_s, trajectory.positions_rad
     ahead = times > elapsed_s
     ahead[-1] = True

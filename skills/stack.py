@@ -1,8 +1,8 @@
 """Stack of a robot: its localiser, costmap, planners, controller, detector and locomotion, with their options.
 
 A component fills each slot. It is a frozen dataclass that a distribution registers as an entry point in the slot's
-group (`SLOTS`); ours are registered in `pyproject.toml` in the same form. Its fields are the options that a stack file
-may set, its docstring explains them, and it implements the slot's protocol below.
+group (`SLOTS`); the project's own are registered in `pyproject.toml` in the same form. Its fields are the options that
+a stack file may set, its docstring explains them, and it implements the slot's protocol below.
 """
 
 from __future__ import annotations
@@ -49,16 +49,16 @@ SLOTS: Final[Mapping[str, str]] = {
     "detector": "errand.detectors",
     "locomotion": "errand.locomotions",
 }
-"""Slots of a stack file, and the entry-point group of each."""
+"""Slots of a stack file, each with its entry-point group."""
 SKILLS: Final = "skills"
 SKILL_GROUP: Final = "errand.skills"
 USE: Final = "use"
 DOORS: Final = "errand.doors"
 """Entry-point group of the plug-ins that open doors (`skills.doorway.DoorOpener`)."""
 BACKENDS: Final = "errand.backends"
-"""Entry-point group of the backends that drive robots; a name is the scheme of addresses, as in `spot://HOST`."""
+"""Entry-point group of the backends that drive robots; an entry's name is the URL scheme, as in `spot://HOST`."""
 PLUGINS: Final[Mapping[Any, str]] = {"graph_nav": "errand-spot", "spot": "errand-spot"}
-"""Plug-ins of this project by the components and schemes that they bring."""
+"""Plug-ins of this project, by the component or URL scheme that they provide."""
 PLUGIN: Final = "plugin"
 DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")
 
@@ -67,9 +67,9 @@ class LocaliserComponent(Protocol):
     """Builds the localiser of one robot."""
 
     def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> Localiser:
-        """Builds a localiser on a surveyed grid, with the robot's start pose if it is known.
+        """Builds a localiser on a surveyed grid; `start` is the robot's start pose, None when it is unknown.
 
-        Not `surely` when the robot may have been moved since it was at the start.
+        `surely` is False when the robot may have been moved since it was at `start`.
         """
 
 
@@ -81,7 +81,7 @@ class CostmapComponent(Protocol):
 
 
 class GlobalPlanner(Protocol):
-    """Plans paths of the base."""
+    """Plans paths for the base."""
 
     def problem(
         self,
@@ -96,8 +96,8 @@ class GlobalPlanner(Protocol):
     ) -> Callable[[], WayPath]:
         """Samples the costmap now; returns a function that plans on that sample, in any thread.
 
-        That function raises PlanningError, and counts its computations in `work`. `zones` has the costs and directions
-        of motions; keep-out zones are obstacles of the costmap already.
+        That function raises PlanningError when there is no path, and counts its computations in `work`. `zones` adds
+        costs and allowed directions of motion; the costmap already contains the keep-out zones as obstacles.
         """
 
 
@@ -114,19 +114,19 @@ class LocalController(Protocol):
         costmap: FreeSpace,
         most_m_s: float = np.inf,
     ) -> Drive:
-        """Returns the velocity for now, at a world pose, body velocity and the velocity commanded `last` (3,)."""
+        """Returns the velocity to command at a world pose and body velocity; `last` (3,) is the previous command."""
 
     def ahead(self, way_m: float) -> FloatArray:
-        """Returns the path's poses (N, 3) from where the robot was last, for a distance (m)."""
+        """Returns the path's poses (N, 3) over the next `way_m`, from the robot's last position on the path."""
 
     def pose_after(self, way_m: float) -> Pose2D:
-        """Returns the path's pose at a distance (m) from where the robot was last."""
+        """Returns the path's pose `way_m` beyond the robot's last position on the path."""
 
 
 class ControllerComponent(Protocol):
-    """Builds a controller for each path; a robot farther off than `lost_path_m` gives the path up.
+    """Builds a controller for each path; a robot farther than `lost_path_m` from the path abandons it.
 
-    A controller with a speed limit of its own has it as the option `max_speed_m_s`; without one it is infinite.
+    `max_speed_m_s` is the controller's own speed limit; infinite when it has none.
     """
 
     lost_path_m: float
@@ -140,9 +140,9 @@ class GraspPlanner(Protocol):
     """Plans grasps and the motions to them."""
 
     def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
-        """Returns grasps, the best first; an empty list for an object that is too wide or too flat.
+        """Returns grasp candidates, the best first; an empty list for an object that is too wide or too flat.
 
-        p_BS is the shoulder.
+        `p_BS` is the position of the shoulder.
         """
 
     def plan(
@@ -154,7 +154,7 @@ class GraspPlanner(Protocol):
         arm_planner: ArmPlanner,
         rng: np.random.Generator,
     ) -> GraspPlan:
-        """Plans the best feasible candidate. Raises PlanningError when there is none."""
+        """Plans the best feasible candidate. Raises PlanningError when none is feasible."""
 
 
 class DetectorComponent(Hashable, Protocol):
@@ -168,16 +168,16 @@ class RobotBackend(Protocol):
     """Connects to robots of one make. Its fields are the options of an address: `spot://HOST?power_on=yes`."""
 
     def connect(self, address: str, name: str) -> AbstractContextManager[ConnectedRobot]:
-        """Connects to the robot at an address without scheme and options; missions call it by the name.
+        """Connects to the robot at an address without scheme and options; `name` is its name in missions.
 
-        At the end, or when the block raises, the robot is left as it was. Raises InputError when the robot cannot be
-        reached or is not ready.
+        At exit, also when the block raises, the robot is left in the state in which it was found. Raises InputError
+        when the robot cannot be reached or is not ready.
         """
 
 
 @dataclass(frozen=True)
 class RobotStack:
-    """Components of one robot, their `names`, and the options of its skills by the skill's name."""
+    """Components of one robot, their `names` by slot, and the options of its `skills` by skill name."""
 
     localiser: LocaliserComponent
     costmap: CostmapComponent
@@ -192,7 +192,7 @@ class RobotStack:
 
 
 class StackError(ValueError):
-    """Error of a stack that cannot be used: where (keys from the top), what is wrong, and what would fit."""
+    """Error in a stack file: the `path` of keys to it, what is wrong, and a `hint` at what would fit."""
 
     def __init__(self, path: tuple[str | int, ...], message: str, hint: str = "") -> None:
         super().__init__(f"{'.'.join(map(str, path)) or 'the stack'}: {message}")
@@ -201,7 +201,7 @@ class StackError(ValueError):
 
 @cache
 def default_stack() -> RobotStack:
-    """Returns the stack that comes with the project."""
+    """Returns the stack that the project provides as default."""
     return stack_of(_default_data())
 
 
@@ -214,12 +214,12 @@ def _default_data() -> dict[str, Any]:
 
 
 def default_component(slot: str) -> Any:
-    """Returns the component of a slot in the project's own stack; imports nothing of the other slots."""
+    """Returns the component that fills a slot in the default stack, without importing those of the other slots."""
     return _component(slot, _default_data()[slot])[1]
 
 
 def stack_of(data: Any) -> RobotStack:
-    """Returns the stack of a file's data, with the default for missing slots and skills. Raises StackError."""
+    """Builds a stack from a file's data, with defaults for missing slots. Raises StackError for invalid data."""
     _known((), data, (*SLOTS, SKILLS))
     chosen = {slot: data.get(slot, {}) for slot in SLOTS}
     parts = {slot: _component(slot, given) for slot, given in chosen.items()}
@@ -235,7 +235,7 @@ def stack_of(data: Any) -> RobotStack:
 
 
 def _component(slot: str, given: Any) -> tuple[str, Any]:
-    """Returns name and component of one slot. Raises StackError."""
+    """Returns the name and the component of one slot. Raises StackError when name or options are invalid."""
     if not isinstance(given, Mapping):
         raise StackError((slot,), "should be a mapping", f"write '{slot}: {{{USE}: NAME}}', then the options")
     known = _names(slot)
@@ -250,12 +250,12 @@ def _component(slot: str, given: Any) -> tuple[str, Any]:
 
 @cache
 def components(slot: str) -> Mapping[str, type]:
-    """Returns the installed components of a slot by name, the default one first. Raises StackError."""
+    """Returns the installed components of a slot by name, the default first. Raises StackError when one cannot load."""
     return MappingProxyType({name: _loaded(slot, name, SLOTS[slot]) for name in _names(slot)})
 
 
 def door_opener(given: Mapping[str, Any]) -> Any:
-    """Returns the plug-in that opens a door, from its name under `plugin` and its options. Raises StackError."""
+    """Returns the plug-in that `plugin` names, with its options. Raises StackError when it cannot be used."""
     known = sorted({entry.name for entry in installed_plugins(DOORS)})
     name = given.get(PLUGIN)
     if name not in known:
@@ -265,7 +265,7 @@ def door_opener(given: Mapping[str, Any]) -> Any:
 
 
 def robot_backend(scheme: str, given: Mapping[str, Any]) -> RobotBackend:
-    """Returns the backend of a scheme, with its options. Raises StackError."""
+    """Returns the backend of a URL scheme. Raises StackError unless one plug-in provides it and takes the options."""
     known = [entry.name for entry in installed_plugins(BACKENDS)]
     if known.count(scheme) != 1:
         several = scheme in known
@@ -298,26 +298,26 @@ def _loaded(slot: str, name: str, group: str) -> type:
 
 
 def is_frozen_dataclass(component: Any) -> bool:
-    """Returns whether a component is a class of options."""
+    """Returns whether a component is a frozen dataclass, as every class of options must be."""
     return isinstance(component, type) and bool(
         getattr(getattr(component, "__dataclass_params__", None), "frozen", False)
     )
 
 
 def _is_ours(entry: EntryPoint) -> bool:
-    """Returns whether an entry is the project's own, whose name nobody else takes."""
+    """Returns whether this project's distribution provides an entry point; its names take precedence."""
     return distribution_of(entry) == OURS
 
 
 def skill_options() -> Mapping[str, type]:
-    """Returns the options class of each installed skill that has one and can be loaded."""
+    """Returns the options class of each installed skill that can be loaded and has options."""
     found = {name: _options_of(name) for name in sorted({entry.name for entry in installed_plugins(SKILL_GROUP)})}
     return MappingProxyType({name: kind for name, kind in found.items() if kind is not None})
 
 
 @cache
 def _options_of(name: str) -> type | None:
-    """Returns the options class of an installed skill; None where it has none or cannot be loaded."""
+    """Returns the options class of an installed skill; None when it has no options or cannot be loaded."""
     entry = max(installed_plugins(SKILL_GROUP).select(name=name), key=_is_ours)
     try:
         kind = getattr(run_plugin(entry, entry.load), "Options", None)
@@ -329,10 +329,7 @@ def _options_of(name: str) -> type | None:
 
 
 def _options(name: str, given: Any) -> Any:
-    """Returns the options that a stack gives to a skill.
-
-    Raises StackError when there are none, or it cannot be loaded.
-    """
+    """Returns a skill's options in a stack. Raises StackError when the skill has none or cannot be loaded."""
     entries = installed_plugins(SKILL_GROUP).select(name=name)
     kind = _options_of(name) if entries else None
     if kind is None:
@@ -342,7 +339,7 @@ def _options(name: str, given: Any) -> Any:
 
 
 def _typed(path: tuple[str | int, ...], kind: type, given: Any) -> Any:
-    """Returns options of a dataclass from a file's data. Raises StackError."""
+    """Builds an options dataclass from a file's data. Raises StackError when the data are invalid."""
     from pydantic import TypeAdapter, ValidationError
 
     _check_keys(path, kind, given)
@@ -354,7 +351,7 @@ def _typed(path: tuple[str | int, ...], kind: type, given: Any) -> Any:
 
 
 def _check_keys(path: tuple[str | int, ...], kind: type, given: Any) -> None:
-    """Refuses keys that are no fields, also in the dataclasses inside. Raises StackError."""
+    """Raises StackError for keys that are no fields of the dataclass or of the dataclasses nested in it."""
     _known(path, given, [each.name for each in dataclasses.fields(kind)])
     for name, inner in get_type_hints(kind).items():
         if dataclasses.is_dataclass(inner) and isinstance(inner, type) and name in given:
@@ -371,7 +368,7 @@ def _known(path: tuple[str | int, ...], given: Any, known: Sequence[str]) -> Non
 
 
 def stack_data(stack: RobotStack) -> dict[str, Any]:
-    """Returns the resolved stack with all options, as plain data that `stack_of` takes again."""
+    """Returns the resolved stack with all options, as plain data that `stack_of` accepts."""
     slots = {slot: {USE: stack.names[slot], **_plain(getattr(stack, slot))} for slot in SLOTS}
     skills = {name: _plain(stack.skills.get(name) or kind()) for name, kind in skill_options().items()}
     return {**slots, SKILLS: skills}
@@ -395,7 +392,7 @@ def stack_schema() -> dict[str, Any]:
 
 
 def _schema(kind: type, defs: dict[str, Any], name: str | None = None) -> dict[str, Any]:
-    """Returns the schema of one options class; adds the schemas that it refers to to `defs`."""
+    """Returns the schema of one options class; adds the schemas that it references to `defs`."""
     from pydantic import TypeAdapter
 
     schema = TypeAdapter(kind).json_schema()

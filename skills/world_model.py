@@ -1,7 +1,7 @@
-"""World model of skills: seen objects, the estimated pose, free space, zones, and the traffic of the robots of one run.
+"""World model of skills: observed objects, pose estimate, free space, zones, and the traffic among a run's robots.
 
-Skills of others import these names from `skills.api`. Nothing in the traffic is the simulator's truth. A robot that
-reports nothing for some seconds is not listed any more, and is only an obstacle that others see.
+Skills of others import these names from `skills.api`. The traffic contains estimates only, never ground truth. A robot
+that has reported nothing for some seconds is removed from it, and remains only an obstacle that others perceive.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 
 PERSON: Final = "person"
-"""The class of people."""
+"""Class name of people."""
 
 
 class PlanningError(Exception):
-    """Error of a planner that found no plan: one plain sentence, and `outputs` of what it learnt (see `Failed`)."""
+    """Error of a planner that found no plan: one plain sentence, and `outputs` for the next attempt (see `Failed`)."""
 
     def __init__(self, message: str, outputs: Mapping[str, Any] | None = None) -> None:
         super().__init__(message)
@@ -36,7 +36,7 @@ class PlanningError(Exception):
 
 @dataclass(frozen=True)
 class ObjectKind:
-    """Kind of object, perhaps with attributes: "red wrench" is ObjectKind("wrench", ("red",))."""
+    """Kind of object, optionally with attributes: "red wrench" is ObjectKind("wrench", ("red",))."""
 
     name: str
     attributes: tuple[str, ...] = ()
@@ -58,8 +58,8 @@ class Surface:
 class Tag:
     """AprilTag that the robot knows: its number, the side of its black square, and what carries it.
 
-    An object's tag is `on` its class. Any other one stands upright with its middle at `p_W`, and its face looks in the
-    direction `yaw_rad`: at a dock (`on` it), or on a wall.
+    For a tag on an object, `on` is the object's class. Any other tag is upright with its centre at `p_W` and faces the
+    direction `yaw_rad`, at the dock named by `on` or on a wall.
     """
 
     id: TagNumber
@@ -69,7 +69,7 @@ class Tag:
     yaw_rad: Angle = 0.0
 
     def X_WT(self) -> RigidTransform:
-        """Pose of a tag with a place: x to the right and y up on its face, z out of it."""
+        """Pose of a tag that has a position: x to the right and y up on its face, z out of the face."""
         from pydrake.math import RigidTransform, RotationMatrix
 
         assert self.p_W is not None
@@ -78,15 +78,16 @@ class Tag:
 
 
 FLOOR: Final = "floor"
-"""Name of the surface of an object that lies on the floor."""
+"""Surface name for an object that lies on the floor."""
 
 
 @dataclass(frozen=True)
 class ObjectObservation:
-    """Seen object: kind, position, size and score.
+    """Observed object: kind, position, size and score.
 
-    `position_W` is the centre of its seen points in the world frame (m); `size_m` the extents of those points along the
-    axes of a box that is turned by `yaw_rad` about the vertical; `surface` the name of the surface that it rests on.
+    `position_W` is the centre of its observed points in the world frame (m). `size_m` are the extents of those points
+    along the axes of a box that is rotated by `yaw_rad` about the vertical. `surface` is the name of the surface on
+    which it rests.
     """
 
     stamp_s: Delay
@@ -102,8 +103,8 @@ class ObjectObservation:
 class LocalisationEstimate:
     """Estimated pose of the robot: X_WO corrects odometry, so that X_WB = X_WO @ X_OB.
 
-    The covariance is over x, y (m), yaw (rad). `health` is the trust in the estimate, from 0 to 1: the share of the
-    scan that the map explains at this pose, less the support for other poses.
+    The covariance is over x, y (m), yaw (rad). `health` is the confidence in the estimate, from 0 to 1: the fraction of
+    the scan that the map explains at this pose, minus the support for competing poses.
     """
 
     stamp_s: float
@@ -125,25 +126,25 @@ class Localiser(Protocol):
 
 @runtime_checkable
 class SearchingLocaliser(Protocol):
-    """Localiser that can search a whole map for the robot's pose, for the recovery from lost localisation."""
+    """Localiser that can search the whole map for the robot's pose, to recover from lost localisation."""
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
-        """Returns the pose where the scan fits, within radius_m of the belief or anywhere (None).
+        """Returns the pose where the scan fits, within `radius_m` of the belief, or anywhere when `radius_m` is None.
 
-        Returns None when it fits nowhere. Changes nothing, reads nothing that `update` changes, and may take long: call
-        it inside a Worker job.
+        Returns None when the scan fits nowhere. Changes nothing, reads nothing that `update` changes, and may take
+        long: call it inside a Worker job.
         """
 
     def accept(self, estimate: LocalisationEstimate) -> None:
-        """Uses this estimate from now on."""
+        """Replaces the estimate."""
 
 
 @runtime_checkable
 class ParticleView(Protocol):
-    """Localiser that shows its belief as sample poses."""
+    """Localiser that represents its belief by particles."""
 
     def particles_W(self, most: int) -> NDArray[np.float64]:
-        """Returns at most `most` poses (N, 3) of x, y (m) and yaw (rad), evenly chosen by weight."""
+        """Returns at most `most` poses (N, 3) of x, y (m) and yaw (rad), resampled evenly by weight."""
 
 
 class FreeSpace(Protocol):
@@ -154,13 +155,13 @@ class FreeSpace(Protocol):
 
 
 class Costmap(FreeSpace, Protocol):
-    """Free space by the surveyed keep-out grid, and by obstacles that the sensors see."""
+    """Free space from the surveyed keep-out grid and from the obstacles that the sensors see."""
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
         """Adds the robot's newest sensor readings; the runner calls this before each tick."""
 
     def add_points(self, points_W: NDArray[np.float64], stamp_s: float) -> None:
-        """Adds points (N, 3) of obstacles that a camera saw, without the floor."""
+        """Adds obstacle points (N, 3) that a camera saw; they must not contain the floor."""
 
 
 @runtime_checkable
@@ -168,7 +169,7 @@ class ClearableCostmap(Protocol):
     """Costmap whose obstacle layer can be cleared; the surveyed grid stays."""
 
     def clear_obstacles(self, within_W: NDArray[np.float64] | None = None) -> int:
-        """Clears the obstacle layer; returns the number of cells that it blocked.
+        """Clears the obstacle layer; returns the number of blocked cells that it cleared.
 
         With discs, rows of x, y and radius (m, world), clears only the cells within them.
         """
@@ -176,41 +177,41 @@ class ClearableCostmap(Protocol):
 
 @runtime_checkable
 class ExcludesRobots(Protocol):
-    """Costmap or localiser that ignores other robots, whose poses are known."""
+    """Costmap or localiser that ignores sensor returns from other robots, whose poses are known."""
 
     def exclude_robots(self, discs_W: NDArray[np.float64]) -> None:
-        """Ignores from now on all that is seen within these discs, rows of x, y and radius (m, world)."""
+        """Ignores, from now on, sensor returns within these discs, rows of x, y and radius (m, world)."""
 
 
 @runtime_checkable
 class ObstacleLayerView(Protocol):
-    """Costmap that shows its obstacle layer."""
+    """Costmap that gives access to its obstacle layer."""
 
     def obstacle_cells(self) -> NDArray[np.float64]:
-        """Returns the centres (N, 2) of the cells blocked by a seen obstacle that the map does not explain."""
+        """Returns the centres (N, 2) of the cells that a perceived obstacle blocks and the map does not explain."""
 
 
 @runtime_checkable
 class ReturnsView(Protocol):
-    """Costmap that gives the LiDAR returns of the last scan that the survey does not explain."""
+    """Costmap that provides those LiDAR returns of the last scan which the survey does not explain."""
 
     def unexplained_returns(self) -> tuple[float, NDArray[np.float64]]:
-        """Returns the scan's stamp and those returns (N, 3) in the world; of one scan alone, so not confirmed."""
+        """Returns the scan's stamp and the returns (N, 3) in the world; one scan alone has seen them."""
 
 
 @runtime_checkable
 class SurveyView(Protocol):
-    """Costmap on a survey of the place, which explains walls and furniture."""
+    """Costmap on a survey of the site, which explains walls and furniture."""
 
     def is_unexplained(self, points_W: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Returns whether each (x, y, z) row lies on surveyed ground and away from all that the survey shows."""
+        """Returns whether each (x, y, z) row lies on surveyed ground and away from everything in the survey."""
 
 
 class WorkCounter(Protocol):
-    """Counts the computations of a run, so that a slower algorithm shows without a clock. Jobs may call it."""
+    """Counts the computations of a run, so that a slower algorithm is detected without a clock. Jobs may call it."""
 
     def count(self, name: str, amount: int = 1) -> None:
-        """Adds to the counter of this name: "planner_expansions"."""
+        """Adds to the counter with this name, such as "planner_expansions"."""
 
 
 class NoWorkCounter:
@@ -229,11 +230,12 @@ IN_THE_WAY: Final = "in_the_way"
 
 @dataclass(frozen=True)
 class Neighbour:
-    """Another robot: its name, its believed pose (3,) and the poses (N, 3) still before it, all x, y, yaw in the world.
+    """Another robot: its name, estimated pose (3,) and remaining path (N, 3), all as x, y, yaw in the world.
 
-    `path` is None while it stands. `discs` (x, y, radius) cover its outline in the body frame. `first` while it goes
-    before us where the two paths meet; `yields` while it clears a path that is reserved against it, because it goes
-    after us or has nothing to do. A robot with neither works where it stands, and the others wait for it.
+    `path` is None while the robot stands. `discs` (x, y, radius) cover its outline in the body frame. `first` is True
+    while it has priority over us where the two paths meet. `yields` is True while it must clear a path that is reserved
+    against it, because it has lower priority or no task. When both are False it works where it stands, and the others
+    wait for it.
     """
 
     name: str
@@ -246,29 +248,29 @@ class Neighbour:
 
 
 class Traffic(Protocol):
-    """One robot's view of the others and of who goes first."""
+    """One robot's view of the other robots and of the priorities among them."""
 
     def claim(self) -> None:
-        """Asks for the right to go; the robot that asked first goes first. Keeps a claim that it has already."""
+        """Asks for the right of way; the robot that asked first goes first. A robot that has a claim keeps it."""
 
     def announce(self, path: FloatArray, discs: FloatArray) -> None:
-        """Reports the poses (N, 3) that lie ahead, and the outline (discs in the body frame) that will follow them.
+        """Reports the poses (N, 3) that lie ahead, and the robot's outline (discs in the body frame).
 
-        With a claim, they are reserved against all robots that claimed later.
+        While the robot has a claim, they are reserved against all robots that claimed later.
         """
 
     def release(self) -> None:
-        """Gives claim and path back. Idempotent."""
+        """Gives up claim and path. Idempotent."""
 
     def others(self) -> Sequence[Neighbour]:
-        """Returns the other robots that reported lately, by name."""
+        """Returns the other robots that have reported recently, by name."""
 
     def let_pass(self, name: str) -> None:
-        """Changes turns with a robot that we should have made way for and cannot."""
+        """Swaps priority with a robot for which we should have made way and cannot."""
 
 
 class _Alone:
-    """Traffic of a robot that is alone."""
+    """Traffic of a robot without other robots."""
 
     def claim(self) -> None:
         """Does nothing."""
@@ -310,7 +312,7 @@ _WORDS: Final = {
 
 
 class FilterType(enum.IntEnum):
-    """Type of a costmap filter of Nav2, by its number in `nav2_msgs/CostmapFilterInfo`."""
+    """Type of a Nav2 costmap filter, by its number in `nav2_msgs/CostmapFilterInfo`."""
 
     KEEP_OUT = 0
     SPEED_SHARE = 1  # percent of the full speed
@@ -319,7 +321,7 @@ class FilterType(enum.IntEnum):
 
 @dataclass(frozen=True)
 class ZoneMask:
-    """Filter mask of Nav2: the YAML file of its picture, and the values (type, base, multiplier) of its filter info.
+    """Nav2 filter mask: the YAML file of its picture, and type, base and multiplier from its filter info.
 
     The limit in a cell is base + multiplier * value, where value is the cell's occupancy in percent; 0 is no limit.
     """
@@ -334,8 +336,8 @@ class ZoneMask:
 class Zone:
     """Zone of the map: its kind, and its ground as corners (x, y) in the world frame (m) or as a filter mask.
 
-    A speed limit is `speed_m_s`, or a `share` of the robot's full speed; a mask has its own. `direction_rad` is that of
-    a one-way zone.
+    A speed limit is `speed_m_s`, or a `share` of the robot's full speed; a mask contains its own limits.
+    `direction_rad` is the direction of a one-way zone.
     """
 
     name: str

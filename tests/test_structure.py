@@ -24,10 +24,10 @@ LINES = {
     "executive/testing": 848,
     "executive/app": 7842,
     "executive/cli": 3740,
-    "skills": 28028,
-    "plant": 11147,
+    "skills": 28087,
+    "plant": 11146,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 416, 59, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 417, 59, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

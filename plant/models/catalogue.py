@@ -54,7 +54,7 @@ class ModelClass(BaseModel):
 
 @cache
 def load_catalogue() -> Mapping[str, ModelClass]:
-    """Reads all classes by name, with those of other distributions; cached. Raises InputError for a broken one."""
+    """Reads all classes by name, with those from other distributions; cached. Raises InputError when one is broken."""
     entries = read_yaml(MODELS_FOLDER / CATALOGUE).data
     found = {name: ModelClass.model_validate(entry) for name, entry in entries.items()}
     for file, classes in class_entries(CATALOGUE, ModelClass):
@@ -74,8 +74,9 @@ Parts = Annotated[int, quantities.Quantity(ge=1, le=10_000_000)]
 class ImportedObject(BaseModel):
     """One imported object: `class` is its detector class, by default the object's own name.
 
-    The origin of its frame is the centre of the bounding box `size_m`, z is up as it rests; `inertia_kg_m2` is xx, yy,
-    zz, xy, xz, yz about its centre of mass. With `photographs`, a box stands for the object, which has no mesh.
+    The origin of its frame is the centre of the bounding box `size_m`, with z up as the object rests. `inertia_kg_m2`
+    is xx, yy, zz, xy, xz, yz about its centre of mass. With `photographs`, a box represents the object, which has no
+    mesh.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, allow_inf_nan=False)
@@ -98,13 +99,13 @@ class ImportedObject(BaseModel):
         return ModelForm(file=file, half_extents_m=(x / 2, y / 2), rest_height_m=z / 2, round=self.round)
 
     def write(self, folder: Path) -> None:
-        """Writes the facts of the object into a folder, for `read_imported`."""
+        """Writes the object's facts into a folder, from which `read_imported` reads them."""
         text = yaml_of(self.model_dump(mode="json", by_alias=True))
         (folder / FACTS_FILE).write_text(f"# Made by `errand object import`, don't edit.\n{text}", encoding="utf-8")
 
 
 def read_imported(folder: Path) -> ImportedObject:
-    """Reads the object in a folder. Raises InputError when there is none, or it is damaged."""
+    """Reads the object in a folder. Raises InputError when the file is missing or damaged."""
     path = folder / FACTS_FILE
     if not path.exists():
         raise InputError(f"there is no imported object ({FACTS_FILE} is missing)", hint=_AGAIN, file=folder)
@@ -123,7 +124,7 @@ def user_cache() -> Path:
 
 
 def cached_folder(folder: Path, fill: Callable[[Path], None]) -> Path:
-    """Returns a folder that `fill` fills once; it appears only when complete, also with several processes."""
+    """Returns a folder that `fill` fills once; it becomes visible only when complete, also with several processes."""
     if folder.is_dir():
         return folder
     folder.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Writes parts of URDF text from facts: links with primitive shapes, joints with motors."""
+"""Builds parts of URDF text from parameters: links with primitive shapes, joints with motors."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class Ground:
         return self._shortened((start_W, *cells, goal_W))
 
     def plan_on(self, start_W: Point, goal_W: Point, *, who: str) -> tuple[Point, ...]:
-        """Plans like `plan_path`; a person who stands too close to an obstacle steps away first."""
+        """Plans like `plan_path`; a person who stands too close to an obstacle first steps away from it."""
         if self._clear_m(np.array([start_W]))[0] >= LEAST_M:
             return self.plan_path(start_W, goal_W, who=who)
         cells = np.argwhere(self._clearance_m >= SHOULDERS_M)
@@ -87,7 +87,7 @@ class Ground:
     def free_points(
         self, from_W: Point, least_m: float, clear_m: float, rng: np.random.Generator, count: int
     ) -> Iterator[Point]:
-        """Draws up to `count` points with a clearance (m), at a least distance from a point, in its connected part."""
+        """Yields up to `count` random points with a clearance (m), connected to a point and at least least_m away."""
         _, parts = cv2.connectedComponents((self._clearance_m >= LEAST_M).astype(np.uint8))
         row, column = self._cell(from_W)
         cells = np.argwhere((parts == parts[row, column]) & (self._clearance_m >= clear_m))
@@ -98,7 +98,7 @@ class Ground:
                 yield float(x), float(y)
 
     def aside(self, from_W: Point, lines_W: Iterable[Sequence[Point]], clear_m: float) -> Point | None:
-        """Returns the nearest free point at a distance (m) from some lines, in the part that holds a point."""
+        """Returns the nearest free point connected to from_W at a distance (m) from lines; None when there is none."""
         lines = np.full(self._free.shape, 255, np.uint8)
         for line in lines_W:
             cv2.polylines(lines, [self._cell(np.array(line))[:, ::-1].astype(np.int32)], False, 0)
@@ -118,7 +118,7 @@ class Ground:
         return bool(np.all(self._clear_m(points) > 0.0))
 
     def _cells_between(self, start_W: Point, goal_W: Point) -> list[Point] | None:
-        """Centres of the cells of a shortest path; None when there is none."""
+        """Centres of the cells on a shortest path; None when no path exists."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import dijkstra
 
@@ -147,7 +147,7 @@ class Ground:
         return [(float(x), float(y)) for x, y in (np.column_stack([column, row]) + 0.5) * _CELL_M + self._low]
 
     def _free_for(self, ends_W: Sequence[Point]) -> NDArray[np.bool_]:
-        """Mask of the cells where a person can be on a path between these ends."""
+        """Mask of the cells that a person may enter on a path between these ends."""
         free: NDArray[np.bool_] = self._clearance_m >= SHOULDERS_M
         rows, columns = np.indices(free.shape)
         for end in ends_W:
@@ -157,7 +157,7 @@ class Ground:
         return free
 
     def _shortened(self, path: Sequence[Point]) -> tuple[Point, ...]:
-        """The path without the corners that can be cut."""
+        """The path without the corners that a straight line can skip."""
         ends, corners, here = (path[0], path[-1]), [path[0]], 0
         while here < len(path) - 1:
             after = len(path) - 1
@@ -170,7 +170,7 @@ class Ground:
         return tuple(corners)
 
     def _straight(self, a: Point, b: Point, ends_W: Sequence[Point]) -> bool:
-        """Returns whether a person can go straight from a to b; near the ends less clearance is enough."""
+        """Returns whether a person can walk straight from a to b; near the ends a smaller clearance suffices."""
         points = np.linspace(a, b, max(2, math.ceil(math.dist(a, b) / (0.5 * _CELL_M))))
         near = np.any([np.hypot(*(points - end).T) < _NEAR_WAYPOINT_M for end in ends_W], axis=0)
         return bool(np.all(self._clear_m(points) >= np.where(near, LEAST_M, SHOULDERS_M) - 0.5 * _CELL_M))

@@ -31,7 +31,7 @@ class Listeners:
     def __init__(
         self, world: WorldDiagram, context: Context, doors: Doors, people: Iterable[Placement], *, seed: int
     ) -> None:
-        """`context` is the plant's; `seed` draws answers that nobody has given to the people."""
+        """`context` is the plant's; `seed` draws the answers that the people have not been given."""
         self._world, self._context, self._doors, self._seed = world, context, doors, seed
         self._answers = {each.name: each.answers for each in people}
         plant, models = world.plant, world.models
@@ -39,7 +39,7 @@ class Listeners:
         self._walls: Ground | None = None
 
     def hearer(self, robot: str) -> str | None:
-        """Returns the nearest hearing person ahead of a robot, else the nearest hearing person; or None."""
+        """Returns the nearest person in earshot and in sight, preferably ahead of the robot; None without any."""
         world = self._world
         X_WR = world.plant.EvalBodyPoseInWorld(self._context, world.robots[robot].body)
         robot_W = float(X_WR.translation()[0]), float(X_WR.translation()[1])
@@ -71,7 +71,7 @@ class Listeners:
         return options[int(rng.integers(len(options)))]
 
     def _in_sight(self, from_W: Point, to_W: Point) -> bool:
-        """Returns whether neither wall nor closed door stands between a robot and a person."""
+        """Returns whether neither a wall nor a closed door is between a robot and a person."""
         world = self._world
         if self._walls is None:
             inspector, corners = world.scene_graph.model_inspector(), (from_W, to_W)

@@ -37,7 +37,7 @@ _ROUNDING_M = 1e-9
 
 
 class _Shapes:
-    """Rows of a body's shapes; a gripper's rubber is many balls, of which only the lowest are of interest."""
+    """Rows of a body's shapes; of the many spheres of a gripper's rubber only the lowest ones are used."""
 
     def __init__(self, rows: Sequence[Row]) -> None:
         self._balls = [row for row in rows if row[0] is ShapeKind.ELLIPSOID and np.ptp(row[1]) == 0.0]
@@ -46,7 +46,7 @@ class _Shapes:
         self._radii_m = np.array([half_m[0] for _, half_m, _ in self._balls])
 
     def lowest(self, X_WB: RigidTransform) -> Sequence[Row]:
-        """Candidate rows for the lowest point with the body at a pose: the lowest balls, and all other shapes."""
+        """Candidate rows for the lowest point with the body at a pose: the lowest spheres, and all other shapes."""
         lows_m = self._centres_B @ X_WB.rotation().matrix()[2] - self._radii_m
         chosen = np.flatnonzero(lows_m <= lows_m.min(initial=np.inf) + _ROUNDING_M)
         return [*self._others, *(self._balls[number] for number in chosen)]
@@ -61,7 +61,7 @@ class Offer:
 
 
 class Offers(Stateful, saved=("_still_since_s",)):
-    """Offers of the robots of one plant; call `update` regularly."""
+    """Tracks the offers of the robots in one plant; call `update` regularly."""
 
     def __init__(self, world: WorldDiagram, context: Context) -> None:
         plant = world.plant
@@ -89,12 +89,12 @@ class Offers(Stateful, saved=("_still_since_s",)):
         self._still_since_s: dict[str, float] = {}
 
     def update(self, now_s: float, holding: Sequence[str]) -> None:
-        """Records the robots of `holding` that keep an object still for a person, and the time since then."""
+        """Records which robots in `holding` keep an object still for a person, and since when."""
         offering = [name for name in holding if self._holds_still(name)]
         self._still_since_s = {name: self._still_since_s.get(name, now_s) for name in offering}
 
     def find(self, p_WP: FloatArray, reach_m: float, since_s: float) -> Offer | None:
-        """Returns an offer that has stood since a time, within reach of a person at p_WP; None when there is none."""
+        """Returns an offer that has existed since a time, within reach of a person at p_WP; None when there is none."""
         for name, still_s in self._still_since_s.items():
             away_m = math.dist(self.grip_W(name)[:2], p_WP[:2])
             if still_s <= since_s and away_m <= reach_m and (held := self._free_in(name)) is not None:
@@ -102,7 +102,7 @@ class Offers(Stateful, saved=("_still_since_s",)):
         return None
 
     def holds(self, offer: Offer) -> bool:
-        """Returns whether an offer still stands: the hand holds the object and moves no faster than a pull moves it."""
+        """Returns whether an offer still exists: the hand holds the object and moves no faster than a pull moves it."""
         p_WO = self._plant.EvalBodyPoseInWorld(self._context, self.loose[offer.object]).translation()
         at_hand = float(np.linalg.norm(p_WO - self.grip_W(offer.robot))) < _AT_HAND_M
         return at_hand and self._outside_outline(offer.robot) and self._hand_m_s(offer.robot) < MOVES_M_S
@@ -125,7 +125,7 @@ class Offers(Stateful, saved=("_still_since_s",)):
         return self._robots[robot].opening(self._context)
 
     def lowest_m(self, offer: Offer) -> float:
-        """Height (m) of the lowest point of an offered object and its gripper."""
+        """Height (m) of the lowest point on an offered object and its gripper."""
         bodies = (self.loose[offer.object], *self._links[offer.robot])
         return min(self._low_m(body) for body in bodies)
 
@@ -135,7 +135,7 @@ class Offers(Stateful, saved=("_still_since_s",)):
         return np.asarray(self._plant.EvalBodyPoseInWorld(self._context, body) @ body.default_com())
 
     def _low_m(self, body: RigidBody) -> float:
-        """Height (m) of the lowest point of a body's shapes; infinite for a body without shapes."""
+        """Height (m) of the lowest point on a body's shapes; infinite for a body without shapes."""
         X_WB = self._plant.EvalBodyPoseInWorld(self._context, body)
         return min((_lowest_m(X_WB, row) for row in self._shapes[int(body.index())].lowest(X_WB)), default=math.inf)
 
@@ -156,7 +156,7 @@ class Offers(Stateful, saved=("_still_since_s",)):
         return bool(np.any((p_BG[:2] < low - BEYOND_OUTLINE_M) | (p_BG[:2] > high + BEYOND_OUTLINE_M)))
 
     def _free_in(self, robot: str) -> str | None:
-        """Returns the only object in contact with a gripper if it has no other contact, else None."""
+        """Returns the only object in contact with a gripper if it has no other contact; None otherwise."""
         links = {int(link.index()) for link in self._links[robot]}
         touching: dict[int, set[int]] = {}
         for each in self._query.Eval(self._context).ComputePointPairPenetration():
@@ -261,7 +261,7 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
             self._go_on(self.offer, now_s)
 
     def _go_on(self, offer: Offer, now_s: float) -> None:
-        """Enters the next phase while the offer stands."""
+        """Enters the next phase while the offer exists."""
         for_s = now_s - self._since_s
         off_m = float(np.linalg.norm(self._under(offer).translation() - self._X_WT.translation()))
         if self.phase is Phase.PULLING and for_s > PULL_S:
@@ -279,16 +279,16 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
             self._go_home(now_s)
 
     def _grip(self, offer: Offer) -> None:
-        """Records the opening and the object's place in the hand, to notice when the gripper gives way."""
+        """Records the opening and the object's position in the hand, to detect when the gripper releases."""
         self._opening, self._p_HO = self._offers.opening(offer.robot), self._offers.in_hand(offer)
 
     def _gives(self, offer: Offer, opens_rad: float = GIVES_RAD, moved_m: float = GIVES_M) -> bool:
-        """Returns whether the gripper has given way since `_grip`."""
+        """Returns whether the gripper has released since `_grip`."""
         opened = self._offers.opening(offer.robot) - self._opening > opens_rad
         return opened or float(np.linalg.norm(self._offers.in_hand(offer) - self._p_HO)) > moved_m
 
     def pull_W(self, now_s: float) -> FloatArray | None:
-        """Force (3,) of the pull (N, world); None when the person does not pull, or the gripper gives way."""
+        """Force (3,) of the pull (N, world); None when the person does not pull, or the gripper releases."""
         if self.offer is None or self.phase is not Phase.PULLING:
             return None
         if self._gives(self.offer, 0.5 * GIVES_RAD):
@@ -326,13 +326,13 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
         return under
 
     def _goal_under(self, under: RigidTransform) -> RigidTransform:
-        """Next goal on the path below the offered object: first down at the body, then to below the object."""
+        """Next goal on the tray's path below the offered object: first down at the body, then to below the object."""
         here, level_m = self._X_WT.translation(), float(under.translation()[2]) - UNDER_M
         xy = here[:2] if here[2] > level_m + _NEAR_M else under.translation()[:2]
         return RigidTransform(under.rotation(), np.array([*xy, level_m]))
 
     def _goal_home(self) -> RigidTransform:
-        """Next goal on the path home: first level and a little down to the body, then into the torso."""
+        """Next goal on the tray's path home: first level and a little down to the body, then into the torso."""
         home, here = self._home_W(), self._X_WT
         p_W = np.array([*home.translation()[:2], here.translation()[2] - _DOWN_M])
         aside_m = float(np.linalg.norm((p_W - here.translation())[:2]))
@@ -355,7 +355,7 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
         self.phase, self._since_s, self._home = phase, now_s, False
 
     def _go_home(self, now_s: float) -> None:
-        """Ends the offer and begins to hide the tray."""
+        """Ends the offer and starts to hide the tray."""
         self.offer = None
         self._enter(Phase.IDLE, now_s)
 
@@ -366,7 +366,7 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
         return self._X_WP() @ X_PT_HOME
 
     def _set(self, X_WT: RigidTransform, V_WT: SpatialVelocity) -> None:
-        """Sets the tray's pose and velocity in the plant where they differ from now."""
+        """Sets the tray's pose and velocity in the plant when they differ from the present ones."""
         plant, context, tray = self._plant, self._context, self._tray
         if not plant.EvalBodyPoseInWorld(context, tray).IsNearlyEqualTo(X_WT, _MOVED):
             plant.SetFreeBodyPose(context, tray, X_WT)
@@ -376,7 +376,7 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
 
 
 def _towards(X: RigidTransform, goal: RigidTransform, dt_s: float) -> tuple[RigidTransform, SpatialVelocity]:
-    """Pose after dt_s on the path to a goal, at limited speed, and the velocity that leads to the pose."""
+    """Pose after dt_s on the path to a goal, at limited speed, and the velocity that leads to that pose."""
     offset = goal.translation() - X.translation()
     shift = offset * min(1.0, SPEED_M_S * dt_s / max(float(np.linalg.norm(offset)), 1e-9))
     turn = (goal.rotation() @ X.rotation().inverse()).ToAngleAxis()
@@ -405,7 +405,7 @@ class Receivers(Stateful, saved=("_steps", "_offers", "_people")):
         self._pulling = False
 
     def __getitem__(self, name: str) -> Receiver:
-        """Returns the person of a name. Raises KeyError."""
+        """Returns the person with this name. Raises KeyError when there is none."""
         return self._people[name]
 
     @property

@@ -1,4 +1,4 @@
-"""Walk of one person: the legs of a route, changes of pace, distractions, and paths from elsewhere."""
+"""Walk of one person: the legs of a route, changes of pace, lapses of attention, and other paths."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Leg:
         return tuple(lengths)
 
     def part(self, from_m: float, until_m: float) -> tuple[Point, ...]:
-        """Corners of the part of the path between two lengths from its beginning."""
+        """Corners of the path's section between two lengths from its start."""
         lengths = self.lengths_m()
         inner = (corner for corner, at_m in zip(self.corners_W, lengths, strict=True) if from_m < at_m < until_m)
         return (self._at(lengths, from_m), *inner, self._at(lengths, until_m))
@@ -71,8 +71,8 @@ class Walk(
 ):
     """A person on the legs of a route, or on paths given by `take_path`, who faces along the path.
 
-    Call `advance` once a step. `held_s` is the person's waiting time for a robot, a door or a person, `walked_m` the
-    whole path so far. `lapsed` is True once a lapse of attention has begun, until the caller resets it.
+    Call `advance` once per step. `held_s` is how long the person has waited for a robot, a door or a person; `walked_m`
+    the total path length. `lapsed` is True once a lapse of attention has begun, until the caller resets it.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class Walk(
     ) -> None:
         """The person stands at `at_W` until `start_s`; the last leg of a looped route ends where the first begins.
 
-        `pace` returns the factor of the speed for each part of the walked path, of `PACE_M` (None: 1).
+        `pace` returns the speed factor for each section of `PACE_M` of the walked path (None: 1).
         """
         self._legs, self._lengths_m = tuple(legs), [leg.lengths_m() for leg in legs]
         self._speed_m_s, self._loops, self._pace, self._lapses = speed_m_s, loops, pace, tuple(lapses)
@@ -119,7 +119,7 @@ class Walk(
 
     @property
     def goes_back(self) -> bool:
-        """Returns whether the person walks back in a lapse of attention."""
+        """Returns whether the person walks back during a lapse of attention."""
         return len(self._asides) > 1
 
     def set_off(self) -> None:
@@ -127,12 +127,12 @@ class Walk(
         self._wait_s = 0.0
 
     def take_detour(self, corners_W: tuple[Point, ...], *, passing: bool = True) -> None:
-        """Replaces the rest of the path by another to its end, which may lead close by an obstacle (`passing`)."""
+        """Replaces the rest of the path by another to its end, which may pass close to an obstacle (`passing`)."""
         pause_s = (self._detour[0] if self._detour is not None else self._legs[self._leg]).pause_s
         self.take_path(corners_W, pause_s, passing=passing)
 
     def take_path(self, corners_W: tuple[Point, ...], pause_s: float = 0.0, *, passing: bool = False) -> None:
-        """Replaces the present path by another, which may lead close by an obstacle (`passing`)."""
+        """Replaces the present path by another, which may pass close to an obstacle (`passing`)."""
         leg = Leg(corners_W, pause_s)
         self._detour, self._done_m = (leg, leg.lengths_m()), 0.0
         self._asides, self._passing = (), passing
@@ -150,22 +150,22 @@ class Walk(
 
     @property
     def left_m(self) -> float:
-        """Length of the present path that is left. Raises IndexError when there is none."""
+        """Remaining length of the present path. Raises IndexError when there is none."""
         lengths_m = self._lengths_m[self._leg] if self._detour is None else self._detour[1]
         return lengths_m[-1] - self._done_m
 
     @property
     def on_detour(self) -> bool:
-        """Returns whether the person walks close by an obstacle on a detour."""
+        """Returns whether the person passes close to an obstacle on a detour."""
         return self._passing
 
     def ahead_W(self, length_m: float) -> tuple[Point, ...]:
-        """Corners of the path that lies ahead, up to a length; the first is the person's place."""
+        """Corners of the path ahead, up to a length; the first is the person's position."""
         leg, _, done_m = self._present()
         return (self.place_W, *leg.part(done_m, done_m + length_m)[1:])
 
     def _present(self) -> tuple[Leg, tuple[float, ...], float]:
-        """Present path, the lengths at its corners, and the part of it that is done, in metres."""
+        """Present path, the lengths at its corners, and the walked length of it, in metres."""
         if self._asides:
             return self._asides[0], self._asides[0].lengths_m(), self._aside_m
         return *(self._detour or (self._legs[self._leg], self._lengths_m[self._leg])), self._done_m
@@ -199,7 +199,7 @@ class Walk(
             self._begin(self._lapses[self._lapse])
 
     def arrive(self) -> None:
-        """Ends the present path here, close to its end, and begins the pause of its end."""
+        """Ends the present path here, close to its end, and starts the pause that belongs to its end."""
         self._wait_s = (self._detour[0] if self._detour is not None else self._legs[self._leg]).pause_s
         self._done_m, self._leg, self._detour = 0.0, self._leg + 1, None
         self._asides, self._passing = (), False
@@ -213,7 +213,7 @@ class Walk(
             self._trail = (self.place_W, *self._trail[: TRAIL_POINTS - 1])
 
     def _begin(self, lapse: Lapse) -> None:
-        """Stops for a lapse of attention; before it, perhaps walks back along the trail, and afterwards forth again."""
+        """Stops for a lapse of attention; if it says so, first walks back along the trail, and later returns."""
         self._lapse, self.lapsed = self._lapse + 1, True
         back = Leg((self.place_W, *self._trail), lapse.stop_s)
         back = Leg(back.part(0.0, min(lapse.back_m, back.lengths_m()[-1])), lapse.stop_s)
@@ -224,7 +224,7 @@ class Walk(
             self._wait_s = lapse.stop_s
 
     def turn_round(self) -> bool:
-        """Ends a walk back, because something is in the way; returns whether the person was on one."""
+        """Ends a walk back because of an obstacle; returns whether the person was walking back."""
         if len(self._asides) < 2:
             return False
         back = self._asides[0]
@@ -239,7 +239,7 @@ class Walk(
 
     @property
     def trail_W(self) -> tuple[Point, ...]:
-        """Places where the person was, the latest first."""
+        """Previous positions of the person, the latest first."""
         return self._trail
 
     def _stand_between(self, a: Point, b: Point, from_a_m: float, dt_s: float) -> None:

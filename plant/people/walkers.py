@@ -81,7 +81,7 @@ Barriers = Sequence[tuple[Point, Point]]
 
 
 class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now_s")):
-    """The people of one plant who walk, by name; call `before_step` before each step."""
+    """The people in one plant who walk, by name; call `before_step` before each step."""
 
     def __init__(
         self, world: WorldDiagram, context: Context, say: Callable[[str, str], None] = lambda name, words: None
@@ -112,12 +112,12 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
             self._walks = {name: _walk(name, route, ground) for name, route in routes.items()}
 
     def __getitem__(self, name: str) -> Walk:
-        """Returns the walk of a person. Raises KeyError."""
+        """Returns the walk of a person. Raises KeyError when nobody has this name."""
         return self._walks[name]
 
     @property
     def still(self) -> bool:
-        """Returns whether nobody of the plant walks."""
+        """Returns whether no person in the plant walks."""
         return not self._walks
 
     def places_W(self) -> Iterator[Point]:
@@ -172,7 +172,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         return True
 
     def _plans_now(self, name: str) -> bool:
-        """Returns whether it is time for a person's next path, and notes it."""
+        """Returns whether a person's next path is due; if so, resets the timer."""
         if self._plans_s.get(name, 0.0) > self._now_s:
             return False
         self._plans_s[name] = self._now_s + PLAN_S
@@ -194,7 +194,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         short_m: float = 0.0,
         passing: bool = False,
     ) -> bool:
-        """Gives a person a path that ends short of a goal; returns whether there is one."""
+        """Gives a person a path that ends short of a goal; returns whether a path exists."""
         with contextlib.suppress(WorldError):
             path = Leg(ground.plan_on(walk.place_W, goal_W, who="somebody"), pause_s)
             length_m = path.lengths_m()[-1]
@@ -204,7 +204,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         return False
 
     def _follow(self, name: str, walk: Walk) -> bool:
-        """Keeps a person behind the robot that leads; returns whether the person may walk on."""
+        """Keeps a person behind the leading robot; returns whether the person may walk on."""
         leader = self._leaders.get(name)
         if leader is None:
             return False
@@ -253,20 +253,20 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
             self._step_aside(name, walk, first, near)
 
     def _is_taken(self, name: str, walk: Walk) -> bool:
-        """Returns whether another person stands at the goal of a person close by."""
+        """Returns whether another person stands at the goal and the person is close to it."""
         others = (there for other, there in self._walks.items() if other != name and not there.walks)
         taken = any(math.dist(there.place_W, walk.next_stop_W) < PASS_APART_M for there in others)
         return taken and math.dist(walk.place_W, walk.next_stop_W) < APART_M + PASS_APART_M
 
     def _path_around(self, name: str, walk: Walk, outlines_W: Sequence[FloatArray]) -> tuple[Point, ...] | None:
-        """Path to the next stop around some outlines; None if there is none, or the person is inside one."""
+        """Path to the next stop around outlines; None when no path exists, or the person is inside an outline."""
         ground = self._blocked_ground(outlines_W)
         with contextlib.suppress(WorldError):
             return ground.plan_path(walk.place_W, walk.next_stop_W, who=name)
         return None
 
     def _step_aside(self, name: str, walk: Walk, first: Sequence[Walk], near: Sequence[FloatArray]) -> None:
-        """Lets others through where nobody can pass: off their ways and the person's own, and back after a while."""
+        """Lets others through where nobody can pass: steps off their paths and the person's own, and returns later."""
         lines_W = (walk.trail_W, *(each.ahead_W(FREE_PATH_M) for each in (walk, *first)))
         ground = self._blocked_ground(near)
         if (place_W := ground.aside(walk.place_W, lines_W, ASIDE_M)) is not None:
@@ -274,14 +274,14 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
                 walk.step_aside(ground.plan_on(walk.place_W, place_W, who=name), ASIDE_S)
 
     def _around(self, name: str, walk: Walk) -> Iterator[FloatArray]:
-        """Outlines (K, 2) of the robots and, if the person keeps apart, the people close around a person."""
+        """Outlines (K, 2) of the robots and, if the person keeps apart, of people close to the person."""
         yield from self._outlines_W(walk)
         for other, there in self._walks.items() if self._routes[name].apart else ():
             if other != name and math.dist(there.place_W, walk.place_W) < MEET_M:
                 yield _swept_W(there.place_W, there.place_W)
 
     def _blocked_ground(self, outlines_W: Sequence[FloatArray]) -> Ground:
-        """Ground with closed doors and some outlines as obstacles."""
+        """Ground with closed doors and `outlines_W` as obstacles."""
         assert self._ground is not None
         doors = (np.array([a, b, b]) for a, b in self._barriers)
         blocked = [*outlines_W, *doors]
@@ -298,7 +298,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         return route.yields and any(self._close_ahead(walk, outline_W) for outline_W in self._outlines_W(walk))
 
     def _people_near(self, name: str, walk: Walk) -> Iterator[Point]:
-        """Positions of the other walking people whom the next steps of a person would bring too near."""
+        """Positions of the other walking people to whom the person's next steps would come too close."""
         for other, there in self._walks.items():
             away_m = math.dist(there.place_W, walk.place_W)
             if other == name or away_m > APART_M + PASS_APART_M:
@@ -321,7 +321,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
                 yield robot.outline_W(self._context)
 
     def _close_ahead(self, walk: Walk, outline_W: FloatArray) -> bool:
-        """Returns whether an outline is close to the person and ahead."""
+        """Returns whether an outline is close to the person and ahead of the person."""
         nearest_W = _nearest_on(outline_W, np.array(walk.place_W))
         if float(np.hypot(*(nearest_W - walk.place_W))) > (PASS_M if walk.on_detour else YIELD_M):
             return False
@@ -336,7 +336,7 @@ def _walk(name: str, route: PointRoute, ground: Ground) -> Walk:
 
     @cache
     def pace(part: int) -> float:
-        """Factor of the speed on a part of the path."""
+        """Speed factor on a section of the path."""
         rng = np.random.default_rng([*route.stream, 1, part])
         return float(rng.uniform(1.0 - route.pace, 1.0 + route.pace))
 
@@ -369,7 +369,7 @@ def segments_cross(a: tuple[Point, Point], b: tuple[Point, Point]) -> bool:
 
 
 def _swept_W(a_W: Point, b_W: Point) -> FloatArray:
-    """Convex outline (K, 2) of a person on the way from one point to another."""
+    """Convex outline (K, 2) of a person who moves from one point to another."""
     box = _HALF_BODY_M * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     corners = np.concatenate([box + a_W, box + b_W]).astype(np.float32)
     return np.asarray(cv2.convexHull(corners).reshape(-1, 2), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""The referee, which alone sees the true state of the plant: it observes a run and judges its goal conditions."""
+"""The referee, which alone knows the true state of the plant: it observes a run and judges its goal conditions."""
 
 from plant.referee.referee import Referee
 

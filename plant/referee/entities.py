@@ -1,4 +1,4 @@
-"""Entities that bodies of the plant belong to (robot, object, person, scenery), their contacts and collisions."""
+"""Entities to which bodies of the plant belong (robot, object, person, scenery), their contacts and collisions."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _kind_of_link(link: str, robot: RobotKind) -> Kind:
 class Entities:
     """All entities by number, the entity of each collision shape, and the bodies whose motion is observed.
 
-    The number of a body's entity is the body's index; pieces of the scenery have the numbers after the bodies.
+    The number of a body's entity is the body's index; pieces of scenery have the numbers after the bodies.
     """
 
     all: Mapping[int, Entity]
@@ -80,9 +80,9 @@ class Entities:
         persons: Sequence[str],
         scenery: Mapping[GeometryId, str],
     ) -> Entities:
-        """Reads the entities of a finalized plant. Raises ValueError with a name that the plant lacks.
+        """Reads the entities of a finalized plant. Raises ValueError, with the name, for a body that the plant lacks.
 
-        `scenery` names the piece of furniture of each collision shape of the world body.
+        `scenery` maps each collision shape on the world body to its piece of furniture.
         """
         loose = [placed for placed in placements if placed.name not in persons]
         objects = {placed.name: _bodies(plant, placed.name)[0] for placed in loose}
@@ -138,7 +138,7 @@ def _bodies(plant: MultibodyPlant, instance_name: str) -> list[RigidBody]:
 
 
 def _links(plant: MultibodyPlant, links: Mapping[str, str]) -> dict[str, RigidBody]:
-    """The named link of each robot that has it."""
+    """Bodies of the named links, by robot; omits robots without that link."""
     return {name: body for name, link in links.items() for body in _bodies(plant, name) if body.name() == link}
 
 
@@ -166,7 +166,7 @@ def contact_heights(
 class Collision:
     """Collision of a robot with an obstacle, with `other_robot` or with a `person`.
 
-    The person has `walked_in` when the robot stood still.
+    `walked_in` is True when the robot stood still and the person walked into it.
     """
 
     time_s: float
@@ -179,10 +179,10 @@ class Collision:
 
 
 class CollisionCounter(Stateful, saved=("_last_touched_s", "collisions")):
-    """Counter of new contacts between robots and scenery, people or other robots.
+    """Counts new contacts between robots and scenery, people or other robots.
 
-    A pair that parts for less than `debounce_s` is still the same collision. Contacts of the first update do not count.
-    All contacts of a robot with the same person or the same other robot are one pair.
+    A pair that separates for less than `debounce_s` is still the same collision. Contacts in the first update do not
+    count. All contacts between a robot and the same person or the same other robot are one pair.
     """
 
     def __init__(self, entities: Mapping[int, Entity], debounce_s: float = 0.5) -> None:
@@ -195,7 +195,7 @@ class CollisionCounter(Stateful, saved=("_last_touched_s", "collisions")):
     def update(self, time_s: float, pairs: Mapping[Pair, float], speeds_m_s: Mapping[str, float]) -> None:
         """Records the pairs in contact at time_s, with the heights of their lowest contacts.
 
-        `speeds_m_s` has the speed of each robot just before the contact.
+        `speeds_m_s` are the speeds of the robots just before the contact.
         """
         touching = {self._counted_as(pair): pair for pair, z in pairs.items() if self._counts(pair, z)}
         if self._last_touched_s is None:
@@ -206,13 +206,13 @@ class CollisionCounter(Stateful, saved=("_last_touched_s", "collisions")):
             self._last_touched_s[counted] = time_s
 
     def _counted_as(self, pair: Pair) -> Pair:
-        """Pair of a contact for the count: whole robots with people and other robots, else the pair itself."""
+        """Pair to count for a contact: whole robots with people and other robots, else the pair itself."""
         a, b = (self._entities[number] for number in pair)
         whole = Kind.PERSON in (a.kind, b.kind) or (a.kind in ROBOT_KINDS and b.kind in ROBOT_KINDS)
         return (self._first_of[a.owner], self._first_of[b.owner]) if whole else pair
 
     def _counts(self, pair: Pair, z: float) -> bool:
-        """Returns whether a contact is a collision: no feet on the floor, no loose object, no robot with itself."""
+        """Returns whether a contact is a collision: not feet on the floor, a loose object, or a robot with itself."""
         kinds = {self._entities[index].kind for index in pair}
         if Kind.OBJECT in kinds or not kinds & ROBOT_KINDS:
             return False

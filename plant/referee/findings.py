@@ -1,4 +1,4 @@
-"""Findings of the referee, helpers of all judges, and the judges of following, guiding and greeting."""
+"""Findings of the referee, helpers of all judges, and the judges for following, guiding and greeting."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,29 +25,29 @@ _SAMPLE_S: Final = 0.1
 
 @dataclass(frozen=True)
 class Finding:
-    """Finding on one condition: whether it holds, and the reason as a sentence."""
+    """Result for one condition: whether it holds, and the reason as a sentence."""
 
     holds: bool
     sentence: str
 
 
 def step_end_s(condition: GoalCondition, truth: Truth) -> float:
-    """Time when the step of a condition ended, or now."""
+    """Time at which the step that belongs to a condition ended; the present time while it runs."""
     return truth.now_s if condition.ended_s is None else min(condition.ended_s, truth.now_s)
 
 
 def is_past(condition: GoalCondition) -> bool:
-    """Returns whether a condition is about the past, not the end of the mission."""
+    """Returns whether a condition concerns an earlier time, not the end of the mission."""
     return condition.when is not When.END_OF_MISSION and condition.ended_s is not None
 
 
 def region_at(regions: Sequence[Region], p_W: FloatArray) -> str | None:
-    """Name, with its article, of the first region that contains a point."""
+    """Name, with its article, of the first region that contains a point; None when none does."""
     return next((the(region.name) for region in regions if region.contains(p_W)), None)
 
 
 def the(name: str) -> str:
-    """Name of a place with its article; a pose or a proper name has none."""
+    """Name of a place with its article; a pose or a proper name has no article."""
     return name if name.startswith("(") or name[:1].isupper() else definite(name)
 
 
@@ -57,13 +57,13 @@ def distance_m(p: FloatArray, q: FloatArray) -> float:
 
 
 def where(regions: Sequence[Region]) -> str:
-    """Names of regions if there are few, else their number."""
+    """Names of the regions if they are few, else their number."""
     names = tuple(dict.fromkeys(the(region.name) for region in regions))
     return " or ".join(names) if len(names) <= NAMED_REGIONS else f"any of {len(names)} places"
 
 
 def judge_company(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges whether a robot was near a person at the person's goal, and, if it followed, never lost them."""
+    """Judges whether a robot was near a person at the person's goal and, when following, never lost them."""
     people = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}
     if not people:
         return Finding(False, f"there is no person {condition.person or ''}".rstrip() + " to go to.")
@@ -78,7 +78,7 @@ def judge_company(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def lost_s(robot: TimedPath, person: TimedPath, from_s: float, until_s: float) -> float:
-    """Longest time (s) for which a robot was farther from a person than `LOST_M`."""
+    """Longest time (s) for which a robot was farther than `LOST_M` from a person."""
     times = np.arange(max(from_s, person.points[0, 3]), until_s, _SAMPLE_S)
     far = np.hypot(*(robot.positions_at(times) - person.positions_at(times))[:, :2].T) > LOST_M
     longest = run = 0
@@ -106,7 +106,7 @@ def _judge_pair(condition: GoalCondition, robot: str, person: str, truth: Truth)
 
 
 def _apart_m(condition: GoalCondition, robot: TimedPath, person: TimedPath, truth: Truth) -> float:
-    """Distance between a robot and a person at the time that counts for a condition, in metres."""
+    """Distance between a robot and a person at the time to which a condition refers, in metres."""
     until_s = step_end_s(condition, truth)
     at_W = person.position_at(until_s)
     if condition.when is When.SOME_TIME:
@@ -115,7 +115,7 @@ def _apart_m(condition: GoalCondition, robot: TimedPath, person: TimedPath, trut
 
 
 def judge_greeted(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges whether the robot spoke near each person who stayed in the region, once for each.
+    """Judges whether the robot spoke near each person who stayed in the region, once per person.
 
     A person who came or left during the step may be greeted or not.
     """

@@ -54,7 +54,7 @@ def _taken_again(history: ObjectHistory, condition: GoalCondition, truth: Truth)
 
 
 def _judge_grasped(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges whether the objects were lifted from the source, and held at the times at which they must be."""
+    """Judges whether the objects were lifted from the source, and held at the required times."""
     until_s = step_end_s(condition, truth)
     from_s = condition.from_s if condition.when is When.SOME_TIME else condition.since_s
     candidates = ((one, _lift(one, condition, from_s, until_s)) for one in _of_class(condition, truth))
@@ -125,7 +125,7 @@ def _was_given(history: ObjectHistory, people: Collection[str], condition: GoalC
 def _why_not_handed(
     condition: GoalCondition, objects: Sequence[ObjectHistory], people: Mapping[str, FloatArray]
 ) -> str:
-    """Sentence on a failed hand-over: where the object is, or which object was wanted."""
+    """Sentence that says why a hand-over failed: where the object is, or which object was wanted."""
     if not objects:
         return f"No {_wanted(condition)} was brought{_out_of(condition.source)}."
     history = next((one for one in objects if one.holder is not None), objects[0])
@@ -157,7 +157,7 @@ def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> str:
-    """Clause on the place of an object that did not rest in the goal in time."""
+    """Clause that says where an object is that did not rest in the goal in time."""
     now = _rest_in(history, condition.goal)
     if now is not None and not history.placed_by_person:
         return f"{definite(history.name)} was not on {where(condition.goal)} at the end of its step"
@@ -167,7 +167,7 @@ def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth)
 
 
 def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> FloatArray | None:
-    """Place in the goal where a robot put an object; None if the object was not there at the required times."""
+    """Position in the goal where a robot put an object; None when the object was not there at the required times."""
     until_s = step_end_s(condition, truth)
     if condition.when is When.SOME_TIME:
         rests = history.own_rests_W(condition.from_s, until_s + SETTLE_S)
@@ -195,7 +195,7 @@ def _judge_went(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _points(condition: GoalCondition, path: TimedPath, truth: Truth) -> Sequence[FloatArray]:
-    """Positions of a path that count for a condition, in the order of time."""
+    """Positions on a path at the required times, sorted by time."""
     until_s = step_end_s(condition, truth)
     if condition.when in (When.SOME_TIME, When.ALWAYS):
         return list(path.positions_between(condition.from_s, until_s))
@@ -216,7 +216,7 @@ def _judge_at(condition: GoalCondition, robot: str, truth: Truth) -> Finding:
 
 
 def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges whether an answer was true at the time when it was given."""
+    """Judges whether an answer was true at the time at which it was given."""
     then_s, aside = condition.answered_s, []
     if condition.classes == (PERSON,):
         when_s = truth.now_s if then_s is None else then_s
@@ -295,7 +295,7 @@ def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> b
 
 
 def _is_left(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
-    """Returns whether an object was in the source at the end of the step, or is there now without being put back."""
+    """Returns whether an object was in the source at the end of the step, or is there now and was not put back."""
     until_s = step_end_s(condition, truth)
     put = history.rest_at(until_s)
     then_W = put[1] if put is not None else history.place_at(until_s)
@@ -329,7 +329,7 @@ def _of_class(condition: GoalCondition, truth: Truth) -> list[ObjectHistory]:
 
 
 def _lift(history: ObjectHistory, condition: GoalCondition, from_s: float, until_s: float) -> Lift | None:
-    """First lift of an object by the condition's robot in an interval, from the source if one is given."""
+    """First lift of an object by the condition's robot in an interval; from the source, if the condition has one."""
     return next(
         (
             lift
@@ -343,7 +343,7 @@ def _lift(history: ObjectHistory, condition: GoalCondition, from_s: float, until
 
 
 def _rest_in(history: ObjectHistory, goal: Sequence[Region]) -> FloatArray | None:
-    """Position of an object at rest in the goal now, else None."""
+    """Position of an object at rest in the goal now; None when it does not rest there."""
     return history.last.p_WO if history.resting and region_at(goal, history.last.p_WO) is not None else None
 
 
@@ -360,14 +360,14 @@ def _wanted(condition: GoalCondition) -> str:
 
 
 def _tally(done: Collection[ObjectHistory], condition: GoalCondition) -> str:
-    """Count of the objects that fulfil a condition: "no beer was", "1 of 2 beer was", "2 of 3 beer were"."""
+    """Counts the objects that fulfil a condition: "no beer was", "1 of 2 beer was", "2 of 3 beer were"."""
     if condition.needed == 1:
         return f"no {_wanted(condition)} was"
     return f"{len(done)} of {condition.needed} {_wanted(condition)} {'was' if len(done) == 1 else 'were'}"
 
 
 def _from(condition: GoalCondition, lift: Lift) -> str:
-    """Phrase with the source of a lift."""
+    """Phrase that names the source of a lift."""
     region = region_at(condition.source, lift.from_W)
     return "" if region is None else f" from {region}"
 

@@ -1,6 +1,6 @@
 """The referee's record: histories of loose objects and paths of robots and people.
 
-An object's history has its resting places, lifts and drops.
+An object's history contains its resting places, lifts and drops.
 """
 
 import math
@@ -101,12 +101,12 @@ class ObjectHistory(Stateful):
 
     @property
     def placed_by_person(self) -> bool:
-        """Returns whether a person moved the object last."""
+        """Returns whether the last move of the object was by a person."""
         return len(self.rests_W) - 1 in self._by_others and not self._carried
 
     @property
     def last(self) -> ObjectSample:
-        """Latest sample. Raises ValueError before the first."""
+        """Latest sample. Raises ValueError when there is none yet."""
         if self._last is None:
             raise ValueError("the referee has not observed anything yet")
         return self._last
@@ -118,7 +118,7 @@ class ObjectHistory(Stateful):
 
     @property
     def holder(self) -> str | None:
-        """Robot that holds the object, or held it a moment ago."""
+        """Robot that holds the object, or held it a moment ago; None when there is none."""
         return self._grip_robot if self.last.time_s - self._grip_s <= FLICKER_S else None
 
     @property
@@ -128,7 +128,7 @@ class ObjectHistory(Stateful):
 
     @property
     def on_tray_of(self) -> str | None:
-        """Person on whose tray the object rests."""
+        """Person on whose tray the object rests; None when it rests on no tray."""
         return self._tray_of if self.resting and self.last.time_s - self._tray_s <= FLICKER_S else None
 
     @property
@@ -137,7 +137,7 @@ class ObjectHistory(Stateful):
         return self.last.time_s - self._supported_s <= FLICKER_S
 
     def place_at(self, time_s: float) -> FloatArray | None:
-        """Resting place of the object at a time; None when it was carried or moved."""
+        """Resting place of the object at a time; None while it was carried or moved."""
         places = [(since_s, p_W) for since_s, p_W in zip(self.rested_s, self.rests_W, strict=True) if since_s <= time_s]
         since_s, p_W = places[-1] if places else (self.rested_s[0], self.rests_W[0])
         lifted = any(since_s < lift.time_s <= time_s for lift in self.lifts)
@@ -164,7 +164,7 @@ class ObjectHistory(Stateful):
         return when_s, self.rests_W[number]
 
     def holder_at(self, time_s: float) -> str | None:
-        """Robot that held the object at a time, or lifted it within SETTLE_S after that; None when no robot did."""
+        """Robot that held the object at a time, or lifted it within SETTLE_S afterwards; None when no robot did."""
         before = [lift for lift in self.lifts if lift.time_s <= time_s]
         after = [lift for lift in self.lifts if time_s < lift.time_s <= time_s + SETTLE_S]
         held = [lift for lift in before[-1:] if not self._ended_between(lift.time_s, time_s)]
@@ -214,7 +214,7 @@ class ObjectHistory(Stateful):
         self._supported_s = time_s
 
     def record_move(self, p_WO: FloatArray, time_s: float) -> None:
-        """Records a person's move of the object to p_WO, neither a drop nor a placement by a robot."""
+        """Records that a person moved the object to p_WO; this is neither a drop nor a placement by a robot."""
         self._last = replace(self.last, time_s=time_s, p_WO=p_WO, gripper=None, X_WH=None, tray_of=None)
         self._grip_s = self._tray_s = float("-inf")
         self._carried, self._left_z_m, self._dropped, self._still_since_s = False, None, False, None
@@ -224,7 +224,7 @@ class ObjectHistory(Stateful):
         self.events.append(f"Somebody moved {definite(self.name)} at {time_s:.2f} s.")
 
     def forget_past(self) -> None:
-        """Forgets the history for another mission; only a held object keeps its lifts and rests."""
+        """Clears the history for the next mission; only a held object keeps its lifts and rests."""
         if self._last is not None and self.holder is None:
             self.lifts, self.rests_W, self.rested_s, self._by_others = [], [], [], []
             self._rests(self._last)
@@ -239,7 +239,7 @@ class ObjectHistory(Stateful):
         return float(np.linalg.norm(slip)) / (sample.time_s - last.time_s) < WITH_HAND_M_S
 
     def _note_lift(self, sample: ObjectSample, with_hand: bool) -> None:
-        """Begins a carry once the gripper has raised the object or moved it well away from its place."""
+        """Starts a carry once the gripper has raised the object or moved it well away from its place."""
         if sample.gripper is None or sample.supported or not with_hand:
             return
         moved_W = sample.p_WO - self.rests_W[-1]
@@ -305,11 +305,11 @@ class TimedPath:
         return self.points[self._index(time_s), :3]
 
     def positions_at(self, times_s: FloatArray) -> FloatArray:
-        """Positions (N, 3) at some times."""
+        """Positions (N, 3) at `times_s`."""
         return self.points[np.maximum(0, np.searchsorted(self.points[:, 3], times_s, side="right") - 1), :3]
 
     def positions_between(self, from_s: float, until_s: float) -> FloatArray:
-        """Positions (N, 3) from just before one time until another."""
+        """Positions (N, 3) from just before one time up to another."""
         first = max(0, int(np.searchsorted(self.points[:, 3], from_s)) - 1)
         return self.points[first : self._index(until_s) + 1, :3]
 
@@ -321,7 +321,7 @@ class TimedPath:
 class Truth:
     """Record up to `now_s`: histories of the objects, and the paths of robots and people by name.
 
-    `given` has the intervals (s) in which an object rested on a person's tray, by object and person. `doors` has the
+    `given` are the intervals (s) in which an object rested on a person's tray, by object and person. `doors` are the
     times (s) and states of each sliding door by its position (x, y): 0 open, 1 closed, between while it moves. Any
     other door is open.
     """
@@ -335,9 +335,9 @@ class Truth:
 
 
 def extend_path(path: list[FloatArray], p_W: FloatArray, time_s: float, most: float = math.inf) -> None:
-    """Adds a point with its time to a path when it is `PATH_STEP_M` from the last point.
+    """Appends a point with its time to a path when it is `PATH_STEP_M` from the last point.
 
-    Beyond `most` points, the older half of the path loses every other point.
+    Beyond `most` points, every other point in the older half of the path is removed.
     """
     if not path or float(np.linalg.norm(p_W[:2] - path[-1][:2])) >= PATH_STEP_M:
         path.append(np.append(p_W, time_s))
@@ -346,7 +346,7 @@ def extend_path(path: list[FloatArray], p_W: FloatArray, time_s: float, most: fl
 
 
 def extend_stays(stays: list[tuple[float, float]], time_s: float) -> None:
-    """Extends the last interval on a tray to time_s, or begins another when the last ended some time ago."""
+    """Extends the last interval on a tray to time_s, or starts another one after an interruption."""
     goes_on = bool(stays) and time_s - stays[-1][1] <= ON_TRAY_GAP_S
     first_s = stays.pop()[0] if goes_on else time_s
     stays.append((first_s, time_s))

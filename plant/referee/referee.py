@@ -49,10 +49,10 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         scenery: Mapping[GeometryId, str] = MappingProxyType({}),
         doors: DoorHistories = dict,
     ) -> None:
-        """`plant` is finalized; `scenery` names the piece of furniture of each collision shape of the world body.
+        """`plant` is finalized; `scenery` maps each collision shape on the world body to its piece of furniture.
 
-        `placements` are the loose objects and the people; `persons` names the people. `robots` has the kind of each
-        robot by the name of its model instance. Raises ValueError with a name that the plant lacks.
+        `placements` are the loose objects and the people; `persons` names the people. `robots` maps the name of each
+        robot's model instance to its kind. Raises ValueError, with the name, for a model that the plant lacks.
         """
         self._plant, self._geometry = plant, plant.get_geometry_query_input_port()
         self._entities = Entities.from_plant(plant, placements, robots, persons, scenery)
@@ -70,7 +70,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
-        """All collisions so far, also those in which a person walked into a robot."""
+        """All collisions so far, including those in which a person walked into a robot."""
         return tuple(self._counter.collisions)
 
     @property
@@ -90,7 +90,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         return (*events, *(collision.sentence for collision in self._counter.collisions))
 
     def lifts(self, robot: str) -> tuple[Lift, ...]:
-        """Lifts by a robot so far, in the order of time."""
+        """Lifts by a robot so far, sorted by time."""
         all_lifts = (lift for history in self._histories.values() for lift in history.lifts if lift.robot == robot)
         return tuple(sorted(all_lifts, key=lambda lift: lift.time_s))
 
@@ -140,7 +140,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
     def resume(self, state: State, paths: Mapping[str, FloatArray]) -> None:
         """Restores a record with the paths of robots and people, (N, 4) like `points`.
 
-        Raises KeyError for an unknown name, ValueError for other shapes.
+        Raises KeyError when a name is unknown, and ValueError when a shape is wrong.
         """
         if any(path.shape[1:] != (PATH_VALUES,) for path in paths.values()):
             raise ValueError("the paths have no times")
@@ -176,7 +176,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         return self._paths[name] if name in self._paths else self._person_paths[name]
 
     def _speeds_before(self) -> dict[str, float]:
-        """Lowest recent speed of each robot; a push that has just begun does not count as the robot's own motion."""
+        """Lowest recent speed of each robot, so that a push that has just begun does not count as its own motion."""
         names = self._speeds_m_s[-1] if self._speeds_m_s else ()
         return {name: min(speeds[name] for speeds in self._speeds_m_s) for name in names}
 
@@ -195,7 +195,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         return np.array(self._plant.EvalBodyPoseInWorld(plant_context, body).translation())
 
     def _neighbours(self, pairs: Mapping[Pair, float]) -> dict[int, dict[int, float]]:
-        """Bodies that touch each object, with the heights of their lowest contacts, by the object's number."""
+        """Bodies in contact with each object, with the height of their lowest contact, by the object's number."""
         found: dict[int, dict[int, float]] = {}
         for (a, b), z in pairs.items():
             for this, other in ((a, b), (b, a)):
@@ -206,7 +206,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
     def _sample(
         self, plant_context: Context, time_s: float, p_WO: FloatArray, touches: Mapping[int, float]
     ) -> ObjectSample:
-        """Sample of an object now, with the bodies that touch it."""
+        """Present sample of an object, with the bodies that touch it."""
         entities = {index: self._entities.all[index] for index in touches}
         gripper = next((entity.owner for entity in entities.values() if entity.kind is Kind.GRIPPER), None)
         hand = None if gripper is None else self._entities.hands.get(gripper)

@@ -42,7 +42,7 @@ class HeadGoal:
 
 @dataclass(frozen=True)
 class Active(Generic[PayloadT]):
-    """A running command: its goal, and its beginning and end on the robot's clock (s)."""
+    """A running command: its goal, and its start and expiry on the robot's clock (s)."""
 
     id: CommandId
     payload: PayloadT
@@ -51,7 +51,7 @@ class Active(Generic[PayloadT]):
 
 
 class CommandStatuses:
-    """Statuses of the latest commands; an older command only counts as stopped."""
+    """Statuses of the latest commands; any older command is reported as stopped."""
 
     def __init__(self) -> None:
         self._statuses: dict[CommandId, CommandStatus] = {}
@@ -94,25 +94,25 @@ class CommandTable(CommandStatuses):
         return command
 
     def refuse(self, reason: str, cause: CommandCause = CommandCause.INVALID) -> CommandId:
-        """Adds a command that is refused for a reason."""
+        """Adds a refused command with its reason."""
         return self.add(CommandStatus(CommandState.REFUSED, reason, cause))
 
     def note(self, state: CommandState, reason: str = "") -> CommandId:
-        """Adds a command that has ended already."""
+        """Adds a command that has already ended."""
         return self.add(CommandStatus(state, reason))
 
     def finish(
         self, part: Part, state: CommandState, reason: str = "", cause: CommandCause = CommandCause.NONE
     ) -> None:
-        """Ends the running command of a part, if there is one."""
+        """Ends the running command of a part; does nothing when none is running."""
         active = self._running.pop(part, None)
         if active is not None:
             self.change(active.id, CommandStatus(state, reason, cause))
 
     def running(self, part: Part) -> Active[object] | None:
-        """Running command of a part, or None."""
+        """Running command of a part; None when there is none."""
         return self._running.get(part)
 
     def part_of(self, command: CommandId) -> Part | None:
-        """Part that runs a command now, or None."""
+        """Part on which a command runs now; None when it has ended."""
         return next((part for part, active in self._running.items() if active.id == command), None)

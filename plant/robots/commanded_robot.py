@@ -40,7 +40,7 @@ GoalT = TypeVar("GoalT")
 
 
 class LeaseManager:
-    """Manager of one robot's lease; only the lease with the highest number counts."""
+    """Manages one robot's lease; only the lease with the highest number is valid."""
 
     def __init__(self, robot_name: str) -> None:
         self._robot_name, self._epoch = robot_name, uuid4().hex
@@ -49,7 +49,7 @@ class LeaseManager:
 
     @property
     def current(self) -> Lease | None:
-        """Lease that counts, or None while it is free."""
+        """Valid lease; None while nobody holds one."""
         return self._current
 
     def acquire(self, holder: str) -> Lease:
@@ -67,7 +67,7 @@ class LeaseManager:
         return self._current
 
     def give_back(self, lease: Lease) -> bool:
-        """Frees the lease; returns False when `lease` did not count."""
+        """Frees the lease; returns False when `lease` was not valid."""
         if lease != self._current:
             return False
         self._current = None
@@ -82,15 +82,15 @@ class LeaseManager:
 
 
 class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
-    """Simulated robot that senses, and runs the commands of the lease holder.
+    """Simulated robot that measures, and executes the commands of the lease holder.
 
-    Its saved state is that of servos and sensors; commands and leases end with the robot's computer.
+    Its saved state is that of servos and sensors; commands and leases are lost when the robot's computer restarts.
     """
 
     def __init__(
         self, body: RobotBody, index: ActuatedJoints, sensors: SensorSuite, context: Context, gripper: GripperTolerances
     ) -> None:
-        """Takes over the robot at the state of the plant's `context`, at time 0."""
+        """Takes control of the robot in the state of the plant's `context`, at time 0."""
         self._name, self._capabilities, self._sensors = body.name, body.kind.capabilities(), sensors
         self._plant, self._instance, self._index, self._context = body.plant, body.instance, index, context
         joints = self._joints()
@@ -122,7 +122,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         return self._sensors.imu
 
     def scan(self) -> Scan | None:
-        """Latest LiDAR revolution, None before the first."""
+        """Latest LiDAR revolution; None before the first one."""
         return self._sensors.scan
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
@@ -142,7 +142,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         return self._sensors.battery
 
     def faults(self) -> tuple[str, ...]:
-        """Present faults, empty when well."""
+        """Present faults; an empty tuple when there are none."""
         return ()
 
     # -- act ------------------------------------------------------------------------------------------------------
@@ -177,11 +177,11 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         return self._commands.refuse("undock: the robot has no docking station", CommandCause.UNSUPPORTED)
 
     def open_door(self, handle: DoorHandle, *, until_s: float, lease: Lease) -> CommandId:
-        """Refuses: a simulated robot turns no handle."""
+        """Refuses: a simulated robot cannot turn a handle."""
         return self._commands.refuse("open_door: the robot opens no doors", CommandCause.UNSUPPORTED)
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
-        """Follows a joint trajectory; done when its end is reached and the arm is still."""
+        """Follows a joint trajectory; done when the arm rests at its end."""
         reason = self._arm.refusal(trajectory)
         return self._commands.refuse(reason) if reason else self._begin(Part.ARM, trajectory, until_s, lease)
 
@@ -202,7 +202,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         return command
 
     def carry(self, holding: bool, *, lease: Lease) -> None:
-        """Changes nothing: the gripper keeps its force whatever happens."""
+        """Does nothing: the gripper keeps its force also when communication is lost."""
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stops all motion, or only the given command if it still runs."""
@@ -221,7 +221,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
     # -- own ------------------------------------------------------------------------------------------------------
 
     def lease_holder(self) -> Lease | None:
-        """Lease that counts now, or None while it is free."""
+        """Valid lease; None while nobody holds one."""
         return self._leases.current
 
     def acquire_lease(self, holder: str) -> Lease:
@@ -234,19 +234,19 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         return self._leases.take(holder)
 
     def return_lease(self, lease: Lease) -> None:
-        """Returns the lease; the robot stops. A lease that no longer counts is ignored."""
+        """Returns the lease; the robot stops. Ignores a lease that is no longer valid."""
         if self._leases.give_back(lease):
             self._halt_all("the lease was returned", CommandCause.NO_LEASE)
 
     # -- called by the simulation ---------------------------------------------------------------------------------
 
     def sense(self, now_s: float) -> None:
-        """Takes new sensor readings."""
+        """Updates all sensors."""
         self._now_s = now_s
         self._sensors.update(now_s)
 
     def control(self, now_s: float, dt_s: float) -> None:
-        """Commands all servos for the next dt_s of simulated time, with feed-forward against gravity."""
+        """Commands all servos for the next dt_s of simulated time, with gravity feed-forward."""
         self._now_s = now_s
         self._expire()
         joints, rates = self._joints(), self._rates()
@@ -271,7 +271,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
             self._arm.hold(self._joints())
 
     def power_up(self, now_s: float) -> None:
-        """Starts the robot where it stands, without lease and commands, and takes readings."""
+        """Starts the robot where it stands, without lease and commands, and updates the sensors."""
         self._now_s = now_s
         self._commands, self._leases = CommandTable(), LeaseManager(self._name)
         self._sensors.power_up(now_s)
@@ -284,7 +284,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
 
     @abstractmethod
     def _fingers_at(self, joints: FloatArray, rates: FloatArray) -> tuple[float, float]:
-        """Opening of the gripper and rate of its fingers, in the unit of its kind and per second."""
+        """Opening of the gripper and rate of its fingers, in the unit of the gripper's kind and per second."""
 
     @abstractmethod
     def _desired(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> FloatArray:
@@ -307,7 +307,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         return np.asarray(self._plant.GetVelocities(self._context)[self._index.velocities])
 
     def _goal(self, part: Part, of: type[GoalT]) -> GoalT | None:
-        """Goal of the part's running command, if it is of that class."""
+        """Goal of the part's running command if it has this class, else None."""
         active = self._commands.running(part)
         return active.payload if active is not None and isinstance(active.payload, of) else None
 

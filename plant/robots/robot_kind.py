@@ -32,16 +32,16 @@ GROUP = "errand.robots"
 
 @dataclass(frozen=True)
 class LocomotionLimits:
-    """Speeds, accelerations and forces with which a robot moves; each kind of robot has a class of its own."""
+    """Speeds, accelerations and forces with which a robot moves; each kind of robot has its own subclass."""
 
 
 @dataclass(frozen=True)
 class PlacedRobot:
-    """One robot of a run: its kind, and its poses at the start and at its dock (world frame).
+    """One robot in a run: its kind, and its poses at the start and at its dock (world frame).
 
-    Without an `own_stack` file it uses the stack of its kind. `start_known` says whether the localiser gets the start.
-    `locomotion` of another kind's class is ignored, and the kind's own limits apply. The battery begins at `charge` (0
-    to 1).
+    Without an `own_stack` file it uses the stack of its kind. `start_known` says whether the localiser receives the
+    start pose. `locomotion` of another kind's class is ignored, and the kind's own limits apply. The battery starts at
+    `charge` (0 to 1).
     """
 
     name: str
@@ -55,17 +55,17 @@ class PlacedRobot:
 
     @property
     def capabilities(self) -> Capabilities:
-        """Capabilities of the robot's kind."""
+        """Capabilities according to the robot's kind."""
         return robot_kind(self.kind).capabilities()
 
     @property
     def stack_file(self) -> Path | None:
-        """File of the robot's stack; None for Errand's default stack."""
+        """File with the robot's stack; None for the default stack."""
         return self.own_stack or robot_kind(self.kind).stack
 
 
 class RobotBody(ABC):
-    """Bodies and joints of one robot in a plant; `body` has the protocol's body frame B, `hand` the hand frame H."""
+    """Bodies and joints of one robot in a plant; `body` carries the body frame B, `hand` the hand frame H."""
 
     def __init__(
         self,
@@ -75,9 +75,9 @@ class RobotBody(ABC):
         gains: Mapping[str, tuple[float, float]],
         packages: Mapping[str, Path] = MappingProxyType({}),
     ) -> None:
-        """Adds the robot to `plant` (before Finalize), with the gains (p, d) of its joints' servos.
+        """Adds the robot to `plant` (before Finalize), with the servo gains (p, d) of its joints.
 
-        `packages` are the folders of meshes that the URDF names.
+        `packages` are the folders with the meshes to which the URDF refers.
         """
         from pydrake.multibody.parsing import Parser
         from pydrake.multibody.tree import PdControllerGains
@@ -95,7 +95,7 @@ class RobotBody(ABC):
 
     @property
     def hand(self) -> RigidBody:
-        """Last link of the arm; the body on a robot without one."""
+        """Last link of the arm; the body on a robot without an arm."""
         return self.plant.GetBodyByName(self.kind.hand_link, self.instance)
 
     def outline_W(self, context: Context) -> FloatArray:
@@ -129,7 +129,7 @@ class RobotBody(ABC):
 
     @abstractmethod
     def place(self, context: Context, pose: Pose2D | None = None) -> None:
-        """Sets the robot standing with its arm stowed: at a pose, else at its start."""
+        """Places the robot, standing with its arm stowed, at a pose, or at its start when the pose is None."""
 
     @abstractmethod
     def opening(self, context: Context) -> float:
@@ -137,29 +137,29 @@ class RobotBody(ABC):
 
 
 class PlantRobot(Robot, Protocol):
-    """Simulated robot: the protocol, and the methods that the engine calls."""
+    """Simulated robot: the Robot protocol, and the methods that the engine calls."""
 
     def control(self, now_s: float, dt_s: float) -> None:
         """Commands all servos for the next dt_s of simulated time."""
 
     def sense(self, now_s: float) -> None:
-        """Takes new sensor readings."""
+        """Updates all sensors."""
 
     def state(self) -> State:
-        """Returns the state of servos and sensors; commands and leases end with the robot's computer."""
+        """Returns the state of servos and sensors; commands and leases are lost when the robot's computer restarts."""
 
     def restore(self, state: State) -> None:
         """Restores a state, before `power_up`."""
 
     def power_up(self, now_s: float) -> None:
-        """Starts the robot where it stands, without lease and commands, and takes readings."""
+        """Starts the robot where it stands, without lease and commands, and updates the sensors."""
 
 
 @dataclass(frozen=True)
 class SensorOptions:
-    """Inputs of a robot's sensors: the plant's context and scene graph, and the seed of their noise.
+    """Inputs to a robot's sensors: the plant's context and scene graph, and the seed of their noise.
 
-    Without a `scene`, cameras are blind. `work` counts rays cast and pictures rendered.
+    Without a `scene`, cameras return no pictures. `work` counts the rays cast and the pictures rendered.
     """
 
     scene_graph: SceneGraph
@@ -173,9 +173,10 @@ class SensorOptions:
 class RobotKind:
     """A kind of robot: its capabilities, and how it is built and driven in a plant.
 
-    `gripper_links` are the hand and the fingers; `trunk_links` the body, `leg_links` legs or wheels: all others belong
-    to the arm. `facts` is the file of its numbers, `stack` that of its stack (None: the default stack). `add` puts a
-    robot into a plant before Finalize, with visual meshes or without; `drive` makes its controllers and sensors.
+    `gripper_links` are the hand and the fingers, `trunk_links` the body, `leg_links` legs or wheels; all others belong
+    to the arm. `facts` is the file with its parameters, `stack` the file with its stack (None: the default stack).
+    `add` adds a robot to a plant before Finalize, with or without visual meshes; `drive` creates its controllers and
+    sensors.
     """
 
     name: str
@@ -190,13 +191,13 @@ class RobotKind:
 
     @property
     def hand_link(self) -> str:
-        """Last link of the arm; the body on a robot without one."""
+        """Last link of the arm; the body on a robot without an arm."""
         return (*self.gripper_links, "body")[0]
 
 
 @cache
 def robot_kinds() -> Mapping[str, EntryPoint]:
-    """Entry points of the installed kinds by name; a kind is loaded at first use."""
+    """Entry points of the installed kinds by name; a kind is loaded when it is first used."""
     return {entry.name: entry for entry in sorted(installed_plugins(GROUP))}
 
 

@@ -1,4 +1,4 @@
-"""All sensors of one robot, its cameras included: readings of the plant's state, with noise from the seed."""
+"""All sensors of one robot, cameras included: measurements of the plant's state, with noise from the seed."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Camera(NoisySensor):
     ) -> Image:
         """Takes a picture, its depth, or both; `frames` is the robot's frame tree at the same time.
 
-        The array of a skipped part is empty.
+        The array that is not requested is empty.
         """
         colour = self._picture.colour(self._render(query_object, self._colour_camera)) if visual else None
         grey = _NO_PICTURE if colour is None else _grey(colour)
@@ -99,7 +99,7 @@ class Camera(NoisySensor):
         )
 
     def _take_depth(self, query_object: QueryObject, grey: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Renders noisy depth; without a picture, renders a small one for the too dark and too shiny spots."""
+        """Renders noisy depth; without a picture, first renders a small one to find too dark and too shiny spots."""
         lens = self.spec.depth_intrinsics()
         seen = grey if grey.size else _grey(self._render(query_object, self._faint_camera))
         small = seen if seen.shape == (lens.height, lens.width) else cv2.resize(seen, (lens.width, lens.height))
@@ -109,7 +109,7 @@ class Camera(NoisySensor):
         return self._depth.depth(clean_m, np.asarray(small, dtype=np.uint8))
 
     def _render(self, query_object: QueryObject, camera: ColorRenderCamera) -> NDArray[np.uint8]:
-        """Renders the clean picture (H, W, 3) RGB."""
+        """Renders the noise-free picture (H, W, 3) RGB."""
         info = camera.core().intrinsics()
         self._work[f"pictures_{info.width()}x{info.height()}"] += 1
         image = query_object.RenderColorImage(camera, self._link_frame, self._X_LC)
@@ -126,7 +126,7 @@ _STILL_M_S = 0.02
 
 @dataclass(frozen=True)
 class LidarMount:
-    """A LiDAR on a link: its pose there, its specification, and the time of a revolution (s)."""
+    """LiDAR on a link: its pose in the link, its specification, and the duration of a revolution (s)."""
 
     link: RigidBody
     X_LinkL: RigidTransform
@@ -139,9 +139,9 @@ class SensorSuite(
     ABC,
     saved=("_odometry_model", "_imu_model", "_joint_model", "_gripper_model", "_battery_model", "_lidar", "_cameras"),
 ):
-    """All sensors of one robot: `update` takes the readings, which are attributes; `image` takes pictures.
+    """All sensors of one robot: `update` stores the measurements in attributes; `image` takes pictures.
 
-    Each kind of robot implements the reading of its gripper.
+    Each kind of robot implements the measurement of its gripper.
     """
 
     def __init__(
@@ -155,7 +155,7 @@ class SensorSuite(
         runtime_s: float,
         gripper_noise: GripperNoise | None = None,
     ) -> None:
-        """`cameras` are on the links that their specifications name."""
+        """`cameras` are mounted on the links that their specifications name."""
         self._body, self._index = body, joints
         self._dock, self._scene, self._context = body.robot.dock, options.scene, options.context
         self._kinematics = body.plant.CreateDefaultContext()
@@ -187,14 +187,14 @@ class SensorSuite(
         return plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(link, self._body.instance).index())
 
     def power_up(self, now_s: float) -> None:
-        """Starts the sensors and takes the first readings."""
+        """Starts the sensors and makes the first measurements."""
         self._scan: Scan | None = None
         self._revolution: Callable[[], Scan] | None = None
         self._scanned_s = -math.inf
         self.update(now_s)
 
     def update(self, now_s: float) -> None:
-        """Takes new readings of all sensors except the cameras."""
+        """Updates all sensors except the cameras."""
         plant, index = self._body.plant, self._index
         self._now_s = now_s
         X_WB = plant.EvalBodyPoseInWorld(self._context, self._body.body)
@@ -216,26 +216,26 @@ class SensorSuite(
 
     @property
     def scan(self) -> Scan | None:
-        """Latest revolution of the LiDAR, computed at the first read; the plant may have stepped since."""
+        """Latest LiDAR revolution, computed when it is first read; the plant may have stepped since."""
         if self._revolution is not None:
             self._scan, self._revolution = self._revolution(), None
         return self._scan
 
     def _reckoned(self, X_WB: RigidTransform) -> RigidTransform:
-        """Pose of the body that odometry measures, before errors are added."""
+        """Pose of the body as odometry measures it, before errors are added."""
         return X_WB
 
     @abstractmethod
     def _gripper_feels(self, positions: FloatArray, rates: FloatArray, efforts: FloatArray) -> tuple[float, float]:
-        """True opening of the gripper, and the force at its tip (N), 0 while it moves freely."""
+        """True opening of the gripper, and the force at its tip (N); 0 while it moves freely."""
 
     @abstractmethod
     def _X_BL(self) -> RigidTransform:
-        """Pose of the LiDAR in the body frame, as the robot knows it."""
+        """Pose of the LiDAR in the body frame, according to the robot."""
 
     @cached_property
     def _chains(self) -> Mapping[str, tuple[str, tuple[str, ...]]]:
-        """Links of hand and head, each with its frame's name and its joints."""
+        """Links of hand and head, each with the name of its frame and its joints."""
         can, plant, instance = self._body.kind.capabilities(), self._body.plant, self._body.instance
         chains = {"hand": can.arm.joint_names if can.arm else (), "head": can.head.joint_names if can.head else ()}
         moved = {frame: joints for frame, joints in chains.items() if joints}
@@ -249,7 +249,7 @@ class SensorSuite(
         return {link: (frame, X_BF) for (link, (frame, _)), X_BF in poses}
 
     def _efforts(self, positions: FloatArray, rates: FloatArray) -> FloatArray:
-        """Efforts of the motors: the servo law with limits, like the solver's at the end of a step."""
+        """Efforts of the motors: the servo law with its limits, as in the solver at the end of a step."""
         plant, instance = self._body.plant, self._body.instance
         servos = plant.get_desired_state_input_port(instance)
         if not servos.HasValue(self._context):
@@ -291,7 +291,7 @@ class SensorSuite(
         return FrameTree(edges)
 
     def _X_BLinks(self, joint_names: tuple[str, ...], links: tuple[str, ...]) -> list[RigidTransform]:
-        """Poses of links in the body frame, with the named joints at their encoder readings."""
+        """Poses of links in the body frame, with the named joints at their encoder positions."""
         plant, instance = self._body.plant, self._body.instance
         positions = plant.GetPositions(self._kinematics)
         for name in joint_names:
@@ -303,7 +303,7 @@ class SensorSuite(
 
 
 def _generators(seed: int, robot_name: str) -> Iterator[np.random.Generator]:
-    """Iterates over independent generators; the same seed and name give the same ones."""
+    """Yields independent random generators; the same seed and name give the same ones."""
     sequence = np.random.SeedSequence([seed, zlib.crc32(robot_name.encode())])
     while True:
         (child,) = sequence.spawn(1)

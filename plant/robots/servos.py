@@ -21,8 +21,8 @@ class ActuatedJoints:
     """Actuated joints of a model instance, in the order of its actuators; after Finalize.
 
     `positions` and `velocities` are indices in the plant's state. The desired state of the actuators has all positions
-    first, then all velocities: a joint's number is the index of its position; `rates_of` gives that of its velocity.
-    Each kind of robot sets the numbers of the arm's joints and their speed limits (rad/s).
+    first, then all velocities: a joint's number is the index of its position; `rates_of` returns the index of its
+    velocity. Each kind of robot sets the numbers of the arm's joints and their speed limits (rad/s).
     """
 
     arm: Indices
@@ -69,7 +69,7 @@ class GripperGoal:
 
 @dataclass(frozen=True)
 class GripperTolerances:
-    """Limits for a reached opening, and for fingers blocked by an object (units of the opening, s)."""
+    """Tolerances for a reached opening, and for fingers blocked by an object (units of the opening, s)."""
 
     arrived: float
     stall_rate: float
@@ -88,7 +88,7 @@ class GripperServo(Stateful, saved=("goal", "_before", "_still_s")):
     """Servo of one gripper: its goal, and the previous goal."""
 
     def __init__(self, opening: float, tolerances: GripperTolerances) -> None:
-        """Starts at an opening."""
+        """Starts at this opening."""
         self._tolerances = tolerances
         self.goal = self._before = GripperGoal(opening, 20.0)
         self._still_s = 0.0
@@ -99,7 +99,7 @@ class GripperServo(Stateful, saved=("goal", "_before", "_still_s")):
         self._still_s = 0.0
 
     def follow(self, opening: float, rate: float, dt_s: float) -> Closing:
-        """Returns the progress after dt_s at an opening that changes at a rate."""
+        """Returns the progress after dt_s, at an opening that changes at `rate`."""
         self._still_s = self._still_s + dt_s if rate < self._tolerances.stall_rate else 0.0
         if abs(opening - self.goal.opening) < self._tolerances.arrived:
             return Closing.ARRIVED
@@ -119,7 +119,7 @@ def clip(value: float, most: float) -> float:
 
 
 def gripper_set_point(goal: float, now: float, lead: float) -> float:
-    """Set point that limits a servo's push to its gain times `lead`."""
+    """Set point that limits a servo's force to its gain times `lead`."""
     return min(max(goal, now - lead), now + lead)
 
 
@@ -132,13 +132,13 @@ class ArmServos(Stateful, saved=("goal_rad",)):
     """Servos of one arm: the set points of its joints."""
 
     def __init__(self, joints: ActuatedJoints, now_rad: FloatArray) -> None:
-        """Holds the arm; `now_rad` has the positions of all joints."""
+        """Holds the arm; `now_rad` are the positions of all joints."""
         self._arm, self._fastest_rad_s = joints.arm, joints.fastest_arm_rad_s
         self._lower, self._upper = joints.lower[self._arm] - 1e-3, joints.upper[self._arm] + 1e-3
         self.hold(now_rad)
 
     def hold(self, joints_rad: FloatArray) -> None:
-        """Holds the arm at its present position; `joints_rad` has the positions of all joints."""
+        """Holds the arm at its present position; `joints_rad` are the positions of all joints."""
         self.goal_rad, self.rate_rad_s = joints_rad[self._arm], np.zeros(len(self._arm))
 
     def refusal(self, trajectory: ArmTrajectory) -> str | None:
@@ -162,7 +162,7 @@ class ArmServos(Stateful, saved=("goal_rad",)):
     def follow(
         self, trajectory: ArmTrajectory | None, elapsed_s: float, joints_rad: FloatArray, rates_rad_s: FloatArray
     ) -> bool:
-        """Sets the set points at a time since the trajectory's start; returns True when the arm has reached its end."""
+        """Sets the set points for a time since the trajectory's start; returns True when the arm is at its end."""
         self.rate_rad_s = np.zeros(len(self._arm))
         if trajectory is None:
             return False
@@ -174,7 +174,7 @@ class ArmServos(Stateful, saved=("goal_rad",)):
 
 
 def arm_set_point(trajectory: ArmTrajectory, elapsed_s: float) -> tuple[FloatArray, FloatArray]:
-    """Positions (J,) and velocities (J,) of a trajectory at a time since its start; at rest beyond its ends."""
+    """Positions (J,) and velocities (J,) on a trajectory at a time since its start; at rest outside its time range."""
     times, positions = trajectory.times_s, trajectory.positions_rad
     if len(times) == 1 or elapsed_s >= times[-1]:
         return positions[-1].copy(), np.zeros(positions.shape[1])

@@ -1,1 +1,1 @@
-"""Sensors of the plant: they turn the true state into readings with realistic noise, from a seed."""
+"""Sensors of the plant: measurements of the true state with realistic noise, from a seed."""

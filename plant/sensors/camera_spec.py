@@ -20,9 +20,9 @@ NEAR_M = 0.05
 
 
 class CameraSpec(BaseModel):
-    """One camera. Its pose is in `link`: z forward, x right, y down; the intrinsics are of the full picture.
+    """One camera. Its pose is in `link`: z forward, x right, y down; the intrinsics are those of the full picture.
 
-    `picture_shrink` and `depth_shrink` divide the pixels of the picture and of the depth, which share the pose.
+    `picture_shrink` and `depth_shrink` divide the resolution of the picture and of the depth, which share the pose.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
@@ -89,7 +89,7 @@ def load_cameras(path: Path) -> dict[str, CameraSpec]:
 
 
 def _spec(source: YamlSource, name: str, entry: object) -> CameraSpec:
-    """Validates the data of one camera. Raises InputError."""
+    """Validates the data of one camera. Raises InputError when a field is missing or wrong."""
     if not isinstance(entry, dict):
         raise source.error((name,), f"camera {name}: should be a mapping of keys to values", "correct it")
     try:
@@ -103,7 +103,7 @@ def _spec(source: YamlSource, name: str, entry: object) -> CameraSpec:
 def colour_render_camera(
     intrinsics: Intrinsics, renderer: str, *, near_m: float = NEAR_M, far_m: float = FAR_M
 ) -> ColorRenderCamera:
-    """Drake's colour camera with these intrinsics; it cuts off nearer and farther surfaces."""
+    """Drake's colour camera with these intrinsics; clips surfaces nearer than near_m and farther than far_m."""
     from pydrake.geometry import ColorRenderCamera
 
     return ColorRenderCamera(_core(intrinsics, renderer, near_m, far_m), False)

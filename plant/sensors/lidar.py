@@ -1,8 +1,9 @@
 """A spinning 16-beam LiDAR: rays against the scene's collision shapes, with range noise and lost returns.
 
-The ray casting is compiled, one call per revolution. It tries shapes nearest first, and only on the columns (azimuths)
-of their bounding boxes. It skips a column when all its rings end nearer than the shape begins: indoors walls hide most
-of the rest. Ranges are along the ray; `NO_RETURN_M` means no hit (finite, because the kernels use fast arithmetic).
+The ray casting is compiled, one call per revolution. It tests shapes nearest first, and only on the columns (azimuths)
+that their bounding boxes cover. It skips a column when all its rings end nearer than the shape begins: indoors walls
+occlude most of the rest. Ranges are along the ray; `NO_RETURN_M` means no hit (finite, because the kernels use fast
+arithmetic).
 """
 
 from collections import Counter
@@ -32,7 +33,7 @@ _EPS = 1.0e-9
 
 
 def _compiled(function: FunctionT) -> FunctionT:
-    """Compiles a function with numba: disk cache, fast arithmetic, no GIL; its type stays the same."""
+    """Compiles a function with numba: disk cache, fast arithmetic, no GIL; keeps the function's type."""
     return cast(FunctionT, numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")(function))
 
 
@@ -100,7 +101,7 @@ def _box_distance(R_WG: FloatArray, p_WG: FloatArray, half: FloatArray, p_W: Flo
 
 @_compiled
 def _columns_spanned(R_LG: FloatArray, p_LG: FloatArray, half: FloatArray, azimuths: FloatArray) -> tuple[int, int]:
-    """First column and number of columns with a vertical plane that may meet the box; all columns around the axis."""
+    """First column and number of columns whose vertical plane may meet the box; all columns around the axis."""
     columns = len(azimuths)
     centre = np.arctan2(p_LG[1], p_LG[0])
     low, high = 0.0, 0.0
@@ -126,7 +127,7 @@ def _columns_spanned(R_LG: FloatArray, p_LG: FloatArray, half: FloatArray, azimu
 
 @_compiled
 def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
-    """Shortens one column's ranges to a box; the loop has no branches, so that it runs on vector units."""
+    """Shortens one column's ranges to a box; the loop has no branches, so that it is vectorised."""
     origin, across, up = rays
     ox, oy, oz = origin[0], origin[1], origin[2]
     hx, hy, hz = half[0], half[1], half[2]
@@ -148,7 +149,7 @@ def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray,
 
 @_compiled
 def _cast_cylinder(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
-    """Shortens one column's ranges to a cylinder along its z: the round wall cut by the slab of the caps."""
+    """Shortens one column's ranges to a cylinder along its z axis: its wall, cut by the slab between the caps."""
     origin, across, up = rays
     ox, oy, oz = origin[0], origin[1], origin[2]
     c = ox * ox + oy * oy - half[0] * half[0]
@@ -188,7 +189,7 @@ def _cast_ellipsoid(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: Float
 
 @_compiled
 def _cast_capsule(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
-    """Shortens one column's ranges to a capsule along its z: a cylinder and two balls (half[2] includes a ball)."""
+    """Shortens one column's ranges to a capsule along its z axis: a cylinder and two spheres (half[2] includes one)."""
     origin, across, up = rays
     straight = half[2] - half[0]
     barrel = np.array([half[0], half[0], straight])
@@ -201,10 +202,10 @@ def _cast_capsule(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatAr
 
 @dataclass(frozen=True)
 class LidarSpec:
-    """Beams and noise. The defaults are those of a Velodyne VLP-16 at 20 revolutions a second.
+    """Beams and noise. The defaults are those of a Velodyne VLP-16 at 20 revolutions per second.
 
-    Elevations are even over +- `half_fov_rad`; `dropout` is the share of returns lost at random. The `columns` of a
-    LiDAR with less than a full turn are centred ahead.
+    `half_fov_rad`: elevations are evenly spaced over +- this. `dropout`: fraction of returns lost at random. `columns`:
+    for a LiDAR with less than a full turn, they are centred ahead.
     """
 
     rings: int = 16
@@ -226,7 +227,7 @@ class LidarSpec:
         return -np.pi + np.arange(columns, dtype=np.float64) * (2.0 * np.pi / columns)
 
     def visible_columns(self) -> slice:
-        """Slice of the columns of a full turn that the LiDAR sees."""
+        """Slice of the full turn's columns that the LiDAR sees."""
         turn = round(2.0 * np.pi / self.azimuth_step_rad)
         columns = turn if self.columns is None else self.columns
         first = (turn - columns + 1) // 2
@@ -248,10 +249,7 @@ class Lidar(NoisySensor):
         spec: LidarSpec | None = None,
         work: Counter[str] | None = None,
     ) -> None:
-        """`plant` is finalized. The beams pass through the `unseen` model instances, by default the LiDAR's own.
-
-        `work` counts the rays.
-        """
+        """`plant` is finalized; beams pass `unseen` instances (None: the LiDAR's own); `work` counts the rays."""
         super().__init__(rng)
         self._work = Counter() if work is None else work
         self.spec = spec or LidarSpec()
@@ -266,14 +264,14 @@ class Lidar(NoisySensor):
     ) -> Scan:
         """Takes one revolution at the context's state. `X_OB` is the odometry at the same time.
 
-        `X_BL` is the robot's belief of the LiDAR's pose in the body frame, by default the mounted pose.
+        `X_BL` is the LiDAR's pose in the body frame according to the robot, by default the mounted pose.
         """
         return self.revolution(plant_context, stamp_s, X_OB, X_BL)()
 
     def revolution(
         self, plant_context: Context, stamp_s: float, X_OB: RigidTransform, X_BL: RigidTransform | None = None
     ) -> Callable[[], Scan]:
-        """Returns a function that computes a scan of the context's present state; call it once."""
+        """Returns a function that computes a scan for the context's present state; call it once."""
         X_WL = self._plant.EvalBodyPoseInWorld(plant_context, self._body) @ self._X_BL
         shapes = self._scene.world_shapes(plant_context)
         return lambda: Scan(
@@ -286,7 +284,7 @@ class Lidar(NoisySensor):
         )
 
     def true_ranges(self, plant_context: Context, X_WL: RigidTransform) -> NDArray[np.float32]:
-        """Ranges (rings, azimuths) without noise from a pose; `NO_RETURN_M` where a ray hits nothing."""
+        """Noise-free ranges (rings, azimuths) from a pose; `NO_RETURN_M` where a ray hits nothing."""
         return self._ranges(self._scene.world_shapes(plant_context), X_WL)
 
     def _ranges(self, shapes: ShapeArrays, X_WL: RigidTransform) -> NDArray[np.float32]:

@@ -1,7 +1,7 @@
-"""Noise of sensors: a random generator for each sensor, and the degradation of clean pictures and depth images.
+"""Sensor noise: a random generator for each sensor, and the degradation of clean pictures and depth images.
 
-Grain comes from random crops of tiles that are drawn once from the seed, because a million normals for every picture
-would cost more than rendering it.
+Grain is a random crop of a tile drawn once from the seed, because a million normals for every picture would cost more
+than rendering it.
 """
 
 from collections.abc import Mapping
@@ -40,7 +40,7 @@ _TILE_MARGIN = 64
 
 @dataclass(frozen=True)
 class PictureNoise:
-    """Grain (standard deviation in counts of 255), blur (pixels of the full picture) and darkening at the corners."""
+    """Grain (standard deviation in counts of 255), blur (pixels of the full picture) and vignetting."""
 
     grain: float = 2.5
     blur_px: float = 0.6
@@ -51,9 +51,9 @@ class PictureNoise:
 class DepthNoise:
     """Depth errors: sigma = `sigma_m` + `sigma_per_m` z^2; holes at edges, grazing angles, dark and shiny spots.
 
-    A step between neighbours above `edge_m` + `edge_share` z is an edge; the share `edge_loss` of its pixels is lost.
-    A surface within asin(`grazing`) of the ray's direction is lost. `dark` and `shiny` are grey values beyond which
-    patches are lost. `speck` is the share of pixels that are lost anywhere.
+    `edge_m`, `edge_share` and `edge_loss`: a step between neighbours above `edge_m` + `edge_share` z is an edge, where
+    this fraction of the pixels is lost. `grazing`: a surface within asin of this from the ray's direction is lost.
+    `dark` and `shiny`: grey values beyond which patches are lost. `speck`: fraction of pixels that are lost anywhere.
     """
 
     sigma_m: float = 0.0015
@@ -102,7 +102,7 @@ class PictureDegrader:
 
 
 class DepthDegrader:
-    """Degrades clean depth images of one size: noise, holes and range."""
+    """Degrades clean depth images of one size: noise, holes and range limits."""
 
     def __init__(
         self, rng: np.random.Generator, intrinsics: Intrinsics, range_m: tuple[float, float], noise: DepthNoise
@@ -114,7 +114,7 @@ class DepthDegrader:
         self._patches = NoiseTile(rng, intrinsics.height // 8 + 1, intrinsics.width // 8 + 1)
 
     def depth(self, clean_m: DepthArray, grey: ColourArray) -> DepthArray:
-        """Returns noisy depth (H, W) in m, rounded to 1 mm, 0 for none; `grey` (H, W) has dark and shiny spots."""
+        """Returns noisy depth (H, W) in m, rounded to 1 mm, 0 where lost; `grey` (H, W) shows dark and shiny spots."""
         near, far = self._range
         valid = np.isfinite(clean_m) & (clean_m >= near) & (clean_m <= far)
         z = np.where(valid, clean_m, np.float32(0.0)).astype(np.float32)
@@ -141,6 +141,6 @@ class DepthDegrader:
         return np.asarray(dx * dx + dy * dy > z * z / self._noise.grazing**2)
 
     def _unseen(self, grey: ColourArray) -> NDArray[np.bool_]:
-        """Mask of the patches that are lost on dark and shiny spots."""
+        """Mask of the patches that are lost because they are dark or shiny."""
         patches = cv2.resize(self._patches.crop()[..., 0], (grey.shape[1], grey.shape[0]))
         return np.asarray(((grey < self._noise.dark) | (grey > self._noise.shiny)) & (patches > 0.0))

@@ -13,7 +13,7 @@ from skills.robot import Battery, FloatArray, Gripper, Imu, Joints, Odometry, Po
 
 @dataclass(frozen=True)
 class JointNoise:
-    """White noise of each reading, and the encoders' constant offsets, drawn once."""
+    """White noise of each measurement, and the encoders' constant offsets, drawn once."""
 
     offset_rad: float = 0.001
     position_rad: float = 0.0003
@@ -33,7 +33,7 @@ class JointModel(NoisySensor):
     def update(
         self, stamp_s: float, position_rad: FloatArray, velocity_rad_s: FloatArray, effort_nm: FloatArray
     ) -> Joints:
-        """Reads the joints at stamp_s from the true arrays (joints,). Raises ValueError when a length is wrong."""
+        """Measures the joints at stamp_s from the true arrays (joints,). Raises ValueError when a length is wrong."""
         noise = self._rng.standard_normal((3, len(self._names)))
         read = (
             position_rad + self._offsets + self._noise.position_rad * noise[0],
@@ -49,7 +49,7 @@ GRAVITY_W = np.array([0.0, 0.0, -9.81])
 
 @dataclass(frozen=True)
 class ImuNoise:
-    """Standard deviations of the constant biases and of the white noise of each axis."""
+    """Standard deviations, per axis, of the constant biases and of the white noise."""
 
     gyro_bias_rad_s: float = 0.002
     gyro_rad_s: float = 0.003
@@ -69,7 +69,7 @@ class ImuModel(NoisySensor, saved=("_last",)):
         self._last: list[Any] | None = None
 
     def update(self, stamp_s: float, X_WB: RigidTransform, w_WB_W: FloatArray, v_WB_W: FloatArray) -> Imu:
-        """Reads the IMU at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in W."""
+        """Measures at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in W."""
         acceleration_W = self._acceleration(stamp_s, np.asarray(v_WB_W, dtype=np.float64))
         R_BW = X_WB.rotation().matrix().T
         rates = R_BW @ w_WB_W + self._gyro_bias + self._rng.normal(0.0, self._noise.gyro_rad_s, 3)
@@ -82,7 +82,7 @@ class ImuModel(NoisySensor, saved=("_last",)):
         )
 
     def _acceleration(self, stamp_s: float, v_WB_W: FloatArray) -> FloatArray:
-        """Mean acceleration since the last update, zero at the first."""
+        """Mean acceleration since the last update; zero at the first one."""
         last, self._last = self._last, [stamp_s, v_WB_W.tolist()]
         if last is None or stamp_s <= last[0]:
             return np.zeros(3)
@@ -91,10 +91,10 @@ class ImuModel(NoisySensor, saved=("_last",)):
 
 @dataclass(frozen=True)
 class BatterySpec:
-    """Battery data: `runtime_s` from full to empty at load 1, the share `idle_share` of that drain at load 0.
+    """Battery data: `runtime_s` from full to empty at load 1, and the fraction `idle_share` of that drain at load 0.
 
-    The gauge errs by `sigma`. A dock charges from empty to full in `charge_s`, which is short so that no mission waits
-    for an hour.
+    `sigma`: error of the gauge. `charge_s`: time at a dock from empty to full, short so that no mission waits for an
+    hour.
     """
 
     runtime_s: float = 5400.0
@@ -115,7 +115,7 @@ class BatteryModel(NoisySensor, saved=("_charge", "_stamp_s")):
         self._stamp_s: float | None = None
 
     def update(self, stamp_s: float, load: float, *, docked: bool = False) -> Battery:
-        """Reads the charge at stamp_s, after a load from 0 (standing) to 1 (walking), or on a dock."""
+        """Measures the charge at stamp_s, after a load from 0 (standing) to 1 (walking), or on a dock."""
         elapsed = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
         self._stamp_s = stamp_s
         if docked:
@@ -127,7 +127,7 @@ class BatteryModel(NoisySensor, saved=("_charge", "_stamp_s")):
 
 
 def charge_after(charge: float, elapsed_s: float, load: float, spec: BatterySpec) -> float:
-    """Charge that is left after elapsed_s at a load (cut to 0..1)."""
+    """Remaining charge after elapsed_s at a load (clipped to 0..1)."""
     share = spec.idle_share + (1.0 - spec.idle_share) * min(max(load, 0.0), 1.0)
     return max(0.0, charge - elapsed_s * share / spec.runtime_s)
 
@@ -136,9 +136,10 @@ def charge_after(charge: float, elapsed_s: float, load: float, spec: BatterySpec
 class OdometryNoise:
     """Errors of odometry, as standard deviations.
 
-    `scale` is the relative error of distances, `turn_scale` that of turns, and `drift_rad_per_m` a steady turn per
-    metre; each is drawn once per run and cut at two sigma. `wander_*` are random walks per square root of a metre.
-    Below `still_m_s` and `still_rad_s` the robot stands, and no error adds up. The rest is white noise of each reading.
+    `scale`, `turn_scale` and `drift_rad_per_m`: relative error of distances, that of turns, and a steady turn per
+    metre; each is drawn once per run and clipped at two sigma. `wander_*`: random walks per square root of a metre.
+    `still_m_s` and `still_rad_s`: below these the robot stands, and no error accumulates. The rest is white noise of
+    each measurement.
     """
 
     scale: float = 0.008
@@ -156,7 +157,7 @@ class OdometryNoise:
 
 @dataclass(frozen=True)
 class _Last:
-    """True pose and estimate of the last update."""
+    """True pose and estimate at the last update."""
 
     stamp_s: float
     true: Pose2D
@@ -177,7 +178,7 @@ class OdometryModel(NoisySensor, saved=("_last",)):
         self._last: _Last | None = None
 
     def update(self, stamp_s: float, X_WB: RigidTransform, w_WB_W: FloatArray, v_WB_W: FloatArray) -> Odometry:
-        """Reads odometry at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body."""
+        """Measures odometry at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body."""
         true = Pose2D.from_transform(X_WB)
         if self._last is None:
             estimate = Pose2D(0.0, 0.0, 0.0)
@@ -212,7 +213,7 @@ class OdometryModel(NoisySensor, saved=("_last",)):
         return RigidTransform(RollPitchYaw(roll, pitch, estimate.yaw_rad), [estimate.x_m, estimate.y_m, height])
 
     def _velocity(self, yaw_rad: float, w_WB_W: FloatArray, v_WB_W: FloatArray) -> tuple[float, float, float]:
-        """Velocity (vx, vy, wz) in the level body frame, with noise."""
+        """Velocity (vx, vy, wz) in the levelled body frame, with noise."""
         vx, vy = _turned(float(v_WB_W[0]), float(v_WB_W[1]), -yaw_rad)
         speed_m_s, turn_rad_s = self._noise.velocity_m_s, self._noise.turn_rate_rad_s
         noise = self._rng.standard_normal(3) * (speed_m_s, speed_m_s, turn_rad_s)
@@ -235,10 +236,11 @@ _TOLERANCE_S = 1e-6
 
 @dataclass(frozen=True)
 class GripperNoise:
-    """Noise of the readings, and the limits of the belief that the gripper holds an object.
+    """Noise of the measurements, and thresholds for reporting that the gripper holds an object.
 
-    The belief begins once the force is at least `holding_force_n` and the opening above `closed` for `holding_after_s`
-    without a break, and ends once one of the two fails for this time. The defaults are for a hinged gripper (rad).
+    `holding_force_n`, `closed` and `holding_after_s`: the report becomes True once the force is at least the first and
+    the opening above the second for this time without a break, and False once one of both fails for this time. The
+    defaults are for a hinged gripper (rad).
     """
 
     opening: float = 0.003
@@ -261,7 +263,7 @@ class GripperModel(NoisySensor, saved=("_holding", "_changing_since_s")):
         self._changing_since_s: float | None = None
 
     def update(self, stamp_s: float, opening: float, force_n: float) -> Gripper:
-        """Reads the gripper at stamp_s from the true opening (0 closed) and the force at its tip.
+        """Measures the gripper at stamp_s from the true opening (0 closed) and the force at its tip.
 
         `force_n` is 0 while the gripper moves freely.
         """
@@ -272,7 +274,7 @@ class GripperModel(NoisySensor, saved=("_holding", "_changing_since_s")):
         return Gripper(stamp_s, max(0.0, read), force, self._holding)
 
     def _settle(self, stamp_s: float, gripped: bool) -> None:
-        """Changes the belief once the readings contradict it for long enough."""
+        """Changes the report once the measurements contradict it for long enough."""
         if gripped == self._holding:
             self._changing_since_s = None
             return

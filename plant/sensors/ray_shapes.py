@@ -1,7 +1,7 @@
-"""The scene's proximity shapes as plain arrays, ready for ray casting.
+"""The scene's proximity shapes as plain arrays, for ray casting.
 
 Every shape is a row: a kind, half extents (3,) along its own axes, and its pose in the frame of its body. Oriented
-bounding boxes stand for meshes and convex hulls, a very wide box below the surface for a half space.
+bounding boxes replace meshes and convex hulls; a very wide box below the surface replaces a half space.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class ShapeArrays:
 
 
 class RayScene:
-    """Proximity shapes of a plant, without those of some model instances, at the poses of a context.
+    """Proximity shapes of a plant, without those of excluded model instances, at the poses in a context.
 
     Shapes on anchored bodies are placed once; the others follow their bodies.
     """
@@ -121,7 +121,7 @@ class RayScene:
         )
 
     def _slot(self, body: RigidBody) -> int:
-        """Index of a moving body among the known ones; adds a new body."""
+        """Index of a moving body in the list of bodies; adds a new body to the list."""
         for slot, known in enumerate(self._bodies):
             if known.index() == body.index():
                 return slot

@@ -1,7 +1,7 @@
 """Checks the files of a world's geometry before Drake reads them: directives, models, meshes and textures.
 
-Drake opens every file that another file names, even a pipe, an address or the same file again. So all files of a user's
-world are checked first. Files of the plant itself are trusted.
+Drake opens every file to which another file refers, even a pipe, an address or the same file again. So all files of a
+user's world are checked first. Files of the plant itself are trusted.
 """
 
 import json
@@ -56,16 +56,16 @@ def check_directives(file: Path, home: Path) -> None:
 
 
 def check_model(file: Path, home: Path, lacking: list[str] | None = None) -> None:
-    """Checks the file of a model and all files that it names, in the folder `home`; raises like `check_directives`.
+    """Checks a model file and all files to which it refers, in the folder `home`; raises like `check_directives`.
 
-    With a list `lacking`, adds the names of missing files to it instead.
+    With a list `lacking`, adds the names of missing files to the list instead.
     """
     _Walk(home.resolve(), lacking).model(file, ())
 
 
 @dataclass
 class _Walk:
-    """Recursive check of files: each file once, directives each time that they are named."""
+    """Recursive check of files: each file once, directives each time that a file refers to them."""
 
     home: Path
     lacking: list[str] | None = None
@@ -73,7 +73,7 @@ class _Walk:
     files: int = 0
 
     def directives(self, file: Path, chain: tuple[Path, ...]) -> None:
-        """Checks directives; the files of `chain` name each other down to them."""
+        """Checks directives; `chain` are the files that led to them, each referring to the next."""
         source = read_yaml(file, TAGS)
         listed = source.data.get("directives") if isinstance(source.data, dict) else None
         if not isinstance(listed, list):
@@ -87,7 +87,7 @@ class _Walk:
                 self._follow(file, source.line(place), name, (*chain, file.resolve()), kind == "add_directives")
 
     def model(self, file: Path, chain: tuple[Path, ...]) -> None:
-        """Checks a model, mesh or picture; the files of `chain` name each other down to it."""
+        """Checks a model, mesh or picture; `chain` are the files that led to it, each referring to the next."""
         kind = file.suffix.lower()
         if kind in _PICTURES:
             from skills.inputs.picture_files import check_picture  # brings OpenCV, which most commands do not need
@@ -102,7 +102,7 @@ class _Walk:
             self._follow(file, line, name, (*chain, file.resolve()), False)
 
     def _follow(self, file: Path, line: int | None, name: object, chain: tuple[Path, ...], directives: bool) -> None:
-        """Checks the file that a line of `file` names."""
+        """Checks the file to which a line of `file` refers."""
 
         def error(what: str, hint: str) -> InputError:
             return InputError(what, hint=hint, file=file, line=line)
@@ -133,7 +133,7 @@ class _Walk:
             raise
 
     def _found(self, file: Path, name: str) -> Path | None:
-        """Resolves a name in `file`; None for a file of the plant or of Drake. Raises InputError."""
+        """Resolves a name in `file`; None for a file of the plant or of Drake. Raises InputError for a missing file."""
         in_package = _IN_PACKAGE.match(name)
         if in_package is None:
             beside = name.removeprefix("file://") if name.startswith("file:///") else name
@@ -158,7 +158,7 @@ def _is_ours(path: Path) -> bool:
 
 
 def _named_in_xml(file: Path) -> Iterator[tuple[int, str]]:
-    """Lines and names of the files in an SDF, URDF, MJCF or COLLADA file."""
+    """Yields lines and names of the files to which an SDF, URDF, MJCF or COLLADA file refers."""
     most_bytes = MOST_MESH_BYTES if file.suffix.lower() == ".dae" else MOST_MODEL_BYTES
     text = read_text(file, most_bytes=most_bytes, hint=_BESIDE)
     found, open_elements, letters = list[tuple[int, str]](), list[str](), list[str]()

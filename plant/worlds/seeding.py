@@ -20,7 +20,7 @@ from skills.robot import FloatArray
 
 @dataclass(frozen=True)
 class PointStop:
-    """A waypoint in the world frame, with the pause of the person there (s)."""
+    """A waypoint in the world frame, and how long the person pauses there (s)."""
 
     at_W: Point
     pause_s: float = 0.0
@@ -28,7 +28,7 @@ class PointStop:
 
 @dataclass(frozen=True)
 class Lapse:
-    """Lapse of a person's attention after a walked path (m): some way back (m), then a stop (s)."""
+    """Lapse of attention after a walked distance (m): the person walks back a distance (m), then stops (s)."""
 
     after_m: float
     stop_s: float
@@ -37,11 +37,11 @@ class Lapse:
 
 @dataclass(frozen=True)
 class PointRoute:
-    """Route of a walking person: begins at `start_s`, and goes back from the last stop to the first if it `loops`.
+    """Route of a walking person: begins at `start_s`, and continues from the last stop to the first if it `loops`.
 
-    A person who `yields` stops for a robot close ahead, a person who keeps `apart` for people as well. `pace` is the
-    share by which the speed changes. A person who `follows` robots begins once one has spoken; a person who `wanders`
-    draws further stops. `says` is the person's text at the end of the route. `stream` seeds all draws on the way.
+    A person who `yields` stops for a robot close ahead; one who keeps `apart` also for people. `pace` is the fraction
+    by which the speed varies. A person who `follows` robots begins once a robot has spoken; one who `wanders` draws
+    further stops. `says` is what the person says at the end of the route. `stream` seeds all draws on the route.
     """
 
     stops: tuple[PointStop, ...]
@@ -59,12 +59,12 @@ class PointRoute:
     stream: tuple[int, ...] = ()
 
     def from_pose(self, at_W: Point, yaw_rad: float) -> PointRoute:
-        """Returns the route for a person who stands at a pose first."""
+        """Returns the route for a person who first stands at a pose."""
         return replace(self, stops=(PointStop(at_W), *self.stops), yaw_rad=yaw_rad)
 
     @property
     def first_yaw_rad(self) -> float:
-        """First heading of the person: given, or towards the second stop."""
+        """First heading of the person: as given, else towards the second stop."""
         if self.yaw_rad is not None:
             return self.yaw_rad
         (x0, y0), (x1, y1) = self.stops[0].at_W, self.stops[min(1, len(self.stops) - 1)].at_W
@@ -72,7 +72,7 @@ class PointRoute:
 
 
 def point_route(route: Route, standing: Mapping[str, Point], stream: Sequence[int] = (0,)) -> PointRoute:
-    """Resolves the places of a route by `standing`, and draws its distractions from the seeds `stream`."""
+    """Resolves the places in a route by `standing`, and draws its lapses of attention from the seeds `stream`."""
     stops = (each if isinstance(each, Stop) else Stop(at=each) for each in route.waypoints)
     points = (PointStop(standing[each.at] if isinstance(each.at, str) else each.at, each.pause) for each in stops)
     return PointRoute(
@@ -92,7 +92,7 @@ def point_route(route: Route, standing: Mapping[str, Point], stream: Sequence[in
 
 
 def _lapses(route: Route, rng: np.random.Generator) -> tuple[Lapse, ...]:
-    """Distractions of a route: as given, or a requested number, one every few metres."""
+    """Lapses of attention on a route: as given, or a requested number, one every few metres."""
     if not isinstance(route.distractions, int):
         return tuple(Lapse(each.after, each.stop, each.back) for each in route.distractions)
     after_m = np.cumsum(rng.uniform(*_LAPSE_EVERY_M, size=route.distractions))
@@ -116,7 +116,7 @@ _WALK_STREAM = 13
 
 @dataclass(frozen=True)
 class Receiving:
-    """Pull (N) of a person at an offered object, and the time for which the object must be still before (s)."""
+    """Pull (N) of a person on an offered object, and how long the object must be still before the pull (s)."""
 
     pull_n: float = 15.0
     reaction_s: float = 1.0
@@ -126,8 +126,8 @@ class Receiving:
 class Placement:
     """A model in the world: X_WO is its pose at the start.
 
-    A loose object rests on `surface`. A person without a `route` is welded to the world; `receiving` is the person's
-    way of taking objects. `answers` maps parts of questions to the person's answers.
+    A loose object rests on `surface`. A person without a `route` is welded to the world. `receiving` says how the
+    person takes objects. `answers` maps phrases in questions to the person's answers.
     """
 
     name: str
@@ -149,7 +149,7 @@ def place_objects(world: World, seed: int) -> tuple[Placement, ...]:
     """Places the world's loose objects at rest on its surfaces. Raises WorldError when they do not fit.
 
     Form, surface and pose vary with the seed. Each object has its own random streams: adding or removing one moves only
-    the objects that it touches.
+    objects that it touches.
     """
     catalogue, outlines, placed = load_catalogue(), list[FloatArray](), list[Placement]()
     for index, rule in enumerate(world.seed_rules.objects):
@@ -162,7 +162,7 @@ def place_objects(world: World, seed: int) -> tuple[Placement, ...]:
 
 
 def place_people(world: World, seed: int) -> tuple[Placement, ...]:
-    """Places the people: at the beginnings of their routes, or on the floor before the start pose, facing the robot."""
+    """Places the people: at the start of their routes, or on the floor in front of the start pose, facing the robot."""
     catalogue = load_catalogue()
     return tuple(
         _place_person(world, rule, _form(catalogue, rule.model, world, seed, index), seed, index)
@@ -173,7 +173,7 @@ def place_people(world: World, seed: int) -> tuple[Placement, ...]:
 def _model(
     catalogue: Mapping[str, ModelClass], name: str, world: World, seed: int, index: int
 ) -> tuple[str, ModelForm]:
-    """Class and form of an object: an imported model by its name, else a form of the class."""
+    """Class and form of an object: an imported model with this name, else a form of the class."""
     if name in world.imports:
         found = world.imports[name]
         return found.object.class_name, found.object.form(found.folder)
@@ -181,7 +181,7 @@ def _model(
 
 
 def _form(catalogue: Mapping[str, ModelClass], name: str, world: World, seed: int, index: int) -> ModelForm:
-    """Form of a class that the seed chooses. Raises WorldError for an unknown class."""
+    """Form of a class, chosen by the seed. Raises WorldError when the class is unknown."""
     if name not in catalogue:
         raise WorldError(f"{world.folder / 'objects.yaml'}: no model {name!r}; there are {', '.join(catalogue)}")
     forms = tuple(catalogue[name].forms.values())
@@ -191,7 +191,7 @@ def _form(catalogue: Mapping[str, ModelClass], name: str, world: World, seed: in
 def place_one(
     world: World, rule: ObjectRule, model: tuple[str, ModelForm], others: Sequence[FloatArray], rng: np.random.Generator
 ) -> tuple[Placement, FloatArray]:
-    """Places one object of a class and form at a free pose; returns also its outline. Raises WorldError without one."""
+    """Places one object at a free pose; returns it with its outline. Raises WorldError when no pose is free."""
     rules, (class_name, form) = world.seed_rules.rules, model
     first = int(rng.integers(len(rule.surfaces)))
     obstacles = np.array([shapely.Polygon(each) for each in (*others, *world.seed_rules.keep_clear)], dtype=np.object_)
@@ -209,7 +209,7 @@ def place_one(
 
 
 def candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
-    """Random centres along the front edges of a surface, with random yaws."""
+    """Yields random centres along the front edges of a surface, with random yaws."""
     middle, fronts = np.mean(surface.polygon_W, axis=0), []
     for ends in world.seed_rules.fronts[surface.name]:
         a, b = (np.array(end) for end in ends)
@@ -238,7 +238,7 @@ def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, in
 def _before_start(
     world: World, ranges: tuple[Lengths, Lengths, Lengths], rng: np.random.Generator
 ) -> tuple[float, float, float]:
-    """Pose (x, y, yaw) of a person at a random distance, bearing and turn before the start pose."""
+    """Pose (x, y, yaw) of a person at a random distance, bearing and turn in front of the start pose."""
     distance_m, bearing_rad, turned_rad = ranges
     direction = world.start.yaw_rad + rng.uniform(*bearing_rad)
     distance = rng.uniform(*distance_m)
@@ -249,7 +249,7 @@ def _before_start(
 
 
 def standing_points_W(world: World) -> FloatArray:
-    """Points (N, 2) of people's possible starts over all seeds: a grid over each person's range."""
+    """Points (N, 2) where people may start under any seed: a grid over each person's range."""
     places = list[tuple[float, float]]()
     for rule in world.seed_rules.people:
         if rule.ranges is not None:
@@ -300,7 +300,7 @@ _STOPS = 4
 def place_clutter(
     world: World, objects: Sequence[Placement], count: int, seed: int, *, spared: Collection[str] = ()
 ) -> tuple[Placement, ...]:
-    """Places up to `count` more objects beside the placed ones, of none of the `spared` classes.
+    """Places up to `count` further objects beside the placed ones, except objects in the `spared` classes.
 
     Each rests on a surface that the rules allow; objects without a free spot are omitted.
     """
@@ -324,7 +324,7 @@ def place_clutter(
 
 
 def add_passers_by(world: World, count: int, seed: int) -> World:
-    """Adds `count` walking people to a world; the seed chooses the places of their looped routes.
+    """Adds `count` walking people to a world; the seed chooses the places on their looped routes.
 
     Raises WorldError when the world has fewer than two places.
     """

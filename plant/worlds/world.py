@@ -40,7 +40,7 @@ Angles = tuple[quantities.Angle, quantities.Angle]
 
 
 class WorldError(InputError):
-    """Files of a world that do not fit together; `path` is the place in `objects.yaml`."""
+    """Error of world files that do not fit together; `path` is the location in `objects.yaml`."""
 
     def __init__(self, message: str, *, path: KeyPath = ()) -> None:
         super().__init__(message)
@@ -48,7 +48,7 @@ class WorldError(InputError):
 
 
 class UnknownWorldError(WorldError):
-    """A name or folder of no world."""
+    """Error of a name or folder that is no world."""
 
 
 class _Strict(BaseModel):
@@ -56,7 +56,7 @@ class _Strict(BaseModel):
 
 
 class Rules(_Strict):
-    """Distances of objects on surfaces, in metres; see `objects.yaml`."""
+    """Distances between objects on surfaces, in metres; see `objects.yaml`."""
 
     from_edge_m: Lengths = Field(description="least and greatest distance of an object's centre from the front edge")
     clear_m: quantities.Margin = Field(description="between objects, and from an object to a keep-clear outline")
@@ -73,7 +73,7 @@ class ObjectRule(_Strict):
 
 
 class PersonRule(_Strict):
-    """A person who walks on a route, or stands within three ranges before the robot's start pose.
+    """A person who walks on a route, or stands within three ranges in front of the robot's start pose.
 
     With both, the person walks to the waypoints from a pose within the ranges.
     """
@@ -97,7 +97,7 @@ class PersonRule(_Strict):
 
     @property
     def ranges(self) -> tuple[Distances, Angles, Angles] | None:
-        """Ranges of distance, bearing and turn; None for a person with only a route."""
+        """Ranges of distance, bearing and turn; None for a person who has only a route."""
         if self.distance_m is None or self.bearing_rad is None or self.turned_rad is None:
             return None
         return self.distance_m, self.bearing_rad, self.turned_rad
@@ -109,7 +109,7 @@ _MANNERS: Final = ("receives", "pull_n", "reaction_s", "answers")
 class DoorRule(_Strict):
     """A doorway with a sliding door that opens into the wall; metres in the world frame, seconds.
 
-    It is open until `closes`, and closed until `opens`; the earlier one determines the state at the beginning.
+    The door is open until `closes`, and closed until `opens`; the earlier of both determines its state at the start.
     """
 
     name: str
@@ -121,7 +121,7 @@ class DoorRule(_Strict):
 
 
 class MoveRule(_Strict):
-    """A move of an object by a person: to a free spot of the surface `to`, or with its base at a point."""
+    """A move of an object by a person: to a free spot on the surface `to`, or with its base at a point."""
 
     name: str
     at: quantities.Delay = Field(description="s")
@@ -160,7 +160,7 @@ class SurfaceTop:
 
 @dataclass(frozen=True)
 class Import:
-    """An imported model: the folder of its files, and its facts."""
+    """An imported model: the folder with its files, and its facts."""
 
     folder: Path
     object: ImportedObject
@@ -170,9 +170,9 @@ class Import:
 class World:
     """A world: its files, and the facts that the plant uses. Lengths in metres, world frame.
 
-    Only its geometry and a start are necessary: dock, rooms, surfaces and seed rules may be missing. `standing` maps
-    each room and surface to the point for a person or robot there. `maps` is the folder of the robot's grids (None: the
-    world's own `map`). `imports` are the models outside the catalogue, by name. `doors` and `moves` are its events.
+    Only its geometry and a start are required: dock, rooms, surfaces and seed rules may be missing. `standing` maps
+    each room and surface to a point where a person or robot can stand. `maps` is the folder of the robot's grids (None:
+    the world's own `map`). `imports` are models outside the catalogue, by name. `doors` and `moves` are its events.
     """
 
     name: str
@@ -198,11 +198,11 @@ class World:
 
     @property
     def own_objects(self) -> Mapping[str, Import]:
-        """Imported models without a class of the detector, by name."""
+        """Imported models that belong to no class of the detector, by name."""
         return {name: each for name, each in self.imports.items() if each.object.class_name == name}
 
     def with_routes(self, routes: Mapping[str, Route]) -> World:
-        """Returns the world with people on these routes by name; adds unknown people.
+        """Returns the world with people on these routes, by name; adds people whom it does not have yet.
 
         Raises WorldError when an object has one of the names, or a waypoint is unknown.
         """
@@ -215,7 +215,7 @@ class World:
         return replace(self, seed_rules=changed)
 
     def with_walks(self, walks: Mapping[str, Route]) -> World:
-        """Returns the world with walking people: known people start at their places, others at a waypoint.
+        """Returns the world with walking people: its own people start at their places, others at a waypoint.
 
         Raises WorldError when a person walks already, an object has one of the names, or a waypoint is unknown.
         """
@@ -233,7 +233,7 @@ class World:
         return replace(self, doors=(*self.doors, *doors), moves=(*self.moves, *moves))
 
     def with_imports(self, folders: Iterable[Path]) -> World:
-        """Returns the world with the models of folders. Raises InputError for a folder without one, or a taken name."""
+        """Returns the world with the models in folders. Raises InputError for a missing model or a taken name."""
         return replace(self, imports=_with_imports(self.imports, folders))
 
     def with_objects(self, objects: Iterable[ObjectRule]) -> World:
@@ -291,7 +291,7 @@ class World:
         return tuple(sorted(self._maps.glob("*scan.yaml")))
 
     def scan_map_seen_from(self, height_m: float | None) -> Path:
-        """Path of the grid with the band nearest to a LiDAR's height, the narrowest of several around it."""
+        """Path of the grid whose band is nearest to a LiDAR's height; the narrowest when several contain it."""
         bands = {path: _band_m(path) for path in self.scan_map_paths}
         if height_m is None or all(low > high for low, high in bands.values()):
             return self.scan_map_path
@@ -300,7 +300,7 @@ class World:
 
     @property
     def keepout_map_path(self) -> Path:
-        """Path of the grid of everything that the body could touch."""
+        """Path of the grid with everything that the body could touch."""
         return self._maps / "keepout.yaml"
 
     @property
@@ -365,7 +365,7 @@ def load_world(name_or_path: str | Path) -> World:
 
 
 def _with_imports(known: Mapping[str, Import], folders: Iterable[Path]) -> Mapping[str, Import]:
-    """Known models and the models of folders, by name. Raises InputError."""
+    """Known models and those in folders, by name. Raises InputError for a folder without a model, or a taken name."""
     found = dict(known)
     for folder in dict.fromkeys(each.resolve() for each in folders):
         imported = read_imported(folder)
@@ -431,7 +431,7 @@ def _check_models(rules: SeedRules, imports: Mapping[str, Import]) -> None:
 
 
 def _check_people(rules: SeedRules, standing: Mapping[str, Point]) -> None:
-    """Raises WorldError when a name is given twice, or a place on a route is unknown."""
+    """Raises WorldError when two people share a name, or a place on a route is unknown."""
     taken = set[str]()
     places = [("objects", index, rule.name) for index, rule in enumerate(rules.objects)]
     places += [("people", index, rule.name) for index, rule in enumerate(rules.people)]

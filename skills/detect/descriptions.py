@@ -1,4 +1,4 @@
-"""Descriptions of objects in words, and the union of the objects of several searches."""
+"""Descriptions of objects in words, and the union of objects from several searches."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -22,7 +22,7 @@ def surface_names(surfaces: Sequence[Surface]) -> str:
 
 
 def describe(seen: ObjectObservation) -> str:
-    """Describes an object: "a red coke on the kitchen table, score 0.90"; gives its position (m) without a surface."""
+    """Describes an object: "a red coke on the kitchen table, score 0.90"; without a surface gives its position (m)."""
     x, y, z = seen.position_W
     place = f"on the {seen.surface}" if seen.surface else f"at ({x:.2f}, {y:.2f}, {z:.2f})"
     return f"{with_article(str(seen.kind))} {place}, score {seen.score:.2f}"
@@ -52,10 +52,10 @@ def plural(name: str) -> str:
 
 
 def distinct_objects(looks: Iterable[Sequence[ObjectObservation]]) -> tuple[ObjectObservation, ...]:
-    """Different objects of several searches, in the order in which they were seen.
+    """Different objects from several searches, in the order in which they were seen.
 
     Two observations of one class within `SAME_WITHIN_M` are one object. The nearest pairs match first, one to one, so
-    that two objects that stand close together stay two.
+    that two objects that stand close together remain two.
     """
     known: list[ObjectObservation] = []
     for look in looks:

@@ -1,4 +1,4 @@
-"""Messages of the detect skill in the event log."""
+"""Messages that the detect skill writes to the event log."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -16,7 +16,7 @@ Message = Mapping[str, Any]
 
 
 def detections_message(image: Image, found: Iterable[Detection], placed: Sequence[Detection3D]) -> Message:
-    """Message of all detections of one picture, with boxes (u0, v0, u1, v1) in its pixels, and the picture."""
+    """Message with all detections in one picture, boxes (u0, v0, u1, v1) in its pixels, and the picture."""
     places = {id(detected.detection): detected for detected in placed}
     return {
         "stamp_s": image.stamp_s,
@@ -51,7 +51,7 @@ def class_id(class_name: str) -> int:
 
 
 def object_to_detect_message(context: SkillContext, classes: Sequence[str]) -> Message:
-    """Message of the wanted classes."""
+    """Message with the wanted classes."""
     return {
         "stamp": context.clock.now(),
         "robot_name": context.robot.name,
@@ -63,7 +63,7 @@ def object_to_detect_message(context: SkillContext, classes: Sequence[str]) -> M
 def object_destination_message(
     context: SkillContext, seen: ObjectObservation, image: Image, X_WO: RigidTransform
 ) -> Message:
-    """Message of the object's position in the world and from the camera."""
+    """Message with the object's position in the world and relative to the camera."""
     p_CO = camera_pose_W(image, X_WO).inverse() @ seen.position_W
     sequence = round(image.stamp_s * 1000)
     return {
@@ -82,7 +82,7 @@ def object_destination_message(
 
 
 def tracks_message(context: SkillContext, tracks: Sequence[Track]) -> Message:
-    """Message of all tracks."""
+    """Message with all tracks."""
     tracked = [_track(track) for track in tracks]
     return {"stamp": context.clock.now(), "robot_name": context.robot.name, "tracks": tracked}
 
@@ -104,7 +104,7 @@ def _track(track: Track) -> Message:
 
 
 def coverage_message(context: SkillContext, shares: Mapping[str, SurfaceShares]) -> Message:
-    """Message of the share of each surface that was seen."""
+    """Message with the fraction of each surface that was seen."""
     surfaces = {
         name: {"seen": round(s.seen, 3), "hidden": round(s.hidden, 3), "out_of_view": round(s.out_of_view, 3)}
         for name, s in shares.items()

@@ -1,4 +1,4 @@
-"""Selection among tracks and clusters: the objects that a search counts, and those worth a closer view."""
+"""Selection among tracks and clusters: which objects a search counts, and which need a closer view."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -37,12 +37,10 @@ _SAME_SIZE_SHARE = 0.3
 class DetectInputs:
     """Wanted objects (any of `classes`, with all `attributes`) and the surfaces to search.
 
-    The class "thing" is any object, whether the detector knows its class or not; objects at the positions of `avoid`
-    are the last choice.
-
-    The search ends with the first `count` objects; a count of 0 searches all surfaces and counts all objects. With
-    `expected_W` it searches only that position, and only objects within 0.35 m of it count. With `floor`, visible
-    objects on the floor beside the surfaces count too.
+    The class "thing" matches any object, whether or not the detector knows its class. `avoid`: objects at these
+    positions are the last choice. `count`: the search ends with so many objects; 0 searches all surfaces and counts all
+    objects. `expected_W`: the search views only this position, and only objects within 0.35 m of it count. `floor`:
+    visible objects on the floor beside the surfaces count too.
     """
 
     classes: tuple[str, ...]
@@ -59,10 +57,11 @@ class DetectInputs:
 class DetectOptions:
     """Extent of the search.
 
-    The skill views candidates again from the side, turned by `confirm_shifts_rad` about the shoulder, `candidates` more
-    of them than are wanted. It views at most `closer_looks` unlabelled clusters from near, and hidden areas from
-    `around_rad`. A result rests on a picture no older than `fresh_s`. An object counts within `expected_within_m` of
-    the expected position, and on the floor within `floor_within_m` of the robot.
+    `confirm_shifts_rad` and `candidates`: candidates are viewed again from the side, at these angles about the
+    shoulder; so many more of them than are wanted. `closer_looks`: how many unlabelled clusters are viewed from near.
+    `around_rad`: angles from which hidden areas are viewed. `fresh_s`: largest age of the picture on which a result
+    rests. `expected_within_m` and `floor_within_m`: largest distance of an object from the expected position, and on
+    the floor from the robot.
     """
 
     confirm_shifts_rad: tuple[Angle, ...] = (0.25, -0.3)
@@ -77,9 +76,9 @@ class DetectOptions:
 def matching_tracks(
     tracks: Sequence[Track], inputs: DetectInputs, options: DetectOptions, p_WB: FloatArray
 ) -> list[Track]:
-    """Tracks with a wanted class, all attributes and a place that counts, likeliest first; p_WB is the robot.
+    """Tracks with a wanted class, all attributes and a valid position, most likely first; p_WB is the robot.
 
-    Where any object is wanted, the nearest and most free ones come first, and those to avoid last.
+    Where any object is wanted, the nearest and most accessible ones come first, and those to avoid last.
     """
     tracks = [t for t in tracks if is_wanted(t, inputs) and _in_place(t, inputs, options, p_WB)]
     fitting = [t for t in tracks if all(has_attribute(t.best, word) for word in inputs.attributes)]
@@ -96,7 +95,7 @@ def matching_tracks(
 
 
 def sure_tracks(matching: Sequence[Track], inputs: DetectInputs) -> list[Track]:
-    """Tracks that need no further view, last seen first; in the given order where any object or a place is wanted."""
+    """Tracks that need no further view, last seen first; in the given order when any object or a place is wanted."""
     sure = [track for track in matching if is_sure(track, inputs)]
     if inputs.expected_W is not None or ANY_OBJECT in inputs.classes:
         return sure
@@ -109,7 +108,7 @@ def is_wanted(track: Track, inputs: DetectInputs) -> bool:
 
 
 def is_sure(track: Track, inputs: DetectInputs) -> bool:
-    """Returns whether a track needs no further view; its class does not matter where any object is wanted."""
+    """Returns whether a track needs no further view; its class does not matter when any object is wanted."""
     views = 2 if inputs.seen_before is None else 1
     return track.exists(views) if ANY_OBJECT in inputs.classes else track.is_confirmed(views)
 
@@ -122,7 +121,7 @@ def _in_place(track: Track, inputs: DetectInputs, options: DetectOptions, p_WB: 
 
 
 def _most_free_first(tracks: Sequence[Track], p_WB: FloatArray) -> list[Track]:
-    """Sorts tracks in the order in which to take the objects: near ones, with much space around them, first."""
+    """Sorts tracks in the order in which to grasp the objects: near ones with much space around them first."""
 
     def cost(track: Track) -> float:
         others = (level_distance(track.position_W, other.position_W) for other in tracks if other is not track)
@@ -132,14 +131,14 @@ def _most_free_first(tracks: Sequence[Track], p_WB: FloatArray) -> list[Track]:
 
 
 def level_distance(p_W: Sequence[float] | FloatArray, q_W: Sequence[float] | FloatArray) -> float:
-    """Horizontal distance of two points (m)."""
+    """Horizontal distance between two points (m)."""
     return float(np.linalg.norm(np.asarray(p_W)[:2] - np.asarray(q_W)[:2]))
 
 
 def unlabelled_clusters(clusters: Iterable[Cluster], tracks: Sequence[Track], classes: Sequence[str]) -> list[Cluster]:
-    """Clusters about as large as objects of some classes that no track explains, each place once; largest first.
+    """Clusters with the size of a wanted class that no track explains, each position once; largest first.
 
-    A track of another class explains no cluster when it may well have one of the classes.
+    A track of another class does not explain a cluster when it may be of a wanted class.
     """
     named = [track.position_W for track in tracks if not _is_doubted(track, classes)]
     left: list[Cluster] = []
@@ -154,7 +153,7 @@ def unlabelled_clusters(clusters: Iterable[Cluster], tracks: Sequence[Track], cl
 
 
 def _is_doubted(track: Track, classes: Sequence[str]) -> bool:
-    """Returns whether a track has another class than the wanted ones, and may have one of them."""
+    """Returns whether a track has an unwanted class, but may be of a wanted one."""
     return track.class_name not in classes and any(track.classes.get(name, 0.0) > _DOUBTED for name in classes)
 
 
@@ -166,10 +165,10 @@ def _may_be(cluster: Cluster, classes: Sequence[str]) -> bool:
 
 
 def seen_again(before: ObjectObservation, segments: Sequence[Detection3D]) -> tuple[Detection3D, ...]:
-    """The segment without a label that is as large as an object seen before and at its place, as one of its class.
+    """The unlabelled segment with the size and position of a previously observed object, labelled with its class.
 
-    The search has confirmed its class from two sides; a picture from near may lack what the network knows it by. An
-    empty tuple when no segment is like it.
+    The search has confirmed its class from two sides; a close picture may lack the features by which the network
+    recognises it. Returns an empty tuple when no segment matches.
     """
     off = {id(each): level_distance(each.position_W, before.position_W) for each in segments}
     alike = [each for each in segments if off[id(each)] < _SEEN_AGAIN_M and _is_as_large(each.size_m, before.size_m)]
@@ -181,6 +180,6 @@ def seen_again(before: ObjectObservation, segments: Sequence[Detection3D]) -> tu
 
 
 def _is_as_large(size_m: Sequence[float], other_m: Sequence[float]) -> bool:
-    """Returns whether length and height are alike; width and height of what is seen from one side may be less."""
+    """Returns whether length and height are similar; width and height seen from one side may be smaller."""
     pairs = ((size_m[0], other_m[0]), (size_m[2], other_m[2]))
     return all(abs(a - b) < max(_SAME_SIZE_M, _SAME_SIZE_SHARE * max(a, b)) for a, b in pairs)

@@ -51,9 +51,9 @@ _RAISED_M = 0.15
 
 @dataclass(frozen=True)
 class Look:
-    """One picture with the robot's pose, the detections with and without a position, and the clusters on the surfaces.
+    """One picture with the robot's pose, the detections with and without a position, and the surfaces' clusters.
 
-    Detections may be faint.
+    Detections may have low scores.
     """
 
     image: Image
@@ -115,7 +115,7 @@ class Detect(LookingSkill[DetectInputs]):
         return (yield from self._ended(inputs, blocked if len(blocked) == len(targets) else []))
 
     def _check(self, inputs: DetectInputs) -> None:
-        """Raises SkillFailure with cause PRECONDITION for an unknown class or attribute, or without surfaces."""
+        """Raises SkillFailure with cause PRECONDITION for an unknown class or attribute, and without surfaces."""
         knows = {*self.context.detector.class_names, ANY_OBJECT, *self._own}
         unknown = [name for name in inputs.classes if name not in knows]
         unknown += [word for word in inputs.attributes if word.lower() not in known_attributes()]
@@ -126,7 +126,7 @@ class Detect(LookingSkill[DetectInputs]):
         assert self.model is not None
 
     def _targets(self, inputs: DetectInputs, X_WB: RigidTransform) -> list[FloatArray]:
-        """Points p_BT to look at, in this order."""
+        """Points p_BT to view, in this order."""
         if inputs.expected_W is not None:
             return [X_WB.inverse() @ np.array(inputs.expected_W)]
         here = X_WB.translation()[:2]
@@ -139,9 +139,9 @@ class Detect(LookingSkill[DetectInputs]):
         return 0 < inputs.count <= len(self._sure(inputs))
 
     def _look_closer(self, inputs: DetectInputs) -> Routine[None]:
-        """Views the expected place from near, or unlabelled clusters that may be wanted.
+        """Views the expected position from near, or unlabelled clusters that may be wanted.
 
-        The second near view of a place is from above.
+        The second near view of a position is from above.
         """
         if inputs.expected_W is not None:
             if not self._has_enough(inputs):
@@ -162,7 +162,7 @@ class Detect(LookingSkill[DetectInputs]):
             self._clusters = others
 
     def _look_around(self, inputs: DetectInputs) -> Routine[None]:
-        """Views hidden areas from both sides; a camera on a head has no other side."""
+        """Views occluded areas from both sides; a camera on a head cannot change sides."""
         around = inputs.expected_W is None and self.object_camera.on_hand
         for p_W in self._coverage.hidden_middle_W().values() if around else ():
             for shift_rad in self.options.around_rad:
@@ -172,9 +172,9 @@ class Detect(LookingSkill[DetectInputs]):
                 yield from self._look_and_confirm(inputs, p_BT, [], shift_rad=shift_rad)
 
     def _look_from_above(self, inputs: DetectInputs, targets_W: Sequence[FloatArray]) -> Routine[None]:
-        """Raises the body as high as it can, for a camera on a head, which sees tables at a flat angle.
+        """Raises the body as high as possible, for a head camera, which sees tables at a flat angle.
 
-        The body stays high when it finds the objects, which may be hidden from lower down.
+        The body stays high when the objects are found, which may be occluded from lower down.
         """
         capabilities = self.context.robot.capabilities()
         raised_m = capabilities.height_range_m[1] - capabilities.standing_height_m - _BELOW_TOP_M
@@ -199,7 +199,7 @@ class Detect(LookingSkill[DetectInputs]):
                 yield from self.look(inputs, p_BO, viewpoints)
 
     def _old_result(self, inputs: DetectInputs) -> Track | None:
-        """The track seen last, if it is sure and its picture is old."""
+        """The track seen last, if it is reliable and its picture is old."""
         newest = next(iter(self._sure(inputs)), None)
         return newest if newest is not None and self._is_old(newest) else None
 
@@ -216,7 +216,7 @@ class Detect(LookingSkill[DetectInputs]):
         shift_rad: float = 0.0,
         raised_m: float = 0.0,
     ) -> Routine[None]:
-        """Views a point, and candidates again from the side. Adds a failure of the arm to `blocked`."""
+        """Views a point, and candidates again from the side. Appends a failure of the arm to `blocked`."""
         viewpoints = self._viewpoints(p_BT, shift_rad, close=close)
         with PlanningAttempt() as attempt:
             yield from self.look(inputs, p_BT, viewpoints, raised_m)
@@ -233,7 +233,7 @@ class Detect(LookingSkill[DetectInputs]):
                 yield from self.look(inputs, p_BO, viewpoints, other_m)
 
     def _viewpoints(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
-        """Camera positions p_BC to view p_BT, turned by shift_rad about the shoulder; near ones first if close."""
+        """Camera positions p_BC to view p_BT, rotated by shift_rad about the shoulder; near ones first if `close`."""
         far = overview_viewpoints(self.model, p_BT, shift_rad, self._height_m)
         if abs(shift_rad) >= max(map(abs, self.options.around_rad)):
             far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))
@@ -242,7 +242,7 @@ class Detect(LookingSkill[DetectInputs]):
     def _confirming(self, track: Track, tries: int, *, close: bool) -> list[FloatArray]:
         """Camera positions for the first, second or third confirming view of a track.
 
-        First the side farther from its last view, then the other side, then right beside the last view.
+        First on the side farther from its last view, then on the other side, then right beside the last view.
         """
         X_BW = self.X_WB().inverse()
         p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
@@ -254,7 +254,7 @@ class Detect(LookingSkill[DetectInputs]):
         return self._viewpoints(p_BO, shifts_rad[tries - 1], close=close)
 
     def _candidate(self, inputs: DetectInputs) -> Track | None:
-        """The likeliest track that needs another view, if any: one more where neither side showed its place."""
+        """The most likely track that needs another view, or None; one more when neither side showed its position."""
         if self._has_enough(inputs) or len(self._tried) > self.options.candidates + inputs.count:
             return None
         shifts = len(self.options.confirm_shifts_rad)
@@ -273,9 +273,9 @@ class Detect(LookingSkill[DetectInputs]):
     def look(
         self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray], raised_m: float = 0.0
     ) -> Routine[Look]:
-        """Points the camera at p_BT from the first possible one of `viewpoints_B`, and updates the tracks.
+        """Points the camera at p_BT from the first feasible viewpoint in `viewpoints_B`, and updates the tracks.
 
-        With a camera on a head, the body rises by raised_m.
+        With a head camera, the body rises by raised_m.
         """
         message = f"looking for {wanted_names(inputs.classes, inputs.attributes)}"
         yield from self.look_at(p_BT, viewpoints_B, message, raised_m=raised_m)
@@ -327,7 +327,7 @@ class Detect(LookingSkill[DetectInputs]):
         raise self._too_few(inputs, found)
 
     def _results(self, inputs: DetectInputs) -> list[Track]:
-        """Sure tracks in the order of the result; where any object is wanted, those with a fresh picture first."""
+        """Reliable tracks in the order of the result; when any object is wanted, those with a fresh picture first."""
         found = self._sure(inputs)
         if inputs.expected_W is not None or ANY_OBJECT not in inputs.classes:
             return found
@@ -348,7 +348,7 @@ class Detect(LookingSkill[DetectInputs]):
 
 
 def _fits_near(inputs: DetectInputs) -> bool:
-    """Returns whether the object was seen before and fits into a picture from near."""
+    """Returns whether the object was observed before and fits into a close picture."""
     return inputs.seen_before is not None and max(inputs.seen_before.size_m) < _FITS_NEAR_M
 
 

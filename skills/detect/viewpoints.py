@@ -1,4 +1,4 @@
-"""Camera targets on surfaces, and boxes about surfaces and clusters for the arm's collision checks."""
+"""Camera targets on surfaces, and boxes around surfaces and clusters for the arm's collision checks."""
 
 from collections.abc import Iterable
 
@@ -31,7 +31,7 @@ _LOWEST_TOP_M = 0.06
 def look_targets(surface: Surface, X_WB: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
     """Points p_BT on a surface whose views cover the part visible from the shoulder p_BS, the middle ones first.
 
-    Empty when no part lies between NEAREST_M and FURTHEST_M and within the arm's turn.
+    Empty when no part lies between NEAREST_M and FURTHEST_M and within the arm's rotation.
     """
     xy = np.concatenate([np.asarray(surface.polygon_W, dtype=float), grid_inside(surface.polygon_W, 0.1)])
     samples = np.column_stack([xy, np.full(len(xy), surface.height_m)])
@@ -57,7 +57,7 @@ def look_targets(surface: Surface, X_WB: RigidTransform, p_BS: FloatArray) -> li
 
 
 def _bins(values: FloatArray, among: NDArray[np.bool_], half_rad: float) -> list[tuple[float, NDArray[np.bool_]]]:
-    """Middles of the fewest angle ranges that cover the values in a mask, each with the mask of its values."""
+    """Centres of the fewest angle ranges that cover the values in a mask, each with the mask of its values."""
     low, high = float(values[among].min()), float(values[among].max())
     count = max(1, int(np.ceil((high - low) / (2 * half_rad))))
     half = max(0.5 * (high - low) / count, 1e-6)
@@ -73,12 +73,12 @@ def surface_boxes(surfaces: Iterable[Surface], X_WB: RigidTransform) -> list[Box
 
 
 def cluster_box(cluster: Cluster, X_WB: RigidTransform, grow_m: float = 0.01) -> Box:
-    """Box about a cluster, in the body frame."""
+    """Bounding box of a cluster, grown by grow_m, in the body frame."""
     return _part_box(cluster, cluster.points.p_W[:, :2], X_WB, grow_m)
 
 
 def cluster_boxes(clusters: Iterable[Cluster], X_WB: RigidTransform, grow_m: float = 0.01) -> list[Box]:
-    """Boxes about clusters, in the body frame; several for a cluster that fills one box badly."""
+    """Bounding boxes of clusters, in the body frame; several for a cluster that fills one box poorly."""
     parts = ((cluster, xy) for cluster in clusters for xy in standing_parts(cluster.points.p_W[:, :2]))
     return [_part_box(cluster, xy, X_WB, grow_m) for cluster, xy in parts]
 
@@ -86,7 +86,7 @@ def cluster_boxes(clusters: Iterable[Cluster], X_WB: RigidTransform, grow_m: flo
 def standing_parts(xy: FloatArray, depth: int = _SPLITS) -> list[FloatArray]:
     """Splits points (N, 2) into groups that fill their rectangles; two walls at a corner are two groups.
 
-    Halves a mostly empty rectangle across its longer side, at most `depth` times.
+    Splits a mostly empty rectangle in the middle of its longer side, at most `depth` times.
     """
     (x, y), (width, height), angle_deg = cv2.minAreaRect((middled := xy - xy.mean(axis=0)).astype(np.float32))
     cells = np.unique(np.floor(xy / _CELL_M).astype(int), axis=0)
@@ -105,7 +105,7 @@ def _part_box(cluster: Cluster, xy: FloatArray, X_WB: RigidTransform, grow_m: fl
 
 
 def _standing_box(xy: FloatArray, bottom_m: float, top_m: float, X_WB: RigidTransform, grow_m: float = 0.0) -> Box:
-    """Upright box in B about points (x, y) in W."""
+    """Upright bounding box in B of points (x, y) in W."""
     middle = xy.mean(axis=0)
     (x, y), (width, depth), angle = cv2.minAreaRect((xy - middle).astype(np.float32))
     centre = [middle[0] + x, middle[1] + y, 0.5 * (bottom_m + top_m)]

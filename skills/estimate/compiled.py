@@ -1,4 +1,4 @@
-"""Compilation of inner loops to machine code, cached on disk between runs, and the loops that several modules share."""
+"""Compilation of inner loops to machine code, cached on disk between runs, and loops shared by several modules."""
 
 import functools
 import math
@@ -12,24 +12,24 @@ FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 
 def compiled(function: FunctionT) -> FunctionT:
-    """Compiles a function at its first call, single-threaded and without reordering of floating-point operations."""
+    """Compiles a function when it is first called, single-threaded and without reordering floating-point operations."""
     return cast(FunctionT, CompiledFunction(function))
 
 
 class CompiledFunction:
-    """A function that numba compiles at the first call, since importing numba takes half a second."""
+    """A function that numba compiles at the first call, because importing numba takes half a second."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)
         self._function = function
 
     def __call__(self, *arguments: Any) -> Any:
-        """The function's result."""
+        """Compiles the function at the first call, and returns its result."""
         return self.machine_code(*arguments)
 
     @property
     def is_compiled(self) -> bool:
-        """Returns whether the function was called, and so compiled."""
+        """Returns whether the function has been called and thus compiled."""
         return "machine_code" in self.__dict__
 
     @functools.cached_property
@@ -47,7 +47,7 @@ class CompiledFunction:
 
 @compiled
 def bilinear(field: NDArray[np.float32], u: float, v: float) -> float:
-    """Value of field[row, column] at column u, row v (cell centres at whole numbers); the edge continues outside."""
+    """Value of field[row, column] at column u, row v (cell centres at whole numbers); clamped to the edge outside."""
     rows, columns = field.shape
     u = min(max(u, 0.0), columns - 1.0)
     v = min(max(v, 0.0), rows - 1.0)
@@ -62,7 +62,7 @@ def bilinear(field: NDArray[np.float32], u: float, v: float) -> float:
 def distances(
     field: NDArray[np.float32], resolution_m: float, x0_m: float, y0_m: float, points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Distances (m) of points (N, 2) by a distance field; outside the field, minus the distance to its edge."""
+    """Distances (m) at points (N, 2), from a distance field; outside the field, minus the distance to its edge."""
     rows, columns = field.shape
     values = np.empty(points.shape[0])
     for n in range(points.shape[0]):

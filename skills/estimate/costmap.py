@@ -1,4 +1,4 @@
-"""The costmap of a mapped place: the surveyed keep-out grid and a layer of obstacles that the sensors see."""
+"""Costmap of a mapped site: the surveyed keep-out grid and a layer of obstacles that the sensors see."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ from skills.robot import FloatArray, Pose2D, Robot, Scan
 class CostmapOptions:
     """The surveyed keep-out grid and a layer of obstacles that the sensors see.
 
-    A point between the heights counts when it is nearer than max_range_m and farther than `explained_m` from all
-    occupied cells of the keep-out grid. LiDAR cells count once two scans agree within `confirm_s`; a cell is remembered
-    for `memory_s` unless a beam sees past it. A depth picture must put `min_points_per_cell` points into a cell.
+    `heights_m`, `max_range_m` and `explained_m`: a point counts between these heights, within this range, and farther
+    than this from all occupied cells of the grid. `confirm_s`: LiDAR cells count once two scans agree within this time.
+    `memory_s`: a cell is remembered this long unless a beam passes beyond it. `min_points_per_cell`: points that a
+    depth image must have in a cell.
     """
 
     heights_m: tuple[Height, Height] = (0.1, 1.0)
@@ -70,7 +71,7 @@ class LayeredCostmap:
         self._left_out_W: FloatArray = np.empty((0, 3))
 
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
-        """Distance (m) from each (x, y) row to the nearest obstacle, negative inside one and off the grid."""
+        """Distance (m) from each (x, y) row to the nearest obstacle; negative inside an obstacle and off the grid."""
         points = np.ascontiguousarray(points_W, dtype=np.float64)
         clearance = self.keepout.distance_m(points)
         field = self._layer_field()
@@ -88,7 +89,7 @@ class LayeredCostmap:
         return self._scan_stamp_s, self._returns_W
 
     def clear_obstacles(self, within_W: FloatArray | None = None) -> int:
-        """Clears the obstacle layer, or only what lies within discs; returns the number of cells that were blocked."""
+        """Clears the obstacle layer, or only its cells within discs; returns the number of blocked cells cleared."""
         cells = self._active()
         if within_W is None:
             self._candidate_s.fill(-math.inf)
@@ -100,14 +101,14 @@ class LayeredCostmap:
         return len(cells)
 
     def exclude_robots(self, discs_W: FloatArray) -> None:
-        """Leaves out of the obstacle layer what lies within these discs, rows of x, y and radius (m, world).
+        """Ignores points within these discs, rows of x, y and radius (m, world), in the obstacle layer.
 
-        `unexplained_returns` still returns it.
+        `unexplained_returns` still includes them.
         """
         self._left_out_W = discs_W
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Takes in the newest scan, if it is new and the robot is localised."""
+        """Updates with the newest scan, when the scan is new and the robot is localised."""
         odometry = robot.odometry()
         X_WO = Pose2D.from_transform(localisation.X_WO)
         self._now_s = odometry.stamp_s
@@ -121,7 +122,7 @@ class LayeredCostmap:
             self._take_scan(scan, X_WO, self._filter, robot)
 
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        """Takes in (N, 3) points of a depth camera, without those on the floor."""
+        """Adds points (N, 3) from a depth camera, except those on the floor."""
         if self._X_WB is None or self._filter is None or len(points_W) == 0:
             return
         own = self._filter.foreign(points_in_body_axes(points_W, self._X_WB), np.empty((0, 3)))
@@ -136,7 +137,7 @@ class LayeredCostmap:
         self._note_change()
 
     def _note_change(self) -> None:
-        """Notes that the set of blocked cells changed."""
+        """Notes that the set of blocked cells has changed."""
         blocked = self._until_s[self._until_s > self._now_s]
         self._next_expiry_s = float(blocked.min()) if len(blocked) else math.inf
         self._changed = True
@@ -148,7 +149,7 @@ class LayeredCostmap:
         return np.argwhere(self._until_s > self._now_s)
 
     def _take_scan(self, scan: Scan, X_WO: Pose2D, own: SelfFilter, robot: Robot) -> None:
-        """Clears the cells that beams see past, then marks cells of returns that neither map nor robot explains."""
+        """Clears cells beyond which beams pass, then marks cells with returns that neither map nor robot explains."""
         options = self._options
         X_WF = compose(X_WO, Pose2D.from_transform(scan.X_OB))
         changed = self._clear(scan, X_WF)
@@ -168,7 +169,7 @@ class LayeredCostmap:
             self._note_change()
 
     def _clear(self, scan: Scan, X_WF: Pose2D) -> bool:
-        """Clears the cells that the scan's beams see past; returns whether there were any."""
+        """Clears the cells beyond which the scan's beams pass; returns whether there were any."""
         active = self._active()
         if len(active) == 0:
             return False
@@ -186,13 +187,13 @@ class LayeredCostmap:
         return np.ascontiguousarray(points_W[self.is_unexplained(points_W)])
 
     def _outside_robots(self, points_W: FloatArray) -> FloatArray:
-        """The (x, y, z) rows that do not lie where another robot reports to be."""
+        """The (x, y, z) rows outside the discs of other robots."""
         if not len(self._left_out_W) or not len(points_W):
             return points_W
         return np.ascontiguousarray(points_W[outside_discs(points_W, self._left_out_W)])
 
     def _layer_field(self) -> NDArray[np.float32] | None:
-        """Distance (m) from each cell of the obstacle layer to the nearest blocked one, None when none is."""
+        """Distance (m) from each cell of the obstacle layer to the nearest blocked cell; None when none is blocked."""
         if self._changed:
             seen = self._until_s > self._now_s
             self._field, self._changed = None, False
@@ -203,9 +204,9 @@ class LayeredCostmap:
 
 
 def clear_cells(scan: Scan, centres_F: FloatArray, cell_m: float) -> NDArray[np.bool_]:
-    """Returns whether the beams of a whole revolution see past each point (N, 3) of the levelled body frame F.
+    """Returns whether the beams of a whole revolution pass beyond each point (N, 3) in the levelled body frame F.
 
-    A point is free when all beams that could have hit it go on for 0.3 m at least. A point that no beam can hit (too
+    A point is free when all beams that could have hit it continue for 0.3 m at least. A point that no beam can hit (too
     low, too near) is free when a free one lies beside it, since both were seen on one object.
     """
     rotation, translation = sensor_pose(scan)
@@ -217,7 +218,7 @@ def clear_cells(scan: Scan, centres_F: FloatArray, cell_m: float) -> NDArray[np.
 def _clear(
     ranges: NDArray[np.float32], elevations: FloatArray, azimuths: FloatArray, places: FloatArray, cell_m: float
 ) -> NDArray[np.bool_]:
-    """The loop of `clear_cells`."""
+    """Compiled loop of `clear_cells`."""
     count = azimuths.shape[0]
     spacing = azimuths[1] - azimuths[0]
     ring_gap = abs(elevations[1] - elevations[0])
@@ -251,7 +252,7 @@ def _clear(
 def _spread(
     free: NDArray[np.bool_], hidden: NDArray[np.bool_], places: FloatArray, radius_m: float
 ) -> NDArray[np.bool_]:
-    """Returns whether each place is free, or hidden and within radius_m of a free one."""
+    """Returns whether each position is free, or hidden and within radius_m of a free one."""
     gone = free.copy()
     for n in np.flatnonzero(hidden):
         for m in np.flatnonzero(free):
@@ -269,10 +270,10 @@ def mark_cells(
     until_s: FloatArray,
     height_m: FloatArray,
 ) -> bool:
-    """Marks hit cells in place; returns whether a cell became blocked that was not.
+    """Marks hit cells in place; returns whether a cell became blocked.
 
-    `times` are the scan's stamp, the time within which another scan must have hit the cell or a neighbour, and the time
-    for which a blocked cell is remembered, in seconds.
+    `times` (s) are the scan's stamp, the time within which another scan must have hit the cell or a neighbour, and the
+    time for which a blocked cell is remembered.
     """
     stamp, confirm, memory = times
     rows, columns = until_s.shape

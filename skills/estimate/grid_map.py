@@ -32,11 +32,11 @@ UNKNOWN_GREY: Final = 205
 class GridMap:
     """An occupancy grid fixed in the world frame, axes parallel to the world's.
 
-    `occupied` and `unknown` are (rows, columns) with row 0 at the smallest y; `origin_m` is the world (x, y) of the
-    outer corner of cell [0, 0]. `distance` is the signed distance (m) from each cell's centre to the boundary of the
-    occupied cells: positive in the open, negative inside. `height_band_m` is the band of heights above the floor that
-    the grid shows, None when its file does not name one; `notes` are remarks on the file for the user. Raises
-    ValueError for grids of fewer than 2 x 2 cells.
+    `occupied` and `unknown` are (rows, columns) with row 0 at the smallest y. `origin_m` is the world (x, y) of the
+    outer corner of cell [0, 0]. `distance` is the signed distance (m) from each cell centre to the boundary of the
+    occupied cells: positive outside, negative inside. `height_band_m` is the band of heights above the floor that the
+    grid covers; None when its file does not name one. `notes` are remarks on the file for the user. The constructor
+    raises ValueError for a grid of fewer than 2 x 2 cells.
     """
 
     occupied: BoolGrid
@@ -59,7 +59,7 @@ class GridMap:
         return columns * self.resolution_m, rows * self.resolution_m
 
     def cells(self, points_W: FloatArray) -> NDArray[np.int64]:
-        """The (row, column) of each (x, y) row; the numbers continue outside the grid."""
+        """The (row, column) of each (x, y) row; extrapolated outside the grid."""
         scaled = (np.asarray(points_W, dtype=np.float64)[:, :2] - self.origin_m) / self.resolution_m
         return np.asarray(np.floor(scaled[:, ::-1]).astype(np.int64))
 
@@ -70,7 +70,7 @@ class GridMap:
     def distance_m(self, points_W: FloatArray) -> FloatArray:
         """Signed distance (m) from each (x, y) row to the nearest occupied cell, bilinear between cell centres.
 
-        Off the grid it is minus the distance to the grid, since ground that is not surveyed counts as blocked.
+        Off the grid it is minus the distance to the grid, because unsurveyed ground counts as blocked.
         """
         points = np.ascontiguousarray(points_W, dtype=np.float64)
         return distances(self.distance, self.resolution_m, self.origin_m[0], self.origin_m[1], points)
@@ -123,7 +123,7 @@ class _MapFile(BaseModel):
 
     @property
     def read_as(self) -> str:
-        """The mode; older files give it as `trinary`."""
+        """The file's mode; older files state it by the key `trinary`."""
         return self.mode or ("scale" if self.trinary is False else "trinary")
 
 
@@ -142,7 +142,7 @@ def load_grid_map(path: Path) -> GridMap:
 
 @dataclass(frozen=True)
 class FilterMask:
-    """A filter mask of Nav2: `percent` (rows, columns), row 0 at the bottom, with -1 for unknown cells.
+    """A Nav2 filter mask: `percent` (rows, columns), row 0 at the bottom, with -1 for unknown cells.
 
     `origin` is the world pose x, y (m), yaw (rad) of the outer corner of cell [0, 0].
     """
@@ -153,18 +153,18 @@ class FilterMask:
 
     @property
     def corners_W(self) -> FloatArray:
-        """World (x, y) of its four corners, (4, 2)."""
+        """World (x, y) of the mask's four corners, (4, 2)."""
         rows, columns = self.percent.shape
         return self._points_W(np.array([(0, 0), (columns, 0), (columns, rows), (0, rows)]))
 
     def outlines_W(self, least: int) -> list[FloatArray]:
-        """World (x, y) of the outlines, (N, 2) each, of the cells with values of `least` and more."""
+        """World (x, y) of the outlines, (N, 2) each, around cells with values of at least `least`."""
         found, _ = cv2.findContours((self.percent >= least).astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
         simple = (cv2.approxPolyDP(each, 1.0, closed=True)[:, 0] for each in found)
         return [self._points_W(each + 0.5) for each in simple if len(each) > 2]
 
     def _points_W(self, cells: NDArray[Any]) -> FloatArray:
-        """World (x, y) of points in columns and rows."""
+        """World (x, y) of points given in columns and rows."""
         x, y, yaw = self.origin
         turn = [[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]]
         return np.asarray(cells * self.resolution_m @ turn + (x, y))
@@ -181,7 +181,7 @@ class FilterMask:
 
 @lru_cache(maxsize=16)
 def load_filter_mask(path: Path) -> FilterMask:
-    """Reads a filter mask of Nav2, in the map_server form, once. Raises InputError as `load_grid_map`."""
+    """Reads a Nav2 filter mask in the map_server form, once per file. Raises InputError as `load_grid_map`."""
     _, file, picture, _ = _read(path)
     occupied, unknown = _classify(picture, file)
     percent = np.where(occupied, 100, 0).astype(np.int16)
@@ -195,7 +195,7 @@ def load_filter_mask(path: Path) -> FilterMask:
 
 
 def _read(path: Path) -> tuple[YamlSource, _MapFile, Brightness, tuple[str, ...]]:
-    """The file of a map, its keys, its picture, and remarks on both. Raises InputError."""
+    """Source, keys and picture of a map file, and remarks on them. Raises InputError when it cannot be used."""
     _refuse_other_files(path)
     source, strange = _without_unknown_keys(read_yaml(path))
     file = validate(_MapFile, source)
@@ -220,7 +220,7 @@ _OTHER_MAPS: Final = {
 
 
 def _refuse_other_files(path: Path) -> None:
-    """Refuses a picture of a map, and maps of other forms. Raises InputError with the file to give instead."""
+    """Raises InputError, naming the file to give instead, for a map's picture and for maps of other forms."""
     suffix = path.suffix.lower()
     if suffix in _PICTURES:
         beside = path.with_suffix(".yaml")
@@ -232,7 +232,7 @@ def _refuse_other_files(path: Path) -> None:
 
 
 def _without_unknown_keys(source: YamlSource) -> tuple[YamlSource, tuple[str, ...]]:
-    """The file without the keys that mean nothing here, and a remark on each; misspelled required keys stay."""
+    """Removes keys without a meaning here, with a remark on each; keeps misspelled required keys."""
     if not isinstance(source.data, dict) or not source.data.keys() & _MapFile.model_fields.keys():
         return source, ()
     lacking = {name for name, field in _MapFile.model_fields.items() if field.is_required()} - source.data.keys()
@@ -249,7 +249,7 @@ def _without_unknown_keys(source: YamlSource) -> tuple[YamlSource, tuple[str, ..
 
 
 def _picture(source: YamlSource, file: _MapFile) -> tuple[Brightness, tuple[str, ...]]:
-    """The map's picture, and a remark if it lies elsewhere. Raises InputError in the line that names it."""
+    """The map's picture, and a remark if it lies in another folder. Raises InputError at the line that names it."""
     name = file.image.replace("\\", "/").rpartition("/")[2]
     beside, notes = source.path.parent / name, tuple[str, ...]()
     try:
@@ -270,7 +270,7 @@ def _picture(source: YamlSource, file: _MapFile) -> tuple[Brightness, tuple[str,
 
 
 def _notes(picture: Brightness, file: _MapFile, occupied: BoolGrid, unknown: BoolGrid) -> tuple[str, ...]:
-    """Remarks on a map that probably does not mean what its file says, or that map_server reads otherwise."""
+    """Remarks on a map whose file is probably wrong, or which map_server interprets differently."""
     notes = []
     if picture.more_bytes:
         notes.append(f"image: it has {count_text(picture.more_bytes, 'byte')} after the last pixel, which are not read")
@@ -296,7 +296,7 @@ def _notes(picture: Brightness, file: _MapFile, occupied: BoolGrid, unknown: Boo
 def _turned(
     occupied: BoolGrid, unknown: BoolGrid, file: _MapFile, source: YamlSource, notes: tuple[str, ...]
 ) -> GridMap:
-    """The grid of a turned map with axes parallel to the world's; cells are half as long, so that thin walls stay."""
+    """Resamples a rotated map to axes parallel to the world's, at half the cell size so that thin walls stay."""
     x, y, yaw = file.origin
     c, s = math.cos(yaw), math.sin(yaw)
     rows, columns = occupied.shape
@@ -317,10 +317,10 @@ def _turned(
 
 
 def _classify(picture: Brightness, file: _MapFile) -> tuple[BoolGrid, BoolGrid]:
-    """Occupied and unknown cells, row 0 at the bottom, by the mode and thresholds as map_server applies them.
+    """Occupied and unknown cells, row 0 at the bottom, by mode and thresholds as map_server applies them.
 
-    Values between the thresholds are unknown in trinary mode, and in scale mode what is likelier. In raw mode a value
-    is the percentage itself, and unknown above 100. In the first two modes cells that are not opaque are unknown.
+    Values between the thresholds are unknown in trinary mode, and in scale mode the more likely state. In raw mode a
+    value is the percentage itself, and unknown above 100. In the first two modes cells that are not opaque are unknown.
     """
     if file.read_as == "raw":
         percent = np.flipud(np.rint(255.0 * picture.shares))

@@ -1,4 +1,4 @@
-"""Localisers: by LiDAR scans matched to the surveyed grid, or by odometry alone where there is no map."""
+"""Localisers: LiDAR scans matched to the surveyed grid, or odometry alone where there is no map."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _HEIGHTS_M = (0.7, 1.3)
 
 @dataclass(frozen=True)
 class LocaliserOptions:
-    """Scan matching on the surveyed grid, within `height_band_m` above the floor (the grid's own where None).
+    """Scan matching on the surveyed grid, within `height_band_m` above the floor (None: the grid's own band).
 
-    `initial_sigma` is the spread of the given start pose in x, y (m) and yaw (rad); `unsure_sigma` and
-    `unsure_radius_m` apply instead where the robot may have been moved since. Odometry is expected to err by
-    `drift_per_m` of the distance, `yaw_drift_rad_per_m` and `yaw_drift_per_rad` of a turn. The robot is lost when the
-    map explains a smaller share of the points than `lost_share` for `lost_scans` scans in a row, and found at
-    `found_share`. Poses whose shares differ by less than `alike_share` count as alike.
+    `initial_sigma`: standard deviations of the start pose in x, y (m) and yaw (rad); `unsure_sigma` and
+    `unsure_radius_m` replace it when the robot may have been moved. `drift_per_m`, `yaw_drift_rad_per_m` and
+    `yaw_drift_per_rad`: expected odometry error, as a fraction of the distance, per metre and per turn. `lost_share`,
+    `lost_scans` and `found_share`: the robot is lost when the map explains a smaller fraction of the points for so many
+    scans in a row, and found at `found_share`. `alike_share`: poses whose fractions differ by less compete.
     """
 
     height_band_m: tuple[Height, Height] | None = None
@@ -51,7 +51,7 @@ class LocaliserOptions:
     matching: MatchOptions = field(default_factory=MatchOptions)
 
     def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> ScanMatchingLocaliser:
-        """Creates a localiser that starts at a pose, surely or only probably, or anywhere (None)."""
+        """Creates a localiser that starts at a pose, reliable or only probable, or anywhere (None)."""
         if surely or start is None:
             return ScanMatchingLocaliser(grid, start, self)
         wide = replace(self, initial_sigma=self.unsure_sigma, search_radius_m=self.unsure_radius_m)
@@ -61,8 +61,8 @@ class LocaliserOptions:
 class ScanMatchingLocaliser:
     """Localiser by odometry, corrected with every new scan; implements `skills.api.Localiser`.
 
-    `initial` is X_WB at the first update; where it is None, the localiser waits to `accept` an estimate. The estimate
-    says `localised` once a scan has agreed with the map, and no longer when several in a row do not; the localiser then
+    `initial` is X_WB at the first update; when it is None, the localiser waits until `accept` is called. The estimate
+    is `localised` once a scan has agreed with the map, and no longer when several in a row do not; the localiser then
     searches around its belief.
     """
 
@@ -86,14 +86,14 @@ class ScanMatchingLocaliser:
         self._left_out_W: FloatArray = np.empty((0, 3))
 
     def estimate(self) -> LocalisationEstimate:
-        """The latest estimate, with the stamp of its last scan (minus infinity before the first)."""
+        """The latest estimate, with the stamp of the last scan used (minus infinity before the first)."""
         if self._transformed is None or self._transformed[0] is not self._X_WO:
             self._transformed = self._X_WO, self._X_WO.transform()
         covariance = self._covariance.copy()
         return LocalisationEstimate(self._stamp_s, self._transformed[1], covariance, self._localised, self._health())
 
     def update(self, robot: Robot) -> None:
-        """Takes in the newest scan, if it is new."""
+        """Updates with the newest scan, when it is new."""
         if self._initial is not None:
             self._X_WO = compose(self._initial, inverse(robot.odometry().pose))
             self._initial = None
@@ -111,9 +111,10 @@ class ScanMatchingLocaliser:
             self._take_in(rest_F)
 
     def exclude_robots(self, discs_W: FloatArray) -> None:
-        """Leaves out of later scans what lies within these discs, rows of x, y and radius (m, world).
+        """Ignores, in later scans, points within these discs, rows of x, y and radius (m, world).
 
-        The discs are placed by the believed pose. A scan of which too little is left neither confirms nor refutes it.
+        The estimated pose places the discs. A scan with too few remaining points neither confirms nor refutes that
+        pose.
         """
         self._left_out_W = discs_W
 
@@ -130,13 +131,13 @@ class ScanMatchingLocaliser:
         return LocalisationEstimate(scan.stamp_s, X_WO.transform(), found.covariance, True)
 
     def accept(self, estimate: LocalisationEstimate) -> None:
-        """Believes an estimate from now on; the next scans confirm or refute it."""
+        """Replaces the belief by an estimate; the next scans confirm or refute it."""
         self._X_WO = Pose2D.from_transform(estimate.X_WO)
         self._covariance = estimate.covariance.copy()
         self._poor_scans, self._localised, self._placed = 0, True, True
 
     def _take_in(self, points_F: FloatArray) -> None:
-        """Corrects the belief by a scan; searches around it once scans do not agree any more."""
+        """Corrects the belief by a scan; searches around the belief once scans no longer agree."""
         if not self._placed:
             return
         self._correct(points_F)
@@ -144,11 +145,11 @@ class ScanMatchingLocaliser:
             self._search(points_F, self._options.search_radius_m)
 
     def _health(self) -> float:
-        """Trust in the estimate, 0 to 1."""
+        """Confidence in the estimate, 0 to 1."""
         return self._inlier_share if self._localised else 0.0
 
     def _points(self, scan: Scan) -> FloatArray:
-        """At most max_points returns of a scan, evenly chosen, in the levelled body frame."""
+        """At most max_points returns from a scan, evenly sampled, in the levelled body frame."""
         options = self._options
         points = scan_points(
             scan, azimuths=options.azimuths, heights_m=self._heights_m, max_range_m=options.max_range_m
@@ -158,7 +159,7 @@ class ScanMatchingLocaliser:
         return np.ascontiguousarray(points[np.linspace(0, len(points) - 1, options.max_points).astype(np.int64)])
 
     def _outside_robots(self, points_F: FloatArray) -> FloatArray:
-        """The points that do not lie where another robot reports to be."""
+        """The points outside the discs of other robots."""
         if not (self._placed and len(self._left_out_W)):
             return points_F
         assert self._X_OB is not None
@@ -177,7 +178,7 @@ class ScanMatchingLocaliser:
         self._covariance = moved_covariance(self._covariance, old, new, along, yaw)
 
     def _correct(self, points_F: FloatArray) -> None:
-        """Matches a scan from the belief on; counts poor matches instead of believing them."""
+        """Matches a scan, starting from the belief; counts a poor match instead of using it."""
         assert self._X_OB is not None
         prior = compose(self._X_WO, self._X_OB)
         found = match(self._surfaces, points_F, prior, self._covariance, self._options.matching)
@@ -193,7 +194,7 @@ class ScanMatchingLocaliser:
         self._believe(found)
 
     def _note_poor(self, inlier_share: float) -> None:
-        """Counts a scan of which the map explains too small a share."""
+        """Counts a scan when the map explains too small a fraction of it."""
         self._inlier_share = inlier_share
         self._poor_scans += 1
         self._localised = self._localised and self._poor_scans < self._options.lost_scans
@@ -211,7 +212,7 @@ class ScanMatchingLocaliser:
         self._covariance = found.covariance
 
     def _search(self, points_F: FloatArray, radius_m: float) -> None:
-        """Searches around the belief, and believes the pose that fits."""
+        """Searches around the belief, and adopts a pose that fits."""
         assert self._X_OB is not None
         found = self._best_match(points_F, compose(self._X_WO, self._X_OB), radius_m)
         if found is not None:
@@ -219,9 +220,9 @@ class ScanMatchingLocaliser:
             self._poor_scans, self._localised = 0, True
 
     def _best_match(self, points_F: FloatArray, centre: Pose2D, radius_m: float | None) -> Match | None:
-        """The match that explains the largest share of the points, None when that is too small.
+        """The match that explains the largest fraction of the points; None when that is too small.
 
-        Of several that explain about as much, the one nearest to the centre.
+        Of several that explain about as much, returns the one nearest to the centre.
         """
         options, matches = self._options, self._matches(points_F, centre, radius_m)
         most = max((found.inlier_share for found in matches), default=0.0)
@@ -251,9 +252,9 @@ def moved_covariance(
 
 
 def candidate_poses(grid: GridMap, centre: Pose2D, radius_m: float | None) -> FloatArray:
-    """Poses (K, 3) on free ground, 0.2 m and 10 degrees apart, within radius_m of a pose or on the whole grid (None).
+    """Poses (K, 3) on free ground, 0.2 m and 10 degrees apart, within radius_m of a pose (None: on the whole grid).
 
-    With a radius, headings stay within 60 degrees of the centre's.
+    With a radius, headings stay within 60 degrees of the centre's heading.
     """
     low, size = np.array(grid.origin_m), np.array(grid.size_m)
     high = low + size
@@ -275,7 +276,7 @@ _START_VARIANCE = 1e-4
 class DeadReckoning:
     """Odometry alone, without a map: goals are relative to the start, and the error grows with the distance.
 
-    Odometry is expected to err by `drift_per_m` of the distance and by `yaw_drift_rad_per_m`.
+    `drift_per_m` and `yaw_drift_rad_per_m`: expected error of the odometry per metre.
     """
 
     drift_per_m: Share = 0.01
@@ -305,7 +306,7 @@ class OdometryLocaliser:
         return LocalisationEstimate(self._stamp_s, self._X_WO.transform(), np.diag(variance), self._last is not None)
 
     def update(self, robot: Robot) -> None:
-        """Takes in the newest odometry."""
+        """Updates with the newest odometry."""
         odometry = robot.odometry()
         if self._last is None:
             self._X_WO = compose(self._start, inverse(odometry.pose))

@@ -1,4 +1,4 @@
-"""Scan matching: robust Gauss-Newton from a guess on any map of surfaces, and scores of many poses on a grid."""
+"""Scan matching: robust Gauss-Newton from a prior on any map of surfaces, and scores of many poses on a grid."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ _CONVERGED = 1e-4
 class MatchOptions:
     """Weights of the points.
 
-    `sigma_m` is the noise of one point against the map; neighbouring points err alike, so all of them together count
-    as `effective_points` independent ones. Points farther off than `outlier_m` have no weight, or `coarse_outlier_m` in
-    the first third of the iterations. The map explains a point within `inlier_m` of a surface.
+    `sigma_m`: noise of one point against the map. `effective_points`: number of independent points to which all points
+    amount, because neighbours have similar errors. `outlier_m` and `coarse_outlier_m`: points farther off have no
+    weight, and the same in the first third of the iterations. `inlier_m`: the map explains a point this near to a
+    surface.
     """
 
     sigma_m: Length = 0.05
@@ -39,7 +40,7 @@ class MatchOptions:
 
 @dataclass(frozen=True)
 class Match:
-    """The matched pose X_WF, its covariance over x, y (m), yaw (rad), and the share of points that the map explains."""
+    """The matched pose X_WF, its covariance over x, y (m), yaw (rad), and the fraction of points explained."""
 
     pose: Pose2D
     covariance: FloatArray
@@ -54,14 +55,14 @@ Parameters are the points (N, 2 or more columns), the pose (3,), the weight of a
 
 
 def grid_surfaces(grid: GridMap) -> Linearise:
-    """The surfaces of a surveyed grid, by its distance field."""
+    """Returns the `Linearise` function for a surveyed grid, which uses the grid's distance field."""
     return partial(_linearise, grid.distance, _frame(grid))
 
 
 def match(
     surfaces: Linearise, points_F: FloatArray, prior: Pose2D, covariance: FloatArray, options: MatchOptions
 ) -> Match:
-    """The pose X_WF at which the points (N, 2 or more columns) lie best on the surfaces, given a prior."""
+    """The pose X_WF at which the points (N, 2 or more columns) fit the surfaces best, given a prior."""
     mean = np.array([prior.x_m, prior.y_m, prior.yaw_rad])
     weight = min(1.0, options.effective_points / max(1, len(points_F))) / options.sigma_m**2
     information = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
@@ -80,12 +81,12 @@ def match(
 
 
 def score_poses(grid: GridMap, points_F: FloatArray, poses: FloatArray, reach_m: float = 0.3) -> FloatArray:
-    """Scores of (K, 3) poses x, y, yaw: 1 where all points lie on surfaces, 0 where none lies within reach_m of one."""
+    """Scores of poses (K, 3) x, y, yaw: 1 when all points lie on surfaces, 0 when none lies within reach_m of one."""
     return _score(grid.distance, _frame(grid), points_F, poses, reach_m)
 
 
 def _frame(grid: GridMap) -> tuple[float, float, float]:
-    """The size of a cell and the x, y of the grid's corner, in metres."""
+    """Cell size and x, y of the grid's corner, in metres."""
     return (grid.resolution_m, grid.origin_m[0], grid.origin_m[1])
 
 
@@ -99,9 +100,9 @@ def add_residual(
     weight: float,
     outlier_m: float,
 ) -> None:
-    """Adds one point's residual along a surface normal, weighed by Tukey's biweight, in place.
+    """Adds one point's residual along a surface normal, weighted by Tukey's biweight, in place.
 
-    `offset` is the point as seen from the pose, in the axes of the map.
+    `offset` is the point relative to the pose, in the axes of the map.
     """
     turn = normal[1] * offset[0] - normal[0] * offset[1]
     jacobian = (normal[0], normal[1], turn)
@@ -122,7 +123,7 @@ def _linearise(
     outlier_m: float,
     inlier_m: float,
 ) -> tuple[FloatArray, FloatArray, int]:
-    """The loop of `grid_surfaces`; see `Linearise`."""
+    """Compiled loop of `grid_surfaces`; see `Linearise`."""
     hessian, gradient = np.zeros((3, 3)), np.zeros(3)
     rows, columns = distance.shape
     c, s, inliers = math.cos(pose[2]), math.sin(pose[2]), 0
@@ -153,7 +154,7 @@ def _score(
     poses: FloatArray,
     reach: float,
 ) -> FloatArray:
-    """The loop of `score_poses`; nearest cell, no interpolation."""
+    """Compiled loop of `score_poses`; nearest cell, no interpolation."""
     scores = np.zeros(poses.shape[0])
     rows, columns = distance.shape
     for k in range(poses.shape[0]):

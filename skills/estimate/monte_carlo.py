@@ -24,15 +24,16 @@ _MOST_AT_REST = 3
 
 @dataclass(frozen=True)
 class MonteCarloOptions:
-    """Monte Carlo localisation: a particle filter finds the place of the robot, scan matching the pose in it.
+    """Monte Carlo localisation: a particle filter finds the region of the pose, scan matching the pose within it.
 
-    Particles are weighed after each `update_m` of driving or `update_rad` of a turn; at rest, while the place is
-    unknown, every `patience_scans` scans, but a few times only, since all these scans err alike. The place is known
-    once `sure_mass` of the weight is in one mode for `sure_updates` in a row. When less than `unsure_mass` is left
-    there, the belief goes to a mode where the scan fits better by `better_share`; while scan matching still explains
-    most of the scan, only after `better_updates` such updates. Where scans surprise by more than `surprise`, or the
-    place is unknown, `injected` particles join about each of the best `hypotheses` of `draws` random poses, refined by
-    scan matching. A search finds no pose where two places fit alike, within `alike_share`.
+    `update_m` and `update_rad`: motion after which particles are weighted. `patience_scans`: at rest, while the pose is
+    unknown, they are weighted every so many scans, but a few times only, since all these scans have the same error.
+    `sure_mass` and `sure_updates`: the pose is known once one mode has this weight for so many updates in a row.
+    `unsure_mass`, `better_share` and `better_updates`: when that mode has less weight, the belief moves to a mode where
+    the scan fits better by this fraction; while scan matching explains most of the scan, only after so many such
+    updates. `surprise`, `injected`, `hypotheses` and `draws`: where scans are this unlikely, or the pose is unknown, so
+    many particles join about each of the best hypotheses among `draws` random poses, refined by scan matching.
+    `alike_share`: a search finds no pose when two fit within this difference.
     """
 
     tracking: LocaliserOptions = field(default_factory=LocaliserOptions)
@@ -52,7 +53,7 @@ class MonteCarloOptions:
     alike_share: Share = 0.05
 
     def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> MonteCarloLocaliser:
-        """Creates a localiser that starts at a pose, surely or only probably, or anywhere (None)."""
+        """Creates a localiser that starts at a pose, reliable or only probable, or anywhere (None)."""
         if surely or start is None:
             return MonteCarloLocaliser(grid, start, self)
         wide = replace(self.tracking, initial_sigma=self.tracking.unsure_sigma)
@@ -62,8 +63,8 @@ class MonteCarloOptions:
 class MonteCarloLocaliser(ScanMatchingLocaliser):
     """Adaptive Monte Carlo localisation; implements `skills.api.SearchingLocaliser`.
 
-    Scan matching carries the belief as long as the particles about it have the weight; where they gather elsewhere, the
-    belief goes there. With `initial` None the robot may be anywhere.
+    Scan matching updates the belief as long as the particles near it have enough weight; when they gather elsewhere,
+    the belief moves there. With `initial` None the robot may be anywhere.
     """
 
     def __init__(self, grid: GridMap, initial: Pose2D | None, options: MonteCarloOptions | None = None) -> None:
@@ -89,12 +90,12 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         return np.asarray(self.particles.poses[chosen])
 
     def estimate(self) -> LocalisationEstimate:
-        """The latest estimate; while the place is unknown its covariance is that of all particles."""
+        """The latest estimate; while the pose is unknown its covariance is that of all particles."""
         estimate = super().estimate()
         return estimate if self._localised else replace(estimate, covariance=self._lost_covariance.copy())
 
     def accept(self, estimate: LocalisationEstimate) -> None:
-        """Believes an estimate from now on; all particles go there."""
+        """Replaces the belief by an estimate; all particles move there."""
         super().accept(estimate)
         if self._X_OB is not None:
             self.particles.place(compose(self._X_WO, self._X_OB), estimate.covariance + _SPREAD)
@@ -102,9 +103,9 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         self._mass, self._agreeing = 1.0, self._own.sure_updates
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
-        """Searches for the pose where a scan fits the map; None also where two places fit equally well.
+        """Searches for the pose where a scan fits the map; None also when two poses fit equally well.
 
-        Before the first fix, of places that fit equally well it is the one where the robot is expected to be.
+        Before the first fix, the expected pose wins among poses that fit equally well.
         """
         X_OB = Pose2D.from_transform(scan.X_OB)
         here = compose(Pose2D.from_transform(belief.X_WO), X_OB)
@@ -121,7 +122,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         return LocalisationEstimate(scan.stamp_s, X_WO, best.covariance, True, best.inlier_share)
 
     def _take_in(self, points_F: FloatArray) -> None:
-        """Carries the belief on by scan matching, and weighs the particles when that is due."""
+        """Updates the belief by scan matching, and weights the particles when that is due."""
         if self._localised:
             self._expected = False
         if self._placed:
@@ -136,7 +137,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         return self._mass * self._inlier_share if self._placed else 0.0
 
     def _due(self) -> bool:
-        """Returns whether particles are to be weighed: the robot moved enough, or waits at rest to be localised."""
+        """Returns whether to weight the particles: the robot moved enough, or waits at rest to be localised."""
         assert self._X_OB is not None
         if self._weighed_at is None:
             return True
@@ -161,7 +162,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         self._lost_covariance = particles.covariance
 
     def _judge(self, points_F: FloatArray) -> None:
-        """Moves the belief to where the particles are, and decides whether the place is known."""
+        """Moves the belief to where the particles are, and decides whether the pose is known."""
         assert self._X_OB is not None
         options = self._own
         self._mass = self.particles.mass_near(compose(self._X_WO, self._X_OB)) if self._placed else 0.0
@@ -173,7 +174,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
             self._localised, self._poor_scans = True, 0
 
     def _go_to(self, mode: Mode, points_F: FloatArray) -> None:
-        """Believes in a mode where the scan fits; gives up a belief that fits well only after many better updates."""
+        """Moves the belief to a mode where the scan fits; leaves a good fit only after many better updates."""
         found = match(self._surfaces, points_F, mode.mean, mode.covariance + _SPREAD, self._options.matching)
         fits = mode.mass > self._mass and found.inlier_share >= self._options.lost_share
         better = fits and found.inlier_share > self._inlier_share + self._own.better_share
@@ -186,7 +187,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
             self._mass, self._inlier_share = mode.mass, found.inlier_share
 
     def _injected(self, points_F: FloatArray, beams: FloatArray) -> FloatArray | None:
-        """Particles about the belief and, when scans surprise, about hypotheses anywhere; None when there are none."""
+        """Particles near the belief and, when scans are unlikely, near hypotheses anywhere; None without any."""
         assert self._X_OB is not None
         options, particles = self._own, self.particles
         hypotheses = [compose(self._X_WO, self._X_OB)] if self._placed else []
@@ -196,7 +197,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         return np.concatenate(drawn) if drawn else None
 
     def _hypotheses(self, points_F: FloatArray, beams: FloatArray) -> list[Match]:
-        """The best of some random poses, refined by scan matching."""
+        """The best of many random poses, refined by scan matching."""
         best = self.particles.likeliest_poses(self._own.draws, self._own.hypotheses, beams)
         surfaces, options = self._surfaces, self._options.matching
         found = [match(surfaces, points_F, Pose2D(*pose), _BASIN, options) for pose in best.tolist()]
@@ -204,7 +205,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
 
 
 def _thinned(points_F: FloatArray, count: int) -> FloatArray:
-    """At most `count` of the points, evenly chosen."""
+    """At most `count` of the points, evenly sampled."""
     chosen = np.linspace(0, len(points_F) - 1, min(count, len(points_F))).astype(np.int64)
     return np.ascontiguousarray(points_F[chosen])
 

@@ -1,4 +1,4 @@
-"""A particle filter of planar poses on a grid: likelihood field with beam skipping, KLD-adaptive size, injection.
+"""A particle filter over planar poses on a grid: likelihood field with beam skipping, KLD-adaptive size, injection.
 
 After Thrun, Burgard and Fox, Probabilistic Robotics, chapter 8: augmented Monte Carlo localisation.
 """
@@ -31,13 +31,13 @@ _LEAST_SHARE = 1e-6
 class FilterOptions:
     """Motion, weights and number of the particles.
 
-    `beams` points of a scan count as `effective_beams` independent ones, or fewer, so that after weighing at least
-    `least_effective` particles count. Each is a hit of spread `hit_sigma_m`, or random with `random_share`. A beam that
-    less than `skip_share` of the particles explain within `skip_m` is skipped, unless that were more than `skip_most`
-    of the beams. The number of particles keeps the KL divergence over bins of `bin_m` and `bin_rad` below `kld_error`
-    at the normal quantile `kld_quantile`. `slow` and `fast` are the rates of the two averages of the likelihood.
-    Odometry errs by `drift_per_m`, `yaw_drift_rad_per_m` and `yaw_drift_per_rad`; `roughening_m` and `roughening_rad`
-    keep equal particles apart.
+    `beams` and `effective_beams`: points of a scan, and the number of independent ones to which they amount; fewer if
+    needed so that the effective sample size is at least `least_effective`. `hit_sigma_m` and `random_share`: spread of
+    a hit, and fraction of random returns. `skip_share`, `skip_m` and `skip_most`: a beam that a smaller fraction of the
+    particles explain within `skip_m` is skipped, unless that were more than `skip_most` of the beams. `bin_m`,
+    `bin_rad`, `kld_error` and `kld_quantile`: bins, bound on the KL divergence and normal quantile that set the number
+    of particles. `slow` and `fast`: rates of the two averages of the likelihood. `drift_per_m`, `yaw_drift_rad_per_m`
+    and `yaw_drift_per_rad`: odometry error. `roughening_m` and `roughening_rad`: noise that separates equal particles.
     """
 
     seed: Tries = 0
@@ -66,7 +66,7 @@ class FilterOptions:
 
 @dataclass(frozen=True)
 class Mode:
-    """A cluster of particles: its share of the whole weight, its mean, and its covariance over x, y (m), yaw (rad)."""
+    """A cluster of particles: its fraction of the total weight, its mean, its covariance over x, y (m), yaw (rad)."""
 
     mass: float
     mean: Pose2D
@@ -76,7 +76,7 @@ class Mode:
 class ParticleFilter:
     """Weighted poses X_WB. Call `place` or `scatter` first; then `move`, `weigh` and `resample` in turn.
 
-    Raises InputError when the map has no free ground.
+    The constructor raises InputError when the map has no free ground.
     """
 
     def __init__(self, grid: GridMap, options: FilterOptions) -> None:
@@ -95,7 +95,7 @@ class ParticleFilter:
 
     @property
     def surprise(self) -> float:
-        """Drop of the likelihood of the last scans: 0 for none, towards 1 for a kidnapped robot."""
+        """Drop of the likelihood of recent scans: 0 for none, towards 1 for a kidnapped robot."""
         return max(0.0, 1.0 - self._fast / self._slow) if self._slow > 0.0 else 0.0
 
     @property
@@ -104,11 +104,11 @@ class ParticleFilter:
         return _spread(self.poses, self.weights)[1]
 
     def place(self, mean: Pose2D, covariance: FloatArray) -> None:
-        """Puts all particles around a pose."""
+        """Draws all particles around a pose."""
         self._replace(self.sample_around(mean, covariance, self._options.min_particles))
 
     def scatter(self) -> None:
-        """Spreads the greatest number of particles evenly over the map."""
+        """Spreads the maximum number of particles uniformly over the map."""
         self._replace(self.sample_anywhere(self._options.max_particles))
 
     def sample_around(self, mean: Pose2D, covariance: FloatArray, count: int) -> FloatArray:
@@ -117,7 +117,7 @@ class ParticleFilter:
         return np.asarray(drawn + [mean.x_m, mean.y_m, mean.yaw_rad])
 
     def sample_anywhere(self, count: int) -> FloatArray:
-        """Poses (count, 3) drawn evenly from the free cells."""
+        """Poses (count, 3) drawn uniformly from the free cells."""
         free = np.empty((0, 2))
         while len(free) < count:
             drawn = self._rng.random((4 * count, 2)) * self._standable.shape
@@ -127,14 +127,14 @@ class ParticleFilter:
         return np.column_stack([places, self._rng.uniform(-math.pi, math.pi, count)])
 
     def likeliest_poses(self, draws: int, count: int, points_F: FloatArray) -> FloatArray:
-        """The likeliest `count` poses (count, 3) of `draws` random ones, at most one for each place and heading."""
+        """The most likely `count` poses (count, 3) of `draws` random ones, at most one per position and heading bin."""
         drawn = self.sample_anywhere(draws)
         drawn = drawn[np.argsort(-self.log_likelihoods(drawn, points_F), kind="stable")]
         _, first = np.unique(_bins(drawn, MODE_RADIUS_M, MODE_TURN_RAD), return_index=True)
         return np.asarray(drawn[np.sort(first)[:count]])
 
     def move(self, step: Pose2D) -> None:
-        """Moves each particle by a step of odometry, in the body frame, with the odometry's errors."""
+        """Moves each particle by an odometry step in the body frame, with sampled odometry errors."""
         options = self._options
         distance, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
         along = options.roughening_m + options.drift_per_m * distance
@@ -147,7 +147,7 @@ class ParticleFilter:
         self.poses[:, 2] = wrap(self.poses[:, 2] + step.yaw_rad + noise[:, 2])
 
     def weigh(self, points_F: FloatArray) -> None:
-        """Weighs each particle by the beams (M, 2) of a scan."""
+        """Weights each particle by the beams (M, 2) of a scan."""
         options = self._options
         everything = self.log_likelihoods(self.poses, points_F)
         fit = float(self.weights @ np.exp(everything))
@@ -168,11 +168,11 @@ class ParticleFilter:
         return _log_likelihoods(self._field, self._standable, self._geometry, poses, points)
 
     def forget(self) -> None:
-        """Starts the averages of the likelihood again."""
+        """Resets the averages of the likelihood."""
         self._slow = self._fast = 0.0
 
     def resample(self, injected: FloatArray | None = None) -> None:
-        """Draws as many particles as the KL divergence asks for; adds the `injected` ones (K, 3) with equal weights."""
+        """Draws as many particles as the KL divergence requires; adds the `injected` ones (K, 3) with equal weights."""
         options, joining = self._options, 0 if injected is None else len(injected)
         drawn = self._draw(min(options.max_particles, 4 * max(len(self.poses), options.min_particles)))
         count = self._enough(self.poses[drawn])
@@ -180,11 +180,11 @@ class ParticleFilter:
         self._replace(poses if injected is None or not joining else np.concatenate([poses, injected]), keep=True)
 
     def mass_near(self, pose: Pose2D) -> float:
-        """Share of the weight in the mode at a pose."""
+        """Fraction of the weight in the mode at a pose."""
         return float(self.weights[self._near(pose)].sum())
 
     def mode(self) -> Mode:
-        """The heaviest mode."""
+        """The mode with the largest weight."""
         keys = _bins(self.poses, MODE_RADIUS_M, MODE_TURN_RAD)
         _, index = np.unique(keys, return_inverse=True)
         chosen = index == np.argmax(np.bincount(index, self.weights))
@@ -203,7 +203,7 @@ class ParticleFilter:
         return np.asarray(near & (np.abs(wrap(off[:, 2])) < MODE_TURN_RAD))
 
     def _explained(self, points_F: FloatArray) -> NDArray[np.bool_]:
-        """Returns whether each beam (M,) counts; all of them do where too many would be skipped."""
+        """Mask (M,) of the beams that count; all of them when too many would be skipped."""
         options = self._options
         stride = max(1, len(self.poses) // _AGREEMENT_PARTICLES)
         poses = np.ascontiguousarray(self.poses[::stride])
@@ -220,7 +220,7 @@ class ParticleFilter:
         return self._rng.permutation(drawn)
 
     def _enough(self, poses: FloatArray) -> int:
-        """The number of drawn poses that is enough, by KLD sampling: the more bins are filled, the more poses."""
+        """Sufficient number of drawn poses by KLD sampling: the more bins are filled, the more poses."""
         options = self._options
         _, first = np.unique(_bins(poses, options.bin_m, options.bin_rad), return_index=True)
         new = np.zeros(len(poses))
@@ -243,13 +243,13 @@ def _likelihood_field(grid: GridMap, options: FilterOptions) -> NDArray[np.float
 
 
 def _standable(grid: GridMap) -> NDArray[np.bool_]:
-    """The cells where the middle of a robot can be: known, and away from occupied cells."""
+    """Mask of the cells where the robot's centre can be: known, and away from occupied cells."""
     open_cells = grid.distance > 0.1
     return open_cells if grid.unknown is None else open_cells & ~grid.unknown
 
 
 def _bins(poses: FloatArray, size_m: float, size_rad: float) -> NDArray[np.int64]:
-    """A number for the bin of each pose."""
+    """Bin number of each pose."""
     cells = np.floor(poses / (size_m, size_m, size_rad)).astype(np.int64)
     cells -= cells.min(axis=0)
     _, rows, turns = cells.max(axis=0) + 1
@@ -264,7 +264,7 @@ def _kld_bound(bins: FloatArray, error: float, quantile: float) -> FloatArray:
 
 
 def _spread(poses: FloatArray, weights: FloatArray) -> tuple[Pose2D, FloatArray]:
-    """Mean and covariance of weighted poses; the mean of headings is that of directions."""
+    """Mean and covariance of weighted poses, with the circular mean of the headings."""
     share = weights / weights.sum()
     yaw = math.atan2(float(share @ np.sin(poses[:, 2])), float(share @ np.cos(poses[:, 2])))
     x, y = share @ poses[:, :2]
@@ -282,7 +282,7 @@ def _log_likelihoods(
     poses: FloatArray,
     points: FloatArray,
 ) -> FloatArray:
-    """The loop of `log_likelihoods`. A pose where no robot can stand loses _IN_WALL."""
+    """Compiled loop of `log_likelihoods`. A pose where no robot can stand loses _IN_WALL."""
     rows, columns = field.shape
     least = float(field.min())
     sums = np.empty(poses.shape[0])
@@ -310,7 +310,7 @@ def _agreement(
     points: FloatArray,
     near_m: float,
 ) -> FloatArray:
-    """The share (M,) of the poses at which each beam ends near a surface."""
+    """Fraction (M,) of the poses at which each beam ends near a surface."""
     rows, columns = distance.shape
     counts = np.zeros(points.shape[0])
     for k in range(poses.shape[0]):

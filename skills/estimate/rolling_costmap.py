@@ -1,4 +1,4 @@
-"""The costmap of a place without a map: obstacles that the LiDAR has seen, on a window that moves with the robot."""
+"""Costmap of a site without a map: obstacles that the LiDAR has seen, in a window that moves with the robot."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ _FACE_M = 0.15
 
 @dataclass(frozen=True)
 class RollingCostmapOptions:
-    """Costmap without a map: obstacles of the LiDAR between the heights and within max_range_m; unseen ground is free.
+    """Costmap without a map: LiDAR obstacles between the heights and within max_range_m; unseen ground is free.
 
-    Each beam adds `hit` to the log odds of the cell in which it ends, and takes `miss` from the cells that it passes at
-    the height of the obstacle seen there (Moravec and Elfes 1985). The window is `window_m` wide and moves once the
-    robot is a quarter of that off its middle. Unseen ground has a clearance of `unknown_clearance_m` at most.
+    `hit` and `miss`: log odds that a beam adds to the cell in which it ends, and subtracts from cells that it crosses
+    at the height of the obstacle seen there (Moravec and Elfes 1985). `window_m`: width of the window, which moves once
+    the robot is a quarter of it off its centre. `unknown_clearance_m`: largest clearance of unseen ground.
     """
 
     heights_m: tuple[Height, Height] = (0.1, 1.0)
@@ -81,7 +81,7 @@ class RollingCostmap:
         self._filter: SelfFilter | None = None
 
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
-        """Distance (m) from each (x, y) row to the nearest obstacle; off the window as at its edge."""
+        """Distance (m) from each (x, y) row to the nearest obstacle; off the window the value at its edge."""
         points = np.ascontiguousarray(points_W, dtype=np.float64)
         off_m = np.abs(points[:, :2] - (self._X_WB.x_m, self._X_WB.y_m))
         if len(points) and self._corner_m is not None and float(off_m.max()) < _NEAR_M - _NEAR_SURE_M:
@@ -93,11 +93,11 @@ class RollingCostmap:
         return _looked_up(self._all, self._options.cell_m, *(self._corner_m or (0.0, 0.0)), points)
 
     def unexplained_returns(self) -> tuple[float, FloatArray]:
-        """The last scan's stamp, and its returns (N, 3) that lie away from all obstacles seen before."""
+        """The last scan's stamp, and its returns (N, 3) away from all obstacles seen before."""
         return self._stamp_s, self._returns_W
 
     def clear_obstacles(self, within_W: FloatArray | None = None) -> int:
-        """Clears all cells, or those within discs; returns the number of cells that were blocked."""
+        """Clears all cells, or those within discs; returns the number of blocked cells that it cleared."""
         forgotten = np.ones(self._odds.shape, dtype=np.bool_)
         if within_W is not None:
             rows, columns = np.indices(self._odds.shape).reshape(2, -1)
@@ -111,7 +111,7 @@ class RollingCostmap:
         return blocked
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Moves the window along and takes in the newest scan, if it is new."""
+        """Moves the window and updates with the newest scan, when it is new."""
         X_WO = Pose2D.from_transform(localisation.X_WO)
         self._X_WB = compose(X_WO, robot.odometry().pose)
         self._filter = self._filter or SelfFilter.of(robot.capabilities())
@@ -125,7 +125,7 @@ class RollingCostmap:
         self._changed()
 
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        """Takes in (N, 3) points of a depth camera, without those on the floor."""
+        """Adds points (N, 3) from a depth camera, except those on the floor."""
         if self._corner_m is None or self._filter is None or len(points_W) == 0:
             return
         points = points_W[self._filter.foreign(points_in_body_axes(points_W, self._X_WB), np.empty((0, 3)))]
@@ -146,7 +146,7 @@ class RollingCostmap:
         return np.asarray(np.floor(scaled[:, ::-1]).astype(np.int64))
 
     def _follow(self, X_WF: Pose2D) -> None:
-        """Keeps the robot in the middle half of the window; cells of the old window that lie in the new one stay."""
+        """Keeps the robot in the central half of the window; cells shared by the old and the new window stay."""
         cell, count = self._options.cell_m, self._odds.shape[0]
         place = np.array([X_WF.x_m, X_WF.y_m])
         corner = np.round(place / cell - 0.5 * count)
@@ -160,9 +160,9 @@ class RollingCostmap:
         self._corner_m = (float(corner[0] * cell), float(corner[1] * cell))
 
     def _take(self, robot: Robot, scan: Scan, X_WF: Pose2D) -> None:
-        """Traces each column of beams to the nearest obstacle in it.
+        """Traces each column of beams to its nearest obstacle.
 
-        Beams see past a column only where all beams that lead down came back: none is lost, or too near to be measured.
+        Beams pass beyond a column only when all downward beams returned: none is lost, or too near to be measured.
         """
         assert self._corner_m is not None and self._filter is not None
         options = self._options
@@ -196,7 +196,7 @@ class RollingCostmap:
         )
 
     def _near_field(self) -> tuple[NDArray[np.float32], float, float]:
-        """The distance field about the robot, and the x and y of its corner (m)."""
+        """The distance field around the robot, and the x and y of its corner (m)."""
         assert self._corner_m is not None
         cell, (x0_m, y0_m) = self._options.cell_m, self._corner_m
         half, most = round(_NEAR_M / cell), self._odds.shape[0]
@@ -205,7 +205,7 @@ class RollingCostmap:
         return self._distances(rows, columns), x0_m + columns.start * cell, y0_m + rows.start * cell
 
     def _distances(self, rows: slice, columns: slice) -> NDArray[np.float32]:
-        """Distance (m) from each cell of a part to the nearest blocked one in it."""
+        """Distance (m) from each cell in a part of the window to the nearest blocked cell in that part."""
         blocked, known = self._odds[rows, columns] > 0.0, self._known[rows, columns]
         field = np.full(blocked.shape, self._options.window_m, dtype=np.float32)
         if blocked.any():
@@ -217,7 +217,7 @@ class RollingCostmap:
 
 
 def _shifted(values: NDArray[Any], rows: int, columns: int) -> NDArray[Any]:
-    """The values of a grid in a window that is shifted by so many cells."""
+    """The values of a grid after the window has shifted by `rows` and `columns`."""
     moved = np.zeros_like(values)
     height, width = values.shape
     if abs(rows) < height and abs(columns) < width:
@@ -230,7 +230,7 @@ def _shifted(values: NDArray[Any], rows: int, columns: int) -> NDArray[Any]:
 def _looked_up(
     field: NDArray[np.float32], cell_m: float, x0_m: float, y0_m: float, points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The values of a field at points (N, 2); off the field, those of its edge."""
+    """The values of a field at points (N, 2); clamped to its edge outside."""
     values = np.empty(points.shape[0])
     for n in range(points.shape[0]):
         values[n] = bilinear(field, (points[n, 0] - x0_m) / cell_m - 0.5, (points[n, 1] - y0_m) / cell_m - 0.5)
@@ -239,9 +239,10 @@ def _looked_up(
 
 @compiled
 def _nearest(points: FloatArray, origin: FloatArray, weight: FloatArray, stride: int) -> FloatArray:
-    """Range and height (columns, 2) of the nearest obstacle in each column of beams, infinite where there is none.
+    """Range and height (columns, 2) of the nearest obstacle in each column of beams; infinite when there is none.
 
-    Both are of the returns within 0.15 m behind the first, which lie on one upright face: mean range, greatest height.
+    Both come from the returns within 0.15 m behind the first, which lie on one upright face: mean range, maximum
+    height.
     """
     count = weight.shape[0]
     first = np.full(count, np.inf)
@@ -262,7 +263,7 @@ def _nearest(points: FloatArray, origin: FloatArray, weight: FloatArray, stride:
 
 
 class _Gains(NamedTuple):
-    """Change of the log odds where a beam ends and where it passes, and the range of the beams."""
+    """Changes of the log odds where a beam ends and where it passes, and the range of the beams."""
 
     hit: float
     miss: float
@@ -286,8 +287,8 @@ def _trace(
 ) -> None:
     """Lowers the odds along each column of beams and raises them half a cell behind its end, in place.
 
-    `frame` is the size of a cell and the corner, `slope` that of the lowest beam. Ground under the robot (outline
-    `own`) becomes known.
+    `frame` is cell size and corner, `slope` that of the lowest beam. Ground under the robot (outline `own`) becomes
+    known.
     """
     cell, x0, y0 = frame
     c, s = math.cos(pose[2]), math.sin(pose[2])

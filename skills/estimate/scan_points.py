@@ -1,7 +1,7 @@
-"""Points of one LiDAR revolution in the levelled body frame F, and the filter of the robot's own points.
+"""Points from one LiDAR revolution in the levelled body frame F, and the filter for the robot's own points.
 
-Frame F stands at the body's origin on the floor: x along the body's heading, z straight up from the floor. It differs
-from the body frame by height, roll and pitch.
+Frame F is on the floor below the body's origin: x along the body's heading, z straight up. It differs from the body
+frame by height, roll and pitch.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _MOVED_RAD = 0.02
 
 
 class ArmShape:
-    """The arm as line segments, by the robot's description and joint angles."""
+    """The arm as line segments, from the robot's description and joint angles."""
 
     def __init__(self, capabilities: Capabilities) -> None:
         if capabilities.arm is None:
@@ -41,7 +41,7 @@ class ArmShape:
         self._joints = [self._plant.GetJointByName(name) for name in self._names]
 
     def points_B(self, joints: Joints) -> FloatArray:
-        """The arm's joints in order and the tip beyond the hand, (joints + 1, 3) in the body frame."""
+        """The arm's joints in order and the tip of the hand, (joints + 1, 3) in the body frame."""
         q = self._plant.GetPositions(self._context)
         for name, joint in zip(self._names, self._joints, strict=True):
             q[joint.position_start()] = joints.position_rad[name]
@@ -53,7 +53,7 @@ class ArmShape:
 
 @dataclass(frozen=True)
 class SelfFilter:
-    """Filter of the robot's own points. `outline_m` is (x_min, x_max, y_min, y_max) of the body."""
+    """Removes the robot's own points. `outline_m` is (x_min, x_max, y_min, y_max) of the body."""
 
     outline_m: tuple[float, float, float, float]
     arm: ArmShape | None = None
@@ -63,14 +63,14 @@ class SelfFilter:
 
     @staticmethod
     def of(capabilities: Capabilities) -> SelfFilter:
-        """Creates the filter of a robot, without the arm when the robot has none or describes none."""
+        """Creates the filter for a robot; without the arm when the robot has none or describes none."""
         corners = np.array(capabilities.footprint_m)
         (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
         arm = ArmShape(capabilities) if capabilities.arm and capabilities.description else None
         return SelfFilter((float(x0), float(x1), float(y0), float(y1)), arm)
 
     def arm_F(self, robot: Robot, scan: Scan) -> FloatArray:
-        """The arm's points (N, 3) as it stands now, in the levelled body frame of a scan; empty without an arm."""
+        """The arm's points (N, 3) at its present angles, in a scan's levelled body frame; empty without an arm."""
         if self.arm is None:
             return np.empty((0, 3))
         rotation, translation = sensor_pose(scan)
@@ -80,9 +80,9 @@ class SelfFilter:
     def foreign(self, points_F: FloatArray, arm_F: FloatArray, *, holding: bool = False) -> NDArray[np.bool_]:
         """Returns whether each (x, y, z) row is not part of the robot.
 
-        All are given in one frame with the body's axes; `arm_F` holds the arm's points (`ArmShape`) and may be empty.
-        Above the body only the body's margin counts, so that a person just before the stowed arm is seen. While
-        `holding`, points about the hand count as the held object.
+        All points are in one frame with the body's axes; `arm_F` are the arm's points (`ArmShape`), perhaps none. Above
+        the body only the body's margin counts, so that a person right in front of the stowed arm is seen. While
+        `holding`, points near the hand count as the held object.
         """
         x0, x1, y0, y1 = self.outline_m
         m = self.body_margin_m
@@ -98,7 +98,7 @@ class SelfFilter:
 
 
 def segment_distance(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Distance of (N, 3) points from the segment start-end."""
+    """Distance from points (N, 3) to the segment start-end."""
     along = end - start
     share = np.clip((points - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
     return np.asarray(np.linalg.norm(points - start - share[:, None] * along, axis=1))
@@ -112,10 +112,9 @@ def points_in_body_axes(points_W: FloatArray, X_WB: Pose2D) -> FloatArray:
 
 
 def scan_points(scan: Scan, *, azimuths: int, heights_m: tuple[float, float], max_range_m: float) -> FloatArray:
-    """Points (N, 5) of a scan in frame F: x, y, height above the floor (m), ring and azimuth index in the scan.
+    """Points (N, 5) from a scan in frame F: x, y, height above the floor (m), ring and azimuth index in the scan.
 
-    About `azimuths` columns of the scan are used, evenly spaced, and returns nearer than max_range_m whose height lies
-    in heights_m.
+    Uses about `azimuths` evenly spaced columns of the scan, and returns within max_range_m at heights in heights_m.
     """
     stride = max(1, len(scan.azimuths_rad) // azimuths)
     ranges = np.ascontiguousarray(scan.ranges_m[:, ::stride])
@@ -126,21 +125,21 @@ def scan_points(scan: Scan, *, azimuths: int, heights_m: tuple[float, float], ma
 
 
 def placed_points(points_F: FloatArray, X_WF: Pose2D) -> FloatArray:
-    """World points (N, 3) of points in the levelled body frame."""
+    """Converts points in the levelled body frame to world points (N, 3)."""
     c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
     x, y = points_F[:, 0], points_F[:, 1]
     return np.column_stack([X_WF.x_m + c * x - s * y, X_WF.y_m + s * x + c * y, points_F[:, 2]])
 
 
 def outside_discs(points_W: FloatArray, discs_W: FloatArray) -> NDArray[np.bool_]:
-    """Returns whether each point (N, 2 or more columns) lies outside all discs, rows of x, y and radius (m)."""
+    """Mask of the points (N, 2 or more columns) outside all discs, rows of x, y and radius (m)."""
     offsets = np.linalg.norm(points_W[:, None, :2] - discs_W[None, :, :2], axis=2)
     outside: NDArray[np.bool_] = (offsets > discs_W[:, 2]).all(axis=1)
     return outside
 
 
 def has_moved(before: Scan, scan: Scan) -> bool:
-    """Returns whether the robot moved between two scans, by odometry; equal scans then come from a frozen LiDAR."""
+    """Returns whether the robot moved between two scans, by odometry; if so, equal scans reveal a frozen LiDAR."""
     step = relative_pose(Pose2D.from_transform(before.X_OB), Pose2D.from_transform(scan.X_OB))
     return math.hypot(step.x_m, step.y_m) > _MOVED_M or abs(step.yaw_rad) > _MOVED_RAD
 
@@ -163,7 +162,7 @@ def _select(
     limits: tuple[float, float, float],
     stride: int,
 ) -> FloatArray:
-    """The loop of `scan_points`."""
+    """Compiled loop of `scan_points`."""
     points = np.empty((ranges.size, 5))
     count = 0
     cosines, sines = np.cos(elevations), np.sin(elevations)

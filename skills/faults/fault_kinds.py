@@ -43,9 +43,9 @@ _OTHER_WORDS: Final[Mapping[str, str]] = {
 
 @dataclass
 class Call:
-    """One call of a verb: `proceed` makes it; the fault's own `memory` lasts from call to call.
+    """One call of a verb: `proceed` makes it; the fault's own `memory` persists from call to call.
 
-    `arguments` are those by position, `options` those by name.
+    `arguments` are the positional arguments, `options` the keyword arguments.
     """
 
     robot: Robot
@@ -57,15 +57,16 @@ class Call:
 
     @property
     def asked(self) -> tuple[Any, ...]:
-        """Key of the reading: the verb, and for pictures the camera and the wanted parts of the picture."""
+        """Key of the measurement: the verb, and for pictures also the camera and the requested arrays."""
         return (self.verb, *self.arguments, *self.options.values())
 
 
 @dataclass(frozen=True)
 class Effect:
-    """Effect of a fault on verbs: `act(call)` while it is on; `watch(result, call)` sees the calls before.
+    """Effect of a fault on verbs: `act(call)` while the fault is active; `watch(result, call)` observes earlier calls.
 
-    Calls of the verbs in `always` go to `act` at all times. A fault that happens `once` is over once it has begun.
+    Calls of the verbs in `always` go to `act` at all times. A fault that happens `once` is over as soon as it has
+    begun.
     """
 
     verbs: frozenset[str]
@@ -91,11 +92,11 @@ class FaultKind:
 
 
 class InjectedFault(RuntimeError):  # noqa: N818 - it stands for any defect of a driver
-    """Error that a verb raises under "VERB raises"."""
+    """Error that a verb raises under the fault "VERB raises"."""
 
 
 def verb_of(word: str) -> str:
-    """Returns the verb that a word names. Raises ValueError, with a hint, when there is none."""
+    """Returns the verb that a word names. Raises ValueError, with a hint, when the word names no verb."""
     verb = _OTHER_WORDS.get(word, word)
     if verb not in VERBS:
         known = (*VERBS, *_OTHER_WORDS)
@@ -114,7 +115,7 @@ def _among(match: re.Match[str], verbs: tuple[str, ...]) -> frozenset[str]:
 
 
 def _freezes(match: re.Match[str]) -> Effect:
-    """The fault that repeats the last reading."""
+    """Fault that repeats the last measurement."""
 
     def watch(result: Any, call: Call) -> None:
         call.memory[call.asked] = result
@@ -128,13 +129,13 @@ def _freezes(match: re.Match[str]) -> Effect:
 
 
 def _sensors(match: re.Match[str]) -> frozenset[str]:
-    """The sense verb that the words name, or all of them."""
+    """The sense verb that the words name; all of them for "sensors" and "everything"."""
     everything = match["verb"] in ("sensors", "everything")
     return frozenset(SENSE_VERBS) if everything else _among(match, SENSE_VERBS)
 
 
 def _drops_out(match: re.Match[str]) -> Effect:
-    """The fault that gives no new readings, and no pictures at all."""
+    """Fault that stops new measurements, and all pictures."""
     frozen = _freezes(match)
 
     def act(call: Call) -> Any:
@@ -150,7 +151,7 @@ def _raise(call: Call) -> Any:
 
 
 def _answer(match: re.Match[str], status: CommandStatus) -> Effect:
-    """The fault by which a verb's commands do nothing, and have this status for ever."""
+    """Fault by which a verb's commands do nothing, and keep this status."""
 
     def act(call: Call) -> Any:
         made_up = call.memory.setdefault("ids", set())
@@ -164,7 +165,7 @@ def _answer(match: re.Match[str], status: CommandStatus) -> Effect:
 
 
 def _reads(verb: str, change: Callable[[Any], Any]) -> Effect:
-    """The fault that changes the answers of a verb."""
+    """Fault that changes the return values of a verb."""
     return Effect(frozenset((verb,)), lambda call: change(call.proceed()))
 
 
@@ -188,7 +189,7 @@ def _black(_: re.Match[str]) -> Effect:
 
 
 def _spoiled(reading: Any) -> Any:
-    """The reading with NaN for every float except its stamp."""
+    """The measurement with NaN for every float except its stamp."""
     if not dataclasses.is_dataclass(reading) or isinstance(reading, type):
         return reading
     names = (each.name for each in dataclasses.fields(reading) if each.name != "stamp_s")
@@ -208,7 +209,7 @@ def _nan_like(value: Any) -> Any:
 
 
 def joints_under_pull(joints: Joints, capabilities: Capabilities, force_n: float = 15.0) -> Joints:
-    """The readings with joint efforts that hold against a force straight ahead on the held object."""
+    """The joint state with efforts that balance a force straight ahead on the held object."""
     model, gripper = arm_model(capabilities), capabilities.gripper
     p_HT = np.array([0.0 if gripper is None else gripper.grip_x_m, 0.0, 0.0])
     q_rad = np.array([joints.position_rad[name] for name in model.names])
@@ -227,7 +228,7 @@ def _pull(match: re.Match[str]) -> Effect:
 
 
 def _jumps(match: re.Match[str]) -> Effect:
-    """The fault that shifts dead reckoning in odometry, scans and pictures."""
+    """Fault that shifts dead reckoning in odometry, scans and pictures."""
     ahead = RigidTransform(np.array([float(match["metres"]), 0.0, 0.0]))
 
     def act(call: Call) -> Any:
@@ -242,7 +243,7 @@ def _jumps(match: re.Match[str]) -> Effect:
 
 
 def _lease(_: re.Match[str]) -> Effect:
-    """The fault by which another holder takes the lease, once."""
+    """Fault by which another holder takes the lease, once."""
 
     def act(call: Call) -> Any:
         if "taken" not in call.memory:
@@ -253,7 +254,7 @@ def _lease(_: re.Match[str]) -> Effect:
 
 
 def _loses(_: re.Match[str]) -> Effect:
-    """The fault by which the held object falls, once: for a while the gripper closes too weakly for any object."""
+    """Fault by which the held object falls, once: for a while the gripper closes too weakly for any object."""
 
     def act(call: Call) -> Any:
         reading, lease, memory = call.robot.gripper(), call.robot.lease_holder(), call.memory

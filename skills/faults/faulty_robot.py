@@ -42,9 +42,9 @@ _MOTIONS: Final = ("arm", "base", "body")
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault by its words: its effect, on from `from_s` until before `to_s`, after `calls` calls.
+    """A fault parsed from its words: its effect, active from `from_s` until before `to_s`, after `calls` calls.
 
-    With a `source`, it concerns only the pictures of that camera.
+    With a `source`, it affects only the pictures of that camera.
     """
 
     words: str
@@ -55,12 +55,12 @@ class Fault:
     source: str | None = None
 
     def over_by(self, now_s: float) -> bool:
-        """Returns whether the fault is over at a time; one that happens once is over when it has begun before."""
+        """Returns whether the fault is over at a time; a fault that happens once is over when it began earlier."""
         return now_s >= self.to_s or (self.effect.once and now_s > self.from_s)
 
 
 def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS, *, cameras: Sequence[str] = ()) -> Fault:
-    """Parses the words of a fault. `cameras` are the robot's, where the robot is known.
+    """Parses the words of a fault. `cameras` are the robot's cameras, if the robot is known.
 
     Raises ValueError, with a hint, when no kind has such words or the robot has no such camera.
     """
@@ -84,7 +84,7 @@ def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS, *, cam
 
 
 def _seconds(match: re.Match[str]) -> str:
-    """A duration of any unit in seconds; other text unchanged."""
+    """Converts a duration of any unit to seconds; leaves other text unchanged."""
     seconds = seconds_in(match[0])
     return match[0] if seconds is None else f"{seconds:.12g} s"
 
@@ -102,7 +102,7 @@ def _span(words: str, when: re.Match[str]) -> tuple[float, float]:
 
 
 def _check_source(source: str, effect: Effect, cameras: Sequence[str]) -> None:
-    """Raises ValueError unless the effect is on pictures and the source is a camera of the robot."""
+    """Raises ValueError unless the effect concerns pictures and the source is a camera of the robot."""
     if effect.verbs != {"image"}:
         raise ValueError(f"'.{source}' names a camera, but this fault does not concern cameras; remove '.{source}'")
     if cameras and source not in cameras:
@@ -114,7 +114,7 @@ def _check_source(source: str, effect: Effect, cameras: Sequence[str]) -> None:
 def random_faults(
     count: int, seed: int, cameras: Sequence[str], kinds: Sequence[FaultKind] = STANDARD_FAULTS
 ) -> tuple[str, ...]:
-    """Draws the words of `count` faults by a seed, among the kinds marked as random; in order of time.
+    """Draws the words of `count` faults by a seed, from the kinds that allow it; sorted by time.
 
     A larger count adds faults to those of a smaller one.
     """
@@ -125,7 +125,7 @@ def random_faults(
 
 
 def _drawn(template: str, cameras: Sequence[str], rng: np.random.Generator) -> tuple[float, str]:
-    """Draws one fault of a kind: its time (s) and its words."""
+    """Draws one fault from a kind's template: its time (s) and its words."""
     images = [f"camera.{source}" for source in cameras] or ["camera"]
     at_s = round(float(rng.uniform(_EARLIEST_S, _LATEST_S)), 1)
     values = {
@@ -141,14 +141,14 @@ def _drawn(template: str, cameras: Sequence[str], rng: np.random.Generator) -> t
 
 @dataclass
 class _Armed:
-    """A fault in use: its memory and the number of calls so far."""
+    """An injected fault: its memory and the number of calls so far."""
 
     fault: Fault
     memory: dict[Any, Any] = field(default_factory=dict)
     seen: int = 0
 
     def through(self, call: Call, now_s: float) -> Any:
-        """Makes the call, changed by the fault while it is on."""
+        """Makes the call, changed by the fault while it is active."""
         effect = self.fault.effect
         if call.verb in effect.always:
             return effect.act(call)
@@ -160,18 +160,18 @@ class _Armed:
         return result
 
     def on(self, now_s: float) -> bool:
-        """Returns whether the fault is on at a time."""
+        """Returns whether the fault is active at a time."""
         return self.fault.from_s - 1e-9 <= now_s < self.fault.to_s - 1e-9
 
     def concerns(self, verb: str, arguments: tuple[Any, ...]) -> bool:
-        """Returns whether the fault concerns a call."""
+        """Returns whether the fault affects a call."""
         if verb == "image" and self.fault.source not in (None, *arguments[:1]):
             return False
         return verb in self.fault.effect.verbs | self.fault.effect.always
 
 
 class FaultyRobot(RobotWrapper):
-    """Robot whose verbs fail by its faults, with times that count from `since_s`. `inject_faults` makes one."""
+    """Robot with injected faults, whose times count from `since_s`. `inject_faults` creates one."""
 
     def __init__(self, robot: Robot, clock: Clock, faults: Sequence[Fault], since_s: float) -> None:
         super().__init__(robot)
@@ -179,12 +179,12 @@ class FaultyRobot(RobotWrapper):
         self._armed = [_Armed(fault) for fault in faults]
 
     def faults_at_work(self) -> tuple[str, ...]:
-        """The words of the faults that are on now; a fault "after N calls" is on from the call after these."""
+        """Words of the faults that are active now; a fault "after N calls" is active from the next call on."""
         now_s = self._clock.now() - self._since_s
         return tuple(each.fault.words for each in self._armed if each.on(now_s) and each.seen >= each.fault.calls)
 
     def _call(self, verb: str, call: Callable[..., AnswerT], *arguments: Any, **options: Any) -> AnswerT:
-        """Makes a call through all faults that concern the verb, the first one outermost."""
+        """Makes a call through all faults that affect the verb, the first one outermost."""
         proceed: Callable[[], AnswerT] = partial(call, *arguments, **options)
         now_s = self._clock.now() - self._since_s
         for armed in reversed(self._armed):
@@ -195,9 +195,9 @@ class FaultyRobot(RobotWrapper):
 
 
 def inject_faults(robot: Robot, clock: Clock, faults: Sequence[Fault | str], *, since_s: float | None = None) -> Robot:
-    """Returns the robot with these faults, given as words or parsed; their times count from now, or from `since_s`.
+    """Wraps the robot with these faults, given as words or parsed; their times count from now, or from `since_s`.
 
-    Raises ValueError for words that are no fault of this robot.
+    Raises ValueError when the words name no fault of this robot.
     """
     named = any(isinstance(fault, str) for fault in faults)
     cameras = [camera.source for camera in robot.capabilities().cameras] if named else []

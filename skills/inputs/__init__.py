@@ -1,1 +1,1 @@
-"""Inputs of users: guarded reading of files and texts, YAML reader, schema check, and the error of bad input."""
+"""User inputs: guarded reading of files and texts, YAML reader, schema check, and the error for bad input."""

@@ -1,4 +1,4 @@
-"""The error of bad user input, with its place and a hint, and the phrases of its messages."""
+"""The error for bad user input, with its location and a hint, and phrases for its messages."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ _MOST_USERS: Final = 3
 
 @dataclass(frozen=True)
 class SourceLine:
-    """A line (from 1) of a user's file."""
+    """A line (from 1) in a user's file."""
 
     file: Path
     line: int
 
 
 class InputError(Exception):
-    """User input that cannot be used.
+    """Error of user input that cannot be used.
 
-    `message` says what is wrong, `hint` what to do; `file` and `line` (from 1) name the place where known. A very long
-    message is cut off. `others` are further errors that were found with it.
+    `message` says what is wrong, `hint` what to do; `file` and `line` (from 1) are the location, if known. A very long
+    message is truncated. `others` are further errors found at the same time.
     """
 
     def __init__(
@@ -51,22 +51,22 @@ class InputError(Exception):
 
     @classmethod
     def at(cls, source: SourceLine | None, message: str, *, hint: str = "") -> InputError:
-        """Makes an error with its line, if the line is known."""
+        """Creates an error with its location, if the line is known."""
         if source is None:
             return cls(message, hint=hint)
         return cls(message, hint=hint, file=source.file, line=source.line)
 
     def __str__(self) -> str:
-        """Formats one line: "file:line: message; hint"; cuts off a very long file name."""
+        """Formats one line: "file:line: message; hint"; truncates a very long file name."""
         file = str(self.file) if len(str(self.file)) <= MOST_LETTERS else f"{str(self.file)[:FEW_LETTERS]}..."
         place = "" if self.file is None else f"{file}: " if self.line is None else f"{file}:{self.line}: "
         hint = self.hint if len(self.hint) <= MOST_LETTERS else f"{self.hint[:MOST_LETTERS]}..."
         return one_line(f"{place}{self.message}{'; ' if hint else ''}{hint}")
 
     def within(self, file: Path, line: int) -> InputError:
-        """Adds the line of the file that uses the erroneous file.
+        """Adds the line in the file that refers to the erroneous file.
 
-        An error without a place gets that line as its own; a long chain names its first files.
+        An error without a location gets that line as its own; a long chain names only its first files.
         """
         others = [other.within(file, line) for other in self.others]
         if self.file is None:
@@ -89,7 +89,7 @@ def disk_is_full(error: BaseException) -> bool:
 
 
 class Problems:
-    """Collector of errors, so that a user sees all at once."""
+    """Collects errors, so that a user sees all of them at once."""
 
     def __init__(self) -> None:
         self._errors: list[InputError] = []
@@ -98,14 +98,14 @@ class Problems:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: object) -> bool:
-        """Adds an InputError and suppresses it; lets other errors pass."""
+        """Adds an InputError and suppresses it; other errors propagate."""
         if isinstance(error, InputError):
             self.add(error)
             return True
         return False
 
     def add(self, error: InputError) -> None:
-        """Adds an error with its `others`."""
+        """Adds an error and its `others`."""
         self._errors += [error, *error.others]
 
     def raise_any(self) -> None:
@@ -116,7 +116,7 @@ class Problems:
 
 
 def nearest_name(word: str, known: Iterable[str]) -> str | None:
-    """Returns the known word with the spelling nearest to `word`, or None when none is near."""
+    """Returns the known word whose spelling is nearest to `word`; None when none is near."""
     from rapidfuzz import fuzz, process
 
     by_lower = {name.lower(): name for name in known}
@@ -127,7 +127,7 @@ def nearest_name(word: str, known: Iterable[str]) -> str | None:
 def suggestion(word: str, known: Iterable[str], otherwise: str | None = None, *, shown: Iterable[str] = ()) -> str:
     """Hint for an unknown word: the word that was probably meant, else `otherwise`, else the nearest known names.
 
-    `shown` are the names to list where `known` holds other spellings, too.
+    `shown` are the names to list when `known` also contains other spellings.
     """
     names = list(known)
     near = nearest_name(word, names)
@@ -135,7 +135,7 @@ def suggestion(word: str, known: Iterable[str], otherwise: str | None = None, *,
 
 
 def known_names(word: str, known: Iterable[str]) -> str:
-    """Lists the known names if they are few, else those with the spelling nearest to `word`."""
+    """Lists the known names if they are few, else those whose spelling is nearest to `word`."""
     from rapidfuzz import fuzz, process
 
     names = list(dict.fromkeys(known))

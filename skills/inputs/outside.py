@@ -23,12 +23,12 @@ _HIDDEN: Final = 100
 
 
 def is_file(path: Path) -> bool:
-    """Returns whether a plain file is at a path; False where the system refuses the name or the folder."""
+    """Returns whether a plain file exists at a path; False when the system refuses the name or the folder."""
     return os.path.isfile(path)  # noqa: PTH113 (Path.is_file raises for a name that is too long)
 
 
 def is_folder(path: Path) -> bool:
-    """Returns whether a folder is at a path; False as for `is_file`."""
+    """Returns whether a folder exists at a path; False as for `is_file`."""
     return os.path.isdir(path)  # noqa: PTH112 (Path.is_dir raises for a name that is too long)
 
 
@@ -39,7 +39,7 @@ def is_there(path: Path) -> bool:
 
 @contextmanager
 def writing(file: Path, hint: str = "name another file") -> Iterator[None]:
-    """Raises InputError if the block cannot write a file or folder that the user names."""
+    """Raises InputError when the block cannot write a file or folder that the user names."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Guarded reading of picture files: the header gives the number of pixels before anything is decoded."""
+"""Guarded reading of picture files: checks the number of pixels in the header before decoding."""
 
 import os
 import re
@@ -79,7 +79,7 @@ def read_brightness(file: Path, *, most_pixels: int) -> Brightness:
 
 
 def _grey_opacity(content: bytes, shares: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Opacity of a grey PNG in which one grey is transparent, which OpenCV leaves out; None for other pictures."""
+    """Opacity of a grey PNG with one transparent grey, which OpenCV ignores; None for other pictures."""
     at = content.find(_TRANSPARENT_GREY, 0, content.find(b"IDAT")) + len(_TRANSPARENT_GREY)
     if not content.startswith(_PNG) or at < len(_PNG) or len(content) < at + 2:
         return None
@@ -112,7 +112,7 @@ def _numbers(body: bytes) -> tuple[NDArray[np.float64], int]:
 
 
 def _raw(content: bytes, start: int, count: int, most: int) -> tuple[NDArray[np.float64], int]:
-    """Values of one or two bytes from `start` on, and the number of bytes after them, without white space."""
+    """Values of one or two bytes from `start` on, and the number of bytes after them, except white space."""
     kind = np.dtype(np.uint8 if most < 256 else ">u2")
     needed = count * kind.itemsize
     if len(content) - start == needed + 1 and content[start - 1 : start + 1] == b"\r\n":

@@ -1,4 +1,4 @@
-"""Loading of entry points of other distributions, with a time limit and one error for all that they raise."""
+"""Loading of entry points from other distributions, with a time limit and one error for everything that they raise."""
 
 import os
 import sys
@@ -30,7 +30,7 @@ ResultT = TypeVar("ResultT")
 
 
 class PluginDefect(Exception):  # noqa: N818
-    """Any error that the code of a plug-in raised: its type and its text."""
+    """Error raised by the code of a plug-in: its type and its text."""
 
 
 def distribution_of(entry: EntryPoint) -> str:
@@ -40,12 +40,12 @@ def distribution_of(entry: EntryPoint) -> str:
 
 @cache
 def _name_of(distribution: Distribution) -> str:
-    """Caches the name of a distribution, which is read from its file each time."""
+    """Name of a distribution, cached because it is read from a file each time."""
     return distribution.name
 
 
 def installed_plugins(group: str) -> EntryPoints:
-    """Entry points of a group. Reads them once, since each reading opens the files of all distributions."""
+    """Entry points in a group, cached because reading them opens the files of all distributions."""
     return _all_installed().select(group=group)
 
 
@@ -55,7 +55,7 @@ def _all_installed() -> SelectableGroups:
 
 
 def class_tables(name: str) -> Iterator[tuple[Path, Any]]:
-    """Yields path and data of a YAML file from each package with classes that has it. Raises InputError."""
+    """Yields path and data of the YAML file `name` from each package with object classes. Raises InputError."""
     from skills.inputs.yaml_source import read_yaml
 
     for entry in sorted(installed_plugins(CLASSES), key=lambda entry: entry.name):
@@ -72,7 +72,7 @@ def class_tables(name: str) -> Iterator[tuple[Path, Any]]:
 
 
 def class_entries(name: str, kind: type[ResultT]) -> Iterator[tuple[Path, dict[str, ResultT]]]:
-    """Yields the file and its entries by class of each package with classes that has it. Raises InputError."""
+    """Yields, for each package with object classes, the YAML file `name` and its entries. Raises InputError."""
     from pydantic import TypeAdapter, ValidationError
 
     from skills.inputs.schema import first_error
@@ -124,7 +124,7 @@ def run_in_thread(call: Callable[[], ResultT], *, limit_s: float) -> ResultT:
 
 @contextmanager
 def _ended_after(entry: EntryPoint, limit_s: float) -> Iterator[None]:
-    """Ends the process when the block takes too long; has no limit for our own modules."""
+    """Ends the process when the block takes too long; the project's own modules have no limit."""
     if distribution_of(entry) == OURS:
         yield
         return

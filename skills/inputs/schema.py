@@ -74,9 +74,9 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
 
 
 def _most_telling(errors: list[ErrorDetails], source: YamlSource) -> list[list[ErrorDetails]]:
-    """Returns the most telling errors of each place: one, or one for each kind of value that may stand there.
+    """Returns the most informative errors at each location: one, or one for each kind of value that may stand there.
 
-    Leaves out errors that an unknown key has caused.
+    Omits errors that an unknown key has caused.
     """
     paths = {id(error): _path(error, source) for error in errors}
     misspelled = {paths[id(error)][:-1] for error in errors if error["type"] == "extra_forbidden"}
@@ -96,7 +96,7 @@ def _parent(error: ErrorDetails, path: KeyPath) -> KeyPath:
 
 
 def _path(error: ErrorDetails, source: YamlSource) -> KeyPath:
-    """Path of an error in the file, without the names of the kinds of values that may stand there."""
+    """Path of an error in the file, without the names of the alternative value kinds."""
     *parts, last = (part for part in error["loc"] if part != "[key]") if error["loc"] else ("",)
     path: list[str | int] = []
     data = source.data
@@ -116,7 +116,7 @@ def _is_in(part: str | int, data: Any) -> bool:
 
 
 def _input_error(model: type[BaseModel], source: YamlSource, errors: list[ErrorDetails]) -> InputError:
-    """Turns the pydantic errors of one place into an error with its line and a hint."""
+    """Converts the pydantic errors at one location to an error with its line and a hint."""
     error = errors[0]
     path = _path(error, source)
     where = ".".join(str(part) for part in path)
@@ -151,7 +151,7 @@ def _comma_hint(error: ErrorDetails, path: KeyPath, source: YamlSource) -> str |
 
 
 def _field_names(*models: type[BaseModel]) -> list[str]:
-    """Keys of models, the required ones first."""
+    """Keys of the models, the required ones first."""
     fields = [item for model in models for item in model.model_fields.items()]
     ordered = sorted(fields, key=lambda item: not item[1].is_required())
     return list(dict.fromkeys(field.alias or name for name, field in ordered))
@@ -187,7 +187,7 @@ def _choices(hint: Any) -> tuple[Any, ...]:
 
 
 def first_error(errors: list[ErrorDetails]) -> tuple[tuple[Any, ...], str, str]:
-    """Returns location, words and hint of the first error; an unknown key comes before a missing one."""
+    """Returns location, words and hint for the first error; an unknown key comes before a missing one."""
     first = min(errors, key=lambda each: each["type"] not in ("extra_forbidden", "unexpected_keyword_argument"))
     return first["loc"], _plain_words(first), _plain_hint(first)
 
@@ -226,6 +226,6 @@ def _plain_hint(error: ErrorDetails, word: str | None = None) -> str:
 
 
 def _allowed(error: ErrorDetails) -> list[str]:
-    """Words that a value may take, where only some are allowed."""
+    """Words that a value may take; empty when any word is allowed."""
     expected = str(error.get("ctx", {}).get("expected", ""))
     return [word.strip().strip("'") for part in expected.split(" or ") for word in part.split(", ") if word.strip()]

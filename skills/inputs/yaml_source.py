@@ -1,6 +1,6 @@
-"""The reader of YAML files: plain data with the line of each key; aliases are followed within bounds.
+"""Reader of YAML files: plain data with the line of each key; aliases are expanded within limits.
 
-Some scalars of YAML 1.1 are read as people mean them: `010`, `14:30` and `2026-12-01` are texts, `1e3` is a number, and
+Some YAML 1.1 scalars are read as people mean them: `010`, `14:30` and `2026-12-01` are texts, `1e3` is a number, and
 `on` as a key is a text.
 """
 
@@ -42,7 +42,7 @@ _Pair = tuple[yaml.ScalarNode, yaml.Node]
 class YamlSource:
     """A YAML document: its data, and the line (from 1) of each key or list item.
 
-    `words` holds the values that YAML reads as true or false although they say "no" or "on", by their paths.
+    `words` are the values that YAML reads as true or false although the file says "no" or "on", by path.
     """
 
     path: Path
@@ -52,12 +52,12 @@ class YamlSource:
     words: Mapping[KeyPath, str] = field(default_factory=dict)
 
     def line(self, path: KeyPath) -> int:
-        """Line of `path`, or of the nearest key above it that the file holds."""
+        """Line of `path`, or of its nearest ancestor in the file."""
         known = next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.lines), None)
         return self.first_line if known is None else self.lines[known]
 
     def below(self, path: KeyPath, data: Any) -> YamlSource:
-        """Source of the part at `path` with its lines; `data` replaces its data."""
+        """Source for the part at `path`, with its lines; `data` replaces the part's data."""
         lines = {each[len(path) :]: line for each, line in self.lines.items() if each[: len(path)] == path != each}
         return YamlSource(self.path, data, lines, first_line=self.line(path))
 
@@ -135,12 +135,12 @@ _Dumper.add_implicit_resolver(f"{_TAG}float", re.compile(f"^(?:{_EXPONENT.patter
 
 
 def quoted_key(key: object) -> str:
-    """Names a key in an error; hides one that is no plain word, since the file may be a foreign one."""
+    """Quotes a key for an error; hides a key that is no plain word, since the file may be a foreign one."""
     return f"key {key!r}" if _WORD.fullmatch(str(key)) else "key that is no plain word"
 
 
 def _refuse_deep(text: str, file: Path) -> None:
-    """Raises InputError before the composer, which calls itself for each level, runs out of stack."""
+    """Raises InputError for deep nesting, before the recursive composer runs out of stack."""
     most = text.count("[") + text.count("{") + max(map(len, text.splitlines()), default=0)
     if most <= _SURELY_FLAT:
         return
@@ -154,7 +154,7 @@ def _refuse_deep(text: str, file: Path) -> None:
 
 
 def _composed(text: str) -> yaml.Node | None:
-    """Composes the nodes of a document by the fast reader; the slow one explains more of a broken document."""
+    """Composes the nodes of a document with the fast reader; a broken one with the slow reader, which explains more."""
     try:
         node: yaml.Node | None = yaml.compose(text, Loader=yaml.CSafeLoader)
     except yaml.YAMLError:
@@ -176,7 +176,7 @@ def _meant_tag(node: yaml.ScalarNode, *, is_key: bool = False) -> str:
 
 @dataclass
 class _Reader:
-    """Turns the nodes of one document into data; notes lines and truth words on the way."""
+    """Converts the nodes of one document to data; records lines and true-or-false words."""
 
     file: Path
     tags: frozenset[str]
@@ -251,7 +251,7 @@ class _Reader:
         return found
 
     def _pairs(self, node: yaml.MappingNode) -> tuple[dict[Any, _Pair], dict[Any, _Pair]]:
-        """Returns the keys that a mapping writes, and those that its merge key adds; the first mapping wins."""
+        """Returns the keys that a mapping contains, and those that its merge key adds; the first mapping wins."""
         own: dict[Any, _Pair] = {}
         merge: _Pair | None = None
         for key_node, value in node.value:
@@ -269,7 +269,7 @@ class _Reader:
         return own, {} if merge is None else self._merged(merge[1])
 
     def _merged(self, node: yaml.Node) -> dict[Any, _Pair]:
-        """Returns the keys of the mapping, or the mappings, that a merge key names."""
+        """Returns the keys of the mapping or mappings to which a merge key refers."""
         self._check(node)
         several = node.value if isinstance(node, yaml.SequenceNode) else [node]
         if not all(isinstance(each, yaml.MappingNode) for each in several):

@@ -1,4 +1,4 @@
-"""Skills of the arm alone: stow folds it onto the body, pose_arm moves it to joint angles, as saved by teleop."""
+"""Skills that move only the arm: stow folds it onto the body; pose_arm moves it to joint angles saved by teleop."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -42,9 +42,9 @@ class Stow(ArmSkill[StowInputs]):
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
 
     def run(self, inputs: StowInputs) -> Routine[Succeeded]:
-        """Stows or carries.
+        """Folds the empty arm or draws in the held object.
 
-        The arm of a raised body comes near first, because it would press on obstacles below while the body sinks.
+        On a raised body the arm moves first, because it would press on obstacles below while the body sinks.
         """
         yield from self.feel_arm("stowing the arm")
         usual_m = self.context.robot.capabilities().standing_height_m
@@ -71,10 +71,7 @@ class Stow(ArmSkill[StowInputs]):
 
 @dataclass(frozen=True)
 class PoseArmInputs:
-    """Joint angles from the shoulder on, and an opening (0 closed).
-
-    None, or a held object, leaves the gripper as it is.
-    """
+    """Joint angles from the shoulder on, and an opening (0 closed); None, or a held object, keeps the opening."""
 
     joints_rad: tuple[Angle, ...]
     opening: Turn | None = None

@@ -21,10 +21,10 @@ _CHANGED_M = 0.05
 
 
 class ArmFootprint:
-    """The body's footprint, extended by discs where the arm or the held object sticks out of it.
+    """The body's footprint, extended by discs where the arm or the held object overhangs it.
 
     The stowed arm counts as part of the body. Heights are ignored, so an arm above an obstacle counts as in collision.
-    At the robot's present pose, discs end before the obstacles of the costmap.
+    At the robot's present pose, discs shrink so that none overlaps an obstacle in the costmap.
     """
 
     def __init__(self, context: SkillContext) -> None:
@@ -41,11 +41,11 @@ class ArmFootprint:
 
     @property
     def _tip_m(self) -> float:
-        """Distance (m) of the hand's last disc along the fingers."""
+        """Distance (m) from the hand's origin to its last disc, along the fingers."""
         return 0.0 if self._gripper is None else max(0.0, self._gripper.tip_x_m - LINK_RADIUS_M)
 
     def now(self) -> Footprint:
-        """The footprint with the arm's present joint angles."""
+        """The footprint at the arm's present joint angles."""
         arm, held = self._outside(self._arm_discs()), self._outside(self._held_discs())
         discs = self._clipped(np.vstack([arm, held]))
         if len(discs) == 0:
@@ -62,14 +62,14 @@ class ArmFootprint:
         return bool(np.any(np.min(apart, axis=1) > _CHANGED_M))
 
     def _arm_discs(self) -> FloatArray:
-        """The arm's links from above, rows of x, y, radius; none while the joint angles are unknown."""
+        """Discs under the arm's links, rows of x, y, radius; none while the joint angles are unknown."""
         q_rad = self._q_rad()
         if self._model is None or q_rad is None:
             return np.empty((0, 3))
         return _link_discs(self._model, q_rad, self._tip_m)
 
     def _held_discs(self) -> FloatArray:
-        """Discs of the held object from above; an unknown size counts as the largest that the gripper can hold."""
+        """Discs under the held object; an object of unknown size counts as the largest that the gripper can hold."""
         q_rad = self._q_rad()
         if self._model is None or self._gripper is None or q_rad is None or not self._context.robot.gripper().holding:
             return np.empty((0, 3))
@@ -87,7 +87,7 @@ class ArmFootprint:
         return q_rad if np.all(np.isfinite(q_rad)) else None
 
     def _outside(self, discs: FloatArray) -> FloatArray:
-        """The discs that stick out of the body with its stowed arm."""
+        """The discs that overhang the body with its stowed arm."""
         low, high = discs[:, :2] - discs[:, 2:], discs[:, :2] + discs[:, 2:]
         out = np.any((low < self._box[0] - _TOLERANCE_M) | (high > self._box[1] + _TOLERANCE_M), axis=1)
         return np.asarray(discs[out])
@@ -112,7 +112,7 @@ def _link_discs(model: ArmModel, q_rad: FloatArray, tip_m: float) -> FloatArray:
 
 
 def _box_discs(X_BH: RigidTransform, corners_H: FloatArray) -> FloatArray:
-    """Discs over the box about some corners, cut into nearly cubic parts."""
+    """Discs over the bounding box of corner points, which is cut into nearly cubic parts."""
     low, high = corners_H.min(axis=0), corners_H.max(axis=0)
     counts = np.maximum(1, np.ceil((high - low) / max(float(np.sort(high - low)[1]), 2.0 * _APART_M))).astype(int)
     half = 0.5 * (high - low) / counts

@@ -1,4 +1,4 @@
-"""Drive commands for skills: each one is short-lived, and the last one ends with the skill."""
+"""Drive commands for skills: each one expires soon, and the last one is stopped when the skill ends."""
 
 import math
 from collections.abc import Callable
@@ -16,9 +16,9 @@ _LOOK_AHEAD_S = 0.4
 
 
 class Base:
-    """Sender of drive commands under a context's lease.
+    """Sends drive commands under a context's lease.
 
-    `accepted` becomes True once the robot accepts a command, `patience` bounds how long a robot may refuse them.
+    `accepted` becomes True once the robot accepts a command; `patience` limits how long a robot may refuse commands.
     """
 
     def __init__(self, context: SkillContext) -> None:
@@ -31,9 +31,9 @@ class Base:
         self.last_velocity: NDArray[np.float64] = np.zeros(3)
 
     def drive(self, velocity: tuple[float, float, float]) -> None:
-        """Moves at a body-frame velocity (m/s, m/s, rad/s) until the next call; without one the drive expires.
+        """Moves at a body-frame velocity (m/s, m/s, rad/s) until the next call; without a call the drive expires.
 
-        Zones with speed limits slow it down.
+        Speed-limit zones reduce the velocity.
         """
         velocity = self._within_limits(velocity)
         until_s = self._context.clock.now() + self._context.robot.capabilities().drive_expiry_s
@@ -41,7 +41,7 @@ class Base:
         self.last_velocity = np.array(velocity)
 
     def _within_limits(self, velocity: tuple[float, float, float]) -> tuple[float, float, float]:
-        """The velocity, slower where zones about the robot want that."""
+        """The velocity, reduced to the speed limits of the zones about the robot."""
         speed = math.hypot(velocity[0], velocity[1])
         if not self._context.zones or speed == 0.0:
             return velocity
@@ -52,7 +52,7 @@ class Base:
         return velocity[0] * share, velocity[1] * share, velocity[2] * share
 
     def refusal(self) -> str | None:
-        """Reason why the robot refused the last command, None when it did not."""
+        """Reason why the robot refused the last command; None when it accepted the command."""
         if self._command is None:
             return None
         status = self._context.robot.command_status(self._command)
@@ -64,14 +64,14 @@ class Base:
         return None
 
     def ask_again(self) -> bool:
-        """Repeats a refused request as a command to stand; False when patience or the lease has ended."""
+        """Repeats a refused request as a command to stand; returns False when patience is over or the lease is lost."""
         if self._cause is CommandCause.NO_LEASE or not self.patience.is_left():
             return False
         self.drive((0.0, 0.0, 0.0))
         return True
 
     def stop(self) -> None:
-        """Stops the last command, if it still runs, and no other motion."""
+        """Stops the last command if it still runs, and no other motion."""
         self.last_velocity = np.zeros(3)
         if self._command is None:
             return
@@ -122,7 +122,7 @@ class MovingSkill(RoutineSkill[InputsT]):
         yield from self.pause(settle_s, "coming to rest")
 
     def drive(self, velocity: tuple[float, float, float], running: Running) -> Routine[float]:
-        """Moves at a body-frame velocity for one tick; returns how long (s) the robot refused. Raises SkillFailure."""
+        """Moves at a body velocity for one tick; returns how long (s) the robot refused. Fails after patience."""
         self._base.drive(velocity)
         yield running
         begun_s = self.context.clock.now()

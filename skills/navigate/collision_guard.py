@@ -1,4 +1,4 @@
-"""Collision guard: stops the robot before moving obstacles, and before obstacles that no costmap has yet.
+"""Collision guard: stops the robot before moving obstacles, and before obstacles that are not yet in the costmap.
 
 The guard uses only the last LiDAR revolution, and brakes at full deceleration.
 """
@@ -22,13 +22,13 @@ _STEP_S = 0.1
 
 @dataclass(frozen=True)
 class GuardOptions:
-    """Collision guard: the robot stands while a moving obstacle would come within `margin_m` in the next `horizon_s`.
+    """Collision guard: stops the robot when a moving obstacle would come within `margin_m` in the next `horizon_s`.
 
-    The guard assumes that the robot drives on along its path and accelerates at `acceleration_m_s2` up to its limit, or
-    keeps its velocity for `coasting_s`. It ignores obstacles slower than `slow_m_s`, and followers: obstacles behind
-    the robot that move in its direction within `follows_rad`. It also stops for `least_points` unexplained returns
-    within `touch_m` of the braking path: after `reaction_s`, at `stop_m_s2`. The robot goes on once its path has been
-    clear for `clear_s`.
+    The prediction has two cases: the robot follows its path and accelerates at `acceleration_m_s2` up to its limit, or
+    keeps its velocity for `coasting_s`. `slow_m_s`: obstacles slower than this are ignored. `follows_rad`: obstacles
+    behind the robot that move in its direction within this angle are ignored. `least_points`: unexplained returns
+    within `touch_m` of the braking path that stop the robot. `reaction_s` and `stop_m_s2`: delay and deceleration on
+    the braking path. `clear_s`: how long the path must be clear before the robot drives on.
     """
 
     horizon_s: Duration = 1.3
@@ -47,7 +47,7 @@ class GuardOptions:
 
 
 class CollisionGuard:
-    """Guard that decides at each tick whether the robot must stand; idle without unexplained returns."""
+    """Decides at each tick whether the robot must stop; does nothing when the costmap lacks unexplained returns."""
 
     def __init__(self, context: SkillContext, footprint: Footprint, options: GuardOptions | None = None) -> None:
         self._context, self.footprint = context, footprint
@@ -57,7 +57,7 @@ class CollisionGuard:
         self._costmap = context.costmap if isinstance(context.costmap, ReturnsView) else None
 
     def danger(self, here: Pose2D, follower: LocalController, most_m_s: float) -> Place | None:
-        """Position (x, y) of the obstacle that the robot would hit at up to most_m_s; None when it may go on."""
+        """Position (x, y) of the obstacle that the robot would hit at up to most_m_s; None when it may drive on."""
         if self._costmap is None:
             return None
         now_s, (stamp_s, returns_W) = self._context.clock.now(), self._costmap.unexplained_returns()
@@ -68,7 +68,7 @@ class CollisionGuard:
         return self._place_W if now_s - self._danger_s < self._options.clear_s else None
 
     def _suddenly_ahead(self, here: Pose2D, returns_W: FloatArray) -> Place | None:
-        """Position of unexplained returns on the braking path, None without any.
+        """Position of the unexplained returns on the braking path; None when there are none.
 
         The speed is that of the outline's fastest point, so that a robot that turns on the spot stops too.
         """
@@ -87,7 +87,7 @@ class CollisionGuard:
     def _crossing(
         self, here: Pose2D, follower: LocalController, most_m_s: float, moving: tuple[Moving, ...], now_s: float
     ) -> Place | None:
-        """Position of the first obstacle that moves into the path, None when there is none."""
+        """Position of the first moving obstacle that will cross the robot's path; None when there is none."""
         options = self._options
         moving = tuple(one for one in moving if math.hypot(*one.velocity_W) >= options.slow_m_s)
         if not moving:
@@ -116,7 +116,7 @@ class CollisionGuard:
         return behind and along > math.cos(self._options.follows_rad) * speed
 
     def _on_path(self, follower: LocalController, speed: float, most_m_s: float, times: FloatArray) -> FloatArray:
-        """Poses (N, 3) on the path at these times."""
+        """Poses (N, 3) on the path at `times`, for a robot that accelerates from `speed`."""
         path = follower.ahead(most_m_s * self._options.horizon_s)
         gained = np.minimum(speed + self._options.acceleration_m_s2 * times, max(most_m_s, speed))
         driven = np.concatenate([[0.0], np.cumsum(0.5 * (gained[1:] + gained[:-1]) * np.diff(times))])
@@ -129,7 +129,7 @@ class CollisionGuard:
         return np.asarray(np.min(np.sqrt(x * x + y * y) - self.footprint.discs[None, :, 2:3], axis=1))
 
     def _velocity_W(self, here: Pose2D) -> FloatArray:
-        """The body's velocity (vx, vy, wz) in the world's axes."""
+        """The body's velocity (vx, vy, wz) in world coordinates."""
         vx, vy, wz = self._context.robot.odometry().velocity
         c, s = math.cos(here.yaw_rad), math.sin(here.yaw_rad)
         return np.array([c * vx - s * vy, s * vx + c * vy, wz])

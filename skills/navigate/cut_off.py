@@ -1,4 +1,4 @@
-"""Goals out of reach: doors that the robot saw closed, and regions without a gap between them."""
+"""Unreachable goals: doors that the robot saw closed, and regions that no gap connects."""
 
 from __future__ import annotations
 
@@ -40,10 +40,11 @@ _PERSON_M = np.stack(np.meshgrid(*2 * [np.arange(-0.5, 0.51, _CELL_M)]), axis=-1
 class DoorOptions:
     """Detection of closed doors on the map while the robot drives.
 
-    A scan shows a door up to `reach_m` away, at up to `flattest_rad` off the direct view. The door is closed while all
-    its gaps are narrower than `closed_m`. When closed doors leave no path, the robot looks again every `look_s`, for
-    `patience_s`. Plans avoid a door that was closed up to `trust_s` before the trip. If none exists, the robot drives
-    to a door last seen more than `sure_s` before and looks. A door with a plug-in opens within `opens_s` of its call.
+    `reach_m` and `flattest_rad`: largest distance and view angle at which a scan is used. `closed_m`: a door counts as
+    closed while all its gaps are narrower. `look_s` and `patience_s`: when closed doors leave no path, how often the
+    robot looks again, and for how long. `trust_s`: plans avoid a door seen closed at most this long ago. `sure_s`: if
+    no path exists, the robot drives to a door whose state was last seen earlier than this before the trip. `opens_s`:
+    how long a door with a plug-in may take to open.
     """
 
     reach_m: Length = 4.0
@@ -57,7 +58,7 @@ class DoorOptions:
 
 
 class DoorWatch:
-    """The doors in view, and the remembered doors that count as closed on one trip."""
+    """Detects closed doors in view, and remembers which doors count as closed on one trip."""
 
     def __init__(self, context: SkillContext, options: DoorOptions | None = None) -> None:
         self._context, self.options = context, options or DoorOptions()
@@ -68,7 +69,7 @@ class DoorWatch:
 
     @property
     def closed(self) -> tuple[Doorway, ...]:
-        """The doors that the robot saw closed on this trip or shortly before, without doubtful ones."""
+        """The doors that the robot saw closed on this trip or shortly before, without those in doubt."""
         return tuple(door for door in self._context.doors if self._counts_as_closed(door))
 
     def _counts_as_closed(self, door: Doorway) -> bool:
@@ -78,7 +79,7 @@ class DoorWatch:
         return door not in self._doubted and self._context.clock.now() <= seen.seen_s + self.options.trust_s
 
     def look(self) -> None:
-        """Judges the doors in view by the newest scan."""
+        """Updates the states of the doors in view from the newest scan."""
         scan, estimate = self._context.robot.scan(), self._context.localiser.estimate()
         if not self._context.doors or scan is None or not estimate.localised:
             return
@@ -96,9 +97,9 @@ class DoorWatch:
                 memory.note(door, DoorState.UNKNOWN, scan.stamp_s)
 
     def doubt(self, doors: Sequence[Doorway]) -> bool:
-        """Allows plans to the `doors` that the robot has not seen lately, so that it looks at them again.
+        """Lets plans pass through those `doors` that the robot has not seen lately, so that it looks at them again.
 
-        Returns whether there are any.
+        Returns whether there are such doors.
         """
         memory = self._context.door_memory
         old = [door for door in doors if memory.last_seen(door).seen_s < self._sure_since_s]
@@ -107,7 +108,7 @@ class DoorWatch:
         return bool(old)
 
     def costmap(self, costmap: FreeSpace, doors: Sequence[Doorway] | None = None) -> FreeSpace:
-        """The costmap with the closed doors, or with `doors`, as obstacles."""
+        """The costmap with `doors` as obstacles; None stands for the closed doors."""
         if not (panelled := self.closed if doors is None else doors):
             return costmap
         turns = [(door, door.through_rad) for door in panelled]
@@ -117,14 +118,14 @@ class DoorWatch:
     def forget_distant(self, here: Pose2D) -> bool:
         """Clears the costmap in distant doorways once another door is closed; returns whether a cell was cleared.
 
-        A partly visible door, seen through another door, may seem to have too narrow a gap.
+        A door seen only in part, through another door, may appear to have too narrow a gap.
         """
         closed, place = self.closed, (here.x_m, here.y_m)
         far = [door for door in self._context.doors if door.distance_m(place) > _JUDGED_M and door not in closed]
         return bool(closed) and self._clear(far)
 
     def detour_margin_m(self, start: Pose2D, goal: Pose2D) -> float:
-        """Margin about start and goal that contains all doors (m), for a plan through other doors."""
+        """Margin (m) about start and goal whose box contains all doors, for a plan through other doors."""
         places = np.array([[start.x_m, start.y_m], [goal.x_m, goal.y_m]])
         doors_W = np.array([door.middle_W for door in self._context.doors])
         out_m = np.maximum(places.min(axis=0) - doors_W, doors_W - places.max(axis=0))
@@ -156,14 +157,14 @@ class DoorWatch:
     def blocking_doors(
         self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()
     ) -> tuple[Doorway, ...]:
-        """The closed doors that block every path to the goals; none where a goal is reachable."""
+        """The closed doors that block every path to the goals; none when a goal is reachable."""
         if not self.closed:
             return ()
         regions = self.regions(footprint, here, goals, people_W)
         return regions.doors_between(self.closed) if regions.cut_off else ()
 
     def doors_on_path(self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D]) -> tuple[Doorway, ...]:
-        """The closed doors on possible paths to the goals; other doors may lead there, too."""
+        """The closed doors on possible paths to the goals, even when other doors lead there too."""
         doors, free = self._context.doors, self._context.free_space()
         doors_W = np.array([door.middle_W for door in doors]).reshape(-1, 2)
         regions = Regions(self.costmap(free, doors), footprint, here, goals, np.empty((0, 2)), doors_W)
@@ -173,8 +174,9 @@ class DoorWatch:
 class Regions:
     """The connected regions of the ground in which a disc as wide as the robot can move.
 
-    A goal outside the robot's region is certainly out of reach; a goal inside may be, since the robot is longer than
-    wide. The points `free_W` (N, 2) always count as free. The ground about the doors at `doors_W` (N, 2) is included.
+    A goal outside the robot's region is unreachable; a goal inside may be unreachable too, since the robot is longer
+    than wide. The points `free_W` (N, 2) always count as free. The grid includes the ground about the doors at
+    `doors_W` (N, 2).
     """
 
     def __init__(
@@ -206,7 +208,7 @@ class Regions:
         return bool(here) and not any(here & self._at((goal.x_m, goal.y_m)) for goal in self._goals)
 
     def doors_between(self, doors: Sequence[Doorway]) -> tuple[Doorway, ...]:
-        """The doors on a path to a goal through `doors`; none without a path."""
+        """Those of `doors` that lie on a path from the robot to a goal; none when no path exists."""
         begin = self._near((self._here.x_m, self._here.y_m))
         ends = set[int]().union(*(self._at((goal.x_m, goal.y_m)) for goal in self._goals))
         joins = {door: sides for door in doors if len(sides := self._sides(door)) == 2}
@@ -219,7 +221,7 @@ class Regions:
         return tuple(_on_a_path(joins, begin | (ends & reached)))
 
     def _sides(self, door: Doorway) -> frozenset[int]:
-        """The regions on the two sides of a door."""
+        """The regions on both sides of a door."""
         through = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
         found: list[int] = []
         for sign in (1.0, -1.0):
@@ -228,7 +230,7 @@ class Regions:
         return frozenset(found)
 
     def _at(self, place_W: tuple[float, float], off_m: float = 0.0) -> set[int]:
-        """The regions at a point, or within off_m of it."""
+        """The regions at a point, or within `off_m` of the point."""
         ((y, x),) = self._cell(np.array([place_W])).tolist()
         far = round(off_m / _CELL_M)
         near = self._labels[max(0, y - far) : max(0, y + far + 1), max(0, x - far) : max(0, x + far + 1)]
@@ -243,7 +245,7 @@ class Regions:
 
 
 def _on_a_path(joins: dict[Doorway, frozenset[int]], ends: set[int]) -> dict[Doorway, frozenset[int]]:
-    """The doors without those to dead ends."""
+    """The doors that remain after those that lead only to dead ends are removed."""
     left = dict(joins)
     while True:
         sides = [side for each in left.values() for side in each]
@@ -255,7 +257,7 @@ def _on_a_path(joins: dict[Doorway, frozenset[int]], ends: set[int]) -> dict[Doo
 
 
 def closed_doors_sentence(doors: Sequence[Doorway], goal: Pose2D) -> str:
-    """ "The doors between the hall and the kitchen, and between the kitchen and the study, are closed ..."."""
+    """Sentence: "The doors between the hall and the kitchen, and between the kitchen and the study, are closed ..."."""
     between = [f"between the {one} and the {other}" for one, other in (door.between for door in doors)]
     no_path = f"so no path leads to ({goal.x_m:.2f}, {goal.y_m:.2f})"
     if len(between) == 1:

@@ -1,4 +1,4 @@
-"""Paths of a differential base: straights ahead or back, turns on the spot, and arcs that round corners."""
+"""Paths of a differential base: straights forward or backward, turns on the spot, and arcs that round corners."""
 
 import math
 from collections.abc import Iterator
@@ -24,9 +24,9 @@ _ARC_STEP_M = 0.05
 
 
 def courses() -> tuple[FloatArray, NDArray[np.int64]]:
-    """Yaws (headings,) along which straights lead from cell to cell of a lattice, and moves (headings, M, 3).
+    """Headings (headings,) at which straights lead from cell to cell of a lattice, and moves (headings, M, 3).
 
-    The moves are short and long steps ahead and back, and turns to the next heading (see `lattice_moves`).
+    The moves are short and long steps forward and backward, and turns to the next heading (see `lattice_moves`).
     """
     quarter = [(1, 0), (2, 1), (1, 1), (1, 2)]
     steps = quarter + [(-dy, dx) for dx, dy in quarter]
@@ -44,9 +44,9 @@ Links = dict[int, tuple[float, tuple[FloatArray, ...]]]
 
 
 def links(space: Space, lattice: Lattice, pose: FloatArray, *, to_pose: bool) -> Links:
-    """The links from a pose to states of the lattice, or back from them to the pose.
+    """The links from a pose to lattice states, or with `to_pose` from lattice states to the pose.
 
-    From the pose the robot goes straight over any distance, since it may lack the clearance to turn on the spot.
+    From the pose the robot may go straight over any distance, since it may lack the clearance to turn on the spot.
     """
     found: Links = {}
     for cost, via in _straights(space, pose):
@@ -59,7 +59,7 @@ def links(space: Space, lattice: Lattice, pose: FloatArray, *, to_pose: bool) ->
 
 
 def _straights(space: Space, pose: FloatArray) -> Iterator[tuple[float, FloatArray]]:
-    """The pose itself, then free poses straight ahead and behind, each with the cost to it."""
+    """Yields the pose itself, then free poses straight ahead and behind, each with the cost of the straight."""
     yield 0.0, pose
     ahead = np.array([math.cos(pose[2]), math.sin(pose[2]), 0.0])
     for sign in (1.0, -1.0):
@@ -74,7 +74,7 @@ def _straights(space: Space, pose: FloatArray) -> Iterator[tuple[float, FloatArr
 
 
 def _around(lattice: Lattice, pose: FloatArray) -> Iterator[tuple[int, FloatArray]]:
-    """The states next to a pose: four cells, two headings each."""
+    """Yields the lattice states about a pose: four cells with two headings each."""
     row, column = (pose[1] - lattice.y0_m) / lattice.cell_m, (pose[0] - lattice.x0_m) / lattice.cell_m
     k = int(np.searchsorted(lattice.yaws_rad, pose[2] % math.tau, side="right")) - 1
     for i in {math.floor(row + 1e-6), math.ceil(row - 1e-6)}:
@@ -88,7 +88,7 @@ def _around(lattice: Lattice, pose: FloatArray) -> Iterator[tuple[int, FloatArra
 
 
 def driven_poses(space: Space, knots: FloatArray) -> FloatArray:
-    """Poses (N, 3) of the path through knots: turn, straight, turn; corners are rounded where the arc is free."""
+    """Poses (N, 3) on the path through knots: turn, straight, turn; rounds corners where the arc is free."""
     legs = _legs(space, knots)
     places = [legs[0][0], *(end for _, end, _ in legs)]
     poses = [knots[0]]
@@ -114,7 +114,7 @@ def driven_poses(space: Space, knots: FloatArray) -> FloatArray:
 
 
 def _allowed(space: Space, poses: FloatArray) -> bool:
-    """Returns whether no motion between poses goes against a one-way zone."""
+    """Returns whether all motions between poses respect the one-way zones."""
     return all(math.isfinite(zone_factor(space, *a[:2], *(b - a)[:2])) for a, b in pairwise(poses))
 
 
@@ -122,7 +122,7 @@ _Leg = tuple[FloatArray, FloatArray, float]
 
 
 def _legs(space: Space, knots: FloatArray) -> list[_Leg]:
-    """The straights between knots, each with its two ends and the yaw on it; yaws are continuous."""
+    """The straights between knots, each with its two ends and the yaw along it; yaws are continuous."""
     legs: list[_Leg] = []
     yaw = float(knots[0, 2])
     for a, b in pairwise(knots):
@@ -136,7 +136,7 @@ def _legs(space: Space, knots: FloatArray) -> list[_Leg]:
 
 
 def _rounded(space: Space, first: _Leg, second: _Leg, free_m: float) -> list[FloatArray] | None:
-    """The widest free arc from one straight to the next; None if they turn back or no arc is free."""
+    """The widest free arc between two straights; None when the base reverses between them or no arc is free."""
     (_, corner, yaw), (_, _, yaw_after) = first, second
     turn = yaw_after - yaw
     towards = [np.subtract(leg[1], leg[0]) @ (math.cos(leg[2]), math.sin(leg[2])) for leg in (first, second)]

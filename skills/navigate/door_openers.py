@@ -1,4 +1,4 @@
-"""Openers of closed doors: the robot's arm, an HTTP call, and the calls of such plug-ins during a run."""
+"""Door openers: the robot's arm, an HTTP call, and the calls of door plug-ins during a run."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ Method = Annotated[str, Field(pattern="^(GET|POST|PUT|PATCH)$")]
 
 @dataclass(frozen=True)
 class ArmDoor:
-    """Door with a handle at a position (x, y, height) in the world (m), which swings open in a direction (rad)."""
+    """Door with a handle at (x, y, height) in the world (m); the door swings open in a direction (rad)."""
 
     handle: tuple[Coordinate, Coordinate, Height]
     swings: Angle
@@ -30,7 +30,7 @@ class ArmDoor:
         raise RuntimeError("the robot opens it with its arm, in the step 'open'")
 
     def handle_from(self, body: Pose2D, body_m: float, middle_W: tuple[float, float]) -> DoorHandle:
-        """The handle relative to a robot at a pose, its body `body_m` above the floor; `middle_W` is the doorway's."""
+        """The handle in the frame of a body `body_m` above the floor; `middle_W` is the doorway's centre."""
         x, y, height_m = self.handle
         off = relative_pose(body, Pose2D(x, y, 0.0))
         before = (body.x_m - middle_W[0], body.y_m - middle_W[1])
@@ -41,14 +41,14 @@ class ArmDoor:
 
 @dataclass(frozen=True)
 class HttpDoor:
-    """Door that opens by one HTTP call; any answer of 200 to 299 within `timeout_s` counts."""
+    """Door that opens by one HTTP call; a status from 200 to 299 within `timeout_s` counts as success."""
 
     url: Url
     method: Method = "POST"
     timeout_s: Duration = 5.0
 
     def open(self, door_name: str, between: tuple[str, str]) -> None:
-        """Calls the address. Raises RuntimeError when nobody answers, or with another status."""
+        """Calls the address. Raises RuntimeError when there is no response or its status is not 2xx."""
         from urllib.error import HTTPError  # skills load this module, and few of them call anybody
         from urllib.request import Request, urlopen
 
@@ -65,7 +65,7 @@ class HttpDoor:
 
 
 class DoorCalls:
-    """Calls of the plug-ins of closed doors, one for each door; a door opens within `opens_s` of the answer, or not."""
+    """Calls the plug-in of each closed door once; a door may take `opens_s` from the response to open."""
 
     def __init__(self, context: SkillContext, opens_s: float) -> None:
         self._context, self._opens_s = context, opens_s
@@ -73,7 +73,7 @@ class DoorCalls:
         self._until_s: dict[Doorway, float] = {}
 
     def may_open(self, doors: Sequence[Doorway]) -> bool:
-        """Calls each plug-in of `doors` once; returns whether one of these doors may still open."""
+        """Calls the plug-in of each of `doors` once; returns whether one of these doors may still open."""
         for door in doors:
             if door.opener is not None and door not in self._calls:
                 self._calls[door] = self._call(door, door.opener)
@@ -81,7 +81,7 @@ class DoorCalls:
         return any(open_yet)
 
     def reasons(self, doors: Sequence[Doorway]) -> str:
-        """Sentences on why the called ones of `doors` stay closed; empty without a call."""
+        """Sentences that say why those of `doors` whose plug-in was called stay closed; empty when none was called."""
         return " ".join(self._reason(door, call) for door, call in self._calls.items() if door in doors)
 
     def _call(self, door: Doorway, opener: DoorOpener) -> Job[str | None]:

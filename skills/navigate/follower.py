@@ -1,7 +1,7 @@
 """Path follower that brakes for obstacles.
 
-A base that cannot go sideways follows by the law of Kanayama, Kimura, Miyazaki and Noguchi, "A Stable Tracking Control
-Method for an Autonomous Mobile Robot", 1990, and turns on the spot where its path does.
+A base that cannot move sideways follows by the law of Kanayama, Kimura, Miyazaki and Noguchi, "A Stable Tracking
+Control Method for an Autonomous Mobile Robot", 1990, and turns on the spot where its path does.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ _RESERVE_M = 0.1
 class FollowerOptions:
     """Path follower with brakes for obstacles: speeds (m/s, rad/s), accelerations (m/s^2, rad/s^2), gain (1/s).
 
-    A mission may lower `max_speed_m_s`, but not raise it. `lead_s` compensates the base's lag. An obstacle closer than
-    `touch_m` to the outline within the next `look_m` blocks the path. Between `wide_m` and `near_m` of clearance the
-    speed falls from full to near_speed_m_s.
+    `max_speed_m_s`: a mission may only lower it. `lead_s`: compensates the lag of the base. `touch_m` and `look_m`: an
+    obstacle closer than `touch_m` to the outline within the next `look_m` blocks the path. `wide_m` and `near_m`:
+    between these clearances the speed falls from full to `near_speed_m_s`.
     """
 
     max_speed_m_s: Speed = 0.8
@@ -56,15 +56,15 @@ class FollowerOptions:
     period_s: Duration = 0.05
 
     def build(self, path: Path, footprint: Footprint, *, max_speed_m_s: float) -> PathFollower:
-        """Creates a follower of one path with a speed limit."""
+        """Creates a follower for one path with a speed limit."""
         return PathFollower(path, footprint, replace(self, max_speed_m_s=min(self.max_speed_m_s, max_speed_m_s)))
 
 
 @dataclass(frozen=True)
 class Drive:
-    """Command of one tick: a body-frame velocity, the rest of the path (m, turns included), the distance from it (m).
+    """Command for one tick: body-frame velocity, remaining path (m, turns included), and distance from it (m).
 
-    `blocked_at` is the world (x, y) of the obstacle that blocks the path ahead, None when it is clear.
+    `blocked_at` is the world (x, y) of the obstacle that blocks the path ahead; None when the path is clear.
     """
 
     velocity: tuple[float, float, float]
@@ -74,7 +74,7 @@ class Drive:
 
 
 class PathFollower:
-    """Follower of one path. Call `command` once a tick."""
+    """Follows one path. Call `command` once per tick."""
 
     def __init__(self, path: Path, footprint: Footprint, options: FollowerOptions | None = None) -> None:
         self._options = options or FollowerOptions()
@@ -99,7 +99,7 @@ class PathFollower:
         costmap: FreeSpace,
         most_m_s: float = math.inf,
     ) -> Drive:
-        """The command at a world pose and a body velocity, after the velocity commanded `last` (3,).
+        """The command at a world pose and a body velocity; `last` (3,) is the previously commanded velocity.
 
         The speed is at most most_m_s; at 0 the robot stands.
         """
@@ -118,7 +118,7 @@ class PathFollower:
         return Drive((float(safe[0]), float(safe[1]), float(safe[2])), remaining, off_path_m, blocked_at)
 
     def _project(self, here: FloatArray) -> float:
-        """Moves the index to the nearest pose of the path a little behind or ahead; returns the distance to it (m)."""
+        """Moves the index to the nearest pose on a short stretch of the path; returns the distance to that pose (m)."""
         first, last = max(0, self._index - 3), min(len(self._progress), self._index + 25)
         delta = self._path.poses[first:last] - here
         turns = wrap(delta[:, 2])
@@ -128,12 +128,12 @@ class PathFollower:
         return float(np.hypot(delta[best, 0], delta[best, 1]))
 
     def _at(self, along: float) -> FloatArray:
-        """The path's pose at a progress."""
+        """The path's pose at a progress (m)."""
         poses = self._path.poses
         return np.array([np.interp(along, self._progress, poses[:, axis]) for axis in range(3)])
 
     def _wanted(self, here: FloatArray, along: float, speed: float) -> FloatArray:
-        """Body-frame velocity along the path and back to it."""
+        """Body-frame velocity that follows the path and corrects the deviation from it."""
         options = self._options
         lead = max(speed * options.lead_s, 0.01)
         target, after = self._at(along), self._at(along + lead)
@@ -157,16 +157,17 @@ class PathFollower:
         return np.asarray(velocity / max(1.0, float(np.max(share))))
 
     def _slew(self, velocity: FloatArray, last: FloatArray) -> FloatArray:
-        """Limits the change of a velocity to the accelerations; slowing down may be twice as quick."""
+        """Limits the change of a velocity to the accelerations; deceleration may be twice as large."""
         options = self._options
         most = np.array([options.acceleration_m_s2, options.acceleration_m_s2, options.turn_acceleration_rad_s2])
         most = most * options.period_s * np.where(np.abs(velocity) < np.abs(last), 2.0, 1.0)
         return np.asarray(last + np.clip(velocity - last, -most, most))
 
     def _free_distance(self, costmap: FreeSpace, now_m: float) -> tuple[float, tuple[float, float] | None]:
-        """Free distance (m) ahead, less a reserve, and the position of the first obstacle in it.
+        """Free distance (m) ahead, minus a reserve, and the position of the first obstacle within it.
 
-        At a clearance of only now_m, the path counts as blocked only if the clearance falls.
+        When the present clearance `now_m` is small already, the path counts as blocked only where the clearance falls
+        below it.
         """
         options = self._options
         end = int(np.searchsorted(self._progress, self._progress[self._index] + options.look_m))
@@ -182,9 +183,9 @@ class PathFollower:
         return max(0.0, float(free_m) - _RESERVE_M), (float(centres[worst, 0]), float(centres[worst, 1]))
 
     def _brake(self, velocity: FloatArray, here: FloatArray, costmap: FreeSpace) -> FloatArray:
-        """The velocity, or the part of it that keeps the outline off obstacles for the next half second.
+        """The velocity, or a fraction of it that keeps the outline clear of obstacles for the next half second.
 
-        Tries half of the velocity, then only sideways motion and turns, then a stop.
+        Tries the whole, half of it, only sideways motion and rotation, one of the two, and then a stop.
         """
         shares = np.array([[1.0, 1.0, 1.0], [0.5, 0.5, 0.5], [0.0, 1.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         tried = velocity * shares
@@ -197,12 +198,12 @@ class PathFollower:
         return tried[safe[0]] if len(safe) else np.zeros(3)
 
     def ahead(self, way_m: float) -> FloatArray:
-        """Poses (N, 3) of the next way_m of the path."""
+        """Poses (N, 3) on the next way_m of the path."""
         end = int(np.searchsorted(self._progress, self._progress[self._index] + way_m))
         return self._path.poses[self._index : end + 1]
 
     def pose_after(self, way_m: float) -> Pose2D:
-        """The path's pose way_m ahead of the robot."""
+        """Pose on the path way_m ahead of the robot."""
         x, y, yaw = self._at(min(self.length_m, float(self._progress[self._index]) + way_m)).tolist()
         return Pose2D(x, y, wrap(yaw))
 
@@ -217,10 +218,10 @@ def speed_by_clearance(clearance_m: FloatArray | float, options: FollowerOptions
 def tracking_velocity(
     here: FloatArray, yaw_rad: float, forward: FloatArray, error: FloatArray, gain: float
 ) -> FloatArray:
-    """Body-frame velocity of a base that cannot go sideways.
+    """Body-frame velocity of a base that cannot move sideways.
 
-    The target pose on the path heads to yaw_rad and moves at `forward` (vx, vy, wz) in the world; `error` leads from
-    `here` to it. Far off that heading the base turns on the spot.
+    The target pose on the path has heading yaw_rad and moves at `forward` (vx, vy, wz) in the world; `error` leads from
+    `here` to the target. At a large heading error the base turns on the spot.
     """
     c, s = math.cos(here[2]), math.sin(here[2])
     ahead, left, turn = c * error[0] + s * error[1], -s * error[0] + c * error[1], float(error[2])
@@ -232,7 +233,7 @@ def tracking_velocity(
 
 
 def corners_of(path: Path) -> NDArray[np.int64]:
-    """Indices of the poses where a path changes between driving ahead, driving back, and turning on the spot."""
+    """Indices of the poses at which a path changes between driving forward, backward, and turning on the spot."""
     steps = np.diff(path.poses, axis=0)
     yaw = path.poses[:-1, 2]
     ahead = np.cos(yaw) * steps[:, 0] + np.sin(yaw) * steps[:, 1]
@@ -245,7 +246,7 @@ def speed_limits(
 ) -> FloatArray:
     """Speed limit along the path (m/s of progress) at each pose: by direction, clearance, and braking for later limits.
 
-    At `corners` (indices) the base almost stands.
+    At `corners` (indices) the limit is nearly zero.
     """
     steps = np.diff(path.poses, axis=0)
     lengths = np.maximum(np.diff(progress_m), 1e-9)

@@ -1,6 +1,6 @@
-"""The robot's outline as discs, and its clearance from the obstacles of a costmap.
+"""The robot's outline as discs, and its clearance from the obstacles in a costmap.
 
-A costmap may have added obstacles: discs about people, outlines of other robots, closed doors.
+A wrapped costmap adds obstacles: discs about people, outlines of other robots, closed doors.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ SAFE_MARGIN_M = 0.06
 class Footprint:
     """Outline of the robot in the body frame, as discs: rows of x, y, radius (m), with the kind of base.
 
-    The discs lie inside the outline, radius 0 at the corners, so their common clearance is that of the rectangle,
-    within about a centimetre. More discs cover the parts beyond the rectangle, which `beyond` names.
+    The discs lie inside the outline, with radius 0 at the corners, so their common clearance equals that of the
+    rectangle within about a centimetre. Further discs cover what overhangs the rectangle; `beyond` names it in
+    messages.
     """
 
     discs: FloatArray
@@ -43,7 +44,7 @@ class Footprint:
 
     @staticmethod
     def round(corners: Sequence[tuple[float, float]]) -> Footprint | None:
-        """Creates one disc about the body's origin where at least eight corners (x, y) lie on a circle; else None."""
+        """Creates one disc about the body's origin if at least eight corners (x, y) lie on a circle; else None."""
         distances = np.hypot(*np.transpose(corners))
         radius = float(distances.max())
         if len(corners) < 8 or float(distances.min()) < 0.97 * radius:
@@ -51,12 +52,12 @@ class Footprint:
         return Footprint(np.array([[0.0, 0.0, radius]]), 2.0 * radius, 2.0 * radius)
 
     def with_discs(self, discs: FloatArray, beyond: str) -> Footprint:
-        """This footprint with more discs, which `beyond` names."""
+        """This footprint with further discs; `beyond` names what they cover."""
         return replace(self, discs=np.vstack([self.discs, discs]), beyond=beyond)
 
     @staticmethod
     def rectangle(corners: Sequence[tuple[float, float]]) -> Footprint:
-        """Creates the bounding rectangle of outline corners (x, y)."""
+        """Creates the bounding rectangle of the outline's corners (x, y)."""
         low, high = np.min(corners, axis=0), np.max(corners, axis=0)
         length, width = (float(v) for v in high - low)
         middle, long_axis = (low + high) / 2.0, 0 if length >= width else 1
@@ -72,7 +73,7 @@ class Footprint:
 
     @property
     def inscribed_m(self) -> float:
-        """Radius (m) of the largest disc inside."""
+        """Radius (m) of the largest inscribed disc."""
         return min(self.length_m, self.width_m) / 2.0
 
     @property
@@ -82,7 +83,7 @@ class Footprint:
 
     @property
     def extent_m(self) -> tuple[float, float]:
-        """Length and width (m) of all discs."""
+        """Length and width (m) over all discs."""
         low = np.min(self.discs[:, :2] - self.discs[:, 2:], axis=0)
         length, width = np.max(self.discs[:, :2] + self.discs[:, 2:], axis=0) - low
         return float(length), float(width)
@@ -94,7 +95,7 @@ def pose_array(poses: Sequence[Pose2D]) -> FloatArray:
 
 
 def disc_centres(discs: FloatArray, poses: FloatArray) -> FloatArray:
-    """World (x, y) of all discs at (N, 3) poses: (N, discs, 2)."""
+    """World (x, y) of all discs (N, discs, 2) at poses (N, 3)."""
     c, s = np.cos(poses[:, 2:3]), np.sin(poses[:, 2:3])
     x, y = discs[:, 0], discs[:, 1]
     return np.stack([poses[:, 0:1] + c * x - s * y, poses[:, 1:2] + s * x + c * y], axis=-1)
@@ -113,7 +114,7 @@ def footprint_clear(costmap: FreeSpace, footprint: Footprint, pose: Pose2D, marg
 
 
 class ClearanceField(NamedTuple):
-    """Clearance (m) sampled at the points (x0_m + column * cell_m, y0_m + row * cell_m), and the footprint's discs."""
+    """Clearance (m) sampled at points (x0_m + column * cell_m, y0_m + row * cell_m), with the footprint's discs."""
 
     values: NDArray[np.float32]
     cell_m: float
@@ -130,7 +131,7 @@ def clearance_on_grid(costmap: FreeSpace, xs: FloatArray, ys: FloatArray) -> Flo
 
 @compiled
 def clearance_at(field: ClearanceField, x: float, y: float, yaw: float) -> float:
-    """Clearance (m) of the footprint at one pose; -1 off the sampled field."""
+    """Clearance (m) of the footprint at one pose; -1 outside the sampled field."""
     values, discs = field.values, field.discs
     cells = 1.0 / field.cell_m
     c, s = math.cos(yaw) * cells, math.sin(yaw) * cells
@@ -152,12 +153,12 @@ def clearance_at(field: ClearanceField, x: float, y: float, yaw: float) -> float
 
 _ROUND_UP_M = 0.02
 _FAR_M = 1.5
-"""Outlines farther than this from their disc are not looked up."""
+"""Distance beyond which an outline does not count as an obstacle."""
 
 
 @dataclass(frozen=True)
 class WithObstacles:
-    """A costmap with more obstacles; `distance_m` returns the distance of points (N, 2) from the nearest one."""
+    """Costmap with further obstacles; `distance_m` maps points (N, 2) to their distance from the nearest of these."""
 
     costmap: FreeSpace
     distance_m: Callable[[FloatArray], FloatArray]
@@ -178,7 +179,7 @@ class NoObstacles:
 
 
 def with_discs(costmap: FreeSpace, discs_W: FloatArray) -> FreeSpace:
-    """The costmap with discs, rows of x, y and radius in metres."""
+    """The costmap with discs as obstacles: rows of x, y and radius (m)."""
 
     def distance_m(points: FloatArray) -> FloatArray:
         offsets = points[:, None, :] - discs_W[None, :, :2]
@@ -190,7 +191,7 @@ def with_discs(costmap: FreeSpace, discs_W: FloatArray) -> FreeSpace:
 def with_segments(
     costmap: FreeSpace, segments_W: Sequence[tuple[FloatArray, FloatArray, float]], radius_m: float
 ) -> FreeSpace:
-    """The costmap with segments, radius_m thick to all sides: middle (2,), unit direction (2,) and length in metres."""
+    """The costmap with segments grown by radius_m as obstacles: centre (2,), unit direction (2,) and length (m)."""
 
     def distance_m(points: FloatArray) -> FloatArray:
         nearest_m = np.full(len(points), np.inf)
@@ -206,9 +207,9 @@ def with_segments(
 def with_outlines(
     costmap: FreeSpace, outlines: Sequence[tuple[FloatArray, FloatArray]], larger_m: float = 0.0
 ) -> FreeSpace:
-    """The costmap with outlines (discs, as in `Footprint`) at poses (N, 3), each grown by larger_m.
+    """The costmap with outlines (discs, as in `Footprint`) as obstacles at poses (N, 3), each grown by larger_m.
 
-    Radii are rounded up to 2 cm. An outline farther than 1.5 m does not count.
+    Radii are rounded up to 2 cm. Outlines farther away than 1.5 m are ignored.
     """
     for discs, poses in outlines:
         steps = np.ceil(discs[:, 2] / _ROUND_UP_M - 1e-6)
@@ -219,7 +220,7 @@ def with_outlines(
 
 
 def _distance_from(discs: FloatArray, poses: FloatArray, radius_m: float) -> Callable[[FloatArray], FloatArray]:
-    """The distance of points from discs of one radius at poses, infinite beyond _FAR_M."""
+    """Distance from points to discs of one radius at poses; infinite beyond _FAR_M."""
     from scipy.spatial import cKDTree
 
     tree, most_m = cKDTree(disc_centres(discs, poses).reshape(-1, 2)), radius_m + _FAR_M

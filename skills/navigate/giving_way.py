@@ -1,9 +1,9 @@
-"""Right of way among robots: obstacles from other robots and their reserved paths, where to stop, where to wait aside.
+"""Right of way among robots: reserved paths as obstacles, where to stop before them, and waiting poses off them.
 
 Prioritised planning (Erdmann and Lozano-Perez, "On Multiple Moving Objects", 1987) with the inherited priority of PIBT
 (Okumura, Machida, Defago and Tamura, "Priority Inheritance with Backtracking for Iterative Multi-Agent Path Finding",
-2022): a robot that goes first reserves its path even through one that goes later, which then has to clear it. Where
-that robot cannot, the two swap priorities. Waiting poses lie off all reserved paths.
+2022): a robot with priority reserves its path even through a robot with lower priority, which then has to clear it.
+Where that robot cannot, the two swap priorities. Waiting poses lie off all reserved paths.
 """
 
 import enum
@@ -50,10 +50,12 @@ _BODY_M = 0.3
 class GivingWayOptions:
     """Right of way: distances between outlines (m), times on the robot's clock (s).
 
-    A robot stops `short_m` before its path comes within `apart_m` of a reserved one. A robot that goes first waits for
-    one that stands within `room_m` of the next `room_look_m` of its path, for `patience_s` at most; then the two swap
-    priorities. A waiting pose lies `aside_m` off reserved paths, and within `reach_m`; at most `places` are tried. The
-    robot plans again every `again_s`, and fails after `blocked_patience_s` behind other robots.
+    `apart_m` and `short_m`: the robot stops `short_m` before its path comes within `apart_m` of a reserved path.
+    `room_m`, `room_look_m` and `patience_s`: a robot with priority waits, for `patience_s` at most, for a robot that
+    must make way and stands within `room_m` of the next `room_look_m` of its path; then the two swap priorities.
+    `aside_m`, `reach_m` and `places`: a waiting pose lies `aside_m` off reserved paths within `reach_m`; at most
+    `places` are tried. `again_s`: time between plans. `blocked_patience_s`: the skill fails after waiting this long for
+    other robots.
     """
 
     apart_m: Margin = 0.15
@@ -70,7 +72,7 @@ class GivingWayOptions:
 
 
 class Avoided(enum.Enum):
-    """Parts of the other robots that a plan avoids, besides the obstacles of the costmap."""
+    """What a plan avoids of the other robots, besides the obstacles in the costmap."""
 
     PATHS = "paths"  # their bodies, and their reserved paths with priority over this robot
     BODIES = "bodies"  # their bodies: the robot stops before a reserved path
@@ -78,7 +80,7 @@ class Avoided(enum.Enum):
 
 
 class GivingWay:
-    """Right of way of one navigation; without other robots, no answer restricts it."""
+    """Right of way during one navigation; without other robots, nothing restricts it."""
 
     def __init__(self, context: SkillContext, options: GivingWayOptions) -> None:
         self._traffic, self._options = context.traffic, options
@@ -86,12 +88,12 @@ class GivingWay:
         self._waiting_since_s: float | None = None
 
     def begin(self) -> None:
-        """Claims a turn in the order of the robots."""
+        """Claims a rank in the order of the robots."""
         self._traffic.release()
         self._traffic.claim()
 
     def end(self) -> None:
-        """Releases the turn and the reserved path."""
+        """Releases the claim and the reserved path."""
         self._traffic.release()
 
     def reserve_path(self, follower: LocalController, footprint: Footprint) -> None:
@@ -103,19 +105,19 @@ class GivingWay:
         self._traffic.announce(np.array([[pose.x_m, pose.y_m, pose.yaw_rad]]), footprint.discs)
 
     def reserve_goal(self, pose: Pose2D, goal: Pose2D, footprint: Footprint) -> None:
-        """Reserves the goal while no path leads to it, so that a robot with a later turn steps aside."""
+        """Reserves the goal while no path leads to it, so that a robot with lower priority steps aside."""
         self._traffic.announce(pose_array([pose, goal]), footprint.discs)
 
     def others(self) -> Sequence[Neighbour]:
-        """All other robots that reported lately."""
+        """All other robots that have reported recently."""
         return self._traffic.others()
 
     def robots_with_priority(self) -> Sequence[Neighbour]:
-        """The other robots with priority and a path."""
+        """The other robots that have a path and priority over this one."""
         return [one for one in self._traffic.others() if one.first and one.path is not None]
 
     def costmap(self, costmap: FreeSpace, avoided: Avoided) -> FreeSpace:
-        """The costmap with the avoided parts of other robots."""
+        """The costmap with the bodies, and where `avoided` says so the reserved paths, of other robots as obstacles."""
         others = [one for one in self._traffic.others() if avoided is not Avoided.WORKING or not _will_move(one)]
         with_others = with_outlines(costmap, [(one.discs, one.pose[None, :]) for one in others], _UNSURE_M)
         if avoided is not Avoided.PATHS:
@@ -123,7 +125,7 @@ class GivingWay:
         return with_outlines(with_others, [(one.discs, _thinned(one)) for one in self.robots_with_priority()])
 
     def less_avoided(self, avoided: Avoided) -> Avoided | None:
-        """The next smaller set to avoid after no path was found; None when that would not help."""
+        """What to avoid less of after no path was found; None when avoiding less would not help."""
         if avoided is Avoided.PATHS and self.robots_with_priority():
             return Avoided.BODIES
         if avoided is not Avoided.WORKING and any(_will_move(one) for one in self._traffic.others()):
@@ -131,12 +133,12 @@ class GivingWay:
         return None
 
     def let_pass(self, names: Sequence[str]) -> None:
-        """Swaps priorities with robots that this one cannot make way for."""
+        """Swaps priorities with robots for which this one cannot make way."""
         for name in names:
             self._traffic.let_pass(name)
 
     def conflict_m(self, follower: LocalController, footprint: Footprint) -> tuple[float, str] | None:
-        """Distance (m) along the path to the first reserved path, and its robot's name; None without a conflict."""
+        """Distance (m) along the path to the first reserved path, and its robot's name; None when there is none."""
         ahead = follower.ahead(self._options.look_m)
         found: tuple[float, str] | None = None
         for one in self.robots_with_priority():
@@ -148,9 +150,9 @@ class GivingWay:
         return found
 
     def robot_to_wait_for(self, follower: LocalController, footprint: Footprint) -> str | None:
-        """Name of the robot ahead that has to make way, for which this one waits; None when there is none.
+        """Name of the robot ahead that must make way and for which this one waits; None when there is none.
 
-        Swaps priorities with a robot that takes too long.
+        Swaps priorities with a robot that takes longer than `patience_s`.
         """
         ahead = follower.ahead(self._options.room_look_m)
         for one in self._traffic.others():
@@ -173,19 +175,19 @@ class GivingWay:
         return any(one.path is not None for one in self._traffic.others())
 
     def is_robot(self, place_W: tuple[float, float]) -> bool:
-        """Returns whether another robot covers a point (x, y), or ends just before it."""
+        """Returns whether a point (x, y) lies on another robot's body or just outside it."""
         bodies = self.costmap(NoObstacles(), Avoided.BODIES)
         return bool(bodies.clearance_m(np.array([place_W]))[0] < _BODY_M)
 
     def name_at(self, place_W: tuple[float, float] | None) -> str | None:
-        """Name of the robot that stands about a point (x, y), None when there is none."""
+        """Name of the robot near a point (x, y); None when no robot is near the point."""
         if place_W is None:
             return None
         about = (one.name for one in self._traffic.others() if math.dist(place_W, one.pose[:2].tolist()) < _ABOUT_M)
         return next(about, None)
 
     def blocked_robots(self, here: Pose2D, footprint: Footprint) -> Sequence[str]:
-        """Names of the robots whose reserved path leads through this one."""
+        """Names of the robots whose reserved path this robot blocks."""
         names, pose = [], pose_array([here])
         for one in self.robots_with_priority():
             path = with_outlines(NoObstacles(), [(one.discs, _thinned(one)[1:])])
@@ -196,10 +198,7 @@ class GivingWay:
     def waiting_pose(
         self, costmap: FreeSpace, footprint: Footprint, here: Pose2D, tried: Sequence[Pose2D] = ()
     ) -> Pose2D | None:
-        """The nearest reachable pose off all reserved paths, None when there is none.
-
-        Leaves out positions beside the `tried` poses.
-        """
+        """The nearest reachable pose off all reserved paths and away from the `tried` poses; None without any."""
         paths = with_outlines(NoObstacles(), [(one.discs, _thinned(one)) for one in self.robots_with_priority()])
         return pose_aside(self.costmap(costmap, Avoided.BODIES), paths, footprint, here, self._options, tried)
 
@@ -212,7 +211,7 @@ def pose_aside(
     options: GivingWayOptions,
     tried: Sequence[Pose2D] = (),
 ) -> Pose2D | None:
-    """The nearest reachable pose that leaves some paths free, None when there is none; see `GivingWay.waiting_pose`."""
+    """The nearest reachable pose clear of `paths`; None when there is none (see `GivingWay.waiting_pose`)."""
     n = int(2.0 * options.reach_m / _CELL_M) + 1
     axis = np.linspace(-options.reach_m, options.reach_m, n)
     xs, ys = here.x_m + axis, here.y_m + axis
@@ -249,7 +248,7 @@ def reachable_cells(free: NDArray[np.bool_], begin: tuple[int, int]) -> list[tup
 
 
 def first_suitable_pose(places_W: FloatArray, suits: Callable[[FloatArray], Pose2D | None]) -> Pose2D | None:
-    """The first pose that `suits` returns for positions (N, 2), checked in batches; None when there is none."""
+    """The first pose that `suits` returns for positions (N, 2), evaluated in batches; None when no position suits."""
     for begin in range(0, len(places_W), _AT_ONCE):
         if (place := suits(places_W[begin : begin + _AT_ONCE])) is not None:
             return place
@@ -257,12 +256,12 @@ def first_suitable_pose(places_W: FloatArray, suits: Callable[[FloatArray], Pose
 
 
 def _will_move(one: Neighbour) -> bool:
-    """Returns whether a robot drives on by itself, or clears a reserved path."""
+    """Returns whether a robot drives along a path, or clears a reserved path."""
     return one.yields or (one.first and one.path is not None)
 
 
 def _thinned(one: Neighbour) -> FloatArray:
-    """The poses that a robot still covers, thinned out: its own and those of its path."""
+    """The robot's pose and the poses of its remaining path, thinned out."""
     path = one.path if one.path is not None else np.empty((0, 3))
     chosen, last_m = [one.pose], -math.inf
     for pose, at_m in zip(path, progress_m(path), strict=True):

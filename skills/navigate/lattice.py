@@ -34,7 +34,7 @@ class Lattice(NamedTuple):
 def lattice_moves(headings: int) -> IntArray:
     """Moves (headings, M, 3) from each heading, as changes of column, row and heading.
 
-    They are sixteen directions, each also with a turn to either side, and turns on the spot.
+    The moves are sixteen directions, each with no turn or a turn to either side, and turns on the spot.
     """
     flat = [(1, 0), (1, 1), (2, 1), (1, 2)]
     steps = {(sx * a, sy * b) for dx, dy in flat for a, b in ((dx, dy), (dy, dx)) for sx in (1, -1) for sy in (1, -1)}
@@ -44,7 +44,7 @@ def lattice_moves(headings: int) -> IntArray:
 
 @compiled
 def cost_to_go(space: Space, lattice: Lattice, goal_row: int, goal_column: int, inscribed_m: float) -> FloatArray:
-    """Least seconds from each cell to the goal for a disc of the inscribed radius; infinite where there is no path."""
+    """Minimum time (s) from each cell to the goal for a disc of the inscribed radius; infinite where no path exists."""
     field, weights = space.field, space.weights
     values, least_m = field.values, inscribed_m - field.cell_m
     rows, columns = lattice.rows, lattice.columns
@@ -86,10 +86,10 @@ def search(
     greed: float,
     expansions: IntArray,
 ) -> IntArray:
-    """State indices from a seed to an end, empty when there is no path; adds to `expansions` (1,).
+    """Indices of the states on the best path from a seed to an end; empty when no path exists.
 
-    A state's index is (row * columns + column) * headings + heading. `seeds` are rows of state index and cost so far,
-    `ends` rows of state index, increasing, and cost from there to the goal.
+    A state's index is (row * columns + column) * headings + heading. `seeds` are rows of state index and cost so far.
+    `ends` are rows of state index, increasing, and cost from there to the goal. Adds to the count `expansions` (1,).
     """
     states = lattice.rows * lattice.columns * lattice.headings
     cost = np.full(states + 1, np.inf)
@@ -140,7 +140,7 @@ def _seconds(lattice: Lattice, moves: IntArray, weights: Weights) -> FloatArray:
 
 @compiled
 def _turn(lattice: Lattice, k: int, change: int | np.int64) -> float:
-    """Angle (rad) from a heading to the one `change` steps on, at most half a turn."""
+    """Angle (rad) from a heading to the one `change` steps further, at most half a turn."""
     off = lattice.yaws_rad[(k + change) % lattice.headings] - lattice.yaws_rad[k]
     return float((off + math.pi) % (2.0 * math.pi) - math.pi)
 
@@ -159,7 +159,7 @@ def _expand(
     reached_states: IntArray,
     reached_totals: FloatArray,
 ) -> int:
-    """Writes the states that a state reaches at a lower cost than before, and their costs; returns their number."""
+    """Writes the states that a state reaches at a lower cost than before, and these costs; returns their number."""
     headings, columns = lattice.headings, lattice.columns
     cell, k = index // headings, index % headings
     i, j = cell // columns, cell % columns
@@ -198,7 +198,7 @@ def _move_cost(
     need: float,
     seconds: float,
 ) -> float:
-    """Cost of one move, checked at its end (stored in `clear`), and between the ends unless both have clearance."""
+    """Cost of one move; checks the clearance at its end (cached in `clear`), and between unless both have plenty."""
     if math.isnan(clear[new]):
         clear[new] = clearance_at(space.field, there[0], there[1], there[2])
     if clear[new] < need:
@@ -218,14 +218,14 @@ def _move_cost(
 
 @compiled
 def _ahead(to_go: FloatArray, lattice: Lattice, index: int | np.int64) -> float:
-    """Cost to go from a state's cell."""
+    """Cost to go from the cell of a state."""
     cell = index // lattice.headings
     return float(to_go[cell // lattice.columns, cell % lattice.columns])
 
 
 @compiled
 def _trace(parent: IntArray, last: int) -> IntArray:
-    """The states from the seed to the one before `last`."""
+    """The states from the seed up to the one before `last`."""
     count, index = 0, parent[last]
     while index >= 0:
         count += 1

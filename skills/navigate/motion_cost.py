@@ -1,4 +1,4 @@
-"""Cost of short motions: seconds at the usual speeds, more near obstacles. Search, smoothing and shortcuts share it."""
+"""Cost of short motions: time at the usual speeds, more near obstacles. Search, smoothing and shortcuts share it."""
 
 import math
 from typing import NamedTuple
@@ -23,7 +23,7 @@ _SLOWER_SHARE = 0.3
 
 
 class Weights(NamedTuple):
-    """Speeds and factors of the cost: see `LatticePlanner`. `turning_radius_m` is the outline's reach in a turn."""
+    """Speeds and weights in the cost: see `LatticePlanner`. `turning_radius_m` is the outline's reach in a rotation."""
 
     forward_m_s: float
     backward_m_s: float
@@ -35,7 +35,7 @@ class Weights(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """Required clearance: margin_m, or escape_margin_m within escape_m of the start (x, y)."""
+    """Required clearance: margin_m, but escape_margin_m within escape_m of the start (x, y)."""
 
     margin_m: float
     escape_margin_m: float
@@ -45,10 +45,10 @@ class Needs(NamedTuple):
 
 
 class ZoneCosts(NamedTuple):
-    """Costs of zones at the points of a clearance field; arrays without rows in a world without costs.
+    """Zone costs at the points of a clearance field; empty arrays when no zone affects the cost.
 
-    `factor`, 1 or more, raises the cost of a motion; motions do not go against `course` (rad; NaN is any direction).
-    `least` is the least factor about each point.
+    `factor`, 1 or more, multiplies the cost of a motion. `course` is the direction (rad) that motions must not oppose;
+    NaN allows any direction. `least` is the smallest factor near each point.
     """
 
     factor: NDArray[np.float32]
@@ -60,7 +60,7 @@ NO_ZONES = ZoneCosts(*3 * [np.empty((0, 0), dtype=np.float32)])
 
 
 class Space(NamedTuple):
-    """Input of a plan: the sampled clearance, the required clearance, the weights of the cost, and the zones."""
+    """Input of a plan: the sampled clearance, the required clearance, the cost weights, and the zones."""
 
     field: ClearanceField
     needs: Needs
@@ -70,7 +70,7 @@ class Space(NamedTuple):
 
 @compiled
 def clearance_needed(space: Space, x: float, y: float) -> float:
-    """Clearance (m) that a pose at (x, y) needs."""
+    """Clearance (m) that a pose at (x, y) requires."""
     needs = space.needs
     near = math.hypot(x - needs.x_m, y - needs.y_m) < needs.escape_m
     return needs.escape_margin_m if near else needs.margin_m
@@ -78,7 +78,7 @@ def clearance_needed(space: Space, x: float, y: float) -> float:
 
 @compiled
 def motion_seconds(dx: float, dy: float, dyaw: float, yaw: float, weights: Weights) -> float:
-    """Seconds for a short motion (world dx, dy, dyaw) of a body that heads to yaw midway."""
+    """Time (s) of a short motion (world dx, dy, dyaw) of a body whose heading midway is `yaw`."""
     c, s = math.cos(yaw), math.sin(yaw)
     ahead, aside = c * dx + s * dy, -s * dx + c * dy
     speed = weights.forward_m_s if ahead >= 0.0 else weights.backward_m_s
@@ -88,14 +88,14 @@ def motion_seconds(dx: float, dy: float, dyaw: float, yaw: float, weights: Weigh
 
 @compiled
 def nearness(clearance: float, weights: Weights) -> float:
-    """Factor, 1 or more, by which a small clearance raises the cost of a motion."""
+    """Factor, 1 or more, by which a small clearance multiplies the cost of a motion."""
     short = min(max(0.0, (weights.soft_m - clearance) / weights.soft_m), 1.0)
     return 1.0 + weights.soft_weight * short * short
 
 
 @compiled
 def zone_factor(space: Space, x: float, y: float, dx: float, dy: float) -> float:
-    """Factor, 1 or more, by which the zones at (x, y) raise the cost of a motion; infinite against a one-way zone."""
+    """Factor, 1 or more, by which the zones at (x, y) multiply a motion's cost; infinite against a one-way zone."""
     if space.zones.factor.shape[0] == 0:
         return 1.0
     field, factor = space.field, space.zones.factor
@@ -122,10 +122,10 @@ def mean_zone_factor(space: Space, x: float, y: float, dx: float, dy: float) -> 
 
 @compiled
 def segment_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> float:
-    """Cost of a straight motion from pose a to pose b with an even turn; infinite where clearance falls below need.
+    """Cost of a straight motion from pose a to pose b with a uniform turn; infinite where clearance is below `need`.
 
-    The yaws must differ by the intended turn (no wrapping here). A step is as long as the spare clearance, since no
-    point of the outline moves farther than a step; at least 6 cm.
+    The yaws must differ by the intended turn (no wrapping here). A step is as long as the spare clearance, at least 6
+    cm, since no point of the outline moves farther than a step.
     """
     dx, dy, dyaw = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length = max(1e-9, math.hypot(dx, dy) + space.weights.turning_radius_m * abs(dyaw))
@@ -149,8 +149,8 @@ def segment_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> flo
 def drive_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> tuple[float, float]:
     """Cost of a turn on the spot, a straight and a turn from pose a to pose b, and the yaw on the straight.
 
-    It drives ahead or back, at the lower cost; the cost is infinite, with the nearer yaw, if neither is free. The yaw
-    differs from a's by the intended turn.
+    The base drives forward or backward, whichever costs less; when neither is free the cost is infinite, with the
+    nearer yaw. The yaw differs from a's yaw by the intended turn.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     moved = math.hypot(dx, dy) > 1e-6

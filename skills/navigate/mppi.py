@@ -1,4 +1,4 @@
-"""Model-predictive path integral control: a path follower that chooses its velocity by sampled rollouts.
+"""Model-predictive path integral control: a path follower that selects its velocity by sampled rollouts.
 
 Williams, Aldrich and Theodorou, "Model Predictive Path Integral Control", 2017.
 """
@@ -34,10 +34,11 @@ _CORNER_M_S = 0.15
 class MppiOptions(FollowerOptions):
     """Model-predictive path integral control: follows a path by sampled rollouts, within the path follower's limits.
 
-    The weights of `samples` rollouts, `steps` times `step_s` long, fall with their cost, more steeply at a low
-    `temperature`. The cost is the squared distance from the path's pose at that time (a radian counts as `yaw_m`),
-    clearance below `near_m` with `clearance_weight`, and change of velocity with `change_weight`. The path follower
-    drives near the goal, while an obstacle blocks the path, and at the corners of a base that cannot go sideways.
+    `samples`, `steps` and `step_s`: number of rollouts, and their length. `temperature`: the lower, the more steeply
+    the weight of a rollout falls with its cost. The cost is the squared distance from the path's pose at that time
+    (`yaw_m`: metres for a radian), plus `clearance_weight` for a clearance below `near_m`, plus `change_weight` for
+    changes of velocity. The path follower itself drives near the goal, while an obstacle blocks the path, and at the
+    corners of a base that cannot move sideways.
     """
 
     samples: Count = 200
@@ -51,12 +52,12 @@ class MppiOptions(FollowerOptions):
     change_weight: Factor = 0.02
 
     def build(self, path: Path, footprint: Footprint, *, max_speed_m_s: float) -> MppiController:
-        """Creates a controller of one path with a speed limit."""
+        """Creates a controller for one path with a speed limit."""
         return MppiController(path, footprint, replace(self, max_speed_m_s=min(self.max_speed_m_s, max_speed_m_s)))
 
 
 class MppiController(PathFollower):
-    """Controller of one path. Equal inputs give equal velocities, since the noise comes from a fixed seed."""
+    """Controller that follows one path. Equal inputs give equal velocities, because the noise has a fixed seed."""
 
     def __init__(self, path: Path, footprint: Footprint, options: MppiOptions | None = None) -> None:
         self._mppi = options or MppiOptions()
@@ -72,7 +73,7 @@ class MppiController(PathFollower):
         costmap: FreeSpace,
         most_m_s: float = math.inf,
     ) -> Drive:
-        """See `PathFollower.command`; on a free path the velocity comes from the weighted rollouts."""
+        """Returns the command as `PathFollower.command`; on a free path the weighted rollouts give the velocity."""
         plain = super().command(pose, velocity, last, costmap, most_m_s)
         if plain.remaining_m < _NEAR_GOAL_M or plain.blocked_at is not None or not any(plain.velocity):
             self._plan = None
@@ -108,13 +109,13 @@ class MppiController(PathFollower):
         return np.ascontiguousarray(poses[1:]), np.ascontiguousarray(feed)
 
     def _sampled(self, costmap: FreeSpace, pose: Pose2D) -> ClearanceField:
-        """Clearance on a grid about the robot."""
+        """Clearance sampled on a grid about the robot."""
         offsets = np.arange(-_HALF_M, _HALF_M + _CELL_M, _CELL_M)
         values = clearance_on_grid(costmap, pose.x_m + offsets, pose.y_m + offsets).astype(np.float32)
         return ClearanceField(values, _CELL_M, pose.x_m - _HALF_M, pose.y_m - _HALF_M, self._footprint.discs)
 
     def _rollout(self) -> _Rollout:
-        """The options as the compiled loop takes them."""
+        """The options in the form of the compiled loop."""
         options = self._mppi
         lateral_m_s = options.lateral_m_s if self._sideways else 0.0
         limits = np.array([options.max_speed_m_s, options.backward_m_s, lateral_m_s, options.turn_rad_s])
@@ -129,7 +130,7 @@ class MppiController(PathFollower):
 
 
 def _noise(options: MppiOptions) -> FloatArray:
-    """Changes of velocity (sets, samples, steps, 3), smooth in time; the first sample of a set has none."""
+    """Velocity perturbations (sets, samples, steps, 3), smooth in time; the first sample of each set is zero."""
     rng = np.random.default_rng(0)
     white = rng.standard_normal((_NOISES, options.samples, options.steps, 3))
     for n in range(1, options.steps):
@@ -140,7 +141,7 @@ def _noise(options: MppiOptions) -> FloatArray:
 
 
 class _Rollout(NamedTuple):
-    """Speed limits (ahead, back, sideways, turning), the most change per step, and weights: see `MppiOptions`."""
+    """Speed limits (forward, backward, sideways, turning), largest change per step, and weights: see `MppiOptions`."""
 
     limits: FloatArray
     rates: FloatArray
@@ -163,7 +164,7 @@ def _improved(
     noise: FloatArray,
     reference: FloatArray,
 ) -> FloatArray:
-    """The plan (steps, 3) of body-frame velocities after one round of sampling about `nominal` and, once, `feed`."""
+    """Plan (steps, 3) of body-frame velocities after one sampling round about `nominal`; `feed` is one extra sample."""
     limits, rates, step_s = rollout.limits, rollout.rates, rollout.step_s
     samples, steps = noise.shape[0], noise.shape[1]
     plans = np.empty((samples, steps, 3))

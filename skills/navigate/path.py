@@ -1,6 +1,6 @@
 """Planned paths: closely spaced poses, the distance along them, and the smoothing of a lattice path.
 
-Smoothing takes shortcuts, then relaxes the path like an elastic band, with clearance checked throughout.
+Smoothing takes shortcuts, then relaxes the path like an elastic band; every step checks the clearance.
 """
 
 import math
@@ -19,9 +19,9 @@ TURN_M_PER_RAD = 0.4
 
 @dataclass(frozen=True)
 class Path:
-    """Poses (N, 3) x, y (m), yaw (rad, continuous, not wrapped) in the world frame, at most some centimetres apart.
+    """Poses (N, 3) x, y (m), yaw (rad, continuous, not wrapped) in the world frame, spaced by a few centimetres.
 
-    `clearance_m` (N,) is the footprint's clearance at each pose when the path was planned.
+    `clearance_m` (N,) is the footprint's clearance at each pose at planning time.
     """
 
     poses: FloatArray
@@ -42,12 +42,12 @@ class Path:
         return Pose2D(*self.poses[-1].tolist())
 
     def progress_m(self) -> FloatArray:
-        """Distance (m) up to each pose (N,), turns included by TURN_M_PER_RAD."""
+        """Distance (m) along the path up to each pose (N,); a radian counts as TURN_M_PER_RAD."""
         return progress_m(self.poses)
 
 
 def progress_m(poses: FloatArray) -> FloatArray:
-    """Distance (m) along poses (N, 3) with continuous yaw up to each of them (N,), turns included by TURN_M_PER_RAD."""
+    """Distance (m) along poses (N, 3) with continuous yaw, up to each pose (N,); a radian counts as TURN_M_PER_RAD."""
     steps = np.diff(poses, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1]) + TURN_M_PER_RAD * np.abs(steps[:, 2])
     return np.concatenate([[0.0], np.cumsum(lengths)])[: len(poses)]
@@ -61,9 +61,10 @@ def path_length(path: Path) -> float:
 
 @compiled
 def shortcut(space: Space, poses: FloatArray, window: int, sideways: bool) -> FloatArray:
-    """The cheapest subset of poses (N, 3) to join by straight lines; each line skips at most `window` poses.
+    """The cheapest subset of poses (N, 3) that straight lines can join; each line skips at most `window` poses.
 
-    The first and the last pose stay; yaws must be continuous. A base that cannot go sideways turns to each line first.
+    The first and the last pose stay; yaws must be continuous. A base that cannot move sideways turns to each line
+    first.
     """
     count = poses.shape[0]
     best = np.full(count, np.inf)
@@ -108,7 +109,7 @@ def densify(poses: FloatArray, step_m: float) -> FloatArray:
 def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m: float) -> FloatArray:
     """Pulls poses between their neighbours, turns them along the path, pushes them off obstacles nearer than wide_m.
 
-    The ends stay. A pose moves only where its clearance stays above margin_m or does not get smaller.
+    Both ends stay. A pose moves only where its clearance stays above margin_m or does not decrease.
     """
     poses = poses.copy()
     count = poses.shape[0]
@@ -133,7 +134,7 @@ def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m:
 
 @compiled
 def _dearer(space: Space, poses: FloatArray, n: int, x: float, y: float) -> bool:
-    """Returns whether zones make the motions to and from a pose dearer when it moves to (x, y)."""
+    """Returns whether zones make the motions to and from a pose more expensive when it moves to (x, y)."""
     if space.zones.factor.shape[0] == 0:
         return False
     before, after = 0.0, 0.0
@@ -148,7 +149,7 @@ def _dearer(space: Space, poses: FloatArray, n: int, x: float, y: float) -> bool
 
 @compiled
 def _off_course(poses: FloatArray, n: int, yaw: float) -> float:
-    """Angle from yaw to the path's direction at a pose; 0 where the path does not lead roughly ahead."""
+    """Heading error of `yaw` against the path's direction at a pose; 0 where the path does not lead roughly forward."""
     first, last = max(0, n - 2), min(poses.shape[0] - 1, n + 2)
     dx, dy = poses[last, 0] - poses[first, 0], poses[last, 1] - poses[first, 1]
     if math.hypot(dx, dy) < 0.1:
@@ -159,7 +160,7 @@ def _off_course(poses: FloatArray, n: int, yaw: float) -> float:
 
 @compiled
 def _uphill(space: Space, x: float, y: float, yaw: float) -> tuple[float, float]:
-    """Direction in which the clearance grows, with a length up to 1."""
+    """Direction in which the clearance grows: a vector of length up to 1."""
     h = 0.03
     gx = clearance_at(space.field, x + h, y, yaw)
     gx -= clearance_at(space.field, x - h, y, yaw)
@@ -171,7 +172,7 @@ def _uphill(space: Space, x: float, y: float, yaw: float) -> tuple[float, float]
 
 @compiled
 def clearances(space: Space, poses: FloatArray) -> FloatArray:
-    """Clearance (m) of the footprint at each of (N, 3) poses."""
+    """Clearance (m) of the footprint at each pose (N, 3)."""
     values = np.empty(poses.shape[0])
     for n in range(poses.shape[0]):
         values[n] = clearance_at(space.field, poses[n, 0], poses[n, 1], poses[n, 2])

@@ -33,18 +33,19 @@ _NOISE_M = 0.015
 
 
 class NoPathError(PlanningError):
-    """Start and goal are free, but no path for the robot joins them."""
+    """Error of a plan whose start and goal are free, while no path joins them."""
 
 
 @dataclass(frozen=True)
 class LatticePlanner:
-    """A lattice over position and heading, searched for the whole footprint, then smoothed.
+    """Searches a lattice over position and heading for the whole footprint, then smooths the path.
 
-    Speeds (m/s, rad/s) set the cost of each motion. The clearance is `margin_m`, or `least_margin_m` if no path has
-    more; nearer than `soft_m` to an obstacle the cost grows up to (1 + soft_weight) fold. From a start that noise
-    blocks, a path may lead through poses of the same clearance within `escape_m`. The search covers the box about start
-    and goal, `around_m` wider to all sides. A base that cannot go sideways gets a path of straights, arcs and turns on
-    the spot, on cells half of `cell_m` wide; `lateral_m_s` and `headings` have no effect on it.
+    The speeds (m/s, rad/s) set the cost of each motion. `margin_m`: required clearance; `least_margin_m`: the same for
+    a second try when no path has it. `soft_m` and `soft_weight`: nearer than `soft_m` to an obstacle the cost grows up
+    to (1 + soft_weight) fold. `escape_m`: distance within which a path may keep the clearance of a start that noise
+    blocks. `around_m`: margin of the searched box about start and goal. A base that cannot move sideways gets
+    straights, arcs and turns on the spot, on cells half of `cell_m` wide; `lateral_m_s` and `headings` do not affect
+    it.
     """
 
     forward_m_s: Speed = 0.8
@@ -63,7 +64,7 @@ class LatticePlanner:
     around_m: Margin = 8.0
 
     def weights(self, footprint: Footprint) -> Weights:
-        """The weights of a motion's cost."""
+        """The weights of the motion cost, for a footprint."""
         return Weights(
             self.forward_m_s,
             self.backward_m_s,
@@ -85,7 +86,7 @@ class LatticePlanner:
         work: WorkCounter = NO_WORK_COUNTER,
         zones: ZoneMap | None = None,
     ) -> Callable[[], Path]:
-        """Samples the costmap now; returns a function that plans on that sample, or raises PlanningError."""
+        """Samples the costmap now; returns a function that plans on that sample or raises PlanningError."""
         options = replace(self, forward_m_s=min(self.forward_m_s, max_speed_m_s))
         problem = problem_of(costmap, footprint, start, goal, options, self.around_m, work)
         return partial(solve, problem) if zones is None else partial(_solve_with_zones, problem, zones)
@@ -93,7 +94,7 @@ class LatticePlanner:
 
 @dataclass(frozen=True)
 class Problem:
-    """Input of one plan: the clearance sampled around start and goal; a snapshot, safe to plan on in a thread."""
+    """Input of one plan: a snapshot of the clearance around start and goal, safe to use in a thread."""
 
     field: ClearanceField
     footprint: Footprint
@@ -105,7 +106,7 @@ class Problem:
 
     @property
     def sideways(self) -> bool:
-        """Returns whether the base can go sideways."""
+        """Returns whether the base can move sideways."""
         return self.footprint.base_kind is not BaseKind.DIFFERENTIAL
 
 
@@ -114,7 +115,8 @@ def plan_path(
 ) -> Path:
     """Plans the cheapest path from start to goal for the footprint. Raises PlanningError when there is none.
 
-    The path begins and ends exactly at start and goal. It may leave a start that is slightly in collision.
+    The path begins exactly at the start and ends exactly at the goal. It may leave a start that is slightly in
+    collision.
     """
     used = options or LatticePlanner()
     try:
@@ -132,7 +134,7 @@ def problem_of(
     margin_m: float = 3.0,
     work: WorkCounter = NO_WORK_COUNTER,
 ) -> Problem:
-    """Samples the costmap on the box around start and goal, margin_m wider to all sides."""
+    """Samples the costmap in the box about start and goal, grown by margin_m."""
     low = np.minimum([start.x_m, start.y_m], [goal.x_m, goal.y_m]) - margin_m
     high = np.maximum([start.x_m, start.y_m], [goal.x_m, goal.y_m]) + margin_m
     xs, ys = (np.arange(low[axis], high[axis] + FIELD_CELL_M, FIELD_CELL_M) for axis in (0, 1))
@@ -144,13 +146,13 @@ def problem_of(
 
 
 def _used(best: NDArray[np.float32]) -> slice:
-    """The indices from the first to the last free sample, and one more to either side."""
+    """Index range from the first to the last free sample, grown by one on both sides."""
     free = np.flatnonzero(best > 0.0)
     return slice(max(0, int(free[0]) - 1), int(free[-1]) + 2) if len(free) else slice(0, 2)
 
 
 def solve(problem: Problem) -> Path:
-    """Plans with the wanted margin, else with the least one. Raises PlanningError when both fail."""
+    """Plans with `margin_m`, then with `least_margin_m`. Raises PlanningError when both fail."""
     options = problem.options
     try:
         return _solve(problem)
@@ -161,7 +163,7 @@ def solve(problem: Problem) -> Path:
 
 
 def _solve_with_zones(problem: Problem, zones: ZoneMap) -> Path:
-    """Plans like `solve`, within the costs and directions of zones; a path may leave the zones of its start."""
+    """Plans like `solve`, subject to zone costs and one-way directions; a path may leave the zones at its start."""
     field, start = problem.field, problem.start
     xs, ys = (
         c0 + field.cell_m * np.arange(n)
@@ -180,7 +182,7 @@ def _solve_with_zones(problem: Problem, zones: ZoneMap) -> Path:
 
 
 def _solve(problem: Problem) -> Path:
-    """Plans with the margin of the options."""
+    """Plans with the options' `margin_m`."""
     space = Space(problem.field, _needs(problem), problem.options.weights(problem.footprint), problem.zones)
     _check_goal(problem)
     for yaw0_rad in (0.0, problem.goal.yaw_rad) if problem.sideways else (0.0,):
@@ -192,7 +194,7 @@ def _solve(problem: Problem) -> Path:
 
 
 def _because(footprint: Footprint) -> str:
-    """Clause on the parts beyond the robot's body, empty without any."""
+    """Clause that names what overhangs the robot's body; empty when nothing does."""
     length, width = footprint.extent_m
     return f": {footprint.beyond} makes it {length:.2f} m long and {width:.2f} m wide" if footprint.beyond else ""
 
@@ -202,7 +204,7 @@ def _place(pose: Pose2D) -> str:
 
 
 def _needs(problem: Problem) -> Needs:
-    """Required clearance; around a blocked start, that of the start itself."""
+    """Required clearance; near a blocked start, the clearance of that start."""
     options, clearance = problem.options, clearance_at(problem.field, *_row(problem.start))
     if clearance < -options.deepest_start_m:
         raise PlanningError(f"The robot stands in an obstacle at {_place(problem.start)}, so no path can begin there.")
@@ -220,7 +222,7 @@ def _check_goal(problem: Problem) -> None:
 
 
 def _lattice(problem: Problem, yaw0_rad: float) -> tuple[Lattice, int, int]:
-    """The lattice over the whole field with the goal in a cell, and the goal's row and column."""
+    """The lattice over the whole field, aligned to the goal, and the goal's row and column."""
     field, goal = problem.field, problem.goal
     cell = problem.options.cell_m * (1.0 if problem.sideways else CELL_SHARE)
     rows, columns = field.values.shape
@@ -239,7 +241,7 @@ def _row(pose: Pose2D) -> FloatArray:
 
 
 def _seeds(space: Space, lattice: Lattice, start: FloatArray) -> Links:
-    """The lattice states next to the start that a free segment leads to."""
+    """Lattice states next to the start that a free segment reaches, with the segment's cost."""
     turn = 2.0 * math.pi / lattice.headings
     column, row = (start[0] - lattice.x0_m) / lattice.cell_m, (start[1] - lattice.y0_m) / lattice.cell_m
     k = math.floor((start[2] - lattice.yaws_rad[0]) / turn)
@@ -256,7 +258,7 @@ def _seeds(space: Space, lattice: Lattice, start: FloatArray) -> Links:
 
 
 def _final_turns(space: Space, lattice: Lattice, goal: FloatArray, goal_cell: int) -> Links:
-    """Turns at the goal from each heading to the goal's, at most one heading's width."""
+    """Turns at the goal from neighbouring headings to the goal's yaw, with their cost."""
     turn = 2.0 * math.pi / lattice.headings
     turns: Links = {}
     for k in range(lattice.headings):
@@ -269,19 +271,19 @@ def _final_turns(space: Space, lattice: Lattice, goal: FloatArray, goal_cell: in
 
 @lru_cache(maxsize=4)
 def _courses(headings: int | None) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Yaws and moves of a lattice with a number of headings; None for a base that cannot go sideways."""
+    """Yaws and moves for a lattice with `headings` headings; None stands for a base that cannot move sideways."""
     if headings is None:
         return courses()
     return np.asarray(np.arange(headings) * (2.0 * math.pi / headings)), lattice_moves(headings)
 
 
 def _rows(found: Links) -> FloatArray:
-    """Rows of state index and cost, in order of the index."""
+    """Rows of state index and cost, sorted by index."""
     return np.array(sorted((float(state), cost) for state, (cost, _) in found.items()), dtype=np.float64).reshape(-1, 2)
 
 
 def _search(problem: Problem, space: Space, yaw0_rad: float) -> FloatArray | None:
-    """Lattice poses from start to goal with continuous yaw, None when there is no path."""
+    """Lattice poses from start to goal with continuous yaw; None when no path exists."""
     lattice, row, column = _lattice(problem, yaw0_rad)
     start, goal = _row(problem.start), _row(problem.goal)
     if problem.sideways:
@@ -307,7 +309,7 @@ def _search(problem: Problem, space: Space, yaw0_rad: float) -> FloatArray | Non
 
 
 def _smooth(problem: Problem, space: Space, rough: FloatArray) -> Path:
-    """The rough path with shortcuts, relaxed like an elastic band, or with rounded corners for a differential base."""
+    """The rough path after shortcuts and relaxation, or, for a differential base, with rounded corners."""
     knots = shortcut(space, rough, _SHORTCUT_POSES, problem.sideways)
     if problem.sideways:
         knots = relax(space, densify(knots, STEP_M), _RELAX_ROUNDS, problem.options.margin_m, _RELAX_CLEARANCE_M)

@@ -1,4 +1,4 @@
-"""Watches over the sensors that driving relies on: health of the LiDAR, low obstacles from depth cameras."""
+"""Monitors of the sensors for driving: health of the LiDAR, and low obstacles from depth cameras."""
 
 import math
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from skills.robot import FloatArray, Image, NoImageError, Scan
 
 @dataclass(frozen=True)
 class WatchOptions:
-    """Low obstacles: the front cameras take turns; every `period_s` a picture, which arrives after `latency_s`.
+    """Low obstacles, from depth images of the front cameras in turn.
 
-    The watch uses about `columns` pixels of each row, and points between the heights above the floor and within
-    `reach_m` of the camera.
+    `period_s` and `latency_s`: time between images, and until one arrives. `columns`: about how many pixels of each row
+    are used. `heights_m` and `reach_m`: range of heights above the floor, and largest depth, of the points used.
     """
 
     period_s: Duration = 0.35
@@ -27,7 +27,7 @@ class WatchOptions:
 
 
 class LowObstacleWatch:
-    """Watch for obstacles below the LiDAR: adds points of the front depth cameras to the costmap."""
+    """Adds obstacles below the LiDAR, seen by the front depth cameras, to the costmap."""
 
     def __init__(self, context: SkillContext, options: WatchOptions | None = None) -> None:
         self._context = context
@@ -40,7 +40,7 @@ class LowObstacleWatch:
         self._X_WO = RigidTransform()
 
     def step(self) -> None:
-        """Processes a new picture, and requests the next one when it is due. Never blocks."""
+        """Processes a new image, and requests the next one when it is due. Never blocks."""
         if self._job is not None:
             if self._job.done():
                 job, self._job = self._job, None
@@ -66,7 +66,7 @@ class LowObstacleWatch:
 
 
 def low_points(image: Image, options: WatchOptions) -> FloatArray:
-    """Points (N, 3) of a depth picture in the odom frame that are low above the floor and near."""
+    """Points (N, 3) from a depth image, in the odom frame, that are near and low above the floor."""
     stride = max(1, image.depth_m.shape[1] // options.columns)
     depth = image.depth_m[::stride, ::stride].astype(np.float64)
     rows, columns = np.nonzero((depth > 0.0) & (depth < options.reach_m))
@@ -81,9 +81,9 @@ def low_points(image: Image, options: WatchOptions) -> FloatArray:
 
 @dataclass(frozen=True)
 class ScanHealthOptions:
-    """Health of the LiDAR: a scan may be `old_s` old, and at least `least_valid` of its ranges must be valid.
+    """Health of the LiDAR: largest age `old_s` of a scan, and smallest fraction `least_valid` of valid ranges.
 
-    A scan that repeats the last one, noise included, keeps its age.
+    A scan that repeats the last one, noise included, keeps the age of that one.
     """
 
     old_s: Delay = 0.5
@@ -91,7 +91,7 @@ class ScanHealthOptions:
 
 
 class ScanHealth:
-    """Check of the newest scan; passes where the costmap does not use LiDAR returns."""
+    """Checks the newest scan; always passes with a costmap that does not use LiDAR returns."""
 
     def __init__(self, context: SkillContext, options: ScanHealthOptions | None = None) -> None:
         self._context, self._options = context, options or ScanHealthOptions()
@@ -99,7 +99,7 @@ class ScanHealth:
         self._last: Scan | None = None
 
     def trouble(self) -> str | None:
-        """Sentence on the LiDAR's fault, None without one."""
+        """Sentence that describes the LiDAR's fault; None when it is healthy."""
         if not self._needed:
             return None
         scan, now_s = self._context.robot.scan(), self._context.clock.now()

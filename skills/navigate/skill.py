@@ -1,4 +1,4 @@
-"""The navigate skill: plans a path, follows it, clears the paths of other robots, and stops at the goal."""
+"""The navigate skill: plans a path, follows it, clears reserved paths of other robots, and stops at the goal."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _EARLY = 0.4
 
 
 class _OnReservedPath(Exception):  # noqa: N818 - no program error
-    """The robot stands on paths that other robots have reserved."""
+    """Raised when the robot stands on paths that other robots have reserved."""
 
     def __init__(self, robots: Sequence[str]) -> None:
         super().__init__()
@@ -42,9 +42,9 @@ class _OnReservedPath(Exception):  # noqa: N818 - no program error
 
 @dataclass
 class _Progress:
-    """Progress along the path: the shortest remaining length so far (m), and its time (s).
+    """Progress along the path: the shortest remaining length so far (m), and when it was reached (s).
 
-    The time of a wait with a reason does not count as a lack of progress.
+    Time spent waiting for a known reason does not count as a lack of progress.
     """
 
     best_s: float
@@ -52,11 +52,11 @@ class _Progress:
     whole_m: float | None = None
 
     def restart(self, now_s: float) -> None:
-        """Starts again, along another path."""
+        """Resets the progress, for another path."""
         self.best_m, self.best_s = math.inf, now_s
 
     def note(self, left_m: float, now_s: float) -> float:
-        """Notes how much of the path is left; returns the share of the whole path that is done, 0 to 1."""
+        """Notes the remaining length; returns the completed fraction of the whole path, 0 to 1."""
         if left_m < self.best_m - 0.03:
             self.best_m, self.best_s = left_m, now_s
         return min(1.0, max(0.0, 1.0 - left_m / max(self.whole_m or left_m, left_m, 1e-3)))
@@ -65,8 +65,8 @@ class _Progress:
 class Navigate(RoutineSkill[NavigateInputs]):
     """Drives to a pose: plans a path for the whole footprint, follows it, and stands still at the goal.
 
-    An attempt goes through the stages localise, plan, follow, wait aside and settle; each stage returns the next one.
-    A robot that stands on the reserved path of another leaves its stage and goes aside first.
+    An attempt goes through the stages localise, plan, follow, wait aside and settle; each stage returns the next one. A
+    robot that stands on another's reserved path leaves its stage and goes aside first.
     """
 
     name: ClassVar[str] = "navigate"
@@ -86,7 +86,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
     def __init__(
         self, context: SkillContext, options: NavigateOptions | None = None, company: Company | None = None
     ) -> None:
-        """With `company` the robot goes with a person, and does not wait for that person to clear the path."""
+        """With `company` the robot accompanies a person, and does not wait for that person to clear the path."""
         super().__init__(context, options)
         self._base, self._company = Base(context), company
 
@@ -111,7 +111,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
         super().end()
 
     def retarget(self, inputs: NavigateInputs) -> bool:
-        """Changes the goal while the robot drives along its path; returns False while a plan is under way."""
+        """Changes the goal while the robot drives along its path; returns False while a plan is being computed."""
         if self._planning.under_way:
             return False
         self._inputs = inputs
@@ -119,25 +119,25 @@ class Navigate(RoutineSkill[NavigateInputs]):
         return True
 
     def suspend(self) -> None:
-        """Ends the attempt, so that others may pass meanwhile."""
+        """Ends the attempt, so that other robots may pass in the meantime."""
         self.end()
 
     def resume(self, inputs: NavigateInputs) -> None:
-        """Starts a new attempt from here."""
+        """Starts a new attempt from the present pose."""
         self.begin(inputs)
 
     def undone(self, inputs: NavigateInputs) -> str | None:
-        """Checks that the robot's pose lies within 1 m of the goal, because later skills may have moved it a little."""
+        """Checks that the robot is within 1 m of the goal; later skills may have moved it a little."""
         pose, goal = self.context.pose(), inputs.goal
         off_m = math.hypot(goal.x_m - pose.x_m, goal.y_m - pose.y_m)
         return None if off_m < _STILL_THERE_M else f"the robot is {off_m:.1f} m from where it went"
 
     def outline(self) -> Footprint:
-        """The robot's footprint as it stands now."""
+        """The robot's footprint with its present arm posture."""
         return ArmFootprint(self.context).now()
 
     def run(self, inputs: NavigateInputs) -> Routine[Succeeded]:
-        """Runs one attempt, stage by stage. Raises SkillFailure."""
+        """Runs one attempt, stage by stage. Raises SkillFailure when the goal is not reached."""
         stage: _Stage | Succeeded = self._localise
         while not isinstance(stage, Succeeded):
             try:
@@ -151,11 +151,11 @@ class Navigate(RoutineSkill[NavigateInputs]):
         return stage
 
     def step(self) -> Step:
-        """One tick: see `Skill.step`."""
+        """Runs one tick: see `Skill.step`."""
         return self._stands() or super().step()
 
     def _stands(self) -> Step | None:
-        """Stands while the LiDAR fails or the robot refuses to drive; fails when that lasts too long."""
+        """Stops while the LiDAR fails or the robot refuses to drive; fails when either lasts too long."""
         trouble = self._around.scans.trouble()
         if trouble is not None:
             self._base.stop()
@@ -209,7 +209,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
         return self._plan
 
     def _plan(self) -> Routine[_Stage]:
-        """Waits for a plan, or for the time of the next one."""
+        """Waits until a plan is finished, or until the next one is due."""
         planning = self._planning
         while True:
             if not planning.under_way and self._now() < planning.wait_until_s:
@@ -223,7 +223,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
                 return stage
 
     def _after_plan(self) -> _Stage | None:
-        """The stage that follows a finished plan; None while none has finished. Raises SkillFailure to give up."""
+        """The stage after a finished plan; None while none has finished. Raises SkillFailure when no plan is left."""
         try:
             path = self._planning.path()
         except PlanningError as error:
@@ -268,7 +268,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
                 yield from self._tick(*self._goes_on(answer))
 
     def _wait_aside(self) -> Routine[_Stage]:
-        """Stands at a waiting pose until no other robot comes past, then plans to the goal again."""
+        """Stands at a waiting pose until no other robot passes any more, then plans to the goal again."""
         robots = self._around.robots
         while True:
             robots.reserve_pose(self.context.pose(), self._around.footprint)
@@ -313,7 +313,10 @@ class Navigate(RoutineSkill[NavigateInputs]):
         return f"standing, since an obstacle comes into the path at {place_text(danger_W)}"
 
     def _drive(self) -> tuple[Drive, str | None]:
-        """Sends the next velocity; returns it with the message while the robot waits, or None. Raises SkillFailure."""
+        """Sends the next velocity; returns it with a message while the robot waits, else None.
+
+        Raises SkillFailure when the robot may not drive on.
+        """
         follower, goal = self._follower, self._planning.goal
         pace = self._around.pace(follower, self._inputs.max_speed_m_s, goal)
         most_m_s, waits = self._give_way()
@@ -331,7 +334,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
         return answer, waits
 
     def _give_way(self) -> tuple[float, str | None]:
-        """The speed that reserved paths allow (m/s), and the message while the robot waits for another."""
+        """The speed that reserved paths allow (m/s), and a message while the robot waits for another robot."""
         robots, footprint, options = self._around.robots, self._around.footprint, self.options.giving_way
         robots.reserve_path(self._follower, footprint)
         if self._planning.aside is not None:
@@ -350,7 +353,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
         return 0.0, self._waits(f"waiting for {name} to pass")
 
     def _waits(self, message: str) -> str:
-        """Counts this tick neither as blocked nor as stuck; returns the message."""
+        """Resets the timers for blocked and stuck robots, because this wait has a reason; returns the message."""
         self._progress.best_s = self._now()
         self._blocked.reset()
         return message
@@ -371,7 +374,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
         return f"on the way, {answer.remaining_m:.1f} m to go", done
 
     def _trouble(self, answer: Drive) -> str | None:
-        """The reason to give up the path; None when there is none."""
+        """The reason to abandon the path; None when there is none."""
         if answer.blocked_at is None:
             self._blocked.reset()
         else:
@@ -414,7 +417,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
         return then if on_path else None
 
     def _arrived(self, share: float) -> bool:
-        """Returns whether the robot is within a share of the tolerances of its present goal."""
+        """Returns whether the robot is within a fraction of the tolerances of its present goal."""
         off = relative_pose(self._planning.goal, self.context.pose())
         near = math.hypot(off.x_m, off.y_m) <= share * self._inputs.position_tolerance_m
         return near and abs(off.yaw_rad) <= share * self._inputs.yaw_tolerance_rad

@@ -1,4 +1,4 @@
-"""Perception of the navigate skill: obstacles, people, doors, other robots, and the robot's own footprint."""
+"""Perception for the navigate skill: obstacles, people, doors, other robots, and the robot's own footprint."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -27,12 +27,13 @@ from skills.world_model import Zone, ZoneKind
 
 @dataclass(frozen=True)
 class SpaceOptions:
-    """Speeds near people, and distances from the robot's outline to a person's upright axis.
+    """Speeds near people, and distances from the robot's outline to a person's vertical axis.
 
-    From `far_m` to `near_m` the speed falls from full to near_m_s, less on a path that leads away by `away_m`. If the
-    path comes nearer than `stop_m` but the goal does not, the robot waits for `patience_s`, then passes at `pass_m_s`;
-    the patience starts again after `forget_s` without people near. Plans have a clearance of `room_m` if start and goal
-    allow it, and of `least_room_m` if no other path exists.
+    `far_m`, `near_m` and `near_m_s`: between these distances the speed falls from full to `near_m_s`. `away_m`: a path
+    that ends this much farther from the person counts by the distance at its end. `stop_m`, `patience_s` and
+    `pass_m_s`: where the path, but not the goal, is nearer than `stop_m`, the robot waits for `patience_s`, then passes
+    at `pass_m_s`. `forget_s`: the patience starts again after this time without people near. `room_m` and
+    `least_room_m`: clearance of plans from people, and the clearance used when no other path exists.
     """
 
     far_m: Length = 2.5
@@ -50,7 +51,7 @@ class SpaceOptions:
 
 
 def outline_distance_m(footprint: Footprint, poses: FloatArray, people: Sequence[SeenPerson]) -> FloatArray:
-    """Distances (N, people) in metres from the outline at poses (N, 3) to people's axes."""
+    """Distances (N, people) in metres from the outline at poses (N, 3) to the axes of people."""
     places = np.array([one.place_W for one in people], dtype=np.float64).reshape(-1, 2)
     centres = disc_centres(footprint.discs, poses)
     offsets = np.linalg.norm(centres[:, :, None, :] - places[None, None, :, :], axis=3)
@@ -65,7 +66,7 @@ def with_people(
     room_m: float,
     slack_m: float = 0.05,
 ) -> FreeSpace:
-    """The costmap with discs of room_m about people, smaller where a `fixed` pose of the robot is nearer."""
+    """The costmap with discs of radius room_m about people, smaller where a pose in `fixed` is nearer to a person."""
     if not people:
         return costmap
     least = np.min(outline_distance_m(footprint, pose_array(fixed), people), axis=0) - slack_m
@@ -87,7 +88,7 @@ class Pace:
 
 
 class PaceManager:
-    """Pace near people at each tick; remembers how long the robot has waited."""
+    """Determines the pace near people at each tick; remembers how long the robot has waited."""
 
     def __init__(self, footprint: Footprint, options: SpaceOptions | None = None) -> None:
         self.footprint = footprint
@@ -99,9 +100,9 @@ class PaceManager:
     def pace(
         self, now_s: float, here: Pose2D, ahead: FloatArray, people: Sequence[SeenPerson], most_m_s: float, goal: Pose2D
     ) -> Pace:
-        """The pace of a robot at `here` with the path `ahead` (N, 3); most_m_s without people near.
+        """The pace of a robot at `here` with the path `ahead` (N, 3); most_m_s when nobody is near.
 
-        The robot does not wait for people as near to the `goal` as to the path.
+        The robot does not wait for people who are as near to the `goal` as to the path.
         """
         if not people:
             return self._nobody(now_s)
@@ -122,7 +123,7 @@ class PaceManager:
         return Pace(self._by_distance(float(least_m[nearest]), most_m_s), people[nearest])
 
     def _close(self, now_s: float, person: SeenPerson) -> Pace:
-        """The pace for a person too near to the path: first standing, then slow."""
+        """The pace for a person too near to the path: at first the robot waits, then it passes slowly."""
         if self._passing:
             return Pace(self._options.pass_m_s, person)
         self._waiting_since_s = now_s if self._waiting_since_s is None else self._waiting_since_s
@@ -148,8 +149,8 @@ class PaceManager:
 class NavigateInputs:
     """The goal (the body's pose in the world), tolerances and the maximum speed.
 
-    Poses at `nearby_m`, forward and left of the goal, count as reached too: a failure is final only if none is
-    reachable.
+    `nearby_m` are offsets (x, y) in the goal's frame; reaching any of these poses counts too, so that a failure is
+    final only if none of them is reachable.
     """
 
     goal: Pose2D
@@ -161,11 +162,11 @@ class NavigateInputs:
 
 @dataclass(frozen=True)
 class NavigateOptions:
-    """Patience and bounds of the skill, times in seconds of the robot's clock.
+    """Patience and limits of the skill, times in seconds of the robot's clock.
 
-    Every `review_s` the robot checks its path `review_m` ahead, and plans again while driving if it is blocked. Failed
-    plans do not count while people are near and for `after_person_s` (longer than a costmap remembers them), up to
-    person_patience_s.
+    `review_s` and `review_m`: period at which the robot checks its path and plans again if the path is blocked, and the
+    least length of path ahead that it checks. `after_person_s`: failed plans do not count while people are near and
+    this long afterwards (longer than a costmap remembers them), for `person_patience_s` at most.
     """
 
     planning_latency_s: Delay = 0.3
@@ -193,15 +194,15 @@ class NavigateOptions:
 
 _OUTLINE_PERIOD_S = 0.5
 _WALKED_M = 0.5
-"""Way of a track from which on it is a person, and no object."""
+"""Length of a track from which on it counts as a person rather than an object."""
 
 
 @dataclass
 class Company:
-    """The person with whom the robot goes; the robot neither avoids the person nor waits for them.
+    """The person whom the robot accompanies; the robot neither avoids this person nor waits for them.
 
-    Another skill steps the `watch`. `track` is the person's number (0: nobody), `most_m_s` the speed limit that keeps
-    the distance.
+    Another skill steps the `watch`. `track` is the number of the person's track (0: nobody). `most_m_s` is the speed
+    limit that keeps the distance.
     """
 
     watch: PeopleWatch
@@ -209,16 +210,16 @@ class Company:
     most_m_s: float = math.inf
 
     def others(self) -> tuple[SeenPerson, ...]:
-        """All other people: those in pictures and walking ones."""
+        """All other people: those detected in pictures, and tracks that walk."""
         sure = {one.track for one in self.watch.people()}
         tracks = (one for one in self.watch.tracks() if one.track in sure or one.moved_m > _WALKED_M)
         return tuple(one for one in tracks if one.track != self.track)
 
 
 class Surroundings:
-    """State of the robot's surroundings, by its sensors, during one trip.
+    """State of the robot's surroundings, as its sensors measure them, during one trip.
 
-    Plans and checks use `footprint`; plans keep `room_m` from people.
+    Plans and checks use `footprint`; plans keep a clearance of `room_m` from people.
     """
 
     def __init__(self, context: SkillContext, options: NavigateOptions, company: Company | None = None) -> None:
@@ -254,40 +255,40 @@ class Surroundings:
         self._measured_s = self._context.clock.now()
 
     def outgrows_footprint(self) -> bool:
-        """Returns whether the arm or its load now reaches beyond `footprint`; measured every _OUTLINE_PERIOD_S."""
+        """Returns whether the arm or its load now overhangs `footprint`; measured every _OUTLINE_PERIOD_S."""
         if self._context.clock.now() < self._measured_s + _OUTLINE_PERIOD_S:
             return False
         self._measured_s = self._context.clock.now()
         return self._outline.outgrows(self.footprint)
 
     def persons(self) -> tuple[SeenPerson, ...]:
-        """The people near, without the robot's company and without detections where other robots report to be."""
+        """The people nearby, without the accompanied person and without detections where other robots report to be."""
         people = self._people.people() if self._company is None else self._company.others()
         return tuple(one for one in people if not self.robots.is_robot(one.place_W))
 
     def reduce_distance_to_people(self) -> bool:
-        """Lets plans pass people more closely from now on; False when nobody is near, or they do already."""
+        """Lets plans pass people at a smaller distance from now on; False when nobody is near or this is so already."""
         if not self.persons() or self.room_m <= self._space.least_room_m:
             return False
         self.room_m = self._space.least_room_m
         return True
 
     def free_space(self) -> FreeSpace:
-        """The costmap with keep-out zones, without the part of a zone through which the robot may leave it."""
+        """The costmap with keep-out zones, without the part of a zone through which the robot may leave that zone."""
         if self._keep_out is None:
             return self._context.costmap
         return self._keep_out.space(self._context.costmap, self.footprint, self._context.pose())
 
     def zone_costs(self, start: Pose2D) -> Mapping[str, ZoneMap]:
-        """The planner's argument for the costs of zones, where there are any."""
+        """The planner's keyword argument for zone costs; empty when no zone affects the cost."""
         return {"zones": self._zones} if self._zones is not None and self._zones.has_costs(start) else {}
 
     def forbidding_zones(self, goal: Pose2D) -> tuple[str, ...]:
-        """Names of the keep-out zones into which the body reaches at a goal."""
+        """Names of the keep-out zones into which the body would reach at a goal."""
         return () if self._zones is None else self._zones.names_at(ZoneKind.KEEP_OUT, goal, self.footprint)
 
     def zones_between(self, goals: Sequence[Pose2D]) -> tuple[str, ...]:
-        """Names of the keep-out zones that cut all goals off: one that suffices, else all zones."""
+        """Names of the keep-out zones that make all goals unreachable: one zone that suffices alone, else all zones."""
         zones = [zone for zone in self._context.zones if zone.kind is ZoneKind.KEEP_OUT]
 
         def opens(left_out: Sequence[Zone]) -> bool:
@@ -300,7 +301,7 @@ class Surroundings:
         return next(((zone.name,) for zone in zones if opens([zone])), tuple(zone.name for zone in zones))
 
     def costmap(self, here: Pose2D, goal: Pose2D, avoided: Avoided = Avoided.BODIES) -> FreeSpace:
-        """The costmap with zones, closed doors, robots, and discs about people, as large as `here` and goal allow."""
+        """The costmap with zones, closed doors, robots, and discs about people, as large as `here` and `goal` allow."""
         costmap = self.robots.costmap(self.doors.costmap(self.free_space()), avoided)
         return with_people(costmap, self.footprint, (here, goal), self.persons(), self.room_m)
 
@@ -309,7 +310,7 @@ class Surroundings:
         return self._guard.danger(self._context.pose(), follower, most_m_s)
 
     def pace(self, follower: LocalController, most_m_s: float, goal: Pose2D) -> Pace:
-        """The speed that people near the path and zones allow, at most `most_m_s`."""
+        """The speed that zones and people near the path permit, at most `most_m_s`."""
         ahead, here = follower.ahead(self._space.look_ahead_m), self._context.pose()
         pace = self._pace.pace(self._context.clock.now(), here, ahead, self.persons(), most_m_s, goal)
         if self._company is not None:
@@ -330,7 +331,7 @@ class Surroundings:
         return self.doors.blocking_doors(self.footprint, here, goals, people_W)
 
     def cut_off(self, goals: Sequence[Pose2D]) -> bool:
-        """Returns whether all goals are certainly out of reach."""
+        """Returns whether all goals are known to be unreachable."""
         return self.doors.regions(self.footprint, self._context.pose(), goals).cut_off
 
     def clear_obstacles(self) -> bool:

@@ -1,4 +1,4 @@
-"""Path planning of one trip: requests plans, and chooses the next attempt after a failed plan."""
+"""Path planning for one trip: requests plans, and decides what to try after a failed plan."""
 
 import math
 from collections.abc import Sequence
@@ -19,28 +19,27 @@ from skills.world_model import zones_sentence
 
 @dataclass
 class _Presence:
-    """Recent presence of people or robots that may leave: near in the last `gap_s`, but not for too long."""
+    """Presence of people or robots that may leave: last seen within `gap_s`, and not for too long already."""
 
     gap_s: float
     last_s: float = -math.inf
     since_s: float = -math.inf
 
     def note(self, now_s: float) -> None:
-        """Notes that somebody is near now."""
+        """Notes that a person or robot is near now."""
         self.since_s = now_s if now_s - self.last_s > self.gap_s else self.since_s
         self.last_s = now_s
 
     def may_go(self, now_s: float, patience_s: float) -> bool:
-        """Returns whether they were near lately, and for less than `patience_s`."""
+        """Returns whether they were near within `gap_s`, and have been near for less than `patience_s`."""
         return now_s - self.last_s < self.gap_s and now_s - self.since_s < patience_s
 
 
 class TripPlanning:
-    """Requests the plans of one trip.
+    """Requests the plans for one trip.
 
-    `aside` is the robot's waiting pose while others pass, None on the way to the goal. `avoided` are the parts of other
-    robots that plans avoid, `obstacle_W` is the last blocked point (x, y). The trip requests no plan before
-    `wait_until_s`.
+    `aside` is the robot's waiting pose while others pass; None on the way to the goal. `avoided` says what plans avoid
+    of other robots. `obstacle_W` is the last blocked point (x, y). The trip requests no plan before `wait_until_s`.
     """
 
     def __init__(
@@ -62,16 +61,16 @@ class TripPlanning:
 
     @property
     def goal(self) -> Pose2D:
-        """The present goal: that of the inputs, or the waiting pose."""
+        """The present goal: the waiting pose if there is one, else the goal of the inputs."""
         return self.aside or self._inputs.goal
 
     @property
     def under_way(self) -> bool:
-        """Returns whether a plan is requested and not taken yet."""
+        """Returns whether a plan has been requested and its path not yet fetched."""
         return self._job is not None
 
     def ask(self, start: Pose2D | None = None, *, map_alone: bool = False) -> None:
-        """Samples the costmap now and plans in the Worker, from `start` or from here.
+        """Samples the costmap now and plans in the Worker, from `start` or from the present pose.
 
         With `map_alone` the plan ignores people and robots, to find out whether a path exists at all.
         """
@@ -95,7 +94,7 @@ class TripPlanning:
         self._job = context.worker.submit(plan, latency_s=self._options.planning_latency_s, name="plan a path")
 
     def retarget(self, inputs: NavigateInputs, start: Pose2D | None) -> None:
-        """Plans to another goal, unless the robot waits aside, and forgets what failed before."""
+        """Plans to another goal, unless the robot waits aside, and forgets earlier failures."""
         self._inputs, self._replans, self._map_leads, self.wait_until_s = inputs, 0, False, -math.inf
         if self.aside is None:
             self.avoided = Avoided.PATHS
@@ -111,7 +110,7 @@ class TripPlanning:
             raise SkillFailure(Cause.PLANNING, sentence, final=all(map(self._around.forbidding_zones, self._goals)))
 
     def path(self) -> Path | None:
-        """The path of a finished plan, returned once; None when there is none to follow. Raises PlanningError."""
+        """The path of a finished plan, returned once, or None. Raises PlanningError when the plan has failed."""
         if self._job is None or not self._job.done():
             return None
         job, self._job = self._job, None
@@ -124,7 +123,7 @@ class TripPlanning:
         return path
 
     def plan_again(self, why: str, start: Pose2D | None) -> None:
-        """Requests another plan, because the path failed for the reason `why`. Raises SkillFailure after too many."""
+        """Requests another plan because the path failed for the reason `why`. Raises SkillFailure after too many."""
         self._replans += not self._around.robots.another_drives()
         self.avoided = Avoided.PATHS
         if self._replans > self._options.replans:
@@ -169,7 +168,7 @@ class TripPlanning:
         self.ask()
 
     def robots_blocked(self) -> Sequence[str]:
-        """Names of the robots whose reserved path this one blocks; none for a while after it failed to go aside."""
+        """Names of the robots whose reserved path this one blocks; empty for a while after it found no waiting pose."""
         if self._now() < self._asked_due_s:
             return ()
         return self._around.robots.blocked_robots(self._context.pose(), self._around.footprint)
@@ -184,7 +183,7 @@ class TripPlanning:
         return (goal, *(compose(goal, Pose2D(*offset, 0.0)) for offset in self._inputs.nearby_m))
 
     def _asks_for_less(self) -> bool:
-        """Requests a plan that avoids less of other robots, or a plan to another waiting pose."""
+        """Requests a plan that avoids less, or a plan to another waiting pose; returns whether it requested one."""
         robots = self._around.robots
         if self.aside is not None:
             self._tried = (*self._tried, self.aside)
@@ -197,7 +196,7 @@ class TripPlanning:
         return less is not None
 
     def _wait_or_give_up(self, why: str) -> None:
-        """Waits for people, robots or doors, or looks again. Raises SkillFailure at the limits of the options."""
+        """Waits for people, robots or doors, or looks again. Raises SkillFailure when patience or tries are used up."""
         robot = self._robot_may_go()
         may_go = robot or self._people_may_go()
         if not robot and (self._waits_for_doors(may_go) or self._plans_detour()):
@@ -241,7 +240,7 @@ class TripPlanning:
         return True
 
     def _plans_detour(self) -> bool:
-        """Requests plans with a wide detour around closed doors from now on; False without doors or if done before."""
+        """Requests plans with a wide detour around closed doors; False when none is closed or this was done before."""
         if self._detours or not self._around.doors.closed:
             return False
         self._detours = True
@@ -249,7 +248,7 @@ class TripPlanning:
         return True
 
     def _looks_again(self) -> bool:
-        """Clears the costmap's obstacle layer once before the goal counts as cut off; returns whether cells changed."""
+        """Clears the obstacle layer once before the goal counts as unreachable; returns whether cells were cleared."""
         if self._looked_again or not self._around.cut_off(self._goals):
             return False
         self._looked_again = True
@@ -259,13 +258,13 @@ class TripPlanning:
         return True
 
     def _people_may_go(self) -> bool:
-        """Returns whether people near the path may block it only for a short time."""
+        """Returns whether people are near who may leave soon."""
         if self._around.persons():
             self._people.note(self._now())
         return self._people.may_go(self._now(), self._options.person_patience_s)
 
     def _robot_may_go(self) -> bool:
-        """Returns whether another robot may block the path only for now; then clears the obstacle layer."""
+        """Returns whether a robot is near that may leave soon; then reserves the goal and clears the obstacle layer."""
         if self._around.robots.others():
             self._robots.note(self._now())
         if not self._robots.may_go(self._now(), self._options.giving_way.blocked_patience_s):
@@ -281,5 +280,5 @@ def _place(pose: Pose2D) -> str:
 
 
 def place_text(place_W: tuple[float, float] | None) -> str:
-    """ "(1.20, 5.50)"."""
+    """Position for a message: "(1.20, 5.50)"."""
     return "an unknown place" if place_W is None else f"({place_W[0]:.2f}, {place_W[1]:.2f})"

@@ -1,6 +1,6 @@
 """Zones drawn on a grid of the ground: keep-out, speed limits, costs and directions of motion, silence.
 
-A robot that starts in a keep-out zone may leave it; the part deeper than the robot stays an obstacle.
+A robot that starts in a keep-out zone may leave it; cells deeper inside the zone remain obstacles.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ Floats = NDArray[np.float32]
 
 @lru_cache(maxsize=16)
 def zone_map(zones: tuple[Zone, ...], full_m_s: float) -> ZoneMap:
-    """The map of zones for a robot with this full speed. Raises InputError for an unreadable mask."""
+    """The zone map for a robot with this full speed. Raises InputError when a mask cannot be read."""
     return ZoneMap(zones, full_m_s)
 
 
 class ZoneMap:
-    """Zones on a grid, and none outside. It is immutable, so that a plan may use it in a thread."""
+    """Zones on a grid; outside the grid there are none. It is immutable, so that a plan may use it in a thread."""
 
     def __init__(self, zones: Sequence[Zone], full_m_s: float) -> None:
         self._zones, self._full_m_s = tuple(zones), full_m_s
@@ -72,12 +72,12 @@ class ZoneMap:
 
     @property
     def axes(self) -> tuple[FloatArray, FloatArray]:
-        """The x and y of the cells' centres."""
+        """The x and y of the cell centres."""
         x, y = ((self.origin_m[n] + (np.arange(self._shape[1 - n]) + 0.5) * self.cell_m) for n in (0, 1))
         return x, y
 
     def cells(self, points_W: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.int64], BoolGrid]:
-        """Row and column of the cell of each point (N, 2), and whether it is on the grid."""
+        """Row and column of the cell that contains each point (N, 2), and whether the point is on the grid."""
         column, row = np.floor((points_W[:, :2] - self.origin_m) / self.cell_m).astype(np.int64).T
         on = (row >= 0) & (row < self._shape[0]) & (column >= 0) & (column < self._shape[1])
         return row[on], column[on], on
@@ -91,7 +91,7 @@ class ZoneMap:
         return np.where(percent < 0, np.nan, zone.mask.base + zone.mask.multiplier * percent)
 
     def ground(self, zone: Zone) -> BoolGrid:
-        """The cells of a zone, edge included."""
+        """The cells inside a zone, edge included."""
         if zone.mask is not None:
             values = self._values(zone)
             return values >= _MOST_PERCENT if zone.kind is ZoneKind.KEEP_OUT else np.isfinite(values)
@@ -123,11 +123,11 @@ class ZoneMap:
 
     @cached_property
     def slowdown(self) -> float:
-        """Factor, 1 or more, by which speed limits may lengthen a drive."""
+        """Factor, 1 or more, by which speed limits may prolong a drive."""
         return max(1.0, self._full_m_s / float(self._limits_m_s.min()))
 
     def speed_m_s(self, footprint: Footprint, poses: FloatArray, ahead_m: FloatArray) -> float:
-        """Speed limit of a robot that reaches `poses` (N, 3) after `ahead_m` (N,), with braking distance."""
+        """Speed limit for a robot that reaches `poses` (N, 3) after `ahead_m` (N,), so that it brakes in time."""
         if not self._of(ZoneKind.SPEED_LIMIT):
             return math.inf
         limits = np.full(len(poses), np.inf)
@@ -137,18 +137,18 @@ class ZoneMap:
         return float(np.min(np.sqrt(limits**2 + 2.0 * _BRAKING_M_S2 * np.maximum(0.0, ahead_m - _EARLY_M))))
 
     def braking_m(self, speed_m_s: float) -> float:
-        """Distance (m) ahead in which limits count at a speed."""
+        """Distance (m) ahead within which speed limits count at this speed."""
         return _EARLY_M + speed_m_s**2 / (2.0 * _BRAKING_M_S2)
 
     def names_at(self, kind: ZoneKind, pose: Pose2D, footprint: Footprint | None = None) -> tuple[str, ...]:
-        """Names of the zones of a kind at the body's origin, or near a footprint at a pose."""
+        """Names of the zones of one kind at the body's origin, or near a footprint when one is given."""
         points = np.zeros((1, 2)) if footprint is None else _body_points(footprint, SAFE_MARGIN_M)
         row, column, _ = self.cells(disc_centres(points, _row(pose))[0])
         return tuple(zone.name for zone in self._of(kind) if self.ground(zone)[row, column].any())
 
     @cached_property
     def _factors(self) -> Floats:
-        """Factors on the cost of a motion, without those of speed limits."""
+        """Cost factors of all zones, without the effect of speed limits."""
         preferred = self._of(ZoneKind.PREFERRED)
         factor = np.full(self._shape, _PREFERENCE if preferred else 1.0)
         for zone in preferred:
@@ -161,15 +161,15 @@ class ZoneMap:
         return factor.astype(np.float32)
 
     def has_costs(self, start: Pose2D) -> bool:
-        """Returns whether some motions from a start cost more than others."""
+        """Returns whether zones make some motions from a start more expensive than others."""
         costly = (ZoneKind.PREFERRED, ZoneKind.ONE_WAY, ZoneKind.SPEED_LIMIT)
         masked = any(zone.mask is not None for zone in self._zones)
         return masked or bool(self._of(*costly)) or bool(self.names_at(ZoneKind.KEEP_OUT, start))
 
     def costs(self, xs: FloatArray, ys: FloatArray, forward_m_s: float, leave: Pose2D | None = None) -> ZoneCosts:
-        """Costs at the points of a grid with these x and y; `forward_m_s` is the speed without a limit.
+        """Zone costs at the points of a grid with these x and y; `forward_m_s` is the speed without a limit.
 
-        Motions that `leave` a start may take any direction in its one-way zones.
+        With `leave`, motions may take any direction in the one-way zones that contain this start.
         """
         factor = np.full((len(ys), len(xs)), _PREFERENCE if self._of(ZoneKind.PREFERRED) else 1.0, dtype=np.float32)
         course = np.full(factor.shape, np.nan, dtype=np.float32)
@@ -187,7 +187,7 @@ class ZoneMap:
         return ZoneCosts(factor, course, cv2.erode(factor, np.ones((13, 13), np.uint8)).astype(np.float32))
 
     def against(self, poses: FloatArray) -> tuple[str, ...]:
-        """Names of the one-way zones in which a path (N, 3) goes against the direction."""
+        """Names of the one-way zones in which a path (N, 3) opposes the direction."""
         names, steps = [], np.diff(poses[:, :2], axis=0)
         row, column, on = self.cells(poses[:-1])
         for zone in self._of(ZoneKind.ONE_WAY):
@@ -200,7 +200,7 @@ class ZoneMap:
 class KeepOut:
     """Keep-out zones as obstacles, for one robot.
 
-    While the body touches a zone, cells no deeper than the body are free, so that the robot may leave.
+    While the body is partly in a zone, cells no deeper than the body are free, so that the robot may leave.
     """
 
     def __init__(self, zones: ZoneMap) -> None:
@@ -209,12 +209,12 @@ class KeepOut:
         self.reset()
 
     def reset(self) -> None:
-        """Looks for the path out again, if the robot has to leave a zone."""
+        """Forgets the path out of a zone, so that the next call searches it again."""
         self._steps: NDArray[np.int32] | None = None
         self._deeper: tuple[int, Floats] | None = None
 
     def space(self, costmap: FreeSpace, footprint: Footprint, pose: Pose2D) -> FreeSpace:
-        """The costmap with the zones as obstacles for a robot at a pose."""
+        """The costmap with the zones as obstacles, for a robot at a pose."""
         keep_out = self._zones.keep_out
         if not keep_out.any():
             return costmap
@@ -236,7 +236,7 @@ class KeepOut:
         return WithObstacles(costmap, self._distance_m(self._deeper[1]))
 
     def _distance_m(self, field: Floats) -> Callable[[FloatArray], FloatArray]:
-        """Distance of points from the cells of a field; infinite off the grid, which is wider than the zones."""
+        """Distance from points to the cells of a field; infinite off the grid, which is larger than the zones."""
         x0_m, y0_m = self._zones.origin_m.tolist()
 
         def distance_m(points_W: FloatArray) -> FloatArray:
@@ -248,9 +248,9 @@ class KeepOut:
 
 
 def _steps_out(zones: ZoneMap, costmap: FreeSpace, footprint: Footprint) -> NDArray[np.int32]:
-    """Distance in cells from each cell of the keep-out zones to free ground, for a disc of the body's width.
+    """Distance, in cells, from each cell of a keep-out zone to free ground, for a disc as wide as the body.
 
-    It is 0 outside, and _NEVER in cells without a path out.
+    It is 0 outside zones, and _NEVER in cells from which no path leads out.
     """
     clear_m = clearance_on_grid(costmap, *zones.axes)
     free = clear_m > footprint.inscribed_m - 2.0 * zones.cell_m
@@ -290,7 +290,7 @@ def _points_of(buffer: bytes, grown_m: float) -> FloatArray:
 def zone_messages(zones: Iterable[Zone]) -> list[dict[str, Any]]:
     """Encodes the zones that have an outline: name, kind, rule in words, outlines (world frame, m), one-way direction.
 
-    The outlines of a mask are those of its keep-out cells or of its limits. Raises InputError for an unreadable mask.
+    A mask's outlines surround its keep-out cells or its limits. Raises InputError when a mask cannot be read.
     """
     found = []
     for zone in zones:

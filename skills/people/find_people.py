@@ -1,4 +1,4 @@
-"""The find_people skill: looks for people in an area, turns in place, and drives to further viewpoints."""
+"""The find_people skill: searches an area for people, turns in place, and drives to further viewpoints."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -47,12 +47,12 @@ _YAWS_RAD = (0.0, 0.8, -0.8, 1.6, -1.6, math.pi)
 
 @dataclass(frozen=True)
 class FindPeopleInputs:
-    """Area to search: the corners (x, y) of `area_W`, with the name `place`.
+    """Area to search: the corners (x, y) `area_W`, and its name `place`.
 
-    `person` is the name of the wanted person; any person counts, since the skill recognises no faces. A `count` of 0
-    counts all people. People near the positions of `avoid` do not count. A person counts once a picture shows them;
-    with `unpictured`, bodies that two scans show count too, after all others. With `moves`, the robot drives to
-    viewpoints that show the rest of the area, until enough people are found.
+    `person`: name of the wanted person, for messages; any person counts, since the skill recognises no faces. `count`:
+    how many people are wanted; 0 counts all. `avoid`: people near these positions do not count. `unpictured`: bodies
+    that two scans show count too, after all people that a picture shows. `moves`: the robot drives to viewpoints that
+    show the rest of the area, until enough people are found.
     """
 
     area_W: tuple[tuple[Coordinate, Coordinate], ...]
@@ -68,9 +68,10 @@ class FindPeopleInputs:
 class FindPeopleOptions:
     """Search in `looks` directions, with turns of `turn_rad` in between.
 
-    Two detections within `same_m` confirm a person: in two directions, or in one by both a camera and the LiDAR. A
-    detection needs `least_score`, within `reach_m` of the camera. A robot that may move drives to `viewpoints` more
-    viewpoints at most, until at most the share `hidden` of people's possible positions was out of view.
+    `same_m`: two detections this near confirm a person, from two directions, or from one by both a camera and the
+    LiDAR. `least_score` and `reach_m`: score of a detection, and its largest distance from the camera. `viewpoints`:
+    how many more viewpoints a robot that may move drives to. `hidden`: it stops when at most this fraction of people's
+    possible positions was out of view.
     """
 
     looks: Count = 5
@@ -85,7 +86,7 @@ class FindPeopleOptions:
 
 
 class FindPeople(MovingSkill[FindPeopleInputs]):
-    """Looks for people with body cameras and LiDAR; with the LiDAR alone if the detector has no class of people."""
+    """Searches for people with body cameras and LiDAR; only with the LiDAR if the detector has no class of people."""
 
     name = "find_people"
     Inputs = FindPeopleInputs
@@ -105,7 +106,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
     options: FindPeopleOptions
 
     def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
-        """Looks until enough people were seen twice; from further viewpoints if the robot may move."""
+        """Searches until enough people were detected twice; from further viewpoints if the robot may move."""
         view, tracker = _View(self.context, inputs, self.options.reach_m), PeopleTracker(self.options.same_m)
         found = yield from self._look_round(inputs, tracker, view)
         for _ in range(self.options.viewpoints if inputs.moves else 0):
@@ -121,7 +122,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
         return self._ended(inputs, tuple(person_observation(one, inputs.person, inputs.place) for one in found), view)
 
     def _look_round(self, inputs: FindPeopleInputs, tracker: PeopleTracker, view: "_View") -> Routine[list[SeenPerson]]:
-        """Looks and turns in place until enough people were seen twice; returns them."""
+        """Looks and turns in place until enough people were detected twice; returns them."""
         view.look()
         area, same_m, found = shapely.Polygon(inputs.area_W), self.options.same_m, list[SeenPerson]()
         area = area.difference(shapely.MultiPoint([one.position_W[:2] for one in inputs.avoid]).buffer(_AVOID_M))
@@ -145,7 +146,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
         return found
 
     def _turn(self) -> Routine[None]:
-        """Turns in place as far as the footprint stays clear."""
+        """Turns in place as far as the footprint stays clear of obstacles."""
         turn_rad_s, for_s = self.options.turn_rad_s, self.options.turn_rad / self.options.turn_rad_s
         costmap, footprint = self.context.free_space(), ArmFootprint(self.context).now()
 
@@ -159,7 +160,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
         yield from self.move(command, for_s, "turning to see more", settle_s=rest_s, enough=lacks_clearance)
 
     def _ended(self, inputs: FindPeopleInputs, found: tuple[ObjectObservation, ...], view: "_View") -> Succeeded:
-        """Returns the result. Raises SkillFailure when too few people were found, or a part of the area was hidden."""
+        """Returns the result. Raises SkillFailure when too few people were found, or part of the area was hidden."""
         enough = len(found) >= max(1, inputs.count)
         else_ = " else" if inputs.avoid else ""
         few = count_sentence(found, ()) if found else f"nobody{else_} is seen in the {inputs.place} from here"
@@ -174,9 +175,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
     def _in_pictures(self, message: str) -> Routine[Sequence[Sequence[SeenPerson]] | None]:
         """Detects people in pictures of the body cameras, and publishes each picture with people, or else the first.
 
-        Returns None if the detector has no class of people.
-
-        Raises SkillFailure in the dark.
+        Returns None when the detector has no class of people. Raises SkillFailure when it is too dark.
         """
         robot, detector, options = self.context.robot, self.context.detector, self.options
         cameras = robot.capabilities().body_cameras
@@ -227,16 +226,16 @@ class _View:
 
     @property
     def hidden(self) -> float:
-        """Share of all positions in the area that were out of view, without those beside known people."""
+        """Fraction of all positions in the area that were out of view, without those beside known people."""
         return float((~self._seen).sum()) / self._count
 
     def look(self) -> None:
-        """Notes what is in view from here."""
+        """Marks the positions in view from the robot's present pose."""
         here = self._context.pose()
         self._seen |= self._shows(np.array((here.x_m, here.y_m)), self._points)
 
     def goals(self) -> list[NavigateInputs]:
-        """Free viewpoints, sorted by the number of hidden positions in view."""
+        """Free viewpoints, sorted by the number of hidden positions that they bring into view."""
         here, hidden = self._context.pose(), self._points[~self._seen]
         gains = np.array([self._shows(point, hidden).sum() for point in self._points])
         drives_m = np.linalg.norm(self._points - (here.x_m, here.y_m), axis=1)
@@ -246,13 +245,13 @@ class _View:
         return [NavigateInputs(pose, 0.2, 0.4) for pose in islice(poses, _BEST_VIEWPOINTS)]
 
     def _free_pose(self, at_W: FloatArray, hidden: FloatArray, footprint: Footprint) -> Pose2D | None:
-        """A free pose at a position (2,), turned to the hidden positions if possible; None without one."""
+        """A free pose at a position (2,), turned to the hidden positions if possible; None when no pose is free."""
         towards = hidden[self._shows(at_W, hidden)].mean(axis=0) - at_W
         (x, y), ahead_rad, costmap = at_W.tolist(), math.atan2(towards[1], towards[0]), self._context.free_space()
         poses = (Pose2D(x, y, wrap(ahead_rad + turn_rad)) for turn_rad in _YAWS_RAD)
         return next((pose for pose in poses if footprint_clear(costmap, footprint, pose)), None)
 
     def _shows(self, eye_W: FloatArray, points_W: FloatArray) -> NDArray[np.bool_]:
-        """Mask (N,) of the positions (N, 2) within reach of a viewpoint (2,), with no obstacle between."""
+        """Mask (N,) of the positions (N, 2) within reach of a viewpoint (2,) and not occluded."""
         is_near: NDArray[np.bool_] = np.linalg.norm(points_W - eye_W, axis=1) <= self._reach_m
         return is_near & line_of_sight(self._context.costmap, eye_W, points_W, beyond_m=_OWN_M)

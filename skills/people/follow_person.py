@@ -68,10 +68,10 @@ _BETWEEN_M = 0.5
 
 @dataclass(frozen=True)
 class FollowPersonInputs:
-    """The person's name for messages, and `place_W` (x, y), where they were seen last; None: the nearest one ahead.
+    """The person's name for messages, and where the person was last seen, `place_W` (x, y); None: the nearest ahead.
 
-    With the corners `until_W` of the place `until`, the skill ends once the person has stood there for 5 s. It ends
-    when somebody tells it to, and after `time_limit_s` at the latest.
+    With the place `until` and its corners `until_W`, the skill ends once the person has stood there for 5 s. It also
+    ends when somebody tells the robot to, and after `time_limit_s`.
     """
 
     person: str = "the person"
@@ -83,7 +83,7 @@ class FollowPersonInputs:
 
 
 def _at_pace(context: SkillContext, max_speed_m_s: float) -> SkillContext:
-    """The context with a controller at walking speed, if the controller has a speed limit."""
+    """The context with its controller limited to walking speed, if the controller has a speed limit."""
     controller: Any = context.stack.controller
     if controller.max_speed_m_s == math.inf:
         return context
@@ -92,14 +92,11 @@ def _at_pace(context: SkillContext, max_speed_m_s: float) -> SkillContext:
 
 
 class _Told(Exception):  # noqa: N818 - no program error
-    """Somebody told the robot to end."""
+    """Raised when somebody tells the robot to end."""
 
 
 class FollowPerson(ListeningSkill[FollowPersonInputs]):
-    """Keeps behind a walking person by LiDAR and body cameras; searches for a person whom it has lost, and asks.
-
-    The navigate skill drives.
-    """
+    """Keeps behind a walking person by LiDAR and body cameras; searches for a lost person, and asks. Uses navigate."""
 
     name = "follow_person"
     Inputs = FollowPersonInputs
@@ -133,7 +130,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         self._company.watch = PeopleWatch(self.context, self.options.people)
 
     def end(self) -> None:
-        """Stops the base, and listens no longer."""
+        """Stops the base and stops listening."""
         self._halt()
         super().end()
 
@@ -143,12 +140,12 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         super().suspend()
 
     def resume(self, inputs: FollowPersonInputs) -> None:
-        """Looks for the person again, first where they were seen last."""
+        """Looks for the person again, first at the last known position."""
         last_W = inputs.place_W if self._target is None else self._target.place_W(self.context.clock.now())
         self.begin(replace(inputs, place_W=last_W))
 
     def run(self, inputs: FollowPersonInputs) -> Routine[Succeeded]:
-        """Finds the person and keeps behind them to the end. Raises SkillFailure."""
+        """Finds the person and keeps behind them to the end. Raises SkillFailure when the person is not found."""
         try:
             self._target = yield from self._find(inputs)
             while not (yield from self._keep_behind(self._target)):
@@ -167,7 +164,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         return self.context.clock.now()
 
     def _tick(self, message: str) -> Routine[None]:
-        """Waits for the next tick; looks for people and listens. Raises SkillFailure at the time limit, and _Told."""
+        """Waits for a tick; looks and listens. Raises SkillFailure at the time limit, and _Told when told to end."""
         yield Running(message)
         company = self._company
         company.watch.step(np.zeros(3))
@@ -193,7 +190,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         raise SkillFailure(Cause.PRECONDITION, f"nobody is seen {where}, so {self._inputs.person} cannot be followed")
 
     def _first(self, inputs: FollowPersonInputs, waited: bool) -> SeenPerson | None:
-        """The nearest person ahead, or at the place of the inputs; a standing one without a picture after a wait."""
+        """The nearest person ahead, or at the inputs' place; after a wait also a standing one that only scans show."""
         tracks, ahead_rad = self._company.watch.tracks(), self.options.ahead_rad
         reach_m = self.options.ahead_m if inputs.place_W is None else _SAME_PLACE_M * (2.0 if waited else 1.0)
         near = people_about(tracks, self.context.pose(), inputs.place_W, reach_m, ahead_rad)
@@ -202,7 +199,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         return min(known, key=lambda one: one.track not in sure, default=None)
 
     def _keep_behind(self, target: Target) -> Routine[bool]:
-        """Follows until the person stands in the place (True), or is lost (False)."""
+        """Follows until the person stands in the place (returns True), or is lost (returns False)."""
         place = self._inputs.until_W
         while (hidden_s := target.hidden_s(self._now())) < self.options.lost_s:
             if hidden_s > self.options.gone_s and self._goal is None:
@@ -226,7 +223,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         return False
 
     def _is_right(self, target: Target, before: SeenPerson) -> Routine[bool]:
-        """Asks a doubted person for their name, unless somebody else may answer.
+        """Asks a doubtful person for their name, unless another person might answer.
 
         A person who says no, or is silent too often, is rejected.
         """
@@ -259,7 +256,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         return True
 
     def _search(self, target: Target) -> Routine[None]:
-        """Looks for a lost person through the doors where they were going, then asks. Raises SkillFailure."""
+        """Searches doors where a lost person was heading, then asks. Raises SkillFailure when they are not found."""
         say(self.context, "I have lost sight of you.")
         self._company.most_m_s = math.inf
         if self._inputs.place_W is not None:  # the robot asks for the name
@@ -288,7 +285,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         raise SkillFailure(Cause.EXECUTION, f"{self._inputs.person} is lost, {last}")
 
     def _plan(self, goal: Pose2D | None) -> None:
-        """Starts or changes the drive; None keeps the present goal."""
+        """Starts or changes the drive to a goal; None keeps the present goal."""
         now = self._goal or self.context.pose()
         if goal is None or _apart_m(goal, now) < (_CHANGED_GOAL_M if self._goal else _NEW_GOAL_M):
             return
@@ -302,7 +299,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         self._goal = goal
 
     def _drive(self, doing: str) -> str:
-        """Drives on for one tick; returns the message. Raises SkillFailure when the robot cannot drive any longer."""
+        """Drives for one tick; returns the message. Raises SkillFailure when the robot cannot drive any longer."""
         if self._goal is None:
             return doing
         step = self._navigate.step()
@@ -322,7 +319,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         self._navigate.end()
 
     def _speed_m_s(self, target: Target) -> float:
-        """Speed limit that keeps the distance to the person; unlimited on a path away from them."""
+        """Speed limit that keeps the distance to the person; unlimited on a path that leads away from them."""
         here, options, place_W = self.context.pose(), self.options, target.place_W(self._now())
         distance_m = math.dist((here.x_m, here.y_m), place_W)
         if self._goal is None or math.dist((self._goal.x_m, self._goal.y_m), place_W) > distance_m:
@@ -330,9 +327,9 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         return max(0.0, target.away_m_s(here)) + options.gain * max(0.0, distance_m - options.close_m)
 
     def _next_pose(self, target: Target, hidden_s: float) -> Pose2D | None:
-        """The next goal pose: behind the person, or aside from the path of a person who comes towards the robot.
+        """The next goal: behind the person, or aside when the person comes towards the robot.
 
-        After `_FAILED_DRIVES` drives in a row that failed, it is aside from the path of the nearest other person.
+        After `_FAILED_DRIVES` drives that failed in a row, it is aside from the path of the nearest other person.
         """
         here, now_s, options = self.context.pose(), self._now(), self.options
         near = not hidden_s and math.dist((here.x_m, here.y_m), target.seen.place_W) < options.meeting_m
@@ -350,7 +347,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         return self._aside if now_s < self._aside_until_s else self._pose_behind(target, hidden_s)
 
     def _blocks_door(self, target: Target, here: Pose2D) -> bool:
-        """Returns once whether the person has stood still by a doorway, perhaps since the robot is in the way."""
+        """Returns True once when the person has stood still by a doorway, perhaps because the robot blocks it."""
         made_way, self._made_way = self._made_way, target.stands_still(self._now())
         if made_way or not self._made_way:
             return False
@@ -358,15 +355,15 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         return any(door.distance_m(place_W) < _BY_DOOR_M for door in self.context.doors for place_W in places_W)
 
     def _pose_aside(self, path_W: FloatArray, here: Pose2D) -> Pose2D | None:
-        """The nearest pose off the path (N, 2) of a person."""
+        """The nearest pose off a person's path (N, 2)."""
         paths = with_discs(NoObstacles(), np.column_stack([path_W, np.full(len(path_W), _PERSON_M)]))
         giving_way = GivingWayOptions(reach_m=self.options.aside_m)
         return pose_aside(self.context.free_space(), paths, self._outline, here, giving_way)
 
     def _pose_behind(self, target: Target, hidden_s: float) -> Pose2D | None:
-        """The nearest free pose behind the person on their trail; None to stay.
+        """The nearest free pose behind the person on their trail; None when the robot should stay.
 
-        While the person is hidden, their last known position counts.
+        While the person is hidden, it is relative to their last known position.
         """
         here, options, walks = self.context.pose(), self.options, target.speed_m_s > _WALKS_M_S
         end_W = np.array(target.place_W(self._now() + (options.ahead_s if walks and not hidden_s else 0.0)))
@@ -385,21 +382,21 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         return self._free(np.array(poses).reshape(-1, 3))
 
     def _turned(self, here: Pose2D, place_W: tuple[float, float]) -> Pose2D | None:
-        """Pose on the spot that faces a person; None when the robot nearly faces them or cannot turn."""
+        """Pose on the spot that faces a person; None when the robot nearly faces them already or cannot turn."""
         turn_rad = bearing_rad(here, place_W)
         if abs(turn_rad) < self.options.turn_rad:
             return None
         return self._free(np.array([(here.x_m, here.y_m, wrap(here.yaw_rad + turn_rad))]))
 
     def _clear_trail(self, target: Target, hidden_s: float) -> None:
-        """Clears the costmap where the person has walked: behind a jamb the LiDAR cannot see that they have gone."""
+        """Clears the costmap where the person has walked: behind a jamb the LiDAR cannot see that they have left."""
         trail = target.trail[-_CLEARED_POINTS:]
         left = np.linalg.norm(trail - target.seen.place_W, axis=1) > (-1.0 if hidden_s else _LEFT_M)
         if isinstance(self.context.costmap, ClearableCostmap) and left.any():
             self.context.costmap.clear_obstacles(np.column_stack([trail[left], np.full(left.sum(), _CLEARED_M)]))
 
     def _is_clear(self, straight: FloatArray) -> bool:
-        """Returns whether the robot can drive straight from a point towards another one (2, 2), as far as it may."""
+        """Returns whether the robot can drive straight from one point to `close_m` before another one (2, 2)."""
         start, along = straight[0], straight[1] - straight[0]
         length_m = float(np.linalg.norm(along))
         share = max(0.0, 1.0 - self.options.close_m / max(length_m, 1e-3))
@@ -407,11 +404,11 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         return bool(self.context.free_space().clearance_m(points).min() > self._outline.inscribed_m + SAFE_MARGIN_M)
 
     def _free(self, poses: FloatArray) -> Pose2D | None:
-        """The first of some poses (N, 3) with clearance."""
+        """The first pose in (N, 3) with enough clearance."""
         clear = footprint_clearance_m(self.context.free_space(), self._outline, poses) > SAFE_MARGIN_M
         return Pose2D(*poses[int(np.argmax(clear))].tolist()) if clear.any() else None
 
 
 def _apart_m(a: Pose2D, b: Pose2D) -> float:
-    """Distance of two poses (m), a radian counting half a metre."""
+    """Distance between two poses (m); a radian counts as half a metre."""
     return math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) + 0.5 * abs(wrap(a.yaw_rad - b.yaw_rad))

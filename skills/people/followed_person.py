@@ -50,12 +50,13 @@ _LINE_POINTS = 20
 
 @dataclass(frozen=True)
 class TargetOptions:
-    """Conditions under which a new track continues the person's after a gap.
+    """Conditions under which a new track continues the person's track after a gap.
 
-    The person is hidden after `hidden_s` without a detection. A later track continues theirs within `again_m` of the
-    prediction, and `again_m_s` farther for each second, up to `farthest_m`. It is doubtful after more than `sure_s`,
-    farther than `again_m` from the prediction, or once another person has come within `close_m`. A person stands still
-    while all positions of `still_s` lie within `still_m`.
+    `hidden_s`: without a detection for this long, the person is hidden. `again_m`, `again_m_s` and `farthest_m`:
+    largest distance of a later track from the prediction, its growth per second, and its limit. `sure_s`: longest gap
+    after which the person is not doubtful; a track farther than `again_m`, or another person within `close_m`, also
+    makes them doubtful. `still_s` and `still_m`: a person stands still while all positions in this time lie within this
+    distance.
     """
 
     hidden_s: Delay = 0.6
@@ -71,7 +72,7 @@ class TargetOptions:
 def people_about(
     people: Sequence[SeenPerson], here: Pose2D, place_W: tuple[float, float] | None, reach_m: float, ahead_rad: float
 ) -> list[SeenPerson]:
-    """The people within reach_m of a place, the nearest first; without a place, of the robot, and ahead of it."""
+    """People within reach_m, the nearest first: of a place, or if it is None of the robot and only ahead of it."""
     centre_W = (here.x_m, here.y_m) if place_W is None else place_W
     about = (one for one in people if math.dist(one.place_W, centre_W) <= reach_m)
     ahead = [one for one in about if place_W is not None or abs(bearing_rad(here, one.place_W)) < ahead_rad]
@@ -79,10 +80,10 @@ def people_about(
 
 
 def is_addressed(one: SeenPerson, near: Sequence[SeenPerson], here: Pose2D, *, still: bool, in_sight: bool) -> bool:
-    """Returns whether only this person answers a question to all `near` people, who are sorted by distance.
+    """Returns whether only this person would answer a question; `near` are all people nearby, sorted by distance.
 
     The person must be the nearest, and ahead of the robot. A person who stands `still` may also be the nearest one
-    ahead, with no obstacle between (`in_sight`), or the nearest of all if nobody is ahead.
+    ahead, not occluded (`in_sight`), or the nearest of all if nobody is ahead.
     """
     faced = [each for each in near if abs(bearing_rad(here, each.place_W)) < _FACES_RAD]
     first = next(iter(faced or near if still else faced), None)
@@ -92,18 +93,19 @@ def is_addressed(one: SeenPerson, near: Sequence[SeenPerson], here: Pose2D, *, s
 
 @dataclass(frozen=True)
 class FollowPersonOptions:
-    """Distances (m) between the middles of robot and person, and patience (s).
+    """Distances (m) between the centres of robot and person, and patience (s).
 
-    The robot drives to `behind_m` behind where the person will be in `ahead_s`, plans again every `replan_s`, and slows
-    down so that it stands at `close_m`. It stays where it is while a standing person is within `near_m`, and turns to
-    one who is more than `turn_rad` to the side. For a person who comes towards it within `meeting_m`, it goes aside by
-    up to `aside_m` for `aside_s` at most. A person who stays hidden for `lost_s` is lost, or for `gone_s` once the
-    robot stands where they were seen last: the robot says so, searches beyond `doors` doors and in the named place,
-    each for `search_s` or `plans` plans `again_s` apart, then asks and listens for `asking_s`. Somebody who may be
-    another is asked for the name within `hearing_m`, with `answer_s` for the answer, and is another after so many
-    `silences`. The robot also asks a person who stands outside the named place for `standing_s`. At the beginning it
-    looks for the person for `finding_s`. It fails after `tries` drives in a row that failed, and at the end if the
-    person was out of its sight for longer than `longest_loss_s`.
+    `behind_m`, `ahead_s` and `replan_s`: the robot drives to this distance behind where the person will be after
+    `ahead_s`, and plans again every `replan_s`. `close_m`: it slows down to stand here. `near_m` and `turn_rad`: it
+    stays while a standing person is this near, and turns to one farther to the side. `meeting_m`, `aside_m` and
+    `aside_s`: for a person who comes towards it, when, how far and how long it goes aside. `lost_s` and `gone_s`: a
+    hidden person is lost after this time, or after `gone_s` once the robot stands at the last known position. `doors`,
+    `search_s`, `plans` and `again_s`: it then searches beyond so many doors and in the named place, each for this time
+    or number of plans; `asking_s`: then it asks and listens. `hearing_m`, `answer_s` and `silences`: a doubtful person
+    within this distance is asked for the name, has this time, and is rejected after so many silences. `standing_s`: it
+    also asks a person who stands this long outside the named place. `finding_s`: time to find the person at the
+    beginning. `tries` and `longest_loss_s`: it fails after so many failed drives in a row, and at the end when the
+    person was out of sight for longer.
     """
 
     behind_m: Length = 1.6
@@ -138,9 +140,9 @@ class FollowPersonOptions:
 
 
 class Target:
-    """The followed person: the last detection `seen`, and the largest distance `farthest_m` of its continuation.
+    """The followed person: the last detection `seen`, and how far (`farthest_m`) a track that continues it may be.
 
-    `doubted` is the last certain detection if the present person is doubtful, `longest_loss_s` the longest time
+    `doubted` is the last reliable detection while the present person is doubtful. `longest_loss_s` is the longest time
     without the person near the robot.
     """
 
@@ -156,25 +158,25 @@ class Target:
 
     @property
     def speed_m_s(self) -> float:
-        """Speed of the person at the last view."""
+        """Speed of the person at the last detection."""
         return math.hypot(*self.seen.velocity_W)
 
     @property
     def trail(self) -> FloatArray:
-        """Points (N, 2) of the person's path to the last view, which begins at the robot; without loops."""
+        """Points (N, 2) on the person's path up to the last detection, beginning at the robot; loops are removed."""
         return np.array(self._trail)
 
     def hidden_s(self, now_s: float) -> float:
-        """Time since the last view, 0 while the person is in view."""
+        """Time since the last detection; 0 while the person is in view."""
         age_s = now_s - self.seen.stamp_s
         return age_s if age_s > self._options.hidden_s else 0.0
 
     def place_W(self, now_s: float) -> tuple[float, float]:
-        """Position (x, y) of the person now."""
+        """Predicted position (x, y) of the person now."""
         return predicted_place_W(self.seen, now_s)
 
     def stands_still(self, now_s: float) -> bool:
-        """Returns whether the person has stood still for so long."""
+        """Returns whether the person has stood still for `still_s`."""
         long_enough = now_s - self._places[0][0] >= self._options.still_s - _SCAN_S
         last_W = self.seen.place_W
         return long_enough and all(math.dist(place, last_W) < self._options.still_m for _, place in self._places)
@@ -184,12 +186,12 @@ class Target:
         return now_s - self._walked_s
 
     def away_m_s(self, here: Pose2D) -> float:
-        """Speed at which the person goes away from the robot, negative towards it."""
+        """Speed at which the person moves away from the robot; negative towards it."""
         off = np.array(self.seen.place_W) - (here.x_m, here.y_m)
         return float(off @ self.seen.velocity_W) / max(float(np.linalg.norm(off)), 1e-3)
 
     def update(self, tracks: Sequence[SeenPerson], others: Sequence[SeenPerson], now_s: float) -> None:
-        """Updates the person from the present tracks; `others` are tracks of certainly other people."""
+        """Updates the person from the present tracks; `others` are tracks known to be other people."""
         self.longest_loss_s = max(self.longest_loss_s, now_s - self._near_s)
         one = next((one for one in tracks if one.track == self.seen.track), None)
         if one is None or now_s - one.stamp_s > self._options.hidden_s:
@@ -214,18 +216,18 @@ class Target:
             self.doubted, self._others_before = self.seen, frozenset(self._others)
 
     def trust(self) -> None:
-        """Takes the person of now for the followed one."""
+        """Accepts the present person as the followed one."""
         self.doubted, self.farthest_m, self._walked_s = None, self._options.farthest_m, self.seen.stamp_s
 
     def reject(self, before: SeenPerson) -> None:
-        """Takes the person of now for somebody else; the followed one was seen `before`."""
+        """Marks the present person as another one; the followed person was last detected in `before`."""
         self._others = {*self._others_before, self.seen.track}
         self._others_W.append(self.seen.place_W)
         self._near_s = before.stamp_s
         self.seen, self.doubted = replace(before, track=0), None
 
     def _note(self, one: SeenPerson) -> None:
-        """Lengthens the trail to the person; cuts off a loop."""
+        """Extends the trail to the person; removes a loop."""
         if math.dist(self._trail[-1], one.place_W) >= _TRAIL_STEP_M:
             old = self._trail[:-_LOOP_POINTS]
             back = next((n for n, point in enumerate(old) if math.dist(point, one.place_W) < _LOOP_M), None)
@@ -237,7 +239,7 @@ class Target:
             self._places.popleft()
 
     def _again(self, people: Sequence[SeenPerson], now_s: float) -> SeenPerson | None:
-        """Continuation of the person's track after a gap: the nearest to the prediction, without other people's."""
+        """Continuation of the person's track after a gap: the nearest track to the prediction, without other people."""
         options, expected_W = self._options, self.place_W(now_s)
         reach_m = min(options.again_m + options.again_m_s * self.hidden_s(now_s), self.farthest_m)
         new = [
@@ -255,7 +257,7 @@ class Target:
 
 
 def poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, float, float]]:
-    """Poses on a trail at a least distance behind its end, nearest first: along the trail, and facing its end."""
+    """Poses on a trail at least behind_m before its end, nearest first: along the trail, and facing its end."""
     end, back_m = trail[-1], 0.0
     for n in range(len(trail) - 1, 0, -1):
         length = float(np.linalg.norm(trail[n] - trail[n - 1]))
@@ -272,7 +274,7 @@ def poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, fl
 def poses_around(
     person_W: FloatArray, here: Pose2D, away_m: Sequence[float], costmap: FreeSpace
 ) -> Iterator[tuple[float, float, float]]:
-    """Poses at some distances from a person (2,) that face them with nothing between, nearest to `here` first."""
+    """Poses at the distances `away_m` that face a person (2,) without occlusion, nearest to `here` first."""
     angles = math.atan2(*(np.array((here.x_m, here.y_m)) - person_W)[::-1]) + _ROUND
     for distance_m in away_m:
         points_W = person_W + distance_m * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -289,9 +291,9 @@ def poses_to_search(
     here: Callable[[], Pose2D],
     free: Callable[[FloatArray], Pose2D | None],
 ) -> Iterator[Pose2D]:
-    """Yields poses beyond the likeliest door, in the area until_W where the person was going, and beyond more doors.
+    """Yields poses beyond the likeliest door, in the area until_W if the person headed there, and beyond more doors.
 
-    `free` gives the first of some poses with clearance.
+    `free` returns the first pose with enough clearance.
     """
     likely = filter(None, map(free, _poses_beyond_doors(target, doors, most_doors, here)))
     yield from islice(likely, 1)
@@ -306,7 +308,7 @@ def poses_to_search(
 def _poses_beyond_doors(
     target: Target, doors: Sequence[Doorway], most: int, here: Callable[[], Pose2D]
 ) -> Iterator[FloatArray]:
-    """Yields poses (N, 3) beyond each door where the person may have gone: from room to room by the likeliest door."""
+    """Yields poses (N, 3) beyond each door that the person may have taken: from room to room by the likeliest door."""
     place_W, heading, left = np.array(target.seen.place_W), np.array(target.seen.velocity_W), [*doors]
 
     def unlikely_m(door: Doorway) -> float:
@@ -325,14 +327,14 @@ def _poses_beyond_doors(
 
 
 def _poses_beyond(door: Doorway, yaw_rad: float) -> FloatArray:
-    """Poses (N, 3) beyond a door in a direction; the last is before it, where the robot sees into the room."""
+    """Poses (N, 3) beyond a door in a direction; the last is in front of it, where the robot sees into the room."""
     x, y = door.middle_W
     c, s = math.cos(yaw_rad), math.sin(yaw_rad)
     return np.array([(x + far_m * c, y + far_m * s, yaw_rad) for far_m in _BEYOND_DOOR_M])
 
 
 def line_through(one: SeenPerson, here: Pose2D, beyond_m: float) -> FloatArray:
-    """Points (20, 2) on the line from a person to the robot and on beyond it."""
+    """Points (20, 2) on the line from a person through the robot, extended by beyond_m."""
     off = np.array((here.x_m, here.y_m)) - one.place_W
     return np.array(
         one.place_W

@@ -1,4 +1,4 @@
-"""The guide_person skill: goes ahead of a person at their pace, waits for them, and goes back for them."""
+"""The guide_person skill: leads a person at their pace, waits for them, and goes back for them."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -46,8 +46,8 @@ _ON_M = 2.0
 class GuidePersonInputs:
     """Name of a person for messages, the robot's pose at the goal, and the name of the goal.
 
-    The person was seen at `place_W` (x, y); None: the nearest one ahead. They must stand in the outline `area_W` in the
-    end; without one, near the robot.
+    `place_W` (x, y) is where the person was last seen (None: the nearest one ahead). At the end the person must stand
+    in the outline `area_W`; without an outline, near the robot.
     """
 
     person: str
@@ -61,12 +61,13 @@ class GuidePersonInputs:
 class GuidePersonOptions:
     """Distances between robot and person, and times.
 
-    The robot drives at up to most_m_s while the person is within `close_m`, slower beyond, and stands beyond `wait_m`
-    or when it has not seen them for `hidden_s`. After `behind_s` of standing it goes back for them, at most `returns`
-    times. At the goal it waits `arrive_s` for them, and goes further into the room, in `drives` at most, for a person
-    who has stood before its door for `outside_s`. Somebody within `same_m` of where they should be is taken for them,
-    without such a place the nearest person within `ahead_m` and `ahead_rad` ahead. A robot that waits says so after
-    `call_s`. Somebody who may be another is asked for the name `questions` times, with `answer_s` for each answer.
+    `most_m_s` and `close_m`: the robot's full speed, and up to which distance of the person it applies. `wait_m` and
+    `hidden_s`: it stands beyond this distance, or when it has not seen them for this time. `behind_s` and `returns`:
+    after standing so long it goes back for them, at most so often. `arrive_s`: it waits for them at the goal.
+    `outside_s` and `drives`: for a person who has stood so long at the room's door, it goes further in, at most so
+    often. `same_m`: a person this near to the expected position counts as the one; without a position, the nearest
+    within `ahead_m` and `ahead_rad` ahead. `call_s`: a robot that waits says so after this time. `questions` and
+    `answer_s`: how often a doubtful person is asked for the name, and the time for each answer.
     """
 
     most_m_s: Speed = 0.7
@@ -87,7 +88,7 @@ class GuidePersonOptions:
 
 
 class Leading(Navigate):
-    """Drive of a robot that leads; a stop to wait for its company does not count as blocked."""
+    """Drive of a robot that leads; a stop to wait for the person does not count as blocked."""
 
     def _give_way(self) -> tuple[float, str | None]:
         most_m_s, waits = super()._give_way()
@@ -97,7 +98,7 @@ class Leading(Navigate):
 
 
 class GuidePerson(ListeningSkill[GuidePersonInputs]):
-    """Goes ahead of a person to a place: at their pace, waits for them, and goes back for them."""
+    """Leads a person to a place: drives at their pace, waits for them, and goes back for them."""
 
     name = "guide_person"
     Inputs = GuidePersonInputs
@@ -114,7 +115,7 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
     options: GuidePersonOptions
 
     def begin(self, inputs: GuidePersonInputs) -> None:
-        """Starts with the person at the place of the inputs."""
+        """Starts with the person at the inputs' position."""
         super().begin(inputs)
         self._inputs, self._place_W, self._who = inputs, inputs.place_W, person_text(inputs.person)
         self._company = Company(PeopleWatch(self.context, _TRACKING))
@@ -124,7 +125,7 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
         self._waiting, self._asked = Patience(self.context.clock, self.options.call_s), False
 
     def step(self) -> Step:
-        """Looks for the person; then as `RoutineSkill.step`."""
+        """Looks for the person, then steps the routine (see `RoutineSkill.step`)."""
         watch, now_s = self._company.watch, self.context.clock.now()
         watch.step(np.zeros(3))
         if self._target is None:
@@ -141,20 +142,20 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
         return people_about(tracks, self.context.pose(), self._place_W, reach_m, self.options.ahead_rad)
 
     def _gap_m(self) -> float:
-        """Distance from the robot to the person, in metres; infinite while they are hidden."""
+        """Distance between the robot and the person, in metres; infinite while the person is hidden."""
         if self._target is None or self._target.hidden_s(self.context.clock.now()) > self.options.hidden_s:
             return math.inf
         here = self.context.pose()
         return math.dist(self._target.seen.place_W, (here.x_m, here.y_m))
 
     def trouble(self) -> SkillFailure | None:
-        """Returns a failure when a person ends it before both are there."""
+        """Returns a failure when somebody ends the skill before both are at the goal."""
         if (said := self.remark) is None or self._are_there():
             return None
         return SkillFailure(Cause.POSTCONDITION, f"'{said}' was said before {self._who} was at {self._inputs.place}")
 
     def run(self, inputs: GuidePersonInputs) -> Routine[Succeeded]:
-        """Leads the person, and goes back for them when needed."""
+        """Leads the person, and goes back for them when they fall behind."""
         yield from self._fetch()
         for _ in range(self.options.returns + 1):
             say(self.context, f"Please follow me to {inputs.place}.")
@@ -167,7 +168,7 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
         raise SkillFailure(Cause.POSTCONDITION, f"{self._who} does not come along to {inputs.place}")
 
     def _lead(self) -> Routine[bool]:
-        """Drives to the goal; returns whether both are there, or False once the person is too far behind."""
+        """Drives to the goal; returns True when both are there, and False once the person is too far behind."""
         inputs, goal, now_s = self._inputs, self._inputs.goal, self.context.clock.now
         for _ in range(self.options.drives):
             drive = NavigateInputs(goal, 0.25, 0.4, self.options.most_m_s)
@@ -192,7 +193,7 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
         return self._are_there()
 
     def _make_sure(self) -> Routine[None]:
-        """Asks somebody who may be another for their name. Raises SkillFailure unless they say yes."""
+        """Asks a doubtful person for their name. Raises SkillFailure unless they say yes."""
         doubted = self._doubted or (self._target is not None and self._target.doubted is not None)
         if self._inputs.place_W is None or not doubted:
             return
@@ -206,12 +207,12 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
             raise SkillFailure(Cause.POSTCONDITION, f"the person who came along to {self._inputs.place} {why}")
 
     def _must_stop(self) -> bool:
-        """Sets the pace; returns whether the drive has to end, since the person fell behind or has ended it."""
+        """Sets the pace; returns whether the drive must end because the person fell behind or ended it."""
         self._company.most_m_s = self._pace_m_s()
         return self._is_behind() or self.remark is not None
 
     def _pose_further_in(self) -> Pose2D | None:
-        """Free pose in the room, far enough from the person's last position that they come in; None without one."""
+        """Free pose in the room, far enough from the person that they come in; None when there is none."""
         area, here = self._inputs.area_W, self.context.pose()
         if self._target is None or not area:
             return None
@@ -232,7 +233,7 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
         return None
 
     def _fetch(self) -> Routine[None]:
-        """Goes back to where the person was seen last, or was going. Raises SkillFailure when nobody is there."""
+        """Goes back to where the person was last seen, or was heading. Raises SkillFailure when nobody is there."""
         if self._is_close():
             return
         inputs, failures = self._inputs, list[SkillFailure]()
@@ -256,7 +257,7 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
         raise SkillFailure(failures[0].cause, why)
 
     def _pace_m_s(self) -> float:
-        """Speed that the distance of the person allows; 0 to wait."""
+        """Speed limit at the present distance to the person; 0 to wait."""
         options, gap_m = self.options, self._gap_m()
         if gap_m > options.wait_m:
             return 0.0
@@ -264,7 +265,7 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
         return _SLOWEST_M_S + share * (options.most_m_s - _SLOWEST_M_S)
 
     def _is_behind(self) -> bool:
-        """Returns whether the person has been too far away for too long; asks them once to come."""
+        """Returns whether the person has been too far behind for too long; asks them once to come."""
         if self._gap_m() <= self.options.wait_m:
             self._behind.reset()
             self._waiting.reset()
@@ -294,9 +295,9 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
 
 
 def _places_of(target: Target) -> Iterator[tuple[float, float]]:
-    """Possible places of a hidden person: the last one, further in the same direction, and back along the trail.
+    """Yields possible positions of a hidden person: the last one, farther in the same direction, and back on the trail.
 
-    When the robot sees the person from one of them, the person's place comes next.
+    When the robot sees the person from one of them, the person's position comes next.
     """
     last, trail = target.seen, target.trail[::-1]
     guesses, back_m = [last.place_W], _ON_M

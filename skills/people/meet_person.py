@@ -45,9 +45,9 @@ def person_observation(seen: SeenPerson, name: str, place: str | None) -> Object
 
 @dataclass(frozen=True)
 class MeetPersonInputs:
-    """Name of a person and of their room, and the point (x, y) where they were seen; None: the nearest one ahead.
+    """Names of a person and their room, and the point (x, y) where they were last seen (None: the nearest one ahead).
 
-    With `within_m`, the robot may stop at this distance (m) where nothing nearer is free.
+    With `within_m`, the robot may stop at this distance (m) when nothing nearer is free.
     """
 
     person: str
@@ -58,11 +58,11 @@ class MeetPersonInputs:
 
 @dataclass(frozen=True)
 class MeetPersonOptions:
-    """Positions of the robot near a person: at the first free of the distances `apart_m`, turned to the person.
+    """Positions of the robot near a person: at the first free one of the distances `apart_m`, turned to the person.
 
-    A robot that is nearer than `near_m` and faces the person within `facing_rad` stays. A person within `same_m` of the
-    expected place is the one; the robot searches within `reach_m` for `look_s`. When the person has walked on, the
-    robot goes after them, in `tries` drives at most.
+    `near_m` and `facing_rad`: a robot that is nearer and faces the person within this angle stays. `same_m`: a person
+    this near to the expected position is the one. `reach_m` and `look_s`: radius and time of the search. `tries`: when
+    the person has walked on, how many drives the robot makes after them.
     """
 
     apart_m: tuple[Length, ...] = (1.3, 1.6)
@@ -76,7 +76,7 @@ class MeetPersonOptions:
 
 
 class MeetPerson(RoutineSkill[MeetPersonInputs]):
-    """Goes beside a person, also if they move on, and faces them. The output `person` is where they are."""
+    """Goes beside a person, also if they move on, and faces them. The output `person` is their observation."""
 
     name = "meet_person"
     Inputs = MeetPersonInputs
@@ -94,7 +94,7 @@ class MeetPerson(RoutineSkill[MeetPersonInputs]):
     options: MeetPersonOptions
 
     def run(self, inputs: MeetPersonInputs) -> Routine[Succeeded]:
-        """Drives beside the person, again if they have moved meanwhile."""
+        """Drives beside the person; again if they have moved meanwhile."""
         place_W, who, near_m = inputs.place_W, person_text(inputs.person), self.options.near_m
         for drives in range(self.options.tries + 1):
             if drives or place_W is None or self._is_in_view(place_W):
@@ -111,7 +111,7 @@ class MeetPerson(RoutineSkill[MeetPersonInputs]):
         raise SkillFailure(Cause.POSTCONDITION, f"{who} does not stay where the robot goes")
 
     def _look(self, name: str, place_W: tuple[float, float] | None) -> Routine[SeenPerson | None]:
-        """Looks for the person nearest to a place (None: nearest ahead); None when nobody is there."""
+        """Looks for the person nearest to a place (None: nearest ahead); returns None when nobody is there."""
         clock, patience = self.context.clock, Patience(self.context.clock)
         watch, end_s = PeopleWatch(self.context, PeopleOptions(track_m=self.options.reach_m)), -math.inf
         while True:
@@ -139,7 +139,7 @@ class MeetPerson(RoutineSkill[MeetPersonInputs]):
         return sorted(near, key=lambda one: math.dist(one.place_W, place_W))
 
     def _is_in_view(self, place_W: tuple[float, float]) -> bool:
-        """Returns whether the robot stands near a place, with no wall between."""
+        """Returns whether the robot stands near a place, with no wall in between."""
         here = self.context.pose()
         towards = Pose2D(here.x_m, here.y_m, here.yaw_rad + bearing_rad(here, place_W))
         return math.dist(place_W, (here.x_m, here.y_m)) <= self.options.near_m and self._sees(towards, place_W)

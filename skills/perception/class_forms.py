@@ -24,7 +24,7 @@ MEANS_BIG: Final[Mapping[str, bool]] = MappingProxyType(
 
 
 class ClassForm(BaseModel):
-    """One class: id in messages, form, lengths (from, to) in m of its longest and second longest side, usual length.
+    """One class: id in messages, form, ranges (from, to) in m of the two longest sides, and the usual length.
 
     `mass_kg` is from the lightest to the heaviest usual object; None when unknown.
     """
@@ -53,7 +53,7 @@ class ColourRange(BaseModel):
     value: tuple[float, float] = (0.0, 1.0)
 
     def share(self, colours: NDArray[np.uint8]) -> float:
-        """Share of colours (N, 3) RGB in the range."""
+        """Fraction of colours (N, 3) RGB in the range."""
         import cv2  # a caller that only lists the words does not load it
 
         hsv = cv2.cvtColor(colours.reshape(1, -1, 3), cv2.COLOR_RGB2HSV_FULL)[0].astype(np.float64)
@@ -74,9 +74,9 @@ def shipped_forms() -> Mapping[str, ClassForm]:
 
 @lru_cache(maxsize=1)
 def class_forms() -> Mapping[str, ClassForm]:
-    """Loads all classes by name, with those of other distributions.
+    """Loads all classes by name, including those from other distributions.
 
-    Raises InputError for a class of another distribution that is malformed, or has the name or id of another class.
+    Raises InputError when a class of another distribution is malformed, or repeats the name or id of another class.
     """
     found = dict(shipped_forms())
     for file, forms in class_entries(FORMS_FILE, ClassForm):
@@ -89,7 +89,7 @@ def class_forms() -> Mapping[str, ClassForm]:
 
 
 def class_form(name: str) -> ClassForm:
-    """Form of a class; `ANY_FORM` for one without."""
+    """Form of a class; `ANY_FORM` for a class that has none."""
     return class_forms().get(name, ANY_FORM)
 
 
@@ -101,5 +101,5 @@ def colour_words() -> Mapping[str, ColourRange]:
 
 
 def known_attributes() -> frozenset[str]:
-    """Attribute words that the pixels or the size of a detected object can show."""
+    """Attribute words that can be verified by the pixels or the size of a detected object."""
     return frozenset(colour_words()) | frozenset(MEANS_BIG)

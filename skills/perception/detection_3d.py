@@ -26,10 +26,10 @@ _LEAST_COLOUR_SHARE = 0.3
 class Detection3D:
     """One detection with its position in the world.
 
-    `covariance` (3, 3) is that of position_W by the camera at capture; `place_covariance` adds the localisation's.
-    `size_m` and `yaw_rad` are as in `ObjectObservation`; `eye_W` is the camera's position; `pixels` (N, 2) as (u, v)
-    are the object's own, by depth, with their `colours` (N, 3), none in a grey picture; `surface` is the surface below
-    it, "floor" for the floor, None when unknown.
+    `covariance` (3, 3) of position_W comes from the camera alone; `place_covariance` adds the localisation's. `size_m`
+    and `yaw_rad` are as in `ObjectObservation`. `eye_W` is the camera's position. `pixels` (N, 2) as (u, v) are the
+    object's own, according to depth, with their `colours` (N, 3), which are empty in a grey picture. `surface` is the
+    name of the surface below it, "floor" for the floor, None when unknown.
     """
 
     stamp_s: float
@@ -55,7 +55,7 @@ def detections_3d(
 ) -> tuple[Detection3D, ...]:
     """Locates detections in the world.
 
-    Leaves out detections without depth, and far larger than the longest objects of their class.
+    Omits detections without depth, and those far larger than the longest objects in their class.
     """
     found = list(detections)
     placed = zip(found, _positions(image, found), strict=True)
@@ -68,7 +68,7 @@ def detections_3d(
 
 
 def _positions(image: Image, detections: Sequence[Detection]) -> list[Position | None]:
-    """Locates each detection; long objects come last, without the pixels of the others, between which they may lie."""
+    """Locates each detection; long objects last, without the pixels of others, which may lie between their ends."""
     shape = (image.intrinsics.height, image.intrinsics.width)
     taken: Mask = np.zeros(shape, dtype=bool)
     found = dict[int, Position | None]()
@@ -113,14 +113,14 @@ def _detection_3d(
 
 
 def place_covariance(p_W: FloatArray, p_WB: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Covariance (3, 3) that the robot's pose covariance (x, y, yaw) gives a point p_W seen from p_WB."""
+    """Covariance (3, 3) of a point p_W seen from p_WB that results from the robot's pose covariance (x, y, yaw)."""
     dx, dy = p_W[0] - p_WB[0], p_W[1] - p_WB[1]
     jacobian = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 0.0]])
     return np.asarray(jacobian @ covariance @ jacobian.T)
 
 
 def surface_below(p_W: FloatArray, base_m: float, surfaces: Sequence[Surface]) -> str | None:
-    """Name of the surface below an object at p_W with its base at a height (m): "floor" for the floor, or None."""
+    """Name of the surface below an object at p_W with its base at `base_m`: "floor" for the floor, None if unknown."""
     above = (one for one in surfaces if inside_polygon(p_W[None, :2], one.polygon_W, _SURFACE_MARGIN_M)[0])
     off = {surface.name: abs(base_m - surface.height_m) for surface in above}
     near = [name for name in sorted(off, key=lambda name: off[name]) if off[name] < _SURFACE_HEIGHT_M]
@@ -128,7 +128,7 @@ def surface_below(p_W: FloatArray, base_m: float, surfaces: Sequence[Surface]) -
 
 
 def observation(detected: Detection3D, attributes: tuple[str, ...] = ()) -> ObjectObservation:
-    """Observation of a 3D detection."""
+    """Converts a 3D detection to an observation."""
     x, y, z = (float(value) for value in detected.position_W)
     return ObjectObservation(
         stamp_s=detected.stamp_s,
@@ -142,7 +142,7 @@ def observation(detected: Detection3D, attributes: tuple[str, ...] = ()) -> Obje
 
 
 def has_attribute(detected: Detection3D, attribute: str) -> bool:
-    """Returns whether a detected object has an attribute: by its own pixels' colours, or its size in its class.
+    """Returns whether a detected object has an attribute, by the colours of its own pixels or by its size in its class.
 
     Raises KeyError for an unknown word.
     """

@@ -1,12 +1,12 @@
-"""Fiducials: the AprilTags (family 36h11) that a picture shows, each with its pose.
+"""Fiducials: the AprilTags (family 36h11) in a picture, each with its pose.
 
-The enlarged picture shows which tags there are; in an enlarged crop the edges of each give its corners to a tenth of a
-pixel. A square has two poses that explain its corners almost equally well when it is small (Collins and Bartoli,
+The enlarged picture shows which tags there are; lines fitted to the edges in an enlarged crop give the corners to a
+tenth of a pixel. A small square has two poses that explain its corners almost equally well (Collins and Bartoli,
 "Infinitesimal plane-based pose estimation", 2014). Both are fitted to the corners and to the depth inside the tag; the
-better one counts. Depth decides the tilt where corners cannot.
+better one is used. Depth decides the tilt where corners cannot.
 
-The frame of a tag (T) is at its middle: x to the right and y up on the upright tag, z out of its face. The size of a
-tag is the side of its black square. A detector recognises objects by the tags on them, beside all that another finds.
+The origin of a tag's frame (T) is its centre: x to the right and y up on the upright tag, z out of its face. The size
+of a tag is the side of its black square. A detector adds the objects with tags to those that another detector finds.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -49,7 +49,7 @@ _SAME_RAD: Final = 0.05
 class SeenTag:
     """A tag in one picture: its pose in the odometry frame at capture, and its corners (4, 2) in pixels.
 
-    `error_px` is the root mean square of the corners' reprojection errors. `ambiguity` is the likelihood of the other
+    `error_px` is the root mean square reprojection error of the corners. `ambiguity` is the likelihood of the competing
     pose relative to this one, from 0 to 1.
     """
 
@@ -62,7 +62,7 @@ class SeenTag:
 
 
 def find_tags(image: Image, sizes_m: Mapping[int, float]) -> tuple[SeenTag, ...]:
-    """Finds the tags of these sizes (m) by id in a picture; other tags, and what only resembles a tag, are ignored."""
+    """Finds the tags whose ids and sizes (m) are in `sizes_m`; ignores other tags and what only resembles a tag."""
     found = (_located(image, tag, corners, sizes_m[tag]) for tag, corners in _quads(image.grey) if tag in sizes_m)
     return tuple(each for each in found if each is not None)
 
@@ -83,7 +83,7 @@ def _detected(picture: Picture, options: Mapping[str, Any]) -> Iterator[tuple[in
 
 
 def _quads(grey: Picture) -> Iterator[tuple[int, FloatArray]]:
-    """Yields the tags of a picture with their corners, from the upper left one on clockwise."""
+    """Yields the tags in a picture with their corners, clockwise from the upper left one."""
     scale = max(1, round(_SEARCHED_PX / grey.shape[1]))
     for tag, corners in _detected(_enlarged(grey, scale), {**_WINDOWS, **_SMALL}):
         quad = _refined(grey, tag, (corners + 0.5) / scale - 0.5)
@@ -92,7 +92,7 @@ def _quads(grey: Picture) -> Iterator[tuple[int, FloatArray]]:
 
 
 def _refined(grey: Picture, tag: int, corners: FloatArray) -> FloatArray | None:
-    """Corners by the straight lines through the edges in an enlarged crop; None where the tag is not found again."""
+    """Intersects lines fitted to the edges in an enlarged crop; None when the tag is not found again."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     side = float((high - low).max())
     u0, v0 = np.maximum(np.floor(low - 0.5 * side - 2.0).astype(int), 0)
@@ -109,7 +109,7 @@ def _enlarged(grey: Picture, scale: int) -> Picture:
 
 
 def _located(image: Image, tag: int, corners: FloatArray, size_m: float) -> SeenTag | None:
-    """Pose of a tag by the better of both solutions; None for corners that no pose explains."""
+    """Pose of a tag: the better of both solutions; None when no pose explains the corners."""
     square = 0.5 * size_m * np.array([[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, -1.0, 0.0]])
     lens = image.intrinsics
     K = np.array([[lens.fx, 0.0, lens.cx], [0.0, lens.fy, lens.cy], [0.0, 0.0, 1.0]])
@@ -134,7 +134,7 @@ def _located(image: Image, tag: int, corners: FloatArray, size_m: float) -> Seen
 def _fitted(
     start: FloatArray, square: FloatArray, corners: FloatArray, K: FloatArray, points_C: FloatArray
 ) -> tuple[FloatArray, float, float]:
-    """Fits a pose (rotation vector, position) to corners and depth: the pose, half the chi square, the error (px)."""
+    """Fits a pose (rotation vector, position) to corners and depth; returns it, half the chi square, the error (px)."""
     from scipy.optimize import least_squares
 
     depth_sigma_m = _DEPTH_SIGMA_M + _DEPTH_SIGMA_PER_M * points_C[:, 2] ** 2
@@ -154,7 +154,7 @@ def _fitted(
 
 
 def _points_inside(image: Image, corners: FloatArray, size_m: float) -> FloatArray:
-    """Points (N, 3) that the depth image shows inside a tag, in the camera frame; none where it shows too few."""
+    """Points (N, 3) inside a tag from the depth image, in the camera frame; none when there are too few."""
     depth, lens, fine = image.depth_m, image.depth_intrinsics, image.intrinsics
     if depth.size == 0:
         return np.empty((0, 3))
@@ -179,9 +179,9 @@ MOST_AMBIGUITY: Final = 0.3
 def look_for_tags(
     skill: RoutineSkill[Any], source: str, sizes_m: Mapping[int, float], message: str
 ) -> Routine[list[SeenTag]]:
-    """Takes a picture with a camera; returns the tags of these sizes (m) by id in it whose poses are sure.
+    """Takes a picture; returns the tags in it with ids and sizes (m) in `sizes_m` whose poses are unambiguous.
 
-    Raises SkillFailure when the camera gives no picture.
+    Raises SkillFailure when the camera returns no picture.
     """
     robot = skill.context.robot
     image = yield from skill.sense(lambda: robot.image(source), latency_s=0.0, name="picture", message=message)
@@ -198,15 +198,15 @@ _BELOW_M: Final = 0.004
 
 
 def with_tags(detector: Detector, tags: Iterable[Tag]) -> Detector:
-    """Returns a detector that knows the objects with these tags, too; the same one where no object has a tag."""
+    """Returns a detector that also recognises the objects with these tags; the same one when no object has a tag."""
     carried = {tag.id: tag for tag in tags if tag.on is not None and tag.p_W is None}
     return TagDetector(detector, tuple(carried.values())) if carried else detector
 
 
 class TagDetector(DetectorWrapper):
-    """Detector that adds the objects with known tags to the detections of another.
+    """Detector that adds the objects with known tags to the detections of the wrapped detector.
 
-    A picture without depth locates no tag.
+    In a picture without depth no tag is located.
     """
 
     def __init__(self, detector: Detector, tags: Sequence[Tag]) -> None:
@@ -216,11 +216,11 @@ class TagDetector(DetectorWrapper):
 
     @property
     def class_names(self) -> tuple[str, ...]:
-        """Classes of the other detector, and those of the tags."""
+        """Classes of the wrapped detector, and those with tags."""
         return tuple(dict.fromkeys((*self._detector.class_names, *self._classes.values())))
 
     def detect_with_depth(self, image: Image, found: Detections) -> Detections:
-        """Adds the objects with tags; a tag replaces what the other detector takes its object for."""
+        """Adds the objects with tags; a tag replaces the wrapped detector's detections of the same object."""
         others, tagged = super().detect_with_depth(image, found), list[Detection]()
         for seen in find_tags(image, self._sizes_m):
             name = self._classes[seen.id]
@@ -229,12 +229,12 @@ class TagDetector(DetectorWrapper):
 
 
 def _unless_same(found: Iterable[Detection], known: Sequence[Detection]) -> list[Detection]:
-    """Detections that are not about the same object as one of those known."""
+    """Detections of other objects than the known ones."""
     return [one for one in found if all(box_overlap(one.box, other.box) < _LEAST_OVERLAP for other in known)]
 
 
 def box_of_carrier(image: Image, tag: SeenTag, class_name: str) -> Box:
-    """Box of the object that carries a tag: the points that hang together with it above the surface below.
+    """Box of the object that carries a tag: the points connected with the tag above the surface below.
 
     Without depth it is the box of the tag.
     """
@@ -251,7 +251,7 @@ def box_of_carrier(image: Image, tag: SeenTag, class_name: str) -> Box:
 
 
 def _boxes(window: Window, tag: SeenTag, own: Box, reach_m: float) -> Iterator[Box]:
-    """Yields the box of the points around a tag, above each level plane below it, or above none."""
+    """Yields the box of the points connected with a tag, above each level plane below the tag, or without a plane."""
     near = window.valid & (np.linalg.norm(window.p_O - tag.X_OT.translation(), axis=-1) < reach_m)
     lowest_m = float(tag.X_OT.translation()[2])
     u0, v0, u1, v1 = own

@@ -1,4 +1,4 @@
-"""Shapes fitted to points: level planes, circles, rectangles, and boxes about objects."""
+"""Shapes fitted to points: level planes, circles, rectangles, and bounding boxes of objects."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _CIRCLE_STEPS = 30
 
 @dataclass(frozen=True)
 class LevelPlane:
-    """A nearly level plane z = height_m + slope . ((x, y) - origin); noise_m is the spread of its points.
+    """A nearly level plane z = height_m + slope . ((x, y) - origin); noise_m is the standard deviation of its points.
 
     The z axis of its frame points up.
     """
@@ -34,7 +34,8 @@ class LevelPlane:
     ) -> LevelPlane:
         """Fits a plane near a height to points (N, 3) by trimmed least squares.
 
-        Starts with a noise; each of the steps uses the points within `sigmas` of the noise, at least within band_m.
+        Starts with `noise_m`; each of the `steps` uses the points within `sigmas` times the noise, but at least within
+        band_m.
         """
         x, y = points[:, :2].mean(axis=0)
         plane = cls((float(x), float(y)), height_m, (0.0, 0.0), noise_m)
@@ -47,7 +48,7 @@ class LevelPlane:
         return np.asarray(self.height_m + (xy - np.array(self.origin)) @ np.array(self.slope))
 
     def _refined(self, points: FloatArray, band_m: float) -> LevelPlane | None:
-        """The plane of the points (N, 3) within band_m; None for too few. Drops slopes beyond 2 degrees as clutter."""
+        """The plane through the points (N, 3) within band_m; None for too few points, or a slope beyond 2 degrees."""
         near = points[np.abs(points[:, 2] - self.z(points[:, :2])) < band_m]
         if len(near) < _PLANE_FEWEST_POINTS:
             return None
@@ -62,9 +63,9 @@ class LevelPlane:
 
 @dataclass(frozen=True)
 class SeenShape:
-    """Upright box about an object: centre (x, y) in W, length >= width, height above its surface (m), yaw of length.
+    """Upright bounding box: centre (x, y) in W, length >= width, height above its surface (m), yaw of the length.
 
-    `round` says that its outline from above fits a circle.
+    `round` is True when its outline from above fits a circle.
     """
 
     centre: tuple[float, float]
@@ -76,7 +77,7 @@ class SeenShape:
 
 
 def measure(points_W: FloatArray, plane_m: FloatArray, p_WC: FloatArray) -> SeenShape:
-    """Fits a shape to the points (N, 3) of an object seen from p_WC; plane_m (N,) is the surface height below each."""
+    """Fits a shape to an object's points (N, 3) seen from p_WC; plane_m (N,) is the surface's height below each."""
     above = points_W[:, 2] - plane_m
     height = float(np.percentile(above, 98))
     if height > 0.06:
@@ -113,7 +114,7 @@ def fit_circle(xy: FloatArray, p_WC: FloatArray, largest_m: float = 0.09) -> tup
 
 
 def _fit_centre(xy: FloatArray, radius: float, guess: FloatArray, scale_m: float = 0.004) -> FloatArray:
-    """Fits the centre of a circle of a radius to points (N, 2) with the soft L1 loss.
+    """Fits the centre of a circle with a given radius to points (N, 2) with the soft L1 loss.
 
     Gauss-Newton with iteratively reweighted least squares (Holland and Welsch, 1977); importing SciPy's solver would
     take longer than all fits of a mission.
@@ -132,7 +133,7 @@ def _fit_centre(xy: FloatArray, radius: float, guess: FloatArray, scale_m: float
 
 
 def fit_rectangle(xy: FloatArray) -> tuple[FloatArray, float, float, float]:
-    """Fits the smallest rectangle about points (N, 2): middle, length, width, yaw of the length in [-pi/2, pi/2)."""
+    """Fits the smallest rectangle around points (N, 2): centre, length, width, yaw of the length in [-pi/2, pi/2)."""
     middle = xy.mean(axis=0)
     (x, y), (first, second), angle_deg = cv2.minAreaRect((xy - middle).astype(np.float32))
     yaw = math.radians(angle_deg) + (0.0 if first >= second else 0.5 * math.pi)
@@ -141,7 +142,7 @@ def fit_rectangle(xy: FloatArray) -> tuple[FloatArray, float, float, float]:
 
 
 def without_strays(xy: FloatArray, cell_m: float = 0.006) -> FloatArray:
-    """Points whose grid cell holds at least two, or all points when fewer than eight remain."""
+    """Points in grid cells that hold at least two, or all points when fewer than eight remain."""
     columns, rows = np.floor((xy - xy.min(axis=0)) / cell_m).astype(np.int64).T
     cells = rows * (columns.max() + 1) + columns
     dense = xy[np.bincount(cells)[cells] >= 2]

@@ -1,12 +1,12 @@
-"""Recognition of own objects: segments of a depth picture are compared with models in size, shape and colours.
+"""Recognition of imported objects: segments of a depth picture are matched against models in size, shape and colours.
 
-An object rests on a surface, so its pose is one of its resting rotations, a turn about the vertical and a place. For
-some turns the segment's points are compared with the model's surface; the best are refined by iterated closest points
-(point to plane). A pose counts when the points of the segment lie on the model, the picture shows no farther surface
-through the model, and the colours agree. A model of photographs has no surface but its bounding box: the object must
-have its size, and outline, colours and gradients as in one of the photographs. A histogram of the directions of
-gradients in each part of a view tells its edges and its shading (Dalal and Triggs, "Histograms of Oriented Gradients
-for Human Detection", 2005).
+An object rests on a surface, so its pose is one of its resting rotations, a turn about the vertical and a position. The
+segment's points are compared with the model's surface at a set of turns; the best are refined by ICP (point to plane).
+A pose is accepted when the segment's points lie on the model, the picture shows no farther surface through the model,
+and the colours agree. A model made from photographs has no surface but its bounding box: the object must have its size,
+and outline, colours and gradients as in one of the photographs. A histogram of gradient directions in each cell of a
+view describes its edges and its shading (Dalal and Triggs, "Histograms of Oriented Gradients for Human Detection",
+2005).
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ _CELL_PX: Final = 8.0
 _LEAST: Final = 0.35
 """Least quality of a fit that identifies an object."""
 _ALIKE: Final = 0.75
-"""Quality of another fit, as a part of the best one's, from which on the object may be either."""
+"""Quality of another fit, as a fraction of the best one's, from which on the object may be either."""
 _MOST_HIDDEN: Final = 0.5
 """Largest share of a model's front that may be hidden."""
 _OPAQUE: Final = 127
@@ -86,7 +86,7 @@ _OUTLINE: Final = 0.8
 
 
 def seen_view(cluster: Cluster, image: Image, X_WC: RigidTransform) -> NDArray[np.uint8]:
-    """View (24, 24, 4) of a segment, down to the surface, in a picture that is not turned about the camera's axis."""
+    """View (24, 24, 4) of a segment, down to the surface, in a picture that is upright."""
     low_W = cluster.points.p_W[cluster.points.p_W[:, 2] < cluster.base_m + _LOW_M]
     u, v = project((X_WC.inverse() @ (low_W * [1, 1, 0] + [0, 0, cluster.base_m]).T).T, image.intrinsics)
     pixels = np.concatenate([cluster.points.pixels, nearest_pixels(u, v, image.intrinsics)])
@@ -97,7 +97,7 @@ def seen_view(cluster: Cluster, image: Image, X_WC: RigidTransform) -> NDArray[n
 
 
 def likeness(seen: NDArray[np.uint8], views: NDArray[np.uint8]) -> float:
-    """Likeness (0 to 1) of a view (24, 24, 4) to the nearest of others (V, 24, 24, 4)."""
+    """Similarity (0 to 1) between a view (24, 24, 4) and the most similar of others (V, 24, 24, 4)."""
     own, other = seen[..., 3] > _OPAQUE, views[..., 3] > _OPAQUE
     both = own & other
     outline = both.sum(axis=(1, 2)) / np.maximum((own | other).sum(axis=(1, 2)), 1)
@@ -112,13 +112,13 @@ def likeness(seen: NDArray[np.uint8], views: NDArray[np.uint8]) -> float:
 
 
 def lab_of(colours: NDArray[Any]) -> FloatArray:
-    """Lab colours (..., 3) of RGB ones."""
+    """Converts RGB colours to Lab (..., 3)."""
     scaled = (colours.reshape(-1, 1, 3) / np.float32(255.0)).astype(np.float32)
     return cv2.cvtColor(scaled, cv2.COLOR_RGB2LAB).reshape(colours.shape).astype(np.float64)
 
 
 def _smoothed(views: NDArray[np.uint8]) -> FloatArray:
-    """Colours (V, 24, 24, 3) of views without their details."""
+    """Low-pass filtered colours (V, 24, 24, 3) of views."""
     opacity = views[..., 3:] / 255.0
     premultiplied = np.concatenate([views[..., :3] * opacity, opacity], axis=-1)
     smooth = np.array([cv2.GaussianBlur(each, (0, 0), _SMOOTH_PX) for each in premultiplied])
@@ -126,7 +126,7 @@ def _smoothed(views: NDArray[np.uint8]) -> FloatArray:
 
 
 def _gradients(views: NDArray[np.uint8]) -> FloatArray:
-    """Unit vectors (V, N): the square root of the strength of each direction of gradients in each part of a view."""
+    """Unit vectors (V, N): histograms of gradient directions in each cell of a view, as square roots."""
     opacity = views[..., 3] / 255.0
     light = lab_of(views[..., :3])[..., 0] * opacity
     mean = light.sum(axis=(1, 2)) / np.maximum(opacity.sum(axis=(1, 2)), 1.0)
@@ -148,18 +148,18 @@ class Sight:
     X_WC: RigidTransform
 
     def sigma_m(self, z: FloatArray) -> FloatArray:
-        """Error of depths (m)."""
+        """Standard deviation of depths (m)."""
         return 0.002 + 0.0015 * z**2
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Pose X_WM of a model that a segment may show, and its agreement with the picture.
+    """Hypothesis: pose X_WM of a model that may explain a segment, and its agreement with the picture.
 
-    `on_model` is the share of the segment's points on the model, `off` their mean distance from it in sigmas of the
-    depth; `shown` is the share of the model's front that the segment shows, of what is not hidden by or part of
-    something else, `hidden` the share that is; `colour` is the mean difference in Lab. A model of photographs has only
-    `likeness`, that to the most similar of them.
+    `on_model`: fraction of the segment's points on the model; `off`: their mean distance from it in sigmas of the
+    depth. `shown`: fraction of the model's visible front that the segment covers; `hidden`: fraction of the front that
+    is occluded or part of another object. `colour`: mean difference in Lab. `likeness`: similarity to the nearest
+    photograph, the only measure of a model made from photographs.
     """
 
     model: ObjectModel
@@ -173,7 +173,7 @@ class Fit:
 
 
 def fits(cluster: Cluster, sight: Sight, models: Iterable[ObjectModel]) -> list[Fit]:
-    """Fits of a segment to the models that have its size."""
+    """Fits of those models whose size a segment has."""
     return [fit for model in models if (fit := _best(cluster, sight, model)) is not None]
 
 
@@ -189,7 +189,7 @@ def _best(cluster: Cluster, sight: Sight, model: ObjectModel) -> Fit | None:
 
 
 def _first_poses(cluster: Cluster, p_W: FloatArray, sight: Sight, model: ObjectModel) -> list[RigidTransform]:
-    """Poses of the model whose surface lies nearest to a segment's points, one for each of some directions."""
+    """Poses of the model whose surface lies nearest to a segment's points, one for each of several directions."""
     along, across = _view(cluster, sight)
     height_m = float(np.percentile(p_W[:, 2] - cluster.plane.z(p_W[:, :2]), 99.5))
     left, right = np.percentile(p_W @ across, [1, 99])
@@ -219,7 +219,7 @@ def _first_poses(cluster: Cluster, p_W: FloatArray, sight: Sight, model: ObjectM
 
 
 def _apart(tried: list[tuple[float, RigidTransform]]) -> list[RigidTransform]:
-    """The first poses that are not nearly the same."""
+    """The best poses that differ clearly from each other."""
     chosen = list[RigidTransform]()
     for _, X in tried:
         if all((X.rotation().inverse() @ other.rotation()).ToAngleAxis().angle() > 0.5 for other in chosen):
@@ -230,14 +230,14 @@ def _apart(tried: list[tuple[float, RigidTransform]]) -> list[RigidTransform]:
 
 
 def _view(cluster: Cluster, sight: Sight) -> tuple[FloatArray, FloatArray]:
-    """Level unit vectors (3,) along and across the view of a segment."""
+    """Horizontal unit vectors (3,) along and across the line of sight to a segment."""
     off = np.array(cluster.shape.centre) - sight.X_WC.translation()[:2]
     x, y = off / max(float(np.linalg.norm(off)), 1e-6)
     return np.array([x, y, 0.0]), np.array([-y, x, 0.0])
 
 
 def _refined(p_W: FloatArray, model: ObjectModel, X_WM: RigidTransform) -> RigidTransform:
-    """Pose after some steps of iterated closest points, point to plane, about the vertical."""
+    """Pose after several steps of ICP, point to plane, about the vertical."""
     R_WM, p_WM = X_WM.rotation().matrix(), np.array(X_WM.translation())
     base_m = p_WM[2]
     for _ in range(_STEPS):
@@ -286,7 +286,7 @@ def _judged(cluster: Cluster, sight: Sight, model: ObjectModel, X_WM: RigidTrans
 
 
 def _shown(p_W: FloatArray, sight: Sight, model: ObjectModel, X_WM: RigidTransform) -> tuple[int, int, int]:
-    """Numbers of points on the model's front: in the segment p_W (N, 3), looked through, and part of something else."""
+    """Counts of points on the model's front: in the segment p_W (N, 3), looked through, and part of another object."""
     from scipy.spatial import cKDTree
 
     X_CM = sight.X_WC.inverse() @ X_WM
@@ -318,7 +318,7 @@ def _shown(p_W: FloatArray, sight: Sight, model: ObjectModel, X_WM: RigidTransfo
 
 
 def _front(u: FloatArray, v: FloatArray, z: FloatArray) -> NDArray[np.bool_]:
-    """Returns which points no other point of the model hides, on a coarse grid of pixels."""
+    """Mask of the points that no other point of the model occludes, on a coarse grid of pixels."""
     cells = np.floor(np.column_stack([u, v]) / _CELL_PX).astype(np.int64)
     _, index = np.unique(cells, axis=0, return_inverse=True)
     nearest = np.full(int(index.max()) + 1, np.inf)
@@ -327,7 +327,7 @@ def _front(u: FloatArray, v: FloatArray, z: FloatArray) -> NDArray[np.bool_]:
 
 
 def _colour_difference(seen: NDArray[np.uint8], of_model: NDArray[np.uint8]) -> float:
-    """Mean difference of colours (N, 3) in Lab, after the lightness of all is made equal within limits."""
+    """Mean difference between colours (N, 3) in Lab, after their lightness is equalised within limits."""
     if len(seen) == 0:
         return 100.0
     a, b = (lab_of(colours) for colours in (seen, of_model))
@@ -337,7 +337,7 @@ def _colour_difference(seen: NDArray[np.uint8], of_model: NDArray[np.uint8]) -> 
 
 
 def quality(fit: Fit) -> float:
-    """Likeness of a fit, 0 to 1."""
+    """Similarity that a fit reaches, 0 to 1."""
     shape = max(0.0, 1.0 - 4.0 * (1.0 - fit.on_model)) * max(0.0, 1.0 - 3.0 * (1.0 - fit.shown))
     return float(fit.likeness * shape * math.exp(-((fit.colour / 30.0) ** 2)) * math.exp(-(fit.off**4)))
 
@@ -345,9 +345,9 @@ def quality(fit: Fit) -> float:
 def identified(
     clusters: Iterable[Cluster], image: Image, place: LocalisationEstimate, models: Mapping[str, ObjectModel]
 ) -> tuple[Detection3D, ...]:
-    """Detections of segments, with the name of the model that each fits; `ANY_OBJECT` for one that fits none.
+    """Detections, one for each segment, with the name of the model that fits; `ANY_OBJECT` when none fits.
 
-    A segment that fits two models almost equally well may be either (`alternatives`).
+    A segment that fits two models almost equally well has both as `alternatives`.
     """
     sight = Sight(image, camera_pose_W(image, place.X_WO))
     return tuple(_identified(each, sight, place, models) for each in clusters)
@@ -369,7 +369,7 @@ def _identified(
 
 
 def _detected(fit: Fit, segment: Detection3D) -> Detection3D:
-    """A segment with the name, the place and the extents of the model that it fits."""
+    """Detection of a segment with the name, the position and the extents of the model that fits it."""
     R_WM, p_WM = fit.X_WM.rotation(), fit.X_WM.translation()
     turned = fit.model.points @ R_WM.matrix().T
     (x, y), (length, width), angle_deg = cv2.minAreaRect(turned[:, :2].astype(np.float32))
@@ -385,13 +385,13 @@ def _detected(fit: Fit, segment: Detection3D) -> Detection3D:
 
 
 def with_models(detector: Detector, folders: Iterable[Path | str]) -> Detector:
-    """Returns a detector that has the models in these folders, too; the same one for none. Raises InputError."""
+    """Adds the models in these folders to a detector; the same detector for no folder. Raises InputError."""
     models = [read_model(Path(folder)) for folder in folders]
     return ModelDetector(detector, models) if models else detector
 
 
 class ModelDetector(DetectorWrapper):
-    """Detector that judges pictures as another one does, and has models of own objects in addition."""
+    """Detector that detects as the wrapped one does, and provides models of imported objects."""
 
     def __init__(self, detector: Detector, models: Iterable[ObjectModel]) -> None:
         super().__init__(detector)

@@ -1,7 +1,7 @@
 """Tracking of moving objects, such as people: clusters of LiDAR returns that the map does not explain, over time.
 
-A cluster moves when it has left cells and entered others. One that only shows another side, as the robot passes, does
-neither.
+A cluster moves when it has left cells and entered others. A cluster that only shows another side, as the robot passes,
+does neither.
 """
 
 import math
@@ -25,10 +25,11 @@ _SETS_OFF = 1.5
 class MovingOptions:
     """Clustering and tracking of moving objects.
 
-    Returns within `join_m` are one cluster, of at least `least_cells` cells of 5 cm and less than `most_size_m` wide. A
-    cluster of the next scan within `match_m` of the prediction continues the track. It moves when, against a scan
-    `short_s` or `long_s` ago, a share `changed` of its cells is new by more than `apart_m`, as many cells are left, and
-    its speed is between the two limits (m/s). A moving object that is hidden is predicted for `hidden_s`.
+    `join_m`: returns this near to each other form a cluster. `least_cells` and `most_size_m`: least number of cells of
+    5 cm, and largest width, of a cluster. `match_m`: distance from its prediction within which a cluster continues a
+    track. `short_s`, `long_s`, `changed` and `apart_m`: a cluster moves when, against a scan `short_s` or `long_s` ago,
+    a fraction `changed` of its cells is new by more than `apart_m` and as many cells are left, at a speed between the
+    limits (m/s). `hidden_s`: how long an occluded moving object is predicted.
     """
 
     join_m: Margin = 0.15
@@ -47,7 +48,7 @@ class MovingOptions:
 
 @dataclass(frozen=True)
 class Moving:
-    """A moving object: its middle (x, y), velocity (2,) in m/s and radius (m), in the world at `stamp_s`."""
+    """A moving object: its centre (x, y), velocity (2,) in m/s and radius (m), in the world at `stamp_s`."""
 
     place_W: tuple[float, float]
     velocity_W: tuple[float, float]
@@ -62,20 +63,20 @@ class Moving:
 
 @dataclass
 class _Track:
-    """One cluster from scan to scan: stamps, its cells (N, 2) in the world, and its last motion."""
+    """One cluster over several scans: stamps, its cells (N, 2) in the world, and its last motion."""
 
     seen: deque[tuple[float, FloatArray]] = field(default_factory=deque)
     moving: Moving | None = None
 
     def expected_W(self, stamp_s: float) -> FloatArray:
-        """Predicts its middle at a time."""
+        """Predicts the centre of the cluster at a time."""
         if self.moving is not None:
             return np.asarray(self.moving.places_W(np.zeros(1), stamp_s)[0])
         return np.asarray(self.seen[-1][1].mean(axis=0))
 
 
 class MovingWatch:
-    """Tracker of clusters; call `update` with the unexplained returns of each new scan."""
+    """Tracks clusters; call `update` with the unexplained returns in each new scan."""
 
     def __init__(self, options: MovingOptions | None = None) -> None:
         self._options = options or MovingOptions()
@@ -84,7 +85,7 @@ class MovingWatch:
         self._moving: tuple[Moving, ...] = ()
 
     def update(self, stamp_s: float, points_W: FloatArray) -> tuple[Moving, ...]:
-        """Returns the moving objects after the returns (N, 2 or more) of a scan; a known scan changes nothing."""
+        """Returns the moving objects after adding a scan's returns (N, 2 or more); a repeated scan changes nothing."""
         if stamp_s > self._stamp_s:
             self._stamp_s = stamp_s
             self._match(stamp_s, clusters(points_W[:, :2], self._options))
@@ -107,7 +108,7 @@ class MovingWatch:
         self._tracks = alive + [_Track(deque([(stamp_s, cells)])) for cells in left]
 
     def _motion_before_hidden(self, track: _Track) -> Moving | None:
-        """Motion of a track before it was hidden, wholly or in part; None when visible, or hidden long ago."""
+        """Motion of a track before it was occluded, at least in part; None when visible, or occluded for too long."""
         if track.moving is None or self._stamp_s - track.moving.stamp_s > self._options.hidden_s:
             return None
         most = max(len(cells) for _, cells in track.seen)
@@ -115,7 +116,7 @@ class MovingWatch:
         return track.moving if unseen or len(track.seen[-1][1]) < _PARTLY * most else None
 
     def _motion(self, track: _Track) -> Moving | None:
-        """Motion of a track; None when it stands still, or the last scan does not show it."""
+        """Motion of a track; None when it stands still, or is not in the last scan."""
         options, (stamp_s, cells) = self._options, track.seen[-1]
         if stamp_s < self._stamp_s:
             return None
@@ -145,13 +146,13 @@ class MovingWatch:
         return velocity if changed else None
 
     def _share_away(self, cells: FloatArray, others: FloatArray) -> float:
-        """Share of some cells that are away from all others."""
+        """Fraction of `cells` that are away from all `others`."""
         apart_m = np.linalg.norm(cells[:, None] - others[None], axis=2).min(axis=1)
         return float(np.mean(apart_m > self._options.apart_m))
 
 
 def clusters(points_W: FloatArray, options: MovingOptions, cell_m: float = 0.05) -> list[FloatArray]:
-    """Clusters points (N, 2): centres (N, 2) of the cells of each cluster that is neither too small nor too wide."""
+    """Clusters points (N, 2): cell centres (N, 2) of each cluster that is neither too small nor too wide."""
     if len(points_W) == 0:
         return []
     cells = np.unique(np.floor(points_W / cell_m).astype(np.int64), axis=0)

@@ -1,4 +1,4 @@
-"""Models of own objects, as `errand object import` writes them."""
+"""Models of imported objects, as `errand object import` writes them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ VIEW_SIDE: Final = 24
 
 
 def view_of(rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """View (24, 24, 4) of an object cut out to its bounds (H, W, 4): scaled to fit, in the middle."""
+    """View (24, 24, 4) of an object from its cut-out (H, W, 4): scaled to fit, centred."""
     import cv2
 
     scale, opacity = VIEW_SIDE / max(rgba.shape[:2]), rgba[..., 3:] / np.float32(255.0)
@@ -44,7 +44,7 @@ def _no_views(count: int = 0) -> NDArray[np.uint8]:
 class ObjectModel:
     """Points (N, 3) in m on an object's surface, their outward normals (N, 3) and colours (N, 3) RGB.
 
-    `rests` (K, 3, 3) are the rotations from the model's frame in which it rests on a level surface. An object of
+    `rests` (K, 3, 3) are the rotations from the model's frame at which it rests on a level surface. A model made from
     photographs has `views` (V, 24, 24, 4) as `view_of` makes them, and its points are those of its bounding box.
     """
 
@@ -57,7 +57,7 @@ class ObjectModel:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Search tree of the points."""
+        """k-d tree of the points."""
         from scipy.spatial import cKDTree
 
         return cKDTree(self.points)
@@ -70,7 +70,7 @@ class ObjectModel:
 
 
 def read_model(folder: Path) -> ObjectModel:
-    """Reads the model of an imported object. Raises InputError when there is none, or it is damaged."""
+    """Reads the model of an imported object. Raises InputError when the file is missing or damaged."""
     file = folder / RECOGNITION_FILE
     try:
         with np.load(file, allow_pickle=False) as data:

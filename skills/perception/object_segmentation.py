@@ -1,8 +1,8 @@
 """Segmentation of an object in its box: the points above its plane that fill the box best.
 
-Each level plane about the box is a hypothesis of the plane below the object; one more hypothesis has no plane. The
-points above the plane are clustered; the hypothesis with the cluster that fills the box best wins. Heights are along
-z of the level frame O of the picture's frame tree.
+Each level plane near the box is a hypothesis for the plane below the object; one more hypothesis has no plane. The
+points above the plane are clustered; the hypothesis whose cluster fills the box best wins. Heights are along z in the
+level frame O of the picture's frame tree.
 """
 
 import math
@@ -49,7 +49,7 @@ _SMOOTHED = 5
 
 @dataclass(frozen=True)
 class Window:
-    """Depth about a box, rows by columns: points p_O (H, W, 3), pixels (u, v) of the colour picture, depth z (m).
+    """Depth around a box, rows by columns: points p_O (H, W, 3), pixels (u, v) of the colour picture, depth z (m).
 
     `valid` marks pixels with depth, `inside` those in the box; `pixel_m` is the width of a pixel at 1 m.
     """
@@ -67,7 +67,7 @@ class Window:
     lens: Intrinsics
 
     def rays_O(self) -> list[FloatArray]:
-        """Rays through the middles of the left, right, top and bottom side of the box, and through its middle."""
+        """Rays through the midpoints of the box's left, right, top and bottom side, and through its centre."""
         u0, v0, u1, v1 = self.box
         um, vm = 0.5 * (u0 + u1), 0.5 * (v0 + v1)
         pixels = ((u0, vm), (u1, vm), (um, v0), (um, v1), (um, vm))
@@ -77,7 +77,7 @@ class Window:
         ]
 
     def border_px(self, p_O: FloatArray) -> float:
-        """Distance of a point from the nearest edge of the picture, in pixels; negative outside of it."""
+        """Distance from a point to the nearest edge of the picture, in pixels; negative outside the picture."""
         p_C = self.R_OC.T @ (p_O - self.p_OC)
         if p_C[2] < MIN_DEPTH_M:
             return -math.inf
@@ -89,8 +89,8 @@ class Window:
 class ObjectSegment:
     """Segment of an object: its mask in the window, the plane below (None: unseen), and its fit to the box (0 to 1).
 
-    An empty mask means that nothing rises above the plane: the object is flat. `covered` is the share of the box that
-    the segment covers.
+    An empty mask means that nothing rises above the plane: the object is flat. `covered` is the fraction of the box
+    that the segment covers.
     """
 
     window: Window
@@ -111,7 +111,7 @@ class ObjectSegment:
 
 
 def window_about(image: Image, box: Box, taken: Mask | None = None) -> Window | None:
-    """Cuts out the depth about a box of the colour picture; None without any depth.
+    """Crops the depth around a box of the colour picture; None when there is no depth.
 
     `taken` (H, W) marks the pixels of the colour picture that belong to other objects.
     """
@@ -152,7 +152,7 @@ def window_about(image: Image, box: Box, taken: Mask | None = None) -> Window | 
 def _pixel_range(
     low: float, high: float, c: float, f: float, depth_c: float, depth_f: float, size: int
 ) -> NDArray[np.int64]:
-    """Rows or columns of the depth picture between two of the colour picture, at most `_MOST_PIXELS`."""
+    """Rows or columns of the depth picture that correspond to a range in the colour picture, at most `_MOST_PIXELS`."""
     first = max(0, math.ceil((low - c) / f * depth_f + depth_c))
     last = min(size - 1, math.floor((high - c) / f * depth_f + depth_c))
     step = max(1, math.ceil((last - first + 1) / _MOST_PIXELS))
@@ -167,7 +167,7 @@ def segment_object(window: Window, form: ClassForm) -> ObjectSegment:
 
 
 def level_planes(window: Window) -> list[LevelPlane]:
-    """Fits level planes about the box, those with the most points first; slopes beyond 2 degrees are clutter."""
+    """Fits level planes near the box, those with the most points first; slopes beyond 2 degrees are clutter."""
     around = window.p_O[window.valid & ~window.inside]
     if len(around) < _FEWEST_ON_PLANE:
         around = window.p_O[window.valid]
@@ -197,7 +197,7 @@ def _peaks(counts: FloatArray, edges: FloatArray, least: float) -> Iterator[floa
 
 
 def _hypotheses(window: Window, plane: LevelPlane | None, form: ClassForm) -> Iterator[ObjectSegment]:
-    """Yields the segment of each clustering, if the object rests on a plane, or on none that is seen."""
+    """Yields the segment from each clustering, under the hypothesis of one plane, or of none."""
     standing = window.valid & ~in_plane(window, plane)
     clusterings = [_groups_from_above(window, standing), groups_in_picture(window, standing)]
     if form.form != "long":
@@ -208,7 +208,7 @@ def _hypotheses(window: Window, plane: LevelPlane | None, form: ClassForm) -> It
 
 
 def _contact(window: Window, mask: Mask, plane: LevelPlane | None) -> float:
-    """1 for a segment that begins right above its plane; less for one that floats, or has no plane."""
+    """1 for a segment that begins right above its plane; less for a segment that floats or has no plane."""
     if plane is None or not np.any(mask):
         return _WITHOUT_PLANE
     points = window.p_O[mask]
@@ -217,7 +217,7 @@ def _contact(window: Window, mask: Mask, plane: LevelPlane | None) -> float:
 
 
 def _best_groups(window: Window, labels: NDArray[np.int32], count: int, form: ClassForm) -> tuple[Mask, float]:
-    """The cluster that fits best, joined with others inside the box that improve the fit.
+    """The cluster that fits best, joined with other clusters inside the box that improve the fit.
 
     Tries both the best of all clusters, which may reach beyond the box as a wall does, and the best inside the box.
     """
@@ -234,7 +234,7 @@ def _best_groups(window: Window, labels: NDArray[np.int32], count: int, form: Cl
 def _with_others(
     window: Window, labels: NDArray[np.int32], first: int, others: list[int], fit: float, form: ClassForm
 ) -> tuple[Mask, float]:
-    """A cluster joined, one after the other, with those of some others that improve its fit."""
+    """A cluster joined, one after the other, with those of `others` that improve its fit."""
     mask = labels == first
     for k in others:
         both = _fit(window, mask | (labels == k), form) if k != first else 0.0
@@ -244,7 +244,7 @@ def _with_others(
 
 
 def _share_inside(window: Window, mask: Mask) -> float:
-    """Share of a cluster that lies in the box."""
+    """Fraction of a cluster that lies in the box."""
     return int((mask & window.inside).sum()) / max(int(mask.sum()), 1)
 
 
@@ -257,7 +257,7 @@ def _largest_inside(window: Window, labels: NDArray[np.int32], count: int) -> li
 
 
 def in_plane(window: Window, plane: LevelPlane | None) -> Mask:
-    """Points in the plane or below it, after smoothing of the depth noise."""
+    """Mask of the points in the plane or below it, after smoothing of the depth noise."""
     if plane is None:
         return np.zeros_like(window.valid)
     above = np.where(window.valid, window.p_O[..., 2] - plane.z(window.p_O[..., :2]), 0.0)
@@ -295,14 +295,14 @@ def groups_in_picture(window: Window, standing: Mask, *, parted: bool = False) -
 
 
 def _fit(window: Window, mask: Mask, form: ClassForm) -> float:
-    """Fit of a cluster to the box of the detection and the size of its class, 0 to 1."""
+    """Fit of a cluster to the detection's box and to the size of its class, 0 to 1."""
     inside = mask & window.inside
     share = _share_inside(window, mask)
     return float(_covered(window, inside) * share**_SHARE_POWER * _sized(window.p_O[inside], form) ** 2)
 
 
 def _covered(window: Window, inside: Mask) -> float:
-    """Share of the box that the box about some pixels fills."""
+    """Fraction of the box that the bounding box of the pixels `inside` fills."""
     if not np.any(inside):
         return 0.0
     (left, right), (top, bottom) = np.percentile(window.u[inside], [1, 99]), np.percentile(window.v[inside], [1, 99])
@@ -311,7 +311,7 @@ def _covered(window: Window, inside: Mask) -> float:
 
 
 def _sized(points: FloatArray, form: ClassForm) -> float:
-    """1 for points no larger than an object of the form, less the more they spread beyond it."""
+    """1 for points no larger than an object of the form; the more they extend beyond it, the less."""
     middled = points - np.median(points, axis=0)
     _, axes = np.linalg.eigh(middled.T @ middled)
     low, high = np.percentile(middled @ axes, [3, 97], axis=0)

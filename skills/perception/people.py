@@ -1,8 +1,8 @@
 """Detection of people in LiDAR scans and in pictures of the body cameras, with positions in the world.
 
-In a scan, a person is an upright cluster as wide as shoulders; for a LiDAR of one ring, a pair of legs, or one leg.
-Where a survey of the place explains walls and furniture, only the other returns count. Elsewhere a person must stand
-alone.
+In a scan, a person is an upright cluster as wide as shoulders; for a single-ring LiDAR, a pair of legs or one leg.
+Where a survey of the site explains walls and furniture, only the other returns count. Elsewhere only a person who
+stands alone is detected.
 """
 
 import math
@@ -49,12 +49,12 @@ ARM_AHEAD_M = 0.19
 
 @dataclass(frozen=True)
 class SeenPerson:
-    """A person: the upright axis (x, y) in the world (m), its covariance (2, 2), and the time of the last view.
+    """A person: the vertical axis (x, y) in the world (m), its covariance (2, 2), and the time of the last detection.
 
-    `here_W` is the robot's pose at that time, `looks` the number of pictures that showed the person, the last one at
-    `picture_s`, and `missed` the number of pictures since then that should have. A tracker gives each person a `track`
-    number above 0, a velocity (m/s), the number of `scans` that showed the person, and how far the person has `moved_m`
-    since the first of them.
+    `here_W` is the robot's pose at that time. `looks` counts the pictures that showed the person, the last one at
+    `picture_s`; `missed` counts later pictures that should have. A tracker sets `track`, a number above 0, the velocity
+    (m/s), the number of `scans` that showed the person, and how far the person has `moved_m` since the first of these
+    scans.
     """
 
     place_W: tuple[float, float]
@@ -72,7 +72,7 @@ class SeenPerson:
 
     @property
     def distance_m(self) -> float:
-        """Distance of the person from the robot at the last view, in metres."""
+        """Distance between the person and the robot at the last detection, in metres."""
         return math.dist(self.place_W, (self.here_W.x_m, self.here_W.y_m))
 
 
@@ -85,7 +85,7 @@ def people_in_scan(
     *,
     ahead_m: float = ARM_AHEAD_M,
 ) -> list[SeenPerson]:
-    """Detects people in a LiDAR scan, nearest first; ignores points in and right around the robot's footprint."""
+    """Detects people in a LiDAR scan, nearest first; ignores points inside and just outside the robot's footprint."""
     corners = np.array(footprint_m)
     own_m = np.array([corners.min(axis=0) - (_OWN_M[0], _OWN_M[1]), corners.max(axis=0) + (ahead_m, _OWN_M[1])])
     if survey is not None and len(scan.elevations_rad) > 1:
@@ -99,7 +99,7 @@ def people_in_scan(
 def _unexplained_clusters(
     scan: Scan, X_WB: RigidTransform, own_m: FloatArray, furthest_m: float, survey: SurveyView
 ) -> list[FloatArray]:
-    """Clusters of returns, in the levelled body frame, that the survey does not explain."""
+    """Clusters of returns that the survey does not explain, in the levelled body frame."""
     points = scan_points(scan, azimuths=_COLUMNS, heights_m=_BODY_HEIGHTS_M, max_range_m=furthest_m + 0.5)[:, :3]
     points = points[~_is_own(points, own_m)]
     here = Pose2D.from_transform(X_WB)
@@ -107,7 +107,7 @@ def _unexplained_clusters(
 
 
 def _lone_people(scan: Scan, X_WB: RigidTransform, own_m: FloatArray, furthest_m: float) -> list[SeenPerson]:
-    """Detects the people who stand alone in a scan of a place without a survey."""
+    """Detects people who stand alone in a scan, at a site without a survey."""
     points_B = scan.points_B()
     level = points_B @ scan.X_OB.rotation().matrix().T
     height = level[:, 2] + scan.X_OB.translation()[2]
@@ -125,7 +125,7 @@ def _lone_people(scan: Scan, X_WB: RigidTransform, own_m: FloatArray, furthest_m
 
 
 def _is_own(points_B: FloatArray, own_m: FloatArray) -> NDArray[np.bool_]:
-    """Mask of the points in the robot's own rectangle, given by its least and greatest x and y (2, 2)."""
+    """Mask of the points in the robot's own rectangle, given by its lowest and highest x and y (2, 2)."""
     (x, y), (low, high) = points_B[:, :2].T, own_m
     return np.asarray((x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]))
 
@@ -146,7 +146,7 @@ def _is_person_sized(points_B: FloatArray) -> bool:
 
 
 def _is_body_sized(points: FloatArray) -> bool:
-    """Returns whether unexplained returns are as wide and tall as a person, of whom a part may be hidden."""
+    """Returns whether unexplained returns are as wide and tall as a person, who may be partly occluded."""
     width, tall = float(np.hypot(*np.ptp(points[:, :2], axis=0))), float(np.ptp(points[:, 2]))
     sized = _BODY_WIDTH_M[0] < width < _BODY_WIDTH_M[1] and tall > _BODY_TALL_M
     return len(points) >= _BODY_FEWEST_POINTS and sized and float(points[:, 2].max()) > _BODY_TOP_M
@@ -165,7 +165,7 @@ def _is_alone(points_B: FloatArray, others: list[FloatArray]) -> bool:
 
 
 def _person(stamp_s: float, X_WB: RigidTransform, points_B: FloatArray) -> SeenPerson:
-    """Person whose front is a cluster: the axis is a little behind its middle."""
+    """Person whose front is a cluster: the axis is a little behind its centre."""
     centre = points_B[:, :2].mean(axis=0)
     behind = centre + _FRONT_TO_AXIS_M * centre / max(float(np.linalg.norm(centre)), 1e-6)
     x, y, _ = (float(value) for value in X_WB @ np.array([*behind, 0.0]))
@@ -173,7 +173,7 @@ def _person(stamp_s: float, X_WB: RigidTransform, points_B: FloatArray) -> SeenP
 
 
 def people_detections(detector: Detector, images: Sequence[Image], least_score: float) -> list[tuple[Image, Detection]]:
-    """Detects people in pictures; pairs each with its picture."""
+    """Detects people in pictures; pairs each detection with its picture."""
     found = detect_class_in_grey(detector, images, PERSON)
     pairs = ((image, one) for image, ones in zip(images, found, strict=True) for one in ones)
     return [(image, one) for image, one in pairs if one.class_name == PERSON and one.score >= least_score]
@@ -182,13 +182,13 @@ def people_detections(detector: Detector, images: Sequence[Image], least_score: 
 def located_people(
     detected: Sequence[tuple[Image, Detection]], X_WO: RigidTransform, here_W: Pose2D, reach_m: float
 ) -> list[SeenPerson]:
-    """Locates detected people, except those beyond reach_m from the camera, or without depth."""
+    """Locates detected people; omits those beyond reach_m from the camera, or without depth."""
     seen = (_located(image, one, X_WO, here_W, reach_m) for image, one in detected)
     return [one for one in seen if one is not None]
 
 
 def _located(image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D, reach_m: float) -> SeenPerson | None:
-    """Locates a detected person; None when out of reach, or without depth."""
+    """Locates a detected person; None when beyond reach_m, or without depth."""
     position = locate(image, one)
     if position is None:
         return None
@@ -202,7 +202,7 @@ def _located(image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D,
 
 
 def cameras_towards(velocity: FloatArray, known: Sequence[CameraCapabilities]) -> tuple[CameraCapabilities, ...]:
-    """Body cameras that face the direction of a body-frame velocity; the front ones when the robot stands or turns."""
+    """Body cameras that face the direction of a body velocity; the front ones when the robot stands or turns."""
     vx, vy = float(velocity[0]), float(velocity[1])
     heading_rad = 0.0
     if abs(vy) > 2.0 * abs(vx):

@@ -1,6 +1,6 @@
-"""Tracking of people by LiDAR scans and pictures of the body cameras together, and the watch that feeds it.
+"""Tracking of people by LiDAR scans and body camera pictures together, and the watch that provides both.
 
-Each person is a Kalman filter of constant velocity; detections are assigned to the filters of least total cost.
+Each person is a Kalman filter with constant velocity; detections are assigned to filters at the lowest total cost.
 """
 
 import contextlib
@@ -43,7 +43,7 @@ _NO_MATCH = 1e6
 
 @dataclass(frozen=True)
 class _Track:
-    """One person: the last view, the state (x, y, vx, vy) then, its covariance (4, 4), and where the track began."""
+    """One person: last detection, the state (x, y, vx, vy) then, its covariance (4, 4), and where the track began."""
 
     seen: SeenPerson
     state: FloatArray
@@ -51,7 +51,7 @@ class _Track:
     begun_W: tuple[float, float]
 
     def at(self, stamp_s: float) -> tuple[FloatArray, FloatArray]:
-        """Predicts state and covariance at a time not before the last view."""
+        """Predicts state and covariance at a time not before the last detection."""
         dt_s = max(0.0, stamp_s - self.seen.stamp_s)
         move = np.eye(4)
         move[0, 2] = move[1, 3] = min(dt_s, _PREDICTED_S)
@@ -61,13 +61,13 @@ class _Track:
 
 
 def predicted_place_W(one: SeenPerson, now_s: float) -> tuple[float, float]:
-    """Position (x, y) of a person now, who keeps the last velocity for a short time at most."""
+    """Position (x, y) of a person now, with the last velocity continued for a short time at most."""
     ahead_s = min(max(0.0, now_s - one.stamp_s), _PREDICTED_S)
     return one.place_W[0] + ahead_s * one.velocity_W[0], one.place_W[1] + ahead_s * one.velocity_W[1]
 
 
 class PeopleTracker:
-    """Tracker that gives each person a number that stays; detections farther than `same_m` are other people."""
+    """Tracks people and gives each a number that stays; detections farther than `same_m` are other people."""
 
     def __init__(self, same_m: float = 0.7) -> None:
         self._same_m = same_m
@@ -80,14 +80,14 @@ class PeopleTracker:
         return tuple(track.seen for track in self._tracks)
 
     def revise(self, change: Callable[[SeenPerson], SeenPerson | None]) -> None:
-        """Replaces each person by what `change` returns; forgets the person where that is None."""
+        """Replaces each person by what `change` returns; removes the person when that is None."""
         revised = [(track, change(track.seen)) for track in self._tracks]
         self._tracks = [replace(track, seen=seen) for track, seen in revised if seen is not None]
 
     def update(self, found: Sequence[SeenPerson], *, by_scan: bool, apart_m: float, births: bool = True) -> None:
-        """Takes in the people of one scan or picture; with `births` those without a track begin one.
+        """Updates with the people in one scan or picture; with `births` those without a track begin one.
 
-        A second detection within apart_m of a person who is seen at the same time is the same person.
+        A second detection within apart_m of a person who is detected at the same time is the same person.
         """
         matched = self._assigned(found)
         for index, one in enumerate(found):
@@ -99,7 +99,7 @@ class PeopleTracker:
                 self._tracks.append(_begun(one, self._count, by_scan))
 
     def _is_known(self, one: SeenPerson, apart_m: float) -> bool:
-        """Returns whether a person seen at the same time is this one."""
+        """Returns whether a detection is a person who was detected at the same time."""
         people = (seen for seen in self.people if seen.stamp_s >= one.stamp_s)
         return any(math.dist(seen.place_W, one.place_W) <= apart_m for seen in people)
 
@@ -129,17 +129,17 @@ class PeopleTracker:
 
 
 def _sigma2(one: SeenPerson) -> FloatArray:
-    """Covariance (2, 2) of a detection, not below a least one."""
+    """Covariance (2, 2) of a detection, with a lower limit."""
     return np.asarray(one.covariance + _LEAST_SIGMA_M**2 * np.eye(2))
 
 
 def _place_then(track: _Track, one: SeenPerson) -> FloatArray:
-    """Position of a detection, moved with the person if the track has a later view already."""
+    """Position of a detection, moved with the person if the track has a later detection already."""
     return np.array(one.place_W) + max(0.0, track.seen.stamp_s - one.stamp_s) * track.state[2:]
 
 
 def _begun(one: SeenPerson, number: int, by_scan: bool) -> _Track:
-    """The track of a person seen for the first time."""
+    """New track for a person detected for the first time."""
     covariance = np.diag([0.0, 0.0, _SPEED_SIGMA_M_S**2, _SPEED_SIGMA_M_S**2])
     covariance[:2, :2] = _sigma2(one)
     picture_s = -math.inf if by_scan else one.stamp_s
@@ -148,7 +148,7 @@ def _begun(one: SeenPerson, number: int, by_scan: bool) -> _Track:
 
 
 def _corrected(track: _Track, one: SeenPerson, by_scan: bool) -> _Track:
-    """A track after a detection of the person."""
+    """Track after the correction by a detection of the person."""
     before = track.seen
     state, covariance = track.at(one.stamp_s)
     gain = np.linalg.solve(covariance[:2, :2] + _sigma2(one), covariance[:2]).T
@@ -187,13 +187,13 @@ _SAME_YAW_RAD: Final = 0.05
 class PeopleOptions:
     """Periods of the watch (s), the latency of a detection (s), and conditions for a person to count.
 
-    A camera takes a picture every `period_s` while it may show a person: a known one, or a cell of the costmap that the
-    map does not explain, within `near_m` and within `view_rad` of its axis. Every `idle_s` all cameras take one. A
-    person counts when two views within `same_m` show them with `least_score`; the second view follows after `again_s`.
-    The watch forgets a person whom `misses` pictures should show and do not. Out of view, it remembers a person for
-    `memory_s`, and for `beside_s` as long as the costmap has an obstacle within `beside_m` of the position.
+    `period_s`: time between pictures of a camera that has, within `near_m` and `view_rad` of its axis, a known person
+    or a costmap cell that the map does not explain. `idle_s`: the same for all other cameras. `same_m` and
+    `least_score`: a person counts when two views this near show them with this score. `again_s`: delay of the second
+    view. `misses`: pictures that should show a person and do not until they are forgotten. `memory_s` and `beside_s`:
+    how long a person out of view is remembered, and how long while the costmap has an obstacle within `beside_m`.
 
-    LiDAR scans update known people. With `track_m` above 0, they also begin tracks of people so far away, who are
+    LiDAR scans update known people. `track_m`: up to this distance scans also begin tracks (0: never), which are
     remembered for `hidden_s`, or for `fleeting_s` after fewer than `least_scans` scans.
     """
 
@@ -218,7 +218,7 @@ class PeopleOptions:
 
 @dataclass(frozen=True)
 class _Look:
-    """People in each of the pictures taken at one time, and these pictures.
+    """Detections of people in pictures taken at one time, and these pictures.
 
     `suspected` pictures have no depth and show a person; the next ones are taken at once, with depth.
     """
@@ -239,7 +239,7 @@ class _Look:
 
 
 class PeopleWatch:
-    """Watch for people near the robot. Does nothing without cameras, or when the detector has no class of people."""
+    """Watches for people near the robot. Does nothing without cameras, or when the detector has no class of people."""
 
     def __init__(self, context: SkillContext, options: PeopleOptions | None = None) -> None:
         self._context = context
@@ -255,11 +255,11 @@ class PeopleWatch:
         self._obstacles = costmap if isinstance(costmap, ObstacleLayerView) else None
 
     def people(self) -> tuple[SeenPerson, ...]:
-        """People who count now."""
+        """People who count now (see `PeopleOptions`)."""
         return tuple(one for one in self._seen if one.looks > 1 and self._remembered(one))
 
     def tracks(self) -> tuple[SeenPerson, ...]:
-        """All whom scans or pictures showed often enough, or shortly ago; see `PeopleOptions.track_m`."""
+        """All people detected often enough, or recently, in scans or pictures; see `PeopleOptions.track_m`."""
         return tuple(one for one in self._seen if one.looks > 1 or one.scans >= self._options.least_scans)
 
     @property
@@ -288,7 +288,7 @@ class PeopleWatch:
             )
 
     def _take_scan(self) -> None:
-        """Takes in the newest scan, if it is new and there is anybody to find in it."""
+        """Updates with the newest scan, when it is new and people may be found in it."""
         options, scan = self._options, self._context.robot.scan()
         tracks_all = options.track_m > 0.0
         if scan is None or scan.stamp_s <= self._scan_s or not (tracks_all or self._seen):
@@ -324,7 +324,7 @@ class PeopleWatch:
         return (self._may_show_person(cameras) if since_s >= period_s else ()), True
 
     def _may_show_person(self, cameras: Sequence[CameraCapabilities]) -> Sequence[CameraCapabilities]:
-        """Cameras with a known person or an unexplained obstacle in view; all of them without a layered costmap."""
+        """Cameras with a known person or an unexplained obstacle in view; all cameras without a layered costmap."""
         if self._obstacles is None:
             return cameras
         here, seen_W = self._context.pose(), np.array([one.place_W for one in self._seen]).reshape(-1, 2)
@@ -336,7 +336,7 @@ class PeopleWatch:
         return [each for each in cameras if np.any(np.cos(bearings_rad - each.heading_rad) > least)]
 
     def _look(self, images: Sequence[Image], X_WO: RigidTransform, here_W: Pose2D, with_depth: bool) -> _Look:
-        """Detects people in one picture of each camera; without depth, only whether there are any."""
+        """Detects people in one picture of each camera; without depth, only whether a picture shows any."""
         detector, options = self._context.detector, self._options
         detected = people_detections(detector, images, options.least_score)
         if not with_depth:
@@ -348,7 +348,7 @@ class PeopleWatch:
         return _Look(found, tuple(images), X_WO, here_W)
 
     def _update(self, look: _Look) -> None:
-        """Updates and publishes the known people; schedules the next view early for a new one."""
+        """Updates and publishes the known people; schedules the next view early when a person is new."""
         before, stamp_s, options = self._seen, self._context.clock.now(), self._options
         for found in look.found:
             stamp_s = found[0].stamp_s if found else stamp_s
@@ -362,7 +362,7 @@ class PeopleWatch:
             self._context.publish(PEOPLE_TOPIC, self._message())
 
     def _count_miss(self, one: SeenPerson, look: _Look, stamp_s: float) -> SeenPerson:
-        """Counts a miss of a person whom the view should have shown and did not."""
+        """Counts a miss when the view should have shown a person and did not."""
         due = one.picture_s < stamp_s and look.shows(one, self._options.reach_m)
         return replace(one, missed=one.missed + 1) if due else one
 
@@ -394,7 +394,7 @@ class PeopleWatch:
 
 
 def _is_inside(image: Image, X_WO: RigidTransform, points_W: FloatArray, reach_m: float) -> bool:
-    """Returns whether any of some points (N, 3) lies well inside a picture, within reach of its camera."""
+    """Returns whether any of the points (N, 3) lies well inside a picture, within reach_m of its camera."""
     lens, p_C = image.intrinsics, camera_pose_W(image, X_WO).inverse().multiply(points_W.T).T
     u, v = project(np.maximum(p_C, [-np.inf, -np.inf, 1e-6]), lens)
     inside = (np.abs(u / lens.width - 0.5) < _WELL_INSIDE) & (np.abs(v / lens.height - 0.5) < _WELL_INSIDE)

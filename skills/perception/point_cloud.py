@@ -1,6 +1,6 @@
 """Depth images as point clouds, points as pixels, clusters of points, and points that rest on a surface.
 
-Visibility in them: points and surfaces that are seen or hidden, and changes between two images.
+Also visibility: which points and surfaces are seen or occluded, and what changed between two images.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class PointCloud:
 
 
 def camera_pose_W(image: Image, X_WO: RigidTransform) -> RigidTransform:
-    """Pose X_WC of the camera when it took the picture."""
+    """Pose X_WC of the camera at capture time."""
     return X_WO @ image.frames.pose(image.camera_frame)
 
 
@@ -88,7 +88,7 @@ def lens_rays(lens: Intrinsics) -> tuple[FloatArray, FloatArray]:
 
 
 def project(p_C: FloatArray, lens: Intrinsics) -> tuple[FloatArray, FloatArray]:
-    """Projects points (..., 3) of the camera frame to pixel coordinates u and v."""
+    """Projects points (..., 3) in the camera frame to pixel coordinates u and v."""
     z = p_C[..., 2]
     return p_C[..., 0] / z * lens.fx + lens.cx, p_C[..., 1] / z * lens.fy + lens.cy
 
@@ -100,7 +100,7 @@ def nearest_pixels(u: FloatArray, v: FloatArray, lens: Intrinsics) -> NDArray[np
 
 
 def closed_mask(pixels: NDArray[np.int64], height: int, width: int) -> Mask:
-    """Mask (height, width) of some pixels (N, 2) with the gaps between them closed."""
+    """Mask (height, width) of pixels (N, 2) after morphological closing."""
     mask = np.zeros((height, width), dtype=np.uint8)
     mask[pixels[:, 1], pixels[:, 0]] = 1
     return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((_GAP_PX, _GAP_PX), np.uint8)) > 0)
@@ -109,18 +109,18 @@ def closed_mask(pixels: NDArray[np.int64], height: int, width: int) -> Mask:
 def grid_labels(
     xy: FloatArray, cell_m: float, *, fewest: int = 1, dilated: bool = False
 ) -> tuple[NDArray[np.int32], int]:
-    """Clusters points (N, 2) by neighbourhood on a grid: label of each, 0 for none, and the number of labels.
+    """Clusters points (N, 2) by neighbourhood on a grid: a label per point, 0 for none, and the number of labels.
 
-    Cells with fewer than `fewest` points are empty; `dilated` also joins clusters across a gap of a cell or two.
+    Cells with fewer than `fewest` points are empty; `dilated` also joins clusters across a gap of one or two cells.
     """
     cells = np.floor((xy - xy.min(axis=0)) / cell_m).astype(np.int64)
     return cell_labels(cells, fewest=fewest, reach=int(dilated))
 
 
 def cell_labels(cells: NDArray[np.int64], *, fewest: int = 1, reach: int = 0) -> tuple[NDArray[np.int32], int]:
-    """Clusters grid cells (N, 2), with repetitions: label of each, 0 for none, and the number of labels.
+    """Clusters grid cells (N, 2), with repetitions: a label per cell, 0 for none, and the number of labels.
 
-    Cells that occur less than `fewest` times are empty; clusters that `reach` cells of dilation connect are joined.
+    Cells that occur fewer than `fewest` times are empty; clusters that `reach` cells of dilation connect are joined.
     """
     cells = cells - cells.min(axis=0) + reach + 1
     counts = np.zeros(cells.max(axis=0) + reach + 2, dtype=np.int32)
@@ -132,10 +132,10 @@ def cell_labels(cells: NDArray[np.int64], *, fewest: int = 1, reach: int = 0) ->
 
 
 def may_rest(xy: FloatArray, height_m: FloatArray) -> Mask:
-    """Returns which points at (N, 2) and heights (N,) over a surface may belong to an object that rests on it.
+    """Mask of the points, at (N, 2) and heights (N,) above a surface, that may belong to an object resting on it.
 
-    Points above a gap do not: they hang over the surface, as the next board of a shelf does. A small part that sticks
-    out of what rests does, such as the lever of an extinguisher.
+    Points above a gap may not: they hang over the surface, as the next board of a shelf does. A small part that
+    protrudes from what rests may, such as the lever of an extinguisher.
     """
     if len(xy) == 0:
         return np.zeros(0, dtype=np.bool_)
@@ -158,7 +158,7 @@ def may_rest(xy: FloatArray, height_m: FloatArray) -> Mask:
 
 
 def _with_parts_that_stick_out(cells: NDArray[np.int64], low_m: FloatArray, high_m: FloatArray, rests: Mask) -> Mask:
-    """Adds small groups of hanging pieces of columns (cells (M, 2), heights from low_m to high_m) that touch others."""
+    """Adds small groups of hanging column pieces (cells (M, 2), from low_m to high_m) that touch resting ones."""
     hanging, resting = np.flatnonzero(~rests), np.flatnonzero(rests)
     if len(hanging) == 0:
         return rests
@@ -197,7 +197,7 @@ _NEAREST_M = 0.1
 
 
 def depth_at_points(image: Image, X_WO: RigidTransform, points_W: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Depth of points (N, 3) from the camera (NaN out of view), and depth that the picture has there (NaN: none)."""
+    """Depth of points (N, 3) from the camera (NaN out of view), and the picture's depth there (NaN where unknown)."""
     lens, X_CW = image.depth_intrinsics, camera_pose_W(image, X_WO).inverse()
     p_C = points_W @ X_CW.rotation().matrix().T + X_CW.translation()
     p_C[p_C[:, 2] <= _LEAST_DEPTH_M, 2] = np.nan
@@ -212,7 +212,7 @@ def depth_at_points(image: Image, X_WO: RigidTransform, points_W: FloatArray) ->
 
 
 def in_plain_view(image: Image, X_WO: RigidTransform, p_W: FloatArray) -> bool:
-    """Returns whether a picture should show an object at a point: well inside, near, and with nothing before it."""
+    """Returns whether a picture should show an object at a point: well inside, near, and not occluded."""
     beside = p_W + np.array([[0.0, 0.0, 0.0], *(_EDGE_M * np.eye(3)), *(-_EDGE_M * np.eye(3))])
     depth, seen = depth_at_points(image, X_WO, beside)
     if not np.all(np.isfinite(depth)) or depth[0] > _PLAIN_M:
@@ -222,14 +222,14 @@ def in_plain_view(image: Image, X_WO: RigidTransform, p_W: FloatArray) -> bool:
 
 @dataclass(frozen=True)
 class SurfaceShares:
-    """Shares of a surface that were seen, were hidden behind something, or were never in view; they add up to 1."""
+    """Fractions of a surface that were seen, were occluded, or were never in view; they add up to 1."""
 
     seen: float
     hidden: float
 
     @property
     def out_of_view(self) -> float:
-        """Share that no picture showed, or for which there was no depth."""
+        """Fraction that no picture showed, or for which there was no depth."""
         return max(0.0, 1.0 - self.seen - self.hidden)
 
     def __str__(self) -> str:
@@ -239,7 +239,7 @@ class SurfaceShares:
 
 
 class Coverage:
-    """Coverage of some surfaces over several pictures."""
+    """Coverage of surfaces over several pictures."""
 
     def __init__(self, surfaces: Sequence[Surface]) -> None:
         self._points = {surface.name: _cells(surface) for surface in surfaces}
@@ -255,13 +255,13 @@ class Coverage:
             self._states[name] = np.maximum(self._states[name], state.astype(np.int8))
 
     def hidden_middle_W(self) -> Mapping[str, FloatArray]:
-        """Middle (3,) of the hidden part of each surface that has a large one, by the surface's name."""
+        """Centre (3,) of the occluded part of each surface where that part is large, by the surface's name."""
         hidden = {name: self._points[name][states == _HIDDEN] for name, states in self._states.items()}
         large = {n: points for n, points in hidden.items() if len(points) > _MUCH_HIDDEN * len(self._points[n])}
         return {n: points.mean(axis=0) for n, points in large.items()}
 
     def shares(self) -> Mapping[str, SurfaceShares]:
-        """Shares of each surface by its name."""
+        """Fractions for each surface by its name."""
         return {
             name: SurfaceShares(float(np.mean(states == _SEEN)), float(np.mean(states == _HIDDEN)))
             for name, states in self._states.items()
@@ -269,16 +269,16 @@ class Coverage:
 
 
 def _cells(surface: Surface) -> FloatArray:
-    """Points (N, 3) all over a surface; its middle when it is small."""
+    """Points (N, 3) spread over a surface; only its centre when it is small."""
     inside = grid_inside(surface.polygon_W, _CELL_M, first_m=0.5 * _CELL_M)
     xy = inside if len(inside) else np.mean(surface.polygon_W, axis=0)[None]
     return np.column_stack([xy, np.full(len(xy), surface.height_m)])
 
 
 def is_at_rest(first: Image, second: Image, X_WO: RigidTransform, p_W: FloatArray, within_m: float) -> bool:
-    """Returns whether two pictures of a still camera show no change about a point p_W (3,) of the world.
+    """Returns whether two pictures of a still camera show no change around a world point p_W (3,).
 
-    A pixel has changed when its depth differs by more than noise and than the pixels beside it explain.
+    A pixel has changed when its depth differs by more than noise and its neighbouring pixels explain.
     """
     lens, p_C = second.depth_intrinsics, camera_pose_W(second, X_WO).inverse() @ p_W
     z = p_C[2]
@@ -297,7 +297,7 @@ def is_at_rest(first: Image, second: Image, X_WO: RigidTransform, p_W: FloatArra
 
 
 def _differs(depth_m: NDArray[np.float32], other_m: NDArray[np.float32], tolerance_m: float) -> Mask:
-    """Returns which depths lie beyond all depths that another picture has there and right beside; skips holes."""
+    """Mask of the depths beyond all depths in another picture at and right beside their pixel; skips holes."""
     kernel = np.ones((_AROUND_PX, _AROUND_PX), np.uint8)
     least = cv2.erode(np.where(other_m > 0.0, other_m, np.float32(np.inf)), kernel)
     most = cv2.dilate(other_m, kernel)

@@ -1,8 +1,8 @@
-"""Position of a detected object: the middle of the whole object, not of its visible side, with the covariance.
+"""Position of a detected object: the centre of the whole object, not of its visible side, with the covariance.
 
 The segment in the box gives the visible side. The form of the class says how far the object extends behind it:
 
-| form | middle |
+| form | centre |
 |---|---|
 | round, upright | the axis: behind the nearest points by half the width across the view, or of the circle that fits |
 | round, lying | the outline from above, extended from its near side to the object's height |
@@ -10,7 +10,7 @@ The segment in the box gives the visible side. The form of the class says how fa
 | long | the outline from above; for a flat object, the point where the ray of the box's middle meets the plane |
 | person | behind the nearest points by half a body's depth; from the floor to the visible top, or a usual height |
 
-The middle is halfway up from the plane to the top. An object that the picture's edge cuts off has its usual length.
+The centre is halfway up from the plane to the top. An object that the picture's edge cuts off has its usual length.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ _END_AT_BORDER_PX = 30.0
 
 @dataclass(frozen=True)
 class Extents:
-    """Upright box about an object in the level frame: middle, length, width, height (m), yaw of its length.
+    """Upright bounding box of an object in the level frame: centre, length, width, height (m), yaw of its length.
 
-    `sigma_m` are the standard deviations of the middle along the view, across it and upwards (m).
+    `sigma_m` are the standard deviations of the centre along the view, across it and upwards (m).
     """
 
     middle: tuple[float, float, float]
@@ -76,10 +76,7 @@ class Position:
 
 
 def locate(image: Image, detection: Detection, taken: Mask | None = None) -> Position | None:
-    """Locates the object of a detection; None without depth.
-
-    `taken` (H, W) marks the pixels that belong to other objects.
-    """
+    """Locates a detection's object without the pixels `taken` (H, W) by other objects; None when there is no depth."""
     form = class_form(detection.class_name)
     window = window_about(image, detection.box, taken)
     if window is None:
@@ -94,7 +91,7 @@ def locate(image: Image, detection: Detection, taken: Mask | None = None) -> Pos
 
 
 def _with_doubt(extents: Extents, segment: ObjectSegment, cut: _Cut) -> tuple[float, float, float]:
-    """Sigmas of the extents, larger for an object that the picture cuts off, or whose base is hidden."""
+    """Sigmas of the extents, enlarged for an object that the picture cuts off, or whose base is occluded."""
     along, across, up = extents.sigma_m
     longest = max(extents.length_m, extents.height_m)
     if cut.anywhere:
@@ -166,7 +163,7 @@ def _base(segment: ObjectSegment, points: FloatArray) -> float:
 
 
 def _view(points: FloatArray, p_OC: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Horizontal unit vectors along and across the view of some points."""
+    """Horizontal unit vectors along and across the line of sight to points."""
     along = np.median(points[:, :2], axis=0) - p_OC[:2]
     along = along / max(float(np.linalg.norm(along)), 1e-6)
     return along, np.array([-along[1], along[0]])
@@ -201,7 +198,7 @@ def _upright(points: FloatArray, segment: ObjectSegment, form: ClassForm, base_m
 
 
 def _near_axis(points: FloatArray, axis: FloatArray, p_OC: FloatArray) -> FloatArray:
-    """Points no farther before or behind an axis than the object reaches to its sides."""
+    """Points within the object's lateral reach before and behind an axis."""
     along, across = _view(points, p_OC)
     reach = min(_REACH_M, float(np.percentile(np.abs((points[:, :2] - axis) @ across), 98)))
     near = points[np.abs((points[:, :2] - axis) @ along) < reach]
@@ -246,7 +243,7 @@ def _lying(
 def _continued(
     centre: FloatArray, length_m: float, yaw_rad: float, height_m: float, window: Window, form: ClassForm
 ) -> tuple[FloatArray, float]:
-    """Middle and length of an outline that the picture cuts off, extended there to the usual length."""
+    """Centre and length of an outline that the picture cuts off, extended there to the usual length."""
     missing_m = max(0.0, form.usual_m - length_m)
     along = np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
     ends = [window.border_px(np.array([*(centre + side * 0.5 * length_m * along), height_m])) for side in (1.0, -1.0)]
@@ -264,7 +261,7 @@ def _towards(seen_m: float, side_m: float) -> float:
 def _outline(
     points: FloatArray, base_m: float, height_m: float, form: ClassForm
 ) -> tuple[FloatArray, float, float, float]:
-    """Rectangle about points seen from above: middle, length, width, yaw of the length."""
+    """Bounding rectangle of points seen from above: centre, length, width, yaw of the length."""
     upper = points[points[:, 2] - base_m > 0.25 * height_m, :2]
     xy = without_strays(upper if len(upper) >= _FEWEST_POINTS else points[:, :2])
     return _rectangle_along(xy, _main_yaw(xy)) if form.form == "long" else fit_rectangle(xy)
@@ -284,7 +281,7 @@ def _main_yaw(xy: FloatArray) -> float:
 
 
 def _rectangle_along(xy: FloatArray, yaw_rad: float) -> tuple[FloatArray, float, float, float]:
-    """Rectangle about points with its length in a direction: middle, length, width, yaw."""
+    """Bounding rectangle of points with its length in a given direction: centre, length, width, yaw."""
     axes = np.array([[math.cos(yaw_rad), math.sin(yaw_rad)], [-math.sin(yaw_rad), math.cos(yaw_rad)]])
     low, high = np.percentile(xy @ axes.T, [0.5, 99.5], axis=0)
     length, width = high - low
@@ -294,7 +291,7 @@ def _rectangle_along(xy: FloatArray, yaw_rad: float) -> tuple[FloatArray, float,
 def _completed(
     centre: FloatArray, seen: tuple[float, float], wanted: tuple[float, float], yaw_rad: float, p_OC: FloatArray
 ) -> FloatArray:
-    """Middle of an outline whose sides change length while the near sides stay."""
+    """Centre of an outline after its sides change length while the near sides stay."""
     along = np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
     view = centre - p_OC[:2]
     view = view / max(float(np.linalg.norm(view)), 1e-6)
@@ -305,7 +302,7 @@ def _completed(
 
 
 def _flat(segment: ObjectSegment, plane: LevelPlane, form: ClassForm) -> Extents | None:
-    """Extents of a flat object, where the ray through the middle of its box meets the plane below it."""
+    """Extents of a flat object, at the point where the ray through its box's centre meets the plane below it."""
     window = segment.window
     meeting = _on_plane(window, plane, 0.35 * form.width_m[0])
     if meeting is None:
@@ -324,7 +321,7 @@ def _flat(segment: ObjectSegment, plane: LevelPlane, form: ClassForm) -> Extents
 
 
 def _on_plane(window: Window, plane: LevelPlane, above_m: float) -> list[FloatArray] | None:
-    """Points where the rays of `Window.rays_O` meet a plane raised by above_m; None where one grazes it."""
+    """Points where the rays of `Window.rays_O` meet a plane raised by above_m; None when a ray grazes it."""
     found = []
     for ray in window.rays_O():
         if ray[2] > -_GRAZING * np.linalg.norm(ray):

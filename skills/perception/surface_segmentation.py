@@ -1,10 +1,10 @@
-"""Segmentation of a surface in a depth image: its plane, and the clusters of points of the objects on it.
+"""Segmentation of a surface in a depth image: its plane, and the point clusters of the objects on it.
 
 Objects that touch are split by their outline from above, at a narrow neck between two parts that bulge: the outline is
 eroded until it falls into cores, and each cell goes to its nearest core. The parts count as objects when each is nearly
 convex and the whole is not, or when the neck is short and their heights or colours differ beside it: a wrench has a
 neck, too, but a long one, and a hammer's peen has the height and colour of its head. Boxes flush side by side have no
-neck and stay one.
+neck and remain one object.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _LEAST_OVERLAP = 0.2
 _LEAST_PART = 0.15
 _APART_M = 0.035
 _MOSTLY_AMONG = 0.8
-"""Share of a cluster's pixels from which on it counts as a part of a detected object."""
+"""Fraction of a cluster's pixels from which on it counts as a part of a detected object."""
 
 _OUTLINE_CELL_M: Final = 0.003
 _BORDER_CELLS: Final = 4
@@ -63,7 +63,7 @@ _LEAST_PART_M2: Final = 0.0003
 _CONVEX: Final = 0.87
 _MORE_CONVEX: Final = 0.03
 _NECK_SHARE: Final = 0.6
-"""Largest half width of a neck, as a part of the narrower object's."""
+"""Largest half width of a neck, as a fraction of the narrower object's."""
 _LEAST_NECK_M2: Final = 0.0001
 """Area that a short neck may always have."""
 _BESIDE_NECK_M: Final = 0.015
@@ -101,7 +101,7 @@ class Cluster:
 
 @dataclass(frozen=True)
 class SurfaceView:
-    """A surface in one picture: its plane, the points of the plane, and the clusters on it."""
+    """A surface in one picture: its plane, the points in the plane, and the clusters on it."""
 
     plane: LevelPlane
     plane_points: PointCloud
@@ -111,7 +111,7 @@ class SurfaceView:
 def segment_surface(
     image: Image, X_WO: RigidTransform, surface: Surface, margin_m: float = 0.03, highest_m: float = HIGHEST_M
 ) -> SurfaceView | None:
-    """Segments one surface in a picture up to a height over it; None when too little of the surface is visible."""
+    """Segments one surface in a picture up to a height above it; None when too little of the surface is visible."""
     return next(segment_surfaces(image, X_WO, (surface,), margin_m, highest_m))
 
 
@@ -122,7 +122,7 @@ def segment_surfaces(
     margin_m: float = 0.03,
     highest_m: float = HIGHEST_M,
 ) -> Iterator[SurfaceView | None]:
-    """Segments each surface in a picture; None for a surface of which too little is visible."""
+    """Segments each surface in a picture; yields None for a surface of which too little is visible."""
     levels_m = [surface.height_m for surface in surfaces]
     band_m = (min(levels_m, default=0.0) - _PLANE_BAND_M, max(levels_m, default=0.0) + highest_m)
     cloud, p_WC = cloud_from_image(image, X_WO, heights_m=band_m), camera_pose_W(image, X_WO).translation()
@@ -150,7 +150,7 @@ def _segment(
 
 
 def _fit_plane(points_W: FloatArray, height_m: float) -> LevelPlane | None:
-    """Fits the plane near a surveyed height, robustly against objects on it; None for too few points."""
+    """Fits the plane near a surveyed height, robustly against objects on it; None when points are too few."""
     near = points_W[np.abs(points_W[:, 2] - height_m) < _PLANE_BAND_M]
     if len(near) < _FEWEST_PLANE_POINTS:
         return None
@@ -188,7 +188,7 @@ def _cluster(points: PointCloud, surface: str, plane: LevelPlane, p_WC: FloatArr
 
 
 def matching_cluster(clusters: tuple[Cluster, ...], detected: Detection3D) -> Cluster | None:
-    """Cluster near a detected object whose box overlaps the detection's most; None if none does."""
+    """Cluster near a detected object whose box overlaps the detection's box most; None when none does."""
     near = [one for one in clusters if _apart(one, detected) < _SAME_OBJECT_M + 0.5 * one.shape.length_m]
     overlaps = {id(one): box_overlap(one.box, detected.detection.box) for one in near}
     best = max(near, key=lambda one: overlaps[id(one)], default=None)
@@ -200,10 +200,10 @@ def _apart(cluster: Cluster, detected: Detection3D) -> float:
 
 
 def split_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
-    """Splits a detected object from a cluster that holds others as well, such as one that touches it.
+    """Splits a detected object from a cluster that also contains others, such as one that touches it.
 
-    A part right above or below the object is not split off, since its box has only left it out. Joins low clusters
-    that the detected object holds.
+    A part right above or below the object is not split off, since the detected box has only missed it. Joins low
+    clusters that the detected object contains.
     """
     view = _join_detected(view, detected)
     whole = matching_cluster(view.clusters, detected)
@@ -222,10 +222,10 @@ def split_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
 
 
 def _join_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
-    """Joins the low clusters among a detected object's pixels, and what of it is lost among the surface's points.
+    """Joins the low clusters among a detected object's pixels, and those of its points that were taken for the surface.
 
     Where depth is lost, a wrench falls to pieces, and its handle may be lower than the noise of single points. Higher
-    clusters are objects of their own, which a large box may hold as well.
+    clusters are objects of their own, which a large box may contain as well.
     """
     low = [each for each in view.clusters if each.shape.height_m < _LOW_M]
     if len(detected.pixels) == 0 or not low:
@@ -247,13 +247,13 @@ def _join_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
 
 
 def _are_among(pixels: NDArray[np.int64], of_object: NDArray[np.int64]) -> Mask:
-    """Returns which pixels (N, 2) lie among those of an object, of which only every few may be given."""
+    """Mask of the pixels (N, 2) that lie among those of an object, which may be subsampled."""
     width, height = np.maximum(pixels.max(axis=0), of_object.max(axis=0)) + 1
     return np.asarray(closed_mask(of_object, height, width)[pixels[:, 1], pixels[:, 0]])
 
 
 def split_touching(view: SurfaceView, p_WC: FloatArray) -> SurfaceView:
-    """Splits the clusters of a view from p_WC into the objects that touch, of any class."""
+    """Splits the clusters in a view from p_WC into the objects that touch, whatever their class."""
     clusters: list[Cluster] = []
     for each in view.clusters:
         labels, count = touching_parts(each.points.p_W, each.points.colours)
@@ -263,7 +263,7 @@ def split_touching(view: SurfaceView, p_WC: FloatArray) -> SurfaceView:
 
 
 def touching_parts(p_W: FloatArray, colours: NDArray[np.uint8]) -> tuple[NDArray[np.int64], int]:
-    """Labels the objects among connected points (N, 3) of some colours (N, 3): the label of each, and their number."""
+    """Labels the objects among connected points (N, 3) with colours (N, 3): a label per point, and their number."""
     cells = np.floor((p_W[:, :2] - p_W[:, :2].min(axis=0)) / _OUTLINE_CELL_M).astype(np.int64) + _BORDER_CELLS
     seen = _SeenCells.of(cells, p_W[:, 2], colours)
     parts, count = _parts(_filled((seen.points > 0).astype(np.uint8)), seen)
@@ -282,7 +282,7 @@ class _SeenCells:
 
     @classmethod
     def of(cls, cells: NDArray[np.int64], z_m: FloatArray, colours: NDArray[np.uint8]) -> _SeenCells:
-        """The cells (N, 2) of points at heights (N,), of colours (N, 3)."""
+        """Builds the cells (N, 2) from points at heights (N,), with colours (N, 3)."""
         shape, at = tuple(cells.max(axis=0) + _BORDER_CELLS + 1), (cells[:, 0], cells[:, 1])
         points, top_m, colour = np.zeros(shape), np.full(shape, -np.inf), np.zeros((*shape, 3))
         np.add.at(points, at, 1.0)
@@ -291,7 +291,7 @@ class _SeenCells:
         return cls(points, top_m, colour / np.maximum(points, 1.0)[..., None])
 
     def differ(self, part: Mask, rest: Mask) -> bool:
-        """Returns whether two parts of an outline have other heights, or other colours, where they are near."""
+        """Returns whether two parts of an outline differ in height, or in colour, where they are close together."""
         sides = [
             one & (_distance_m(other) < _BESIDE_NECK_M) & (self.points > 0)
             for one, other in ((part, rest), (rest, part))
@@ -355,7 +355,7 @@ def _filled(seen: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _convexity(part: NDArray[np.uint8] | Mask) -> float:
-    """Share of its convex hull that an outline fills."""
+    """Fraction of its convex hull that an outline fills."""
     hull = cv2.convexHull(np.argwhere(part).astype(np.float32))
     # the hull passes through the middles of the cells: half a cell is missing all around
     hull_cells = cv2.contourArea(hull) + 0.5 * cv2.arcLength(hull, closed=True) + 1.0
@@ -369,10 +369,10 @@ def loose_clusters(
     labelled: Sequence[Detection3D],
     surfaces: Sequence[Surface],
 ) -> list[Cluster]:
-    """Clusters of the objects on some surfaces that none of the `labelled` detections explains.
+    """Clusters of the objects on surfaces that none of the `labelled` detections explains.
 
-    Leaves out clusters that the picture's edge cuts off, that stand beside the surface, such as a wall, or that are
-    longer than 0.6 m.
+    Omits clusters that the picture's edge cuts off, that stand beside the surface, such as a wall, or that are longer
+    than 0.6 m.
     """
     outlines = {surface.name: surface.polygon_W for surface in surfaces}
     p_WC = camera_pose_W(image, place.X_WO).translation()
@@ -399,7 +399,7 @@ def _is_cut_off(cluster: Cluster, image: Image) -> bool:
 
 
 def segment_3d(cluster: Cluster, image: Image, place: LocalisationEstimate) -> Detection3D:
-    """A cluster as the detection of an object without a class."""
+    """Converts a cluster to the detection of an object without a class."""
     shape, X_WO = cluster.shape, place.X_WO
     u0, v0, u1, v1 = (float(value) for value in cluster.box)
     p_W = np.array([*shape.centre, cluster.base_m + 0.5 * shape.height_m])

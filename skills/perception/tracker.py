@@ -1,9 +1,10 @@
-"""Tracker of objects over several views: position, class and belief in the existence of each.
+"""Tracks objects over several views: position, class and belief in the existence of each.
 
-A detection belongs to the track that it fits by position (Mahalanobis distance) and class; positions are fused in
-information form (inverse covariances add). A track that a picture should show and does not loses belief. A faint
-detection begins no track, but supports one. A segment without a label (`ANY_OBJECT`) gives a position, and no evidence
-of a class, unless `ANY_OBJECT` is among the tracker's names: then it says that the segment is none of the others.
+A detection is associated with the track that it fits by position (Mahalanobis distance) and class; positions are fused
+in information form (inverse covariances add). A track loses belief when a picture should show it and does not. A
+detection with a low score begins no track, but supports one. A segment without a label (`ANY_OBJECT`) gives a position,
+and no evidence of a class, unless `ANY_OBJECT` is among the tracker's names: then it means that the segment is none of
+the others.
 """
 
 import math
@@ -42,8 +43,8 @@ _LEAST_BELIEF = 0.05
 class Track:
     """Track of one object. `position_W` with `covariance` (3, 3) from the views, without the localisation's error.
 
-    `classes` are the probabilities of the classes, `belief` is that of the object's existence. `eyes_W` are the camera
-    positions that saw it; `latest` is its last detection, `best` the one with the best score.
+    `classes` are the probabilities of the classes, `belief` the probability that the object exists. `eyes_W` are the
+    camera positions that saw it; `latest` is its last detection, `best` the one with the highest score.
     """
 
     number: int
@@ -58,7 +59,7 @@ class Track:
 
     @property
     def class_name(self) -> str:
-        """Likeliest class; `ANY_OBJECT` where no view had a label."""
+        """Most likely class; `ANY_OBJECT` when no view had a label."""
         return ANY_OBJECT if self.best.class_name == ANY_OBJECT else max(self.classes, key=self.classes.__getitem__)
 
     @property
@@ -68,16 +69,16 @@ class Track:
 
     @property
     def views(self) -> int:
-        """Number of different camera positions that saw it."""
+        """Number of different camera positions that saw the object."""
         return len(self.eyes_W)
 
     @property
     def last_seen_s(self) -> float:
-        """Time of its last detection."""
+        """Time of the last detection."""
         return self.latest.stamp_s
 
     def is_confirmed(self, views: int = 2) -> bool:
-        """Returns whether the object exists, is likely of its class, and was so at its last detection."""
+        """Returns whether the object exists and is likely of its class, also according to its last detection."""
         return (
             self.exists(views) and self.class_belief >= CONFIRMED_BELIEF and self.latest.class_name == self.class_name
         )
@@ -88,7 +89,7 @@ class Track:
 
 
 class Tracker:
-    """Tracker that is updated with the detections of each picture."""
+    """Tracks objects, updated with the detections in each picture."""
 
     def __init__(self, class_names: Sequence[str]) -> None:
         self._names = tuple(class_names)
@@ -100,7 +101,7 @@ class Tracker:
         return tuple(sorted(self._tracks.values(), key=lambda track: (-track.belief, track.number)))
 
     def update(self, seen: Sequence[Detection3D], in_plain_view: Callable[[Track], bool]) -> tuple[Track, ...]:
-        """Updates the tracks with the detections of a picture; `in_plain_view` says whether it should show a track."""
+        """Updates the tracks with a picture's detections; `in_plain_view` says whether it should show a track."""
         before, seen = tuple(self._tracks.values()), without_duplicates(seen)
         pairs = _matched_surest_first(before, seen)
         for track in before:
@@ -137,7 +138,7 @@ class Tracker:
 
 
 def without_duplicates(seen: Sequence[Detection3D]) -> tuple[Detection3D, ...]:
-    """Removes the worse detection of an object that one picture shows as two classes."""
+    """Removes the worse detection when one picture shows an object as two classes."""
     unique: list[Detection3D] = []
     for one in sorted(seen, key=lambda detected: -detected.detection.score):
         if not any(_is_same_object(one, other) for other in unique):
@@ -151,7 +152,7 @@ def _is_same_object(one: Detection3D, other: Detection3D) -> bool:
 
 
 def _matched_surest_first(tracks: Sequence[Track], seen: Sequence[Detection3D]) -> dict[int, int]:
-    """Matches sure detections first, then faint ones with the other tracks: track number by detection index."""
+    """Matches high scores first, then low ones with the remaining tracks: track number by detection index."""
     sure, faint = (
         [k for k, s in enumerate(seen) if (s.detection.score >= SURE_SCORE) is wanted] for wanted in (True, False)
     )
@@ -185,13 +186,13 @@ def fits(track: Track, detected: Detection3D) -> bool:
 
 
 def squared_distance(track: Track, detected: Detection3D) -> float:
-    """Squared Mahalanobis distance of a detection from a track."""
+    """Squared Mahalanobis distance between a detection and a track."""
     off = track.position_W - detected.position_W
     return float(off @ np.linalg.solve(track.covariance + _spread(detected), off))
 
 
 def _spread(detected: Detection3D) -> FloatArray:
-    """Covariance of a detection with the jitter of the localisation between two views."""
+    """Covariance of a detection, plus the localisation's jitter between two views."""
     return np.asarray(detected.covariance + _JITTER_M**2 * np.eye(3))
 
 
@@ -215,9 +216,9 @@ def _fused(track: Track, detected: Detection3D, names: Sequence[str]) -> Track:
 
 
 def _latest(track: Track, detected: Detection3D) -> Detection3D:
-    """Last detection of a track.
+    """Last detection for a track.
 
-    A faint detection of the same class, or a segment, only renews the time of the one before.
+    A detection with a low score of the same class, or a segment, only renews the time of the previous one.
     """
     unlabelled = detected.class_name == ANY_OBJECT != track.latest.class_name and ANY_OBJECT not in track.classes
     if detected.detection.score >= SURE_SCORE and not unlabelled:
@@ -243,7 +244,7 @@ def _classes(before: Mapping[str, float], detected: Detection3D) -> Mapping[str,
 def _evidence(detected: Detection3D) -> float:
     """Likelihood ratio of a detection with and without an object.
 
-    Assumes that scores are the shares of right detections, as they nearly are (docs/finding-things.md).
+    Assumes that a score is the fraction of correct detections, as it nearly is (docs/finding-things.md).
     """
     ratio = _odds(min(detected.detection.score, _MOST_SURE)) / _odds(_SEEN_BY_CHANCE)
     return math.pow(ratio, _NEW_IN_A_VIEW)

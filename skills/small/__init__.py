@@ -1,1 +1,1 @@
-"""Skills of one page each: doors, dock, costmap, finding the pose again, backing off and speaking."""
+"""Short skills, one module each: doors, dock, costmap, relocalisation, backing off and speaking."""

@@ -25,7 +25,7 @@ _STEP_M = 0.05
 
 @dataclass(frozen=True)
 class BackOffInputs:
-    """Distance (m), and the least distance (m) that counts as success."""
+    """Distance (m) to drive, and the least distance (m) that counts as success."""
 
     distance_m: Length = 0.4
     least_m: Length = 0.15
@@ -33,7 +33,7 @@ class BackOffInputs:
 
 @dataclass(frozen=True)
 class BackOffOptions:
-    """Speed of the robot, distance from the goal at which it stops (m), and time to come to rest (s)."""
+    """Speed of the robot, distance from the goal at which it brakes (m), and time to come to rest (s)."""
 
     speed_m_s: Speed = 0.25
     arrived_m: Length = 0.03
@@ -96,9 +96,9 @@ class BackOff(MovingSkill[BackOffInputs]):
         return Succeeded("backed off a little")
 
     def _chosen(self, inputs: BackOffInputs, footprint: Footprint, sideways: bool) -> Pose2D:
-        """Returns the goal in the body frame: the first direction that is clear all along, else the longest.
+        """Returns the goal in the body frame: the first direction that is entirely clear, else the longest one.
 
-        Raises SkillFailure when none is clear for `least_m`.
+        Raises SkillFailure when no direction is clear for `least_m`.
         """
         directions = DIRECTIONS_RAD if sideways else (DIRECTIONS_RAD[0], DIRECTIONS_RAD[-1])
         lengths = [(self._free_m(inputs.distance_m, footprint, direction), direction) for direction in directions]
@@ -109,9 +109,9 @@ class BackOff(MovingSkill[BackOffInputs]):
         return Pose2D(length * math.cos(direction), length * math.sin(direction), 0.0)
 
     def _free_m(self, most_m: float, footprint: Footprint, direction_rad: float) -> float:
-        """Returns how far (m) the body can go in a direction, at most `most_m`.
+        """Returns how far (m) the body can move in a direction, at most `most_m`.
 
-        A body in contact may go out of the contact but not further into it.
+        A body in contact may move out of the contact but not further into it.
         """
         steps = np.arange(1, max(1, round(most_m / _STEP_M)) + 1) * _STEP_M
         here = self.context.pose()

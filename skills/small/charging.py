@@ -1,4 +1,4 @@
-"""Skills at the dock: locate_dock finds it by its tag before the robot drives onto it, charge stands on it."""
+"""Skills at the dock: locate_dock finds the dock by its tag before the robot docks, charge waits on the dock."""
 
 import math
 from collections.abc import Mapping
@@ -25,14 +25,14 @@ class ChargeInputs:
 
 @dataclass(frozen=True)
 class ChargeOptions:
-    """Limits on which a battery counts as not charging: it has not gained `least_gain` (a share) within `no_gain_s`."""
+    """Limits on charging: a battery that gains less than the fraction `least_gain` in `no_gain_s` does not charge."""
 
     no_gain_s: Duration = 30.0
     least_gain: Share = 0.005
 
 
 class Charge(Skill[ChargeInputs]):
-    """Waits on the dock until the battery is charged, and checks that the charge rises. Moves nothing."""
+    """Waits on the dock until the battery is charged, and checks that the charge rises. Commands no motion."""
 
     name: ClassVar[str] = "charge"
     Inputs: ClassVar[type] = ChargeInputs
@@ -47,7 +47,7 @@ class Charge(Skill[ChargeInputs]):
     max_data_age_s: ClassVar[Mapping[str, float]] = {"battery": 10.0}
 
     def begin(self, inputs: ChargeInputs) -> None:
-        """Forgets an earlier attempt."""
+        """Resets the state of an earlier attempt."""
         self._level = inputs.level
         self._begun_at = self._best = self.context.robot.battery().charge
         self._best_s = self.context.clock.now()
@@ -69,7 +69,7 @@ class Charge(Skill[ChargeInputs]):
 
 @dataclass(frozen=True)
 class LocateDockInputs:
-    """The dock's tag, and the robot's pose on the dock, both as the map has them."""
+    """The dock's tag, and the robot's pose on the dock, both according to the map."""
 
     tag: Tag
     dock: Pose2D
@@ -77,15 +77,15 @@ class LocateDockInputs:
 
 @dataclass(frozen=True)
 class LocateDockOptions:
-    """Number of `pictures` by each camera that looks towards the tag."""
+    """Number of `pictures` from each camera that faces the tag."""
 
     pictures: Count = 3
 
 
 class LocateDock(RoutineSkill[LocateDockInputs]):
-    """Looks for the dock's tag with the body cameras, and tells the robot's pose on the dock. Moves nothing.
+    """Looks for the dock's tag with the body cameras, and returns the robot's pose on the dock. Commands no motion.
 
-    Where no camera shows the tag, that is the pose of the map.
+    When no camera shows the tag, it returns the pose according to the map.
     """
 
     name = "locate_dock"

@@ -10,7 +10,7 @@ from skills.quantities import Delay
 
 @dataclass(frozen=True)
 class ClearCostmapInputs:
-    """Time (s) to sense again before success; two scans must agree on an obstacle."""
+    """Time (s) to sense again before success; the costmap needs two scans to confirm an obstacle."""
 
     look_s: Delay = 1.0
 
@@ -27,13 +27,13 @@ class ClearCostmap(Skill[ClearCostmapInputs]):
     default_timeout_s: ClassVar[float] = 10.0
 
     def begin(self, inputs: ClearCostmapInputs) -> None:
-        """Forgets an earlier attempt."""
+        """Resets the state of an earlier attempt."""
         self._inputs = inputs
         self._cleared: int | None = None
         self._end_s = 0.0
 
     def step(self) -> Step:
-        """Clears at the first step, then looks."""
+        """Clears at the first step, then waits."""
         costmap, now_s = self.context.costmap, self.context.clock.now()
         if self._cleared is None:
             if not isinstance(costmap, ClearableCostmap):

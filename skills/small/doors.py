@@ -1,4 +1,4 @@
-"""Skills of doors: check_door looks whether one is open, open_door opens it by its plug-in or the robot's arm."""
+"""Door skills: check_door measures whether a door is open; open_door opens it by its plug-in or the robot's arm."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ _FEW_RAYS = 50
 
 @dataclass(frozen=True)
 class CheckDoorInputs:
-    """Doorway: its centre `middle_W` (x, y), clear width, direction of passage from either side, and name."""
+    """Doorway: its centre `middle_W` (x, y), clear width, the direction through it (either way), and name."""
 
     middle_W: tuple[Coordinate, Coordinate]
     width_m: Length
@@ -33,10 +33,10 @@ class CheckDoorInputs:
 
 @dataclass(frozen=True)
 class CheckDoorOptions:
-    """Number of `scans` in a look, of `looks` and the `pause_s` between them, until the skill can tell.
+    """Measurement with `scans` scans, repeated up to `looks` times with `pause_s` in between, until the state is known.
 
-    The skill can tell from `reach_m` at most, and from `flattest_rad` at most off the direct view. The door is open
-    when the robot's outline fits through with `margin_m` on each side.
+    `reach_m` and `flattest_rad`: largest distance and view angle at which the state can be known. `margin_m`: the door
+    is open when the robot's outline fits through with this margin on each side.
     """
 
     scans: Count = 5
@@ -48,11 +48,10 @@ class CheckDoorOptions:
 
 
 class CheckDoor(RoutineSkill[CheckDoorInputs]):
-    """Looks with the LiDAR whether a door is open, from where the robot stands.
+    """Measures with the LiDAR whether a door is open, from where the robot stands.
 
-    A gap too narrow for the robot is not open.
-
-    Rays that go through and clearly beyond the doorway show where it is free. Objects on the floor are not judged.
+    A gap too narrow for the robot does not count as open. Rays that end clearly beyond the doorway show where it is
+    free. Objects on the floor are not judged.
     """
 
     name = "check_door"
@@ -69,7 +68,7 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
     max_data_age_s: ClassVar[Mapping[str, float]] = {"scan": 0.5, "localisation": 1.0}
 
     def run(self, inputs: CheckDoorInputs) -> Routine[Succeeded]:
-        """Looks until the skill can tell."""
+        """Measures until the state is known."""
         door = Doorway(inputs.middle_W, inputs.width_m, inputs.through_rad)
         for look in range(self.options.looks):
             if look:
@@ -87,7 +86,7 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
     def _look(self, door: Doorway, name: str) -> Routine[Opening]:
         """Measures the opening in the next scans.
 
-        Raises SkillFailure when there are none, the robot is lost, or stands where the skill cannot tell.
+        Raises SkillFailure when there are none, the robot is lost, or its distance or view angle is too large.
         """
         scans: list[tuple[Scan, RigidTransform]] = []
         while len(scans) < self.options.scans:
@@ -104,7 +103,7 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
         return measure_opening(door, scans)
 
     def _next_scan(self, message: str) -> Routine[Scan]:
-        """Returns the first scan that is taken from now on. Raises SkillFailure when there is none."""
+        """Returns the first scan taken from now on. Raises SkillFailure when none arrives."""
         now_s = self.context.clock.now()
         while (scan := self.context.robot.scan()) is None or scan.stamp_s <= now_s:
             if self.context.clock.now() > now_s + _SCAN_PATIENCE_S:
@@ -118,7 +117,7 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
         return max(sides) - min(sides) + 2.0 * self.options.margin_m
 
     def _answer(self, inputs: CheckDoorInputs, seen: Opening) -> Succeeded:
-        """Returns the answer."""
+        """Returns the success with the door's state."""
         door, needed_m = inputs.door, self._needed_m()
         outputs = {"open": seen.least_m >= needed_m, "free_m": seen.least_m}
         if outputs["open"]:
@@ -131,7 +130,7 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
 
 @dataclass(frozen=True)
 class OpenDoorOptions:
-    """Times within which a door opens after its plug-in has answered, and the robot opens one with its arm."""
+    """Time limits: for a door to open after its plug-in has answered, and for the robot to open one with its arm."""
 
     opens_s: Delay = 15.0
     arm_s: Delay = 60.0
@@ -140,7 +139,7 @@ class OpenDoorOptions:
 class OpenDoor(RoutineSkill[CheckDoorInputs]):
     """Calls the plug-in of a door, and watches from where the robot stands until the door is open.
 
-    A robot that opens doors itself (`Capabilities.opens_doors`) opens one of plug-in `arm`, and walks through.
+    A robot with `Capabilities.opens_doors` opens a door that has the plug-in `arm` itself, and walks through.
     """
 
     name = "open_door"
@@ -176,7 +175,7 @@ class OpenDoor(RoutineSkill[CheckDoorInputs]):
             yield Running(f"waiting until the {inputs.door} opens")
 
     def _with_arm(self, door: Doorway, opener: ArmDoor, name: str) -> Routine[Succeeded]:
-        """Lets the robot open the door before it. Raises SkillFailure."""
+        """Lets the robot open the door in front of it. Raises SkillFailure when the door does not open."""
         robot, lease, now = self.context.robot, self.context.lease, self.context.clock.now
         capabilities, message = robot.capabilities(), f"opening the {name}"
         if not capabilities.opens_doors:

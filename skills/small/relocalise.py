@@ -1,4 +1,4 @@
-"""The relocalise skill: searches the whole map for the robot's pose, standing, then turning, then driving a little."""
+"""The relocalise skill: searches the whole map for the robot's pose; first standing, then turning, then driving."""
 
 import math
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ _BEYOND_M = 5.0
 
 @dataclass(frozen=True)
 class FreeSpaceOptions:
-    """Heights of obstacles above the floor, and the body's clearance from them (m)."""
+    """Range of heights that count as obstacles, and the body's clearance from obstacles (m)."""
 
     heights_m: tuple[Height, Height] = (0.1, 1.2)
     side_m: Margin = 0.15
@@ -33,7 +33,7 @@ class FreeSpaceOptions:
 
 
 def obstacles_B(scan: Scan, capabilities: Capabilities, options: FreeSpaceOptions) -> FloatArray:
-    """Returns the points (N, 2) of a scan in the body frame that the body would hit, without its own outline."""
+    """Returns the scan points (N, 2) in the body frame that the body could hit, without its own outline."""
     points = scan.points_B()
     heights = points[:, 2] + scan.X_OB.translation()[2]
     x, y = points[:, 0], points[:, 1]
@@ -45,7 +45,7 @@ def obstacles_B(scan: Scan, capabilities: Capabilities, options: FreeSpaceOption
 
 
 def free_m(obstacles: FloatArray, heading_rad: float, capabilities: Capabilities, options: FreeSpaceOptions) -> float:
-    """Returns how far (m) the body can go straight once it has turned to a heading in the body frame."""
+    """Returns how far (m) the body can drive straight after it has turned to a heading in the body frame."""
     corners = np.asarray(capabilities.footprint_m)
     front, half = corners[:, 0].max(), np.abs(corners[:, 1]).max() + options.side_m
     c, s = math.cos(heading_rad), math.sin(heading_rad)
@@ -67,7 +67,7 @@ _LEAST_STEP_M = 0.15
 
 @dataclass(frozen=True)
 class RelocaliseInputs:
-    """Largest numbers of headings to search in, an eighth of a turn apart, and of drives elsewhere."""
+    """Maximum numbers of headings to search from, an eighth of a turn apart, and of drives to other places."""
 
     turns: Tries = 8
     drives: Tries = 3
@@ -75,10 +75,11 @@ class RelocaliseInputs:
 
 @dataclass(frozen=True)
 class RelocaliseOptions:
-    """Time of a search (s), speed and angle of the turns between searches.
+    """Latency of a search (s), and speed and angle of the turns between searches.
 
-    Between rounds of turns the robot drives up to `drive_m`, in steps of `step_m` with a look ahead before each. It
-    knows its pose once scans have agreed for `agree_s` and the estimate's health is at least `good_health`.
+    `drive_m` and `step_m`: between rounds of turns the robot drives up to this far, in steps with a look ahead before
+    each. `agree_s` and `good_health`: the pose is accepted once scans have agreed for this time and the estimate's
+    health is at least this.
     """
 
     search_latency_s: Delay = 1.0
@@ -94,7 +95,7 @@ class RelocaliseOptions:
 
 
 class Relocalise(MovingSkill[RelocaliseInputs]):
-    """Finds the robot's pose on the map again. A pose counts once new scans agree with it for a second."""
+    """Recovers the robot's pose on the map. A pose is accepted once new scans agree with it for `agree_s`."""
 
     name: ClassVar[str] = "relocalise"
     Inputs: ClassVar[type] = RelocaliseInputs
@@ -110,7 +111,7 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
     options: RelocaliseOptions
 
     def run(self, inputs: RelocaliseInputs) -> Routine[Succeeded]:
-        """Searches the whole map; turns a little and searches again; after a full round drives elsewhere."""
+        """Searches the whole map; turns a little and searches again; after a full round drives to another place."""
         localiser = self.context.localiser
         if not isinstance(localiser, SearchingLocaliser):
             raise SkillFailure(Cause.PRECONDITION, "the localiser of this robot cannot search the map")
@@ -129,7 +130,7 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
         raise SkillFailure(Cause.POSTCONDITION, "no place on the map fits what the robot sees")
 
     def _found(self, localiser: Localiser) -> Routine[bool]:
-        """Searches with a new scan, uses the pose found, and checks whether the next scans agree."""
+        """Searches with a new scan, adopts the pose found, and checks whether the next scans agree."""
         message = "searching the whole map"
         scan = yield from self._new_scan(message)
         assert isinstance(localiser, SearchingLocaliser)
@@ -146,7 +147,7 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
         return (yield from self._agreed(localiser))
 
     def _found_by_tag(self, localiser: Localiser) -> Routine[bool]:
-        """Looks for the tags on walls; uses the pose from which one is seen where the map has it, if scans agree."""
+        """Looks for tags on walls; adopts the pose that puts a tag where the map has it, if scans agree."""
         assert isinstance(localiser, SearchingLocaliser)
         walls = {tag.id: tag for tag in self.context.tags if tag.on is None}
         sizes_m = {tag.id: tag.size_m for tag in walls.values()}
@@ -161,7 +162,7 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
         return False
 
     def _agreed(self, localiser: Localiser) -> Routine[bool]:
-        """Returns whether the scans of a whole second agree with the map."""
+        """Returns whether the scans agree with the map for `agree_s`."""
         context = self.context
         begun_s = context.clock.now()
         while (estimate := localiser.estimate()).localised:
@@ -173,7 +174,7 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
         return False
 
     def _new_scan(self, message: str) -> Routine[Scan]:
-        """Returns a scan that is taken from now on."""
+        """Returns the first scan taken from now on."""
         context = self.context
         begun_s = context.clock.now()
         while (scan := context.robot.scan()) is None or scan.stamp_s < begun_s - 0.11:
@@ -183,7 +184,7 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
         return scan
 
     def _turn(self, turn_rad: float) -> Routine[None]:
-        """Turns slowly on the spot by a signed angle, where there is space, and comes to rest."""
+        """Turns slowly on the spot by a signed angle, if there is space, and comes to rest."""
         scan = yield from self._new_scan("looking for space to turn")
         capabilities, free_space = self.context.robot.capabilities(), self.options.free_space
         if not can_turn(obstacles_B(scan, capabilities, free_space), capabilities, free_space):
@@ -215,7 +216,7 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
         return driven_m > 0.0
 
     def _free_ahead_m(self) -> Routine[float]:
-        """Returns how far (m) the robot can go straight, by a new scan and a depth picture of each front camera."""
+        """Returns how far (m) the robot can drive straight, from a new scan and a depth image of each front camera."""
         message, robot, low = "looking ahead", self.context.robot, self.options.low
         scan = yield from self._new_scan(message)
         capabilities, free_space = robot.capabilities(), self.options.free_space
@@ -228,7 +229,7 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
         return free_m(np.concatenate(points), 0.0, capabilities, free_space)
 
     def _low_points(self, source: str, low: WatchOptions) -> Routine[FloatArray]:
-        """Returns the points (N, 3) that a depth camera sees low above the floor, in the odom frame."""
+        """Returns points (N, 3) low above the floor from a depth camera, in the odom frame."""
         robot = self.context.robot
         job = self.context.worker.sense(
             lambda: robot.image(source, visual=False),

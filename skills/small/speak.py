@@ -1,4 +1,4 @@
-"""The speak skill says a sentence to the people around; skills that move speak and listen by the same means."""
+"""The speak skill says a sentence to the people around; skills that move speak and listen through this module."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -29,10 +29,10 @@ class SpeakOptions:
 
 
 class Speak(Skill[SpeakInputs]):
-    """Says a text once, and waits as long as saying it takes. Moves nothing.
+    """Says a text once, and waits as long as saying it takes. Commands no motion.
 
-    The text is published under the topic `speech` when it begins; a viewer of the run says it aloud or in writing, and
-    in a silent zone, which the message names, in writing only.
+    The text is published under the topic `speech` when it begins. A viewer of the run says it aloud or shows it; in a
+    silent zone, which the message names, it is only shown.
     """
 
     name: ClassVar[str] = "speak"
@@ -45,7 +45,7 @@ class Speak(Skill[SpeakInputs]):
     _begun_s: float | None = None
 
     def begin(self, inputs: SpeakInputs) -> None:
-        """Says the text, unless that is refused."""
+        """Says the text, unless it cannot be said."""
         self._text = " ".join(inputs.text.split())
         self._refusal = _refusal(self._text)
         self._begun_s = self.context.clock.now()
@@ -68,13 +68,13 @@ class Speak(Skill[SpeakInputs]):
         return Succeeded(f'said "{self._text}"')
 
     def resume(self, inputs: SpeakInputs) -> None:
-        """Says the text again only after a restart, when nobody knows how much of it was heard."""
+        """Says the text again only after a restart, when it is unknown how much of it was heard."""
         if self._begun_s is None:
             self.begin(inputs)
 
 
 def say(context: SkillContext, text: str) -> str | None:
-    """Says a text, without waiting until it is said; in a silent zone only shows it, and returns the zone's name."""
+    """Says a text without waiting for its end; in a silent zone only shows it, and returns the zone's name."""
     message = {"robot": context.robot.name, "text": text, "t": round(context.clock.now(), 6)}
     if silent := context.silent_zone():
         message["silent"] = silent
@@ -92,13 +92,13 @@ def _refusal(text: str) -> Failed | None:
 
 
 class ListeningSkill(RoutineSkill[InputsT]):
-    """Routine that hears what people say to the robot; nothing while it is suspended."""
+    """Routine that hears what people say to the robot, except while it is suspended."""
 
     _heard: Job[str] | None = None
 
     @property
     def remark(self) -> str | None:
-        """Words that somebody has said, or nothing so far."""
+        """Words that somebody has said; None when nobody has spoken."""
         return self._heard.result() if self._heard is not None and self._heard.done() else None
 
     def ask_for_name(
@@ -106,7 +106,7 @@ class ListeningSkill(RoutineSkill[InputsT]):
     ) -> Routine[str | None]:
         """Asks "Are you Robin?"; returns "yes", "no", or "" when nobody answers within answer_s.
 
-        Waits by `tick`; returns None once `enough` holds.
+        Yields from `tick` while it waits; returns None once `enough` holds.
         """
         name = f"{self.name} of {self.context.robot.name}"
         asked = self.context.ask(Question(name, f"Are you {person}?", ("yes", "no"), "", answer_s))
@@ -125,7 +125,7 @@ class ListeningSkill(RoutineSkill[InputsT]):
         self._heard = self.context.listen()
 
     def suspend(self) -> None:
-        """Listens no longer; see `RoutineSkill.suspend`."""
+        """Stops listening; see `RoutineSkill.suspend`."""
         self._stop_listening()
         super().suspend()
 
@@ -135,7 +135,7 @@ class ListeningSkill(RoutineSkill[InputsT]):
         self._heard = self.context.listen()
 
     def end(self) -> None:
-        """Listens no longer; see `RoutineSkill.end`."""
+        """Stops listening; see `RoutineSkill.end`."""
         self._stop_listening()
         super().end()
 

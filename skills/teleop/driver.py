@@ -1,6 +1,6 @@
 """Teleoperation of body, arm and gripper by keys and sticks, within the limits of the skills.
 
-Dead-man's switch: keys count for `life_s` on the robot's clock. All commands expire by then, or end at rest.
+Dead-man's switch: a key is valid for `life_s` on the robot's clock. By then every command has expired or ends at rest.
 """
 
 import math
@@ -53,7 +53,7 @@ KEYS: Final[Mapping[str, tuple[str, float]]] = {
 
 
 def axis_values(keys: Iterable[str], sticks: Mapping[str, float] | None = None) -> dict[str, float]:
-    """Axis values of held keys and sticks together, each within [-1, 1]; keys without a meaning count as none."""
+    """Axis values from held keys and sticks together, each within [-1, 1]; ignores keys without a meaning."""
     asked = dict(sticks or {})
     for axis, sign in (KEYS[key] for key in keys if key in KEYS):
         asked[axis] = asked.get(axis, 0.0) + sign
@@ -88,7 +88,7 @@ class ArmOptions:
 
 @dataclass(frozen=True)
 class ArmMotion:
-    """Joint angles and rates at a time (s), from which on the arm brakes for `braking_s`."""
+    """Joint angles and rates at the time `at_s`, after which the arm brakes for `braking_s`."""
 
     at_s: float
     q_rad: FloatArray
@@ -105,7 +105,7 @@ class ArmMotion:
 
 
 class HandControl:
-    """Converter of axis values into arm trajectories, each of which continues the last one."""
+    """Converts axis values to arm trajectories, each of which continues the previous one."""
 
     def __init__(self, model: ArmModel, options: ArmOptions) -> None:
         self._model, self._options = model, options
@@ -115,7 +115,7 @@ class HandControl:
     def next(
         self, asked: Mapping[str, float], now_s: float, q_measured_rad: FloatArray, scene: ArmScene
     ) -> ArmTrajectory | None:
-        """The trajectory from now on, None while the arm rests; `note` is the reason why the arm stops."""
+        """The trajectory from now on; None while the arm rests. `note` is the reason why the arm stops."""
         options = self._options
         q, rate = (q_measured_rad, np.zeros(len(q_measured_rad)))
         if self._motion is not None:
@@ -166,7 +166,7 @@ class HandControl:
 
 
 def _slewed(rate: FloatArray, wanted: FloatArray, most: float) -> FloatArray:
-    """The rate nearest to the wanted one within the most change."""
+    """The rate nearest to the wanted one that differs from `rate` by at most `most`."""
     change = wanted - rate
     return np.asarray(rate + change * min(1.0, most / max(float(np.max(np.abs(change))), 1e-9)))
 
@@ -187,8 +187,7 @@ _ARM: frozenset[str] = frozenset((*HAND, *JOINTS))
 class TeleopOptions:
     """Limits of teleoperation; speeds and accelerations of the base are those of the path follower.
 
-    The base keeps `margin_m` of clearance on the ground that it covers in `reaction_s` and while it brakes at
-    `stop_m_s2`.
+    `margin_m`: clearance on the ground that the base covers in `reaction_s` and while it brakes at `stop_m_s2`.
     """
 
     life_s: Delay = 0.3
@@ -242,7 +241,7 @@ class Teleop:
         )
 
     def tick(self) -> None:
-        """Sends the commands for the next period; `note` is the reason why the robot does not obey, if it does not."""
+        """Sends the commands for the next period; `note` is the reason when the robot does not obey, else empty."""
         asked, at_s = self._asked
         now_s, until_s = self._context.clock.now(), at_s + self._options.life_s
         alive = now_s + self._options.period_s <= until_s + 1e-9
@@ -278,7 +277,7 @@ class Teleop:
         self._base.stop()
 
     def _clear(self, velocity: FloatArray) -> bool:
-        """Returns whether the ground that the body covers until it stands is free, or the clearance grows."""
+        """Returns whether the ground that the body covers until it stands is free, or its clearance grows."""
         options, here = self._options, self._context.pose()
         until_s = options.reaction_s + float(np.hypot(*velocity[:2])) / (2.0 * options.stop_m_s2)
         times = np.linspace(0.0, until_s, 6)
@@ -331,7 +330,7 @@ class Teleop:
         self._commands.append(self._context.robot.stand(*self._posture, until_s=until_s, lease=lease))
 
     def _refusal(self) -> str:
-        """Reason why the robot refused one of the commands, empty when it accepted them all."""
+        """Reason why the robot refused one of the commands; empty when it accepted all of them."""
         statuses = [self._context.robot.command_status(command) for command in self._commands]
         refused = next((one.reason for one in statuses if one.state is CommandState.REFUSED), "")
         return self._base.refusal() or refused

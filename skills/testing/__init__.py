@@ -1,1 +1,1 @@
-"""Tools to test skills: a clock that the test moves, and a scripted robot with exact estimators in a small world."""
+"""Tools for testing skills: a clock driven by the test, and a scripted robot with exact estimators in a small world."""

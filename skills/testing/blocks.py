@@ -1,4 +1,4 @@
-"""A small world of upright blocks, and LiDAR scans and depth images of it by ray casting."""
+"""A small world of upright blocks, with LiDAR scans and depth images rendered by ray casting."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NOTHING_COLOUR: Colour = (20, 20, 20)
 class Block:
     """Upright block from (x0, y0) to (x1, y1) in the world frame (m), from height z0 to z1, of one colour (RGB).
 
-    A robot can grasp a `loose` block. Raises ValueError for a block without extent.
+    A robot can grasp a `loose` block. The constructor raises ValueError for a block without extent.
     """
 
     x0: float
@@ -40,12 +40,12 @@ class Block:
             raise ValueError(f"{self}: x0 < x1, y0 < y1 and z0 < z1 must hold")
 
     def holds(self, point_W: FloatArray, margin_m: float = 0.0) -> bool:
-        """Returns whether a point (3,) lies in the block, or within a margin of it."""
+        """Returns whether a point (3,) lies in the block grown by margin_m."""
         low, high = np.array([self.x0, self.y0, self.z0]), np.array([self.x1, self.y1, self.z1])
         return bool(np.all(point_W >= low - margin_m) and np.all(point_W <= high + margin_m))
 
     def standing_at(self, x: float, y: float, z: float) -> Block:
-        """Moves the block: the middle of its base is then at (x, y, z)."""
+        """Returns the block moved so that the centre of its base is at (x, y, z)."""
         dx, dy = 0.5 * (self.x1 - self.x0), 0.5 * (self.y1 - self.y0)
         return replace(self, x0=x - dx, y0=y - dy, x1=x + dx, y1=y + dy, z0=z, z1=z + self.z1 - self.z0)
 
@@ -70,7 +70,7 @@ TABLE_CAN: Block = can_at(1.38, 0.0, 0.75)
 
 
 def block_array(blocks: Sequence[Block]) -> FloatArray:
-    """Rows x0, y0, z0, x1, y1, z1 (B, 6) of blocks."""
+    """Rows x0, y0, z0, x1, y1, z1 (B, 6), one per block."""
     return np.array([(b.x0, b.y0, b.z0, b.x1, b.y1, b.z1) for b in blocks], dtype=np.float64).reshape(-1, 6)
 
 
@@ -78,10 +78,10 @@ def block_array(blocks: Sequence[Block]) -> FloatArray:
 def cast_rays(
     origin: FloatArray, directions: FloatArray, blocks: FloatArray, limit: float
 ) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Casts rays in directions (N, 3): distance to the first hit, and the number of the block that is hit.
+    """Casts rays in directions (N, 3); returns the distance to the first hit and the index of the block that is hit.
 
-    A miss within the limit gives NaN and -1, and the floor at height 0 the number -2. Distances are multiples of the
-    direction's length, so that directions with z = 1 in a camera give depth.
+    A ray without a hit up to `limit` gives NaN and -1, and the floor at height 0 the index -2. Distances are multiples
+    of the direction's length, so that directions with z = 1 in the camera frame give depth.
     """
     low, high = blocks[:, :3] - origin, blocks[:, 3:] - origin
     inverse = 1.0 / np.where(np.abs(directions) > 1e-12, directions, 1e-12)
@@ -110,7 +110,7 @@ def cast_rays(
 
 @compiled
 def distances_from(blocks: FloatArray, points: FloatArray) -> FloatArray:
-    """Distance of each point (x, y) from the nearest block, seen from above (m); negative within one."""
+    """Distance from each point (x, y) to the nearest block, seen from above (m); negative inside a block."""
     distances = np.empty(len(points))
     for n in range(len(points)):
         nearest, x, y = np.inf, points[n, 0], points[n, 1]
@@ -122,13 +122,13 @@ def distances_from(blocks: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def colours_of(blocks: Sequence[Block], hits: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """Colours RGB (N, 3) of the hits of rays; -1 stands for nothing, -2 for the floor."""
+    """Colours RGB (N, 3) at the hits of rays; -1 stands for no hit, -2 for the floor."""
     palette = np.array([*(b.colour for b in blocks), FLOOR_COLOUR, NOTHING_COLOUR], dtype=np.uint8)
     return np.asarray(palette[hits])
 
 
 def grid_of(blocks: Sequence[Block], band_m: tuple[float, float], resolution_m: float = 0.05) -> GridMap:
-    """Exact grid map of the blocks that stand in a band of heights."""
+    """Exact grid map of the blocks that reach into a band of heights."""
     x0, y0 = min(b.x0 for b in blocks) - 0.2, min(b.y0 for b in blocks) - 0.2
     columns = math.ceil((max(b.x1 for b in blocks) + 0.2 - x0) / resolution_m)
     rows = math.ceil((max(b.y1 for b in blocks) + 0.2 - y0) / resolution_m)
@@ -151,7 +151,7 @@ _DOWN_30 = RotationMatrix(RollPitchYaw(0.0, math.radians(30.0), 0.0)) @ _AHEAD
 
 @dataclass(frozen=True)
 class CameraMount:
-    """A camera on a frame of the robot ("body", "hand" or "head"): X_FC, lens, and the range of depth (m)."""
+    """A camera on a frame of the robot ("body", "hand" or "head"): X_FC, lens, and depth range (m)."""
 
     frame: str
     X_FC: RigidTransform
@@ -167,7 +167,7 @@ FRONT_CAMERAS = tuple(CameraCapabilities(name, _AT_FRONT) for name in ("frontlef
 
 
 def mount_of(camera: CameraCapabilities, *, fine: bool = False) -> CameraMount:
-    """Mount of a robot's camera, with a lens of this module: fine for a camera that looks for objects."""
+    """Mount for a robot's camera with a lens of this module: `fine` for the camera that searches for objects."""
     lens = _HAND_LENS if fine or camera.mount is not Mount.BODY else _BODY_LENS
     return CameraMount(camera.mount.value, camera.X_FC, lens)
 
@@ -204,7 +204,7 @@ def take_picture(
     *,
     noise_m: float = 0.001,
 ) -> Image:
-    """Takes a picture by a camera on the frame F at its true pose X_WF."""
+    """Takes a picture with a camera on the frame F at its true pose X_WF."""
     lens = mount.lens
     u, v = np.meshgrid(np.arange(lens.width), np.arange(lens.height))
     rays_C = np.stack([(u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy, np.ones_like(u, dtype=float)], axis=-1)

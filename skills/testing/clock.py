@@ -1,4 +1,4 @@
-"""Clock that only the test moves."""
+"""Clock that only the test advances."""
 
 from __future__ import annotations
 
@@ -8,10 +8,7 @@ STEP_S = 0.01
 
 
 class VirtualClock:
-    """Clock that only `advance` moves; it calls what is attached in steps of 0.01 s.
-
-    Implements `skills.robot.Clock`.
-    """
+    """Clock that only `advance` moves, in steps of 0.01 s with calls of what is attached; a `skills.robot.Clock`."""
 
     def __init__(self) -> None:
         self._now_s = 0.0
@@ -26,7 +23,7 @@ class VirtualClock:
         return self._now_s
 
     def advance(self, dt_s: float) -> None:
-        """Advances by dt_s seconds, in whole steps of 0.01 s and a remainder."""
+        """Advances by dt_s seconds, in whole steps of 0.01 s and the remainder."""
         whole, rest = divmod(round(dt_s, 9), STEP_S)
         steps = [STEP_S] * int(whole) + ([rest] if rest > 1e-9 else [])
         for step_s in steps:

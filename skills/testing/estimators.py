@@ -20,9 +20,9 @@ _COVARIANCE = np.eye(3) * 1e-4
 
 
 class KnownPlace:
-    """Localiser that knows the start of the odometry and trusts it. Implements `skills.api.SearchingLocaliser` too.
+    """Localiser that knows where odometry started and trusts it. Implements `skills.api.SearchingLocaliser` too.
 
-    Set `localised` to False to make the robot lost. The stamp is that of the last odometry.
+    Set `localised` to False to simulate a lost robot. The stamp is that of the last odometry.
     """
 
     def __init__(self, start: Pose2D | None = None) -> None:
@@ -34,7 +34,7 @@ class KnownPlace:
         return LocalisationEstimate(self._stamp_s, self._X_WO, _COVARIANCE, self.localised)
 
     def update(self, robot: Robot) -> None:
-        """Reads the stamp of the odometry."""
+        """Reads the odometry's stamp."""
         self._stamp_s = robot.odometry().stamp_s
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
@@ -42,21 +42,18 @@ class KnownPlace:
         return LocalisationEstimate(scan.stamp_s, self._X_WO, _COVARIANCE, True)
 
     def accept(self, estimate: LocalisationEstimate) -> None:
-        """Accepts an estimate; the robot is no longer lost."""
+        """Marks the robot as localised; the estimate itself is exact already."""
         self._X_WO, self.localised = estimate.X_WO, True
 
 
 class BlockCostmap:
-    """Costmap of the blocks that the body could touch (heights 0.05 to 1.0 m).
-
-    Implements `skills.api.Costmap`.
-    """
+    """Costmap of the blocks that the body could touch (heights 0.05 to 1.0 m). Implements `skills.api.Costmap`."""
 
     def __init__(self, blocks: Sequence[Block] = ()) -> None:
         self._blocks = block_array([block for block in blocks if block.z0 < 1.0 and block.z1 > 0.05])
 
     def clearance_m(self, points_W: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance of each point (x, y) from the nearest block (m), negative within one."""
+        """Distance from each point (x, y) to the nearest block (m); negative inside a block."""
         if not len(self._blocks):
             return np.full(len(points_W), OPEN_M)
         return distances_from(self._blocks, np.ascontiguousarray(points_W, dtype=np.float64))

@@ -1,4 +1,4 @@
-"""Commands of the scripted robot: one at a time for each part, with expiry."""
+"""Commands of the scripted robot, with expiry: each part runs one at a time."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -37,7 +37,7 @@ class Commands:
         return command
 
     def finish(self, part: str, state: CommandState, reason: str = "", cause: CommandCause = CommandCause.NONE) -> None:
-        """Ends the part's running command, if any."""
+        """Ends the part's running command; does nothing when none is running."""
         active = self._active.pop(part, None)
         if active is not None:
             self._statuses[active.id] = CommandStatus(state, reason, cause)
@@ -49,7 +49,7 @@ class Commands:
                 self.finish(part, CommandState.STOPPED, "stopped", cause)
 
     def expire(self, now_s: float) -> None:
-        """Ends the commands whose time is over: a drive is done, any other is stopped short of its goal."""
+        """Ends commands at their expiry: a drive is then done, any other is stopped before its goal."""
         for part, active in list(self._active.items()):
             if now_s > active.until_s:
                 if part == "drive":
@@ -58,7 +58,7 @@ class Commands:
                     self.finish(part, CommandState.STOPPED, "expired", CommandCause.LATE)
 
     def active(self, part: str) -> ActiveCommand | None:
-        """Running command of a part, if any."""
+        """Running command of a part; None when there is none."""
         return self._active.get(part)
 
     def status(self, command: CommandId) -> CommandStatus:

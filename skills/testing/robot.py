@@ -69,9 +69,9 @@ BASE_ONLY = Capabilities(
 class Start:
     """Initial state: true pose in the world, arm angles (default: stowed), gripper, charge.
 
-    `in_gripper_rad` is the opening at which a closing gripper meets an object between its fingers (None: no object).
-    With `holding` the gripper begins closed about the object. A `docked` robot charges. From `pulled_at_s` on, a person
-    pulls the object.
+    `in_gripper_rad` is the opening at which a closing gripper touches an object between its fingers (None: no object).
+    With `holding` the gripper starts closed around the object. A `docked` robot charges. From `pulled_at_s` on, a
+    person pulls at the object.
     """
 
     pose: Pose2D = field(default_factory=lambda: Pose2D(0.0, 0.0, 0.0))
@@ -84,11 +84,12 @@ class Start:
 
 
 class ScriptedRobot:
-    """Robot that moves exactly as commanded, without a real robot's precautions; `calls` records the verbs used.
+    """Robot that moves exactly as commanded, without a real robot's safety functions; `calls` records the verbs used.
 
     It drives through the `blocks` of its world, but can pick and place loose ones. A grip of less than 2 N drops the
-    object. Odometry is exact but for `odometry_scale` and `yaw_drift_rad_per_m`; `lidar` is the number of azimuths and
-    the noise (m), `fine_camera` the one with a fine lens. Its clock moves it. Implements `skills.robot.Robot`.
+    object. Odometry is exact except for `odometry_scale` and `yaw_drift_rad_per_m`. `lidar` is the number of azimuths
+    and the noise (m); `fine_camera` is the camera with a fine lens. It moves when its clock advances. Implements
+    `skills.robot.Robot`.
     """
 
     def __init__(
@@ -136,12 +137,12 @@ class ScriptedRobot:
 
     @property
     def arm(self) -> ArmModel:
-        """Kinematics of the arm. Raises ValueError for a robot without an arm."""
+        """Kinematics of the arm. Raises ValueError when the robot has no arm."""
         return arm_model(self._capabilities)
 
     @property
     def holding(self) -> bool:
-        """Returns whether the gripper is closed about an object."""
+        """Returns whether the gripper is closed around an object."""
         met_rad = self.in_gripper_rad
         return met_rad is not None and self.clamp_force_n > 0.0 and self.opening <= met_rad + 0.02
 
@@ -160,7 +161,7 @@ class ScriptedRobot:
         self.calls.append("own_localisation")
 
     def imu(self) -> Imu:
-        """Latest inertial measurement: at rest but for the turn rate."""
+        """Latest inertial measurement: at rest except for the turn rate."""
         self.calls.append("imu")
         return Imu(self._clock.now(), (0.0, 0.0, float(self.velocity[2])), (0.0, 0.0, 9.81))
 
@@ -173,7 +174,7 @@ class ScriptedRobot:
         return self._scan
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        """Takes a picture with colour and depth, whatever is asked for. Raises ValueError for an unknown source."""
+        """Takes a picture with colour and depth, whatever is requested. Raises ValueError for an unknown source."""
         self.calls.append("image")
         cameras = {each.source: each for each in self._capabilities.cameras}
         if (camera := cameras.get(source)) is None:
@@ -211,7 +212,7 @@ class ScriptedRobot:
         return Battery(self._clock.now(), self.charge)
 
     def faults(self) -> tuple[str, ...]:
-        """Present faults, empty when there are none."""
+        """Present faults; an empty tuple when there are none."""
         self.calls.append("faults")
         return self.present_faults
 
@@ -299,7 +300,7 @@ class ScriptedRobot:
         return self.take_lease(holder)
 
     def take_lease(self, holder: str) -> Lease:
-        """Takes the lease from any holder; the robot stops."""
+        """Takes the lease away from its holder; the robot stops."""
         self._commands.stop(None, CommandCause.NO_LEASE)
         self._lease_number += 1
         self._lease = Lease(self._name, holder, self._lease_number, "scripted")
@@ -313,7 +314,7 @@ class ScriptedRobot:
             self._lease = None
 
     def lease_holder(self) -> Lease | None:
-        """Valid lease; None while it is free."""
+        """Valid lease; None while nobody holds one."""
         return self._lease
 
     @property
@@ -420,7 +421,7 @@ class ScriptedRobot:
         return np.asarray(self._X_WB() @ self.arm.X_BH(self.q_rad) @ np.array([grip_m, 0.0, 0.0]))
 
     def _grasp(self) -> None:
-        """Takes the loose block between the fingers, if there is one."""
+        """Grasps the loose block between the fingers, if there is one."""
         gripper = self._capabilities.gripper
         place_W = self._between_fingers_W()
         block = next((b for b in self.blocks if b.loose and b.holds(place_W, _FINGER_M)), None)
@@ -438,7 +439,7 @@ class ScriptedRobot:
         self.held = self.in_gripper_rad = None
 
     def _below_fingers_m(self) -> float:
-        """Height of the fingers' middle above the block or floor below it (m)."""
+        """Height (m) of the point between the fingers above the block or floor below."""
         x, y, z = (float(v) for v in self._between_fingers_W())
         tops = [b.z1 for b in self.blocks if b.x0 <= x <= b.x1 and b.y0 <= y <= b.y1 and b.z1 <= z]
         return z - max(tops, default=0.0)

@@ -1,4 +1,4 @@
-"""Spot's URDF text, made from the facts in `spot.yaml` and primitive shapes.
+"""Spot's URDF text, built from the parameters in `spot.yaml` and primitive shapes.
 
 Visual meshes come from a data package if it is installed; else the collision shapes are drawn.
 """
@@ -26,16 +26,16 @@ _MESH_PREFIX = {"fl": "front_left", "fr": "front_right", "hl": "rear_left", "hr"
 
 @cache
 def spot_facts() -> Mapping[str, Any]:
-    """Facts in `spot.yaml`."""
+    """Parameters in `spot.yaml`."""
     facts: Mapping[str, Any] = read_yaml(FACTS).data
     return facts
 
 
 def spot_urdf(*, visuals: bool = False, pads: bool = True) -> str:
-    """URDF text of Spot with arm and LiDAR; root link `body`, free.
+    """URDF text of Spot with arm and LiDAR; root link `body`, with a floating base.
 
-    With `visuals` it is drawn by meshes under `package://spot_visuals/`, else by the collision shapes. Motion planning
-    omits the rubber `pads`, which stand a few millimetres proud of the jaws.
+    With `visuals` it is drawn with meshes under `package://spot_visuals/`, else with the collision shapes. Motion
+    planning omits the rubber `pads`, which protrude a few millimetres from the jaws.
     """
     facts = spot_facts()
     robot = ElementTree.Element("robot", name="spot")

@@ -1,4 +1,4 @@
-"""The planar floating base under Spot's body in place of the legs: five joints with effort limits.
+"""The planar floating base that replaces the legs below Spot's body: five joints with effort limits.
 
 World -> prismatic x -> prismatic y -> revolute yaw -> prismatic height -> revolute pitch -> weld -> body.
 """
@@ -36,7 +36,7 @@ from skills.robot import FloatArray, Pose2D, quantities
 
 @dataclass(frozen=True)
 class FloatingBaseLimits(LocomotionLimits):
-    """Limits of a planar floating base that bears the body; forces in N, torques in N m."""
+    """Limits of a planar floating base that carries the body; forces in N, torques in N m."""
 
     speed_m_s: quantities.Speed = 1.6
     turn_rate_rad_s: quantities.TurnRate = 2.0
@@ -109,12 +109,12 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
 
     @property
     def velocity(self) -> Velocity:
-        """Commanded velocity now, after the acceleration limit."""
+        """Present commanded velocity, after the acceleration limit."""
         return self._velocity
 
     @property
     def posture(self) -> tuple[float, float]:
-        """Commanded height and pitch now, after the speed limits."""
+        """Present commanded height and pitch, after the speed limits."""
         return self._posture
 
     def pose(self, positions: FloatArray) -> list[float]:
@@ -128,7 +128,7 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
         return [joint.position_start() for joint in self._joints]
 
     def place(self, context: Context, pose: Pose2D, height_m: float) -> None:
-        """Sets the body's pose at the beginning of a run."""
+        """Sets the body's pose at the start of a run."""
         values = (pose.x_m, pose.y_m, pose.yaw_rad, height_m, 0.0)
         positions = self._plant.GetPositions(context)
         positions[self._places] = values

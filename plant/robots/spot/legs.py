@@ -1,4 +1,4 @@
-"""Spot's legs: the trot plans the feet, leg kinematics and servos move them there."""
+"""Spot's legs: the trot plans the feet; leg kinematics and servos move them there."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SIDES = {"fl": (1.0, 1.0), "fr": (1.0, -1.0), "hl": (-1.0, 1.0), "hr": (-1.0, -
 
 
 class UnreachableFootError(ValueError):
-    """A target of a foot outside the reach of its leg."""
+    """Error of a foot target outside the reach of its leg."""
 
 
 def nominal_footholds() -> FloatArray:
@@ -31,7 +31,7 @@ def nominal_footholds() -> FloatArray:
 
 @dataclass(frozen=True)
 class LegKinematics:
-    """Geometry of one leg: `p_BHip` is the hip-x joint, `side_m` the signed offset to hip y, the rest link vectors."""
+    """Geometry of one leg: `p_BHip` is the hip-x joint, `side_m` the signed offset to hip y; the rest link vectors."""
 
     p_BHip: tuple[float, float, float]
     side_m: float
@@ -70,7 +70,7 @@ class LegKinematics:
         return np.array([x, c * y - s * z, s * y + c * z]) + self.p_BHip
 
     def joints(self, p_BFoot: Sequence[float]) -> tuple[float, float, float]:
-        """Joint angles (hip x, hip y, knee; rad) of a foot position, with the knee bent backwards.
+        """Joint angles (hip x, hip y, knee; rad) for a foot position, with the knee bent backwards.
 
         Raises UnreachableFootError when the foot would lie beyond the stretched leg or inside its smallest fold.
         """
@@ -98,7 +98,7 @@ class LegServos(Stateful, saved=("_last",)):
     """Servos of the legs: joint set points for the feet that the gait plans."""
 
     def __init__(self, index: JointIndex, rest_rad: FloatArray) -> None:
-        """`rest_rad`: (4, 3) joint angles at the beginning."""
+        """`rest_rad` (4, 3) are the joint angles at the start."""
         self._lower, self._upper = index.lower[index.legs], index.upper[index.legs]
         self._kinematics = [LegKinematics.from_facts(leg) for leg in LEGS]
         self.rest_rad = rest_rad.copy()
@@ -128,7 +128,7 @@ _PAIRS = ((0, 3), (1, 2))  # indices into LEGS: fl with hr, fr with hl
 
 @dataclass(frozen=True)
 class TrotParameters:
-    """Shape of the trot: time and height of a swing, and largest distance of a resting foot from its place."""
+    """Shape of the trot: time and height of a swing, and largest distance of a standing foot from its foothold."""
 
     swing_s: float = 0.28
     swing_height_m: float = 0.07
@@ -148,7 +148,7 @@ class BodyMotion:
     wz: float
 
     def ahead(self, dt_s: float) -> tuple[float, float, float]:
-        """Pose (x, y, yaw) after dt_s at this velocity."""
+        """Pose (x, y, yaw) after dt_s at constant velocity."""
         yaw = self.yaw_rad + self.wz * dt_s
         middle = self.yaw_rad + self.wz * dt_s / 2
         c, s = math.cos(middle), math.sin(middle)
@@ -158,12 +158,12 @@ class BodyMotion:
 class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_progress_s")):
     """Trot: plans the positions of the four feet, step by step. Feet are ordered as `LEGS`.
 
-    Diagonal pairs of feet swing in turn, while the others stay on the floor. Footholds follow Raibert's rule (Legged
+    Diagonal pairs of feet swing in turn, while the others stand on the floor. Footholds follow Raibert's rule (Legged
     Robots That Balance, 1986): a foot lands below the hip's position in the middle of its next stance.
     """
 
     def __init__(self, nominal_B: FloatArray, parameters: TrotParameters | None = None) -> None:
-        """`nominal_B` has the resting positions (4, 2) of the feet in the body frame."""
+        """`nominal_B` are the resting positions (4, 2) of the feet in the body frame."""
         self._nominal_B: list[list[float]] = nominal_B.tolist()
         self._parameters = parameters or TrotParameters()
         self._feet_W = [[0.0, 0.0, 0.0] for _ in LEGS]
@@ -180,7 +180,7 @@ class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_p
 
     @property
     def stance(self) -> tuple[bool, ...]:
-        """Flags of the feet that stand on the floor."""
+        """Whether each foot stands on the floor."""
         lifted = _PAIRS[self._swinging] if self._swinging is not None else ()
         return tuple(foot not in lifted for foot in range(len(LEGS)))
 

@@ -34,7 +34,7 @@ _CELL_M = 0.01
 
 
 def visuals_folder() -> Path | None:
-    """Folder of Spot's simplified meshes, or None when the data package is not installed."""
+    """Folder of Spot's simplified meshes; None when the data package is not installed."""
     spec = importlib.util.find_spec(_MODULE)
     source = Path(spec.origin).parent / _FOLDER if spec is not None and spec.origin is not None else None
     if source is None or not source.is_dir():
@@ -128,7 +128,7 @@ class SpotModel(RobotBody):
             filters.Apply(CollisionFilterDeclaration().ExcludeBetween(GeometrySet(legs), floor))
 
     def place(self, context: Context, pose: Pose2D | None = None) -> None:
-        """Sets the robot standing with its arm stowed: at a pose, else at its start."""
+        """Places the robot, standing with its arm stowed, at a pose, or at its start when the pose is None."""
         facts, pose = spot_facts(), pose or self.robot.start
         standing = facts["legs"]["standing"]
         legs = {joint: standing[joint[-2:]] for leg in LEGS for joint in leg_joint_names(leg)}

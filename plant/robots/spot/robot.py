@@ -41,7 +41,7 @@ class SpotSensors(SensorSuite):
         )
 
     def _gripper_feels(self, positions: FloatArray, rates: FloatArray, efforts: FloatArray) -> tuple[float, float]:
-        """Angle of the finger, and the force at its tip by its motor's torque."""
+        """Angle of the finger, and the force at its tip estimated from its motor's torque."""
         gripper = self._joints.gripper
         opening = -float(positions[gripper])
         if abs(float(rates[gripper])) > _GRIPPER_MOVES_RAD_S:
@@ -56,12 +56,12 @@ _GRIPPER_TOLERANCES = GripperTolerances(arrived=0.03, stall_rate=0.03)
 
 
 class SpotRobot(CommandedRobot, saved=("_posture", "_leg_servos", "_trot", "_floating_base")):
-    """One Spot: turns the commands of the lease's holder into set points of the plant's servos."""
+    """One Spot: converts the commands of the lease holder to set points of the plant's servos."""
 
     _index: JointIndex
 
     def __init__(self, model: SpotModel, options: SensorOptions) -> None:
-        """Takes over the robot at the state of `options.context`, at time 0."""
+        """Takes control of the robot in the state of `options.context`, at time 0."""
         joints = JointIndex(model.plant, model.instance)
         super().__init__(model, joints, SpotSensors(model, joints, options), options.context, _GRIPPER_TOLERANCES)
         self._body, self._floating_base = model.body, model.floating_base
@@ -153,7 +153,7 @@ class SpotRobot(CommandedRobot, saved=("_posture", "_leg_servos", "_trot", "_flo
 def _feet_ahead(
     feet_W: Sequence[Sequence[float]], motion: BodyMotion, X_WB: FloatArray, dt_s: float
 ) -> list[tuple[float, float, float]]:
-    """Positions of the feet in the body frame after dt_s; the body moves on from X_WB (3, 4) at the same tilt."""
+    """Positions of the feet in the body frame after dt_s, when the body moves on from X_WB (3, 4) at the same tilt."""
     x, y, yaw = motion.ahead(dt_s)
     c, s = math.cos(yaw - motion.yaw_rad), math.sin(yaw - motion.yaw_rad)
     (xx, xy, xz, x0), (yx, yy, yz, y0), (zx, zy, zz, z0) = X_WB.tolist()

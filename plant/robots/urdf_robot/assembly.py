@@ -1,8 +1,8 @@
-"""URDF text of a robot as the plant and the planner of arm motions need it: few links, joined by the driven joints.
+"""URDF text of a robot for the plant and for arm planning: few links, connected by the driven joints.
 
-All links that no driven joint moves are one link `body`, whose frame is B. Below a lift, they are a link with the name
-of the root, whose frame is on the floor below B. The arm's frames are parallel to B at zero where the axes allow; the
-last is the hand frame H.
+All links that no driven joint moves form one link `body`, whose frame is B. Those below a lift form a link with the
+name of the root, whose frame is on the floor below B. The arm's frames are parallel to B at zero where the axes allow
+it; the last one is the hand frame H.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _PAD_LENGTH_M: Final = 0.045
 
 @dataclass(frozen=True)
 class _Mass:
-    """Mass (kg), centre of mass (3,) and moments (3, 3) about it, in one frame."""
+    """Mass (kg), centre of mass (3,) and moments of inertia (3, 3) about it, in one frame."""
 
     mass_kg: float
     com: FloatArray
@@ -45,10 +45,10 @@ class _Mass:
 
 
 class Assembly:
-    """A robot's URDF, with the names of its file resolved; `carriers` are the links of the text."""
+    """A robot's URDF, with the names in its file resolved; `carriers` are the links of the generated text."""
 
     def __init__(self, file: RobotFile) -> None:
-        """Reads the URDF and puts links together. Raises InputError with the place in either file."""
+        """Reads the URDF and merges links. Raises InputError at the location in either file."""
         self.file = file
         self.urdf = UrdfFile(file.source.path.parent / file.urdf)
         self._check_names()
@@ -82,7 +82,7 @@ class Assembly:
         return f"{link}_link" if link == BODY else link
 
     def carrier(self, link: str) -> str:
-        """The link of the text that a link of the file is part of."""
+        """Link of the generated text that contains a link of the file."""
         return self._carrier[link]
 
     def X_CL(self, link: str) -> RigidTransform:
@@ -93,17 +93,17 @@ class Assembly:
 
     @property
     def base_height_m(self) -> float:
-        """Height over the floor of the frame of the link `root`."""
+        """Height above the floor of the frame of the link `root`."""
         return self.file.base.height if self.file.lift is None else 0.0
 
     @property
     def hand_link(self) -> str | None:
-        """The arm's last link, whose frame is H; None without an arm."""
+        """The arm's last link, whose frame is H; None when there is no arm."""
         arm = self.file.arm
         return None if arm is None else self._name(self.urdf.joints[arm.joints[-1]].child)
 
     def axle(self) -> tuple[float, float]:
-        """Radius of the driven wheels, and half the distance between them. Raises InputError unless B is between."""
+        """Wheel radius, and half the track of the driven wheels. Raises InputError unless B is midway between them."""
         wheels = self.file.base.wheels
         assert wheels is not None
         left, right = (self.X_BL[self.urdf.joints[name].child].translation() for name in wheels.joints)
@@ -174,7 +174,7 @@ class Assembly:
     # -- frames ---------------------------------------------------------------------------------------------------
 
     def _rotation(self, joint: UrdfJoint, X_BF: RigidTransform) -> RotationMatrix:
-        """Rotation of a carrier's frame in B: that of the hand for the hand and behind it, else B's where it can be."""
+        """Rotation of a carrier's frame in B: the hand's for the hand and behind it, else B's where the axis allows."""
         if joint.name not in self.file.moving:
             return RotationMatrix()
         arm = self.file.arm
@@ -198,7 +198,7 @@ class Assembly:
         return self._text(planned=False)
 
     def planned_text(self) -> str:
-        """URDF text for planners: its root is `body`; it has no visuals and no pads, and boxes for meshes."""
+        """URDF text for planners: its root is `body`; without visuals and pads, with boxes in place of meshes."""
         return self._text(planned=True)
 
     def _text(self, *, planned: bool) -> str:
@@ -219,7 +219,7 @@ class Assembly:
         return ElementTree.tostring(robot, encoding="unicode")
 
     def _add_joint(self, robot: Element, joint: UrdfJoint, *, from_body: bool) -> None:
-        """Adds a joint; `from_body`, that of the lift carries what is below it, and still reads the same."""
+        """Adds a joint; with `from_body`, a lift joint carries the link below it, at the same joint position."""
         parent, child = self.carrier(joint.parent), self._name(joint.child)
         if joint.name not in self.file.moving:
             X_PC = self._X_BC[parent].inverse() @ self._X_BC[child]
@@ -263,7 +263,7 @@ class Assembly:
                     copied.append(contact)
 
     def _with_colour(self, material: Element) -> Element:
-        """A material with its colour, which may stand at the top of the file."""
+        """A material with its colour, which may be defined at the top of the file."""
         named = (each for each in self.urdf.robot.findall("material") if each.get("name") == material.get("name"))
         return material if len(material) else next(named, material)
 
@@ -276,7 +276,7 @@ class Assembly:
         return geometry, X_CS @ RigidTransform((low + high) / 2.0)
 
     def _pads(self, gripper: GripperFile) -> PadsFile:
-        """Rubber on the ends of fingers of which only the geometry is known."""
+        """Default rubber pads at the ends of fingers, from the geometry of the gripper."""
         first = max(gripper.palm_x, gripper.tip_x - _PAD_LENGTH_M) + _PAD_RADIUS_M
         rows = np.arange(first, gripper.tip_x - _PAD_RADIUS_M + 1e-9, _PAD_STEP_M)
         half = max(0.0, gripper.half_breadth - _PAD_RADIUS_M)
@@ -285,7 +285,7 @@ class Assembly:
     def _add_pads(
         self, element: Element, carrier: str, X_BC: RigidTransform, gripper: GripperFile, pads: PadsFile
     ) -> None:
-        """Adds rubber pads to the inner face of a finger that slides: spheres that stand a little proud of it."""
+        """Adds rubber pads to the inner face of a sliding finger: spheres that protrude a little from the face."""
         joint = next((each for each in self.joints.values() if self._name(each.child) == carrier), None)
         if joint is None or joint.name not in gripper.joints or gripper.kind is not GripperKind.PARALLEL:
             return
@@ -317,7 +317,7 @@ class Assembly:
         ElementTree.SubElement(inertial, "inertia", {key: str(value) for key, value in moments.items()})
 
     def _mass(self, link: str) -> _Mass | None:
-        """Mass of a link in its carrier's frame; None without one. Raises InputError when no body can have it."""
+        """Mass of a link in its carrier's frame; None when it has none. Raises InputError when it is not physical."""
         inertial = self.urdf.links[link].find("inertial")
         if inertial is None:
             return None
@@ -342,7 +342,7 @@ class Assembly:
 
 
 def _joined(masses: list[_Mass]) -> _Mass | None:
-    """Mass of several bodies that are one; None when there is none."""
+    """Mass of several bodies that form one; None when there is none."""
     if len(masses) == 1:
         return masses[0]
     total = sum(each.mass_kg for each in masses)

@@ -35,7 +35,7 @@ _CORNERS = 12
 
 
 class Description:
-    """A robot's file and URDF, read when they are first used, and what follows from them."""
+    """A robot's file and URDF, read when first used, and the data derived from them."""
 
     def __init__(self, path: Path) -> None:
         """`path` is the robot's `robot.yaml`."""
@@ -55,7 +55,7 @@ class Description:
 
     @cached_property
     def gripper_links(self) -> tuple[str, ...]:
-        """Links of hand and fingers, none without an arm."""
+        """Links of hand and fingers; empty without an arm."""
         assembly, gripper = self.assembly, self.file.gripper
         if assembly.hand_link is None:
             return ()
@@ -64,7 +64,7 @@ class Description:
 
     @cached_property
     def wheel_links(self) -> tuple[str, ...]:
-        """Links of wheels and casters that stand on the floor, none on a floating base."""
+        """Links of wheels and casters that touch the floor; empty on a floating base."""
         assembly, wheels = self.assembly, self.file.base.wheels
         if wheels is None:
             return ()
@@ -78,12 +78,12 @@ class Description:
 
     @cached_property
     def head_links(self) -> tuple[str, ...]:
-        """Links of pan and tilt, none without a head."""
+        """Links of pan and tilt; empty without a head."""
         return tuple(self.assembly.carrier(self.assembly.urdf.joints[name].child) for name in self.file.head or ())
 
     @cached_property
     def capabilities(self) -> Capabilities:
-        """Capabilities of the robot. Raises InputError for parts that no skill can use."""
+        """Capabilities of the robot. Raises InputError when a part is not usable by any skill."""
         base, lift, assembly = self.file.base, self.file.lift, self.assembly
         down_m, up_m = (0.0, 0.0)
         if lift is not None:

@@ -1,4 +1,4 @@
-"""Kind of a robot that a URDF and a `robot.yaml` describe."""
+"""Kind of robot built from a URDF and a `robot.yaml`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def urdf_kind(path: Path) -> RobotKind:
-    """Returns the kind of robot that a `robot.yaml` describes. Raises InputError with the place in its files."""
+    """Returns the kind of robot that a `robot.yaml` describes. Raises InputError at the location in its files."""
     description = Description(path)
 
     def add(plant: MultibodyPlant, robot: PlacedRobot, visuals: bool) -> RobotBody:

@@ -1,4 +1,4 @@
-"""A robot from a URDF in a MultibodyPlant, behind the Robot protocol, and one that a planar floating base bears."""
+"""A robot from a URDF in a MultibodyPlant, behind the Robot protocol; also a variant on a planar floating base."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class UrdfBody(RobotBody):
             plant.AddCouplerConstraint(*pair, share / opposite)
 
     def opening(self, context: Context) -> float:
-        """Opening of the gripper, 0 without one."""
+        """Opening of the gripper; 0 when there is none."""
         gripper, q = self.description.file.gripper, self.plant.GetPositions(context)
         shares = {} if gripper is None else gripper.joints
         places = {name: self.plant.GetJointByName(name, self.instance).position_start() for name in shares}
@@ -82,11 +82,11 @@ class UrdfBody(RobotBody):
 
     @abstractmethod
     def _place_base(self, context: Context, pose: Pose2D, height_m: float) -> None:
-        """Sets the pose of `base`, whose frame is at a height over the floor."""
+        """Sets the pose of `base`, whose frame is at a height above the floor."""
 
 
 class UrdfIndex(ActuatedJoints):
-    """Joints of head, arm, fingers and lift; `shares` are how far fingers go for an opening."""
+    """Joints of head, arm, fingers and lift; `shares` are the finger positions at an opening of 1."""
 
     def __init__(self, body: UrdfBody) -> None:
         super().__init__(body.plant, body.instance)
@@ -103,7 +103,7 @@ class UrdfIndex(ActuatedJoints):
         self.finger_rates = fastest[self.fingers]
 
     def opening(self, joints: FloatArray) -> float:
-        """Opening of the gripper with all joints at positions; or its rate, for rates. 0 without a gripper."""
+        """Opening of the gripper from all joint positions, or its rate from all joint rates; 0 without a gripper."""
         return float(np.mean(joints[self.fingers] / self.shares)) if len(self.shares) else 0.0
 
 
@@ -126,7 +126,7 @@ class UrdfSensors(SensorSuite):
         )
 
     def _gripper_feels(self, positions: FloatArray, rates: FloatArray, efforts: FloatArray) -> tuple[float, float]:
-        """Opening of the gripper, and the force of each finger on an object between them."""
+        """Opening of the gripper, and the force that each finger exerts on an object."""
         index = self._index
         opening, fingers = index.opening(positions), index.fingers
         if not len(fingers) or float(np.abs(rates[fingers]).max()) > _MOVES[index.kind]:
@@ -143,7 +143,7 @@ class UrdfSensors(SensorSuite):
 
 
 def lidar_spec(description: Description) -> LidarSpec:
-    """Specification of the LiDAR of a robot's file."""
+    """Specification of the LiDAR in a robot's file."""
     lidar = description.file.lidar
     full = lidar.field_of_view > math.tau - 0.01
     step_rad = (math.tau if full else lidar.field_of_view) / lidar.points
@@ -160,21 +160,21 @@ def lidar_spec(description: Description) -> LidarSpec:
 
 @dataclass(frozen=True)
 class _Height:
-    """Goal of the posture: a height of the body frame over the floor."""
+    """Posture goal: a height of the body frame above the floor."""
 
     height_m: float
 
 
 class UrdfRobot(CommandedRobot, saved=("_finger_goals", "_head", "_head_goal", "_lift", "_lift_goal")):
-    """Robot from a URDF: turns the commands of the lease's holder into set points of the plant's servos.
+    """Robot from a URDF: converts the commands of the lease holder to set points of the plant's servos.
 
-    A robot without a lift has one at 0, which does not move.
+    For a robot without a lift, the lift is a joint at 0 that does not move.
     """
 
     _index: UrdfIndex
 
     def __init__(self, body: UrdfBody, index: UrdfIndex, sensors: UrdfSensors, options: SensorOptions) -> None:
-        """Takes over the robot at the state of `options.context`, at time 0."""
+        """Takes control of the robot in the state of `options.context`, at time 0."""
         super().__init__(body, index, sensors, options.context, _TOLERANCES[index.kind])
         file, joints = body.description.file, self._joints()
         self._finger_goals = joints[index.fingers]
@@ -184,7 +184,7 @@ class UrdfRobot(CommandedRobot, saved=("_finger_goals", "_head", "_head_goal", "
         self._height_m = file.base.height
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Lifts the body frame to a height above the floor; it does not pitch."""
+        """Raises the body frame to a height above the floor; ignores the pitch."""
         low, high = self._capabilities.height_range_m
         if not (low - _SAME_HEIGHT_M <= height_m <= high + _SAME_HEIGHT_M and pitch_rad == 0.0):
             return self._commands.refuse(
@@ -272,7 +272,7 @@ class UrdfRobot(CommandedRobot, saved=("_finger_goals", "_head", "_head_goal", "
 
 
 class FloatingBody(UrdfBody):
-    """Bodies and joints of a robot whose base floats: it touches no floor."""
+    """Bodies and joints of a robot on a floating base, which does not touch the floor."""
 
     def __init__(self, plant: MultibodyPlant, robot: PlacedRobot, description: Description) -> None:
         """Adds the robot to `plant` (before Finalize)."""
@@ -292,7 +292,7 @@ class FloatingBody(UrdfBody):
         return (self.instance, self.floating_base.instance)
 
     def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
-        """Lets links of this robot pass each other, and its base pass the floor."""
+        """Disables collisions between links of this robot, and between its base and the floor."""
         super().filter_collisions(filters, floor)
         base = GeometrySet(self.plant.GetCollisionGeometriesForBody(self.base))
         filters.Apply(CollisionFilterDeclaration().ExcludeBetween(base, floor))
@@ -302,10 +302,10 @@ class FloatingBody(UrdfBody):
 
 
 class FloatingRobot(UrdfRobot, saved=("_floating_base",)):
-    """Robot whose floating base drives it."""
+    """Robot driven by a floating base."""
 
     def __init__(self, body: FloatingBody, options: SensorOptions) -> None:
-        """Takes over the robot at the state of `options.context`, at time 0."""
+        """Takes control of the robot in the state of `options.context`, at time 0."""
         index = UrdfIndex(body)
         super().__init__(body, index, UrdfSensors(body, index, options), options)
         self._floating_base = body.floating_base

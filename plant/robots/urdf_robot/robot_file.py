@@ -24,7 +24,7 @@ class _Strict(BaseModel):
 
 
 class WheelsFile(_Strict):
-    """Driven wheels that roll on the floor: their joints, the left one first, and the links of casters that glide."""
+    """Driven wheels: their joints, the left one first, and the links of casters, which slide on the floor."""
 
     joints: tuple[Name, Name]
     radius: quantities.Length
@@ -32,10 +32,7 @@ class WheelsFile(_Strict):
 
 
 class BaseFile(_Strict):
-    """Base: its link, whose origin is the body frame B (x ahead, z up), and how it drives.
-
-    Without `wheels`, a planar floating base moves it.
-    """
+    """Base: its link with frame B (x ahead, z up), and how it drives; on a floating base without `wheels`."""
 
     link: Name
     motion: BaseKind = BaseKind.DIFFERENTIAL
@@ -78,7 +75,7 @@ class CameraFile(_Strict):
 
 
 class HandFile(_Strict):
-    """Hand frame: a link behind the last joint, and the axes of it along the fingers and along their closing."""
+    """Hand frame: a link behind the last joint, and its axes along the fingers and along their closing direction."""
 
     link: Name
     along: Axis
@@ -86,7 +83,7 @@ class HandFile(_Strict):
 
 
 class ArmFile(_Strict):
-    """Arm: its joints from the shoulder on, where they are stowed, and where the hand carries (B, m)."""
+    """Arm: its joints from the shoulder on, their stowed positions, and positions of the carrying hand (B, m)."""
 
     joints: Annotated[tuple[Name, ...], Field(min_length=2)]
     stowed: tuple[quantities.Angle, ...]
@@ -106,7 +103,7 @@ class ArmFile(_Strict):
 
 
 class PadsFile(_Strict):
-    """Rubber on sliding fingers: its balls along x and y of the hand frame, and how far they pass the closing plane."""
+    """Rubber on sliding fingers: spheres along x and y of the hand frame, and how far they pass the closing plane."""
 
     x: Annotated[tuple[quantities.Coordinate, ...], Field(min_length=1)]
     y: Annotated[tuple[quantities.Coordinate, ...], Field(min_length=1)]
@@ -114,7 +111,7 @@ class PadsFile(_Strict):
 
 
 class GripperFile(_Strict):
-    """Gripper: its joints with the part of an opening of one that each goes, and its geometry in the hand frame (m)."""
+    """Gripper: its joints with their positions at an opening of 1, and its geometry in the hand frame (m)."""
 
     kind: GripperKind = GripperKind.PARALLEL
     joints: Annotated[dict[Name, quantities.Number], Field(min_length=1, max_length=2)]
@@ -133,7 +130,7 @@ class GripperFile(_Strict):
 
 
 class RobotFile(_Strict):
-    """A robot: the file of its URDF and its parts; it has no arm, gripper, head or camera where none is named.
+    """A robot: the file of its URDF and its parts; an arm, gripper, head or camera that is not named does not exist.
 
     Joints that no part names are fixed, at `held` (rad, m) or 0.
     """
@@ -155,12 +152,12 @@ class RobotFile(_Strict):
 
     @property
     def source(self) -> YamlSource:
-        """The document, for the places of errors."""
+        """The document, for the locations of errors."""
         return self._source
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """Joints that are driven: of lift, wheels, head, arm and gripper."""
+        """Driven joints: those of lift, wheels, head, arm and gripper."""
         lift = () if self.lift is None else (self.lift.joint,)
         wheels = () if self.base.wheels is None else self.base.wheels.joints
         arm = () if self.arm is None else self.arm.joints

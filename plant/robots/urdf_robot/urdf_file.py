@@ -52,7 +52,7 @@ class UrdfJoint:
 
     @property
     def moves(self) -> bool:
-        """Returns whether it has one degree of freedom."""
+        """Returns whether the joint has one degree of freedom."""
         return self.kind in MOVING
 
     def X_FC(self, position: float) -> RigidTransform:
@@ -64,15 +64,15 @@ class UrdfJoint:
         return RigidTransform(RotationMatrix(AngleAxis(position, self.axis)), np.zeros(3))
 
     def clipped(self, position: float) -> float:
-        """The position nearest to a given one within the limits."""
+        """Position clipped to the joint's limits."""
         return min(max(position, self.lower), self.upper)
 
 
 class UrdfFile:
-    """URDF file. Its errors name file and line."""
+    """URDF file whose errors name file and line."""
 
     def __init__(self, path: Path) -> None:
-        """Reads the file. Raises InputError when it is no URDF, or its links are no tree."""
+        """Reads the file. Raises InputError when it is no URDF, or its links form no tree."""
         self.path = path
         text = read_text(path, most_bytes=MOST_BYTES, hint="check the path")
         if path.suffix == ".xacro" or _XACRO.search(text) is not None:
@@ -125,7 +125,7 @@ class UrdfFile:
         return UrdfJoint(name, kind, parent, child, X_PF, axis_F, **ends, mimics=mimics, line=line)
 
     def _named(self, element: Element, tag: str, key: str) -> str:
-        """Link that a joint names. Raises InputError when there is none."""
+        """Link to which a joint refers. Raises InputError when it does not exist."""
         found = element.find(tag)
         name = "" if found is None else found.get(key, "")
         if name not in self.links:
@@ -134,7 +134,7 @@ class UrdfFile:
         return name
 
     def numbers(self, element: Element | None, key: str, default: str) -> list[float]:
-        """Numbers of an attribute, as many as the default has. Raises InputError."""
+        """Numbers in an attribute, as many as the default has. Raises InputError for any other content."""
         text = default if element is None else element.get(key, default)
         try:
             found = [float(word) for word in text.split()]
@@ -154,7 +154,7 @@ class UrdfFile:
 
     @cached_property
     def order(self) -> Sequence[UrdfJoint]:
-        """All joints, each after those between it and the root. Raises InputError when some form a loop."""
+        """All joints, parents first. Raises InputError when joints form a loop."""
         children, order, reached = list(self.joints.values()), list[UrdfJoint](), {self.root}
         while children:
             ready = [joint for joint in children if joint.parent in reached]
@@ -174,7 +174,7 @@ class UrdfFile:
         return joints[::-1]
 
     def poses(self, positions: Mapping[str, float]) -> dict[str, RigidTransform]:
-        """Poses of all links in the root link, with joints at positions (rad, m), else at 0 or the nearest limit."""
+        """Poses of all links in the root link, at joint positions (rad, m); other joints at 0 or the nearest limit."""
         X = {self.root: RigidTransform()}
         for joint in self.order:
             position = positions.get(joint.name, joint.clipped(0.0)) if joint.moves else 0.0
@@ -182,7 +182,7 @@ class UrdfFile:
         return X
 
     def need_limits(self, names: Collection[str]) -> None:
-        """Raises InputError for the first of some joints that lacks limits."""
+        """Raises InputError for the first of these joints that lacks limits."""
         for joint in (self.joints[name] for name in names):
             lacking = [key for key in ("effort", "velocity") if getattr(joint, key) <= 0.0]
             if not joint.lower < joint.upper:
@@ -195,7 +195,7 @@ class UrdfFile:
         return [each for each in self.links[link].findall(role) if each.find("geometry") is not None]
 
     def mesh_path(self, mesh: Element) -> Path:
-        """File of a mesh of the robot's own folder. Raises InputError when there is none."""
+        """File of a mesh in the robot's folder. Raises InputError when it is missing."""
         name = mesh.get("filename", "")
         path = self.path.parent / name.removeprefix(f"package://{PACKAGE}/")
         if not name.startswith(f"package://{PACKAGE}/") or not path.is_file():
@@ -204,7 +204,7 @@ class UrdfFile:
         return path
 
     def mesh_points(self, mesh: Element) -> FloatArray:
-        """Vertices (N, 3) of the OBJ file of a mesh, at its scale. Raises InputError when there is none."""
+        """Vertices (N, 3) of a mesh's OBJ file, scaled. Raises InputError when it has none."""
         lines = self.mesh_path(mesh).read_text(encoding="utf-8").splitlines()
         points = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], dtype=np.float64)
         return np.asarray(points * self.numbers(mesh, "scale", "1 1 1"))

@@ -1,4 +1,4 @@
-"""A robot from a URDF that stands on wheels: two roll and drive it, casters glide."""
+"""A robot from a URDF that stands on wheels: two are driven, casters slide."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _MEAN_AHEAD = 0.75
 
 @dataclass(frozen=True)
 class WheelLimits(LocomotionLimits):
-    """Limits of two driven wheels that bear a base; the motors alone could accelerate it by 2.6 m/s^2.
+    """Limits of two driven wheels that carry a base; the motors alone could accelerate it by 2.6 m/s^2.
 
-    `lead_rad` is the greatest distance of a wheel's set point from a wheel that cannot follow.
+    `lead_rad`: largest difference between a wheel's set point and its position when it cannot follow.
     """
 
     speed_m_s: quantities.Speed = 1.0
@@ -40,33 +40,33 @@ class WheelLimits(LocomotionLimits):
 
 @dataclass(frozen=True)
 class Axle:
-    """Two wheels of a radius at y = +- `half_track_m`, the left one first."""
+    """Two wheels of equal radius at y = +- `half_track_m`, the left one first."""
 
     radius_m: float
     half_track_m: float
 
     def rates(self, speed_m_s: float, turn_rate_rad_s: float) -> FloatArray:
-        """Wheel rates (2,), rad/s, for a speed ahead and a turn rate of the base."""
+        """Wheel rates (2,), rad/s, for a forward speed and a turn rate of the base."""
         across = self.half_track_m * turn_rate_rad_s
         return np.array([speed_m_s - across, speed_m_s + across]) / self.radius_m
 
     def travel(self, turned_rad: FloatArray) -> tuple[float, float]:
-        """Distance ahead (m) and turn (rad) of the base for turns (rad) of the wheels (2,) without slip."""
+        """Forward distance (m) and turn (rad) of the base for wheel rotations (2,) in rad, without slip."""
         left_m, right_m = (self.radius_m * turned_rad).tolist()
         return (left_m + right_m) / 2.0, (right_m - left_m) / (2.0 * self.half_track_m)
 
 
 class WheelServos(Stateful, saved=("_speed", "_turn_rate", "_due_rad")):
-    """Servos of the wheels: set points for a wanted velocity; at rest they hold the wheels."""
+    """Servos of the wheels: set points for a commanded velocity; at rest they hold the wheels."""
 
     def __init__(self, axle: Axle, now_rad: FloatArray, limits: WheelLimits) -> None:
-        """The wheels (2,) stand at `now_rad`."""
+        """`now_rad` are the positions of the wheels (2,)."""
         self._axle, self._limits = axle, limits
         self._speed = self._turn_rate = 0.0
         self.goal_rad, self.rate_rad_s, self._due_rad = now_rad.copy(), np.zeros(2), now_rad.copy()
 
     def follow(self, wanted: Velocity, now_rad: FloatArray, dt_s: float, *, stopping: bool) -> None:
-        """Sets the wheels for the next dt_s: ramps to the wanted speed ahead and turn rate, faster when `stopping`."""
+        """Sets the wheels for the next dt_s: ramps to the commanded speed and turn rate, faster when `stopping`."""
         limits = self._limits
         most = limits.stop_deceleration_m_s2 if stopping else limits.acceleration_m_s2
         turn = limits.stop_turn_deceleration_rad_s2 if stopping else limits.turn_acceleration_rad_s2
@@ -79,15 +79,15 @@ class WheelServos(Stateful, saved=("_speed", "_turn_rate", "_due_rad")):
 
 
 class WheelOdometer(Stateful, saved=("pose", "_last_rad")):
-    """Odometer: pose of the base since the beginning, by the wheel encoders, which do not notice slip."""
+    """Odometer: pose of the base relative to its start, from the wheel encoders, which do not measure slip."""
 
     def __init__(self, axle: Axle, now_rad: FloatArray) -> None:
-        """The wheels (2,) stand at `now_rad`, the base at the origin."""
+        """`now_rad` are the positions of the wheels (2,); the base is at the origin."""
         self._axle, self._last_rad = axle, now_rad.copy()
         self.pose = Pose2D(0.0, 0.0, 0.0)
 
     def count(self, now_rad: FloatArray) -> None:
-        """Adds the arc that the base has driven since the last count; the wheels (2,) stand at `now_rad`."""
+        """Adds the arc that the base has driven since the last call; `now_rad` are the positions of the wheels (2,)."""
         ahead_m, turn_rad = self._axle.travel(now_rad - self._last_rad)
         self._last_rad = now_rad.copy()
         middle = self.pose.yaw_rad + turn_rad / 2.0
@@ -137,11 +137,11 @@ class WheeledSensors(UrdfSensors, saved=("_odometer",)):
         super().__init__(body, joints, options)
 
     def count_wheels(self, wheels_rad: FloatArray) -> None:
-        """Counts the turns of the wheels (2,) in each control period, more often than readings are taken."""
+        """Updates the odometer from the wheels (2,) in each control period, more often than the sensors are updated."""
         self._odometer.count(wheels_rad)
 
     def _reckoned(self, X_WB: RigidTransform) -> RigidTransform:
-        """Pose by the wheel encoders, at the height of the lift, with the true tilt of the body."""
+        """Pose from the wheel encoders, at the height of the lift, with the true tilt of the body."""
         positions = np.asarray(self._body.plant.GetPositions(self._context)[self._joints.positions])
         self._odometer.count(positions[self._joints.wheels])
         pose, rpy = self._odometer.pose, RollPitchYaw(X_WB.rotation())
@@ -151,7 +151,7 @@ class WheeledSensors(UrdfSensors, saved=("_odometer",)):
 
 
 class WheeledRobot(UrdfRobot, saved=("_wheels",)):
-    """Robot whose wheels drive it."""
+    """Robot driven by wheels."""
 
     _index: WheeledIndex
 

@@ -1,1 +1,1 @@
-"""The approach skill, and the base placements that other skills share."""
+"""The approach skill, and base placements, which other skills share."""

@@ -39,7 +39,7 @@ class BasePlacement:
 
 
 def is_comfortable(pose: Pose2D, point_W: tuple[float, float], arm: ArmCapabilities) -> bool:
-    """Returns whether the point is ahead of the robot at a good distance already."""
+    """Returns whether the point is ahead of the robot and within the arm's comfortable range of distances."""
     nearest_m, farthest_m = arm.comfortable_m
     dx, dy = point_W[0] - pose.x_m, point_W[1] - pose.y_m
     bearing = wrap(math.atan2(dy, dx) - pose.yaw_rad)
@@ -67,9 +67,9 @@ def free_placements(
 def reachable_placements(
     free: Sequence[BasePlacement], reach_cost: Callable[[Pose2D], float | None]
 ) -> list[BasePlacement]:
-    """Returns the best of some placements within reach, best first.
+    """Returns the cheapest placements from which the point is within reach, best first.
 
-    `reach_cost` gives the cost of the reach from a pose, None when the point is out of reach.
+    `reach_cost` returns the cost of the reach from a pose, and None when the point is out of reach.
     """
     best = list[BasePlacement]()
     for placement in sorted(free, key=lambda placement: placement.cost):
@@ -88,7 +88,8 @@ def first_reachable_spot(
 ) -> tuple[FloatArray, Sequence[BasePlacement]] | None:
     """Returns the first spot within reach of a free pose, with its placements; else the first spot with a free pose.
 
-    `reach_cost` returns the cost of a spot's reach from a pose. Returns None when no spot has a free pose.
+    `reach_cost` returns, for a spot, the function from a pose to the cost of the reach. None when no spot has a free
+    pose.
     """
     for spot, free in before:
         if near := reachable_placements(free, reach_cost(spot)):
@@ -97,7 +98,7 @@ def first_reachable_spot(
 
 
 def _sure_cost(pose: Pose2D, reach_cost: Callable[[Pose2D], float | None]) -> float | None:
-    """Cost of the reach, allowing for a robot that stops short of the pose; None when the point is out of reach."""
+    """Cost of the reach, also when the robot stops short of the pose; None when the point is out of reach."""
     cost = reach_cost(pose)
     if cost is None:
         return None
@@ -107,14 +108,14 @@ def _sure_cost(pose: Pose2D, reach_cost: Callable[[Pose2D], float | None]) -> fl
 
 
 def _cost(pose: Pose2D, here: Pose2D, off_m: float) -> float:
-    """Cost of the distance to drive, of the turn, and of the distance's error."""
+    """Cost of the distance to drive, of the turn, and of the deviation from the best distance."""
     turn = abs(wrap(pose.yaw_rad - here.yaw_rad))
     drive_m = float(np.hypot(pose.x_m - here.x_m, pose.y_m - here.y_m))
     return drive_m + 0.3 * turn + 4.0 * off_m
 
 
 def go_to_one(skill: RoutineSkill[Any], goals: Sequence[NavigateInputs]) -> Routine[None]:
-    """Drives to the first of some goals to which there is a path. Raises SkillFailure."""
+    """Drives to the first of the goals to which a path exists. Raises SkillFailure when no goal is reached."""
     *first, last = goals
     for goal in first:
         with PlanningAttempt():

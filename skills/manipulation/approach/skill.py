@@ -1,4 +1,4 @@
-"""The approach skill: drives to where the arm can grasp a seen object, and looks at the object again."""
+"""The approach skill: drives to where the arm can grasp an observed object, and observes the object again."""
 
 import math
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ _STILL_BEFORE_M = 1.3
 
 @dataclass(frozen=True)
 class ApproachInputs:
-    """Object as it was seen, and the surfaces near it, including the one that it lies on."""
+    """Observed object, and the surfaces near it, including the one on which it lies."""
 
     observation: ObjectObservation
     surfaces: tuple[Surface, ...]
@@ -41,10 +41,10 @@ class ApproachInputs:
 
 @dataclass(frozen=True)
 class ApproachOptions:
-    """Tolerances and speed of the drive, and the condition for a robot to stay.
+    """Tolerances and speed of the drive, and the condition for the robot to stay where it is.
 
-    The robot goes to the first of `tries` places with a path. It stays when the best grasp from here costs at most
-    `good_grasp` more than the cheapest candidate.
+    `tries`: number of placements to which the robot tries to drive. `good_grasp`: the robot stays when the best grasp
+    from its present pose costs at most this much more than the cheapest candidate.
     """
 
     position_tolerance_m: Length = 0.06
@@ -55,7 +55,7 @@ class ApproachOptions:
 
 
 class Approach(LookingSkill[ApproachInputs]):
-    """Drives slowly, with the arm stowed, to where the arm can grasp an object, and looks at the object again."""
+    """Drives slowly, with the arm stowed, to where the arm can grasp an object, and observes the object again."""
 
     name = "approach"
     Inputs = ApproachInputs
@@ -71,7 +71,7 @@ class Approach(LookingSkill[ApproachInputs]):
     options: ApproachOptions
 
     def run(self, inputs: ApproachInputs) -> Routine[Succeeded]:
-        """Chooses where to stand, drives there and looks at the object again."""
+        """Chooses a base placement, drives there and observes the object again."""
         seen = inputs.observation
         placements = yield from choose_with_look(self, seen, partial(self._choose, inputs))
         if not placements:
@@ -90,9 +90,9 @@ class Approach(LookingSkill[ApproachInputs]):
         return Succeeded(f"standing before the {seen.kind}", found.outputs)
 
     def _choose(self, inputs: ApproachInputs) -> Routine[tuple[list[BasePlacement], FloatArray]]:
-        """Chooses base placements, best first, and points (N, 3, world) of the arm at the first one.
+        """Chooses base placements, best first, and points (N, 3, world) on the arm at the first one.
 
-        The first is the present pose if that is good enough.
+        The first placement is the present pose if its grasp is good enough.
         """
         context, seen = self.context, inputs.observation
         here, point_W = context.pose(), (seen.position_W[0], seen.position_W[1])
@@ -120,7 +120,7 @@ class Approach(LookingSkill[ApproachInputs]):
         return (yield from self.compute(choose, latency_s=0.2, name="choose a place", message=message))
 
     def _why_none(self, seen: ObjectObservation) -> str:
-        """Returns why there is no placement: the gripper cannot grasp the object, or no free pose is near enough."""
+        """Returns why there is no placement: the gripper cannot grasp the object, or no free pose is within reach."""
         target, p_BS = observed_target(seen, self.X_WB()), self.model.p_BS
         if self.context.stack.grasp_planner.candidates(target, p_BS=p_BS, gripper=self.gripper):
             return f"there is no free place to stand from which the {seen.kind} is within reach"
@@ -134,5 +134,5 @@ class Approach(LookingSkill[ApproachInputs]):
 
 
 def own_surfaces(inputs: ApproachInputs) -> tuple[Surface, ...]:
-    """Returns the object's surface, or all given ones when it is not among them."""
+    """Returns only the surface on which the object lies, or all given surfaces when that one is not among them."""
     return tuple(s for s in inputs.surfaces if s.name == inputs.observation.surface) or inputs.surfaces

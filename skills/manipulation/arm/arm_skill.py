@@ -48,7 +48,7 @@ _OPEN_RAD = 0.05
 
 @dataclass(frozen=True)
 class GripperTurn:
-    """Motion of the gripper from one opening to another while the arm moves."""
+    """Motion of the gripper between two openings while the arm moves."""
 
     start: float
     end: float
@@ -60,11 +60,11 @@ class GripperTurn:
 
     @property
     def narrow(self) -> float:
-        """The narrower opening, for which the arm's motion is planned."""
+        """The narrower opening, with which the arm's motion is planned."""
         return max(0.0, min(self.start, self.end))
 
     def begins_s(self, scene: ArmScene, trajectory: ArmTrajectory) -> float | None:
-        """Time on a trajectory (s) from which on the wide gripper touches nothing, None when there is none."""
+        """Time (s) on a trajectory from which on the wide gripper is free of contact; None when there is none."""
         scene.set_opening(max(self.start, self.end))
         times_s = trajectory.times_s
         if self.closes:
@@ -83,9 +83,9 @@ class GripperTurn:
 class ArmSkill(RoutineSkill[InputsT]):
     """Routine that moves the arm.
 
-    `boxes` (frame B) are obstacles, `held` (frame H) are in the hand. Occupied cells of the camera are obstacles too,
-    except within `known_W` (least and greatest corners, world), where only `boxes` count. While `_watch` is set, the
-    loss of the held object fails the skill with `lost_message`.
+    `boxes` (frame B) are obstacles; `held` (frame H) are boxes in the hand. Solid cells from the cameras are obstacles
+    too, except within `known_W` (lowest and highest corners, world), where only `boxes` count. While `_watch` is set,
+    the loss of the held object fails the skill with `lost_message`.
     """
 
     lost_message: ClassVar[str] = "the object was lost"
@@ -102,13 +102,13 @@ class ArmSkill(RoutineSkill[InputsT]):
         self._rng = np.random.default_rng(context.seed)
 
     def begin(self, inputs: InputsT) -> None:
-        """Forgets the obstacles, the held object and the random numbers of an earlier attempt."""
+        """Resets the obstacles, the held object and the random numbers of an earlier attempt."""
         self._watch = None
         self._forget()
         super().begin(inputs)
 
     def resume(self, inputs: InputsT) -> None:
-        """Continues after a pause or a restart; obstacles may have moved, and a slip in the pause does not count."""
+        """Continues after a pause or a restart; obstacles may have moved, and a slip during the pause is ignored."""
         self._watch = None if self._watch is None else self.hold_watch()
         if not self.can_go_on():
             self._forget()
@@ -120,7 +120,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         self._rng = np.random.default_rng(self.context.seed)
 
     def trouble(self) -> SkillFailure | None:
-        """Returns a failure when the watched object is lost; grips an object more firmly that begins to slip."""
+        """Returns a failure when the watched object is lost; grips the object more firmly when it starts to slip."""
         if self._watch is None:
             return None
         context = self.context
@@ -160,7 +160,7 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     @property
     def p_HT(self) -> FloatArray:
-        """Point (3,) of the hand frame at which the gripper holds an object (m)."""
+        """Point (3,) in the hand frame at which the gripper holds an object (m)."""
         return np.array([self.gripper.grip_x_m, 0.0, 0.0])
 
     def X_WB(self) -> RigidTransform:
@@ -170,7 +170,7 @@ class ArmSkill(RoutineSkill[InputsT]):
     def q_rad(self) -> FloatArray:
         """Present arm angles (J,), clipped to their limits, because a servo may slightly exceed them.
 
-        Raises SkillFailure with cause EXECUTION when the robot reports no finite angles.
+        Raises SkillFailure with cause EXECUTION when the robot reports angles that are not finite.
         """
         positions = self.context.robot.joints().position_rad
         q = np.array([positions[name] for name in self.model.names])
@@ -193,13 +193,13 @@ class ArmSkill(RoutineSkill[InputsT]):
         return float(np.linalg.norm(self.model.X_BH(self.q_rad()).translation() - p_BP)) < within_m
 
     def hold_watch(self) -> HoldWatch:
-        """A new watch of the object in the gripper."""
+        """A new monitor for the object in the gripper."""
         return hold_watch(self.context.robot.capabilities())
 
     def scene_now(self, boxes: Sequence[Box] | None = None) -> Callable[[], ArmScene]:
-        """Returns a function that builds, inside a Worker job, the collision scene of this moment.
+        """Returns a function that builds the collision scene as it is now, inside a Worker job.
 
-        `boxes` (frame B) replace the known obstacles.
+        `boxes` (frame B) replace the skill's obstacles.
         """
         robot, model, held = self.context.robot, self.model, self.held
         boxes = [*self.boxes, *self.seen_boxes()] if boxes is None else boxes
@@ -218,9 +218,9 @@ class ArmSkill(RoutineSkill[InputsT]):
         return prepared
 
     def seen_boxes(self, beyond_m: float = 0.0) -> list[Box]:
-        """Boxes (B) around the solid cells and walls within the arm's reach and `beyond_m`, without `known_W`.
+        """Boxes (B) around the solid cells and walls within the arm's reach plus `beyond_m`, outside `known_W`.
 
-        Cells at the body, the arm and the held object are left out: a small error of the pose must not block the arm.
+        Omits cells at the body, the arm and the held object: a small pose error must not block the arm.
         """
         context, X_WB, q_rad = self.context, self.X_WB(), self.q_rad()
         held_H = context.payload.corners_H if context.robot.gripper().holding else None
@@ -232,16 +232,16 @@ class ArmSkill(RoutineSkill[InputsT]):
         return [*seen, *wall_boxes(context.walls, X_WB, reach_m, replace(own, lines_W=(arm_W, stowed_W)).holds)]
 
     def _outline(self) -> Outline:
-        """The body's outline with a margin."""
+        """The body's outline, grown by a margin."""
         corners = np.array(self.context.robot.capabilities().footprint_m)
         return Outline(self.X_WB(), corners.min(axis=0) - _OUTLINE_MARGIN_M, corners.max(axis=0) + _OUTLINE_MARGIN_M)
 
     def attempt_at_heights(
         self, heights_m: Sequence[float], message: str, attempt: Callable[[], Routine[PlannedT]]
     ) -> Routine[PlannedT]:
-        """Runs `attempt` at each body height (m) in turn until it finds a plan.
+        """Runs `attempt` at each body height (m) in turn until one finds a plan.
 
-        Raises the SkillFailure of the last height, or the first one with another cause than PLANNING.
+        Raises the SkillFailure of the last height, or the first failure with another cause than PLANNING.
         """
         *first_m, last_m = heights_m
         for height_m in first_m:
@@ -259,8 +259,8 @@ class ArmSkill(RoutineSkill[InputsT]):
     ) -> Routine[FloatArray]:
         """Plans to the configuration `goal(scene, q_now)` and moves there; returns that configuration.
 
-        The gripper moves to `opening` on the way if its wider opening is free of contact. Otherwise it closes before
-        the motion, or opens after it.
+        The gripper moves to `opening` during the motion if the wider of its two openings is free of contact. Otherwise
+        it closes before the motion, or opens after it.
         """
 
         scene_now, start, opening_now = self.scene_now(), self.q_rad(), self.context.robot.gripper().opening
@@ -308,7 +308,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return context.robot.set_gripper(opening, force_n, until_s=until_s, lease=context.lease)
 
     def _turning(self, turn: GripperTurn, after_s: float) -> Callable[[FloatArray], bool]:
-        """A guard for `follow` that commands the gripper after a while and never stops the arm."""
+        """A guard for `follow` that commands the gripper after `after_s` and never stops the arm."""
         begins_s, given = self.context.clock.now() + after_s, list[CommandId]()
 
         def guard(q_wanted_rad: FloatArray) -> bool:
@@ -319,7 +319,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return guard
 
     def carry(self, R_BH: RotationMatrix, message: str, speed_rad_s: float | None = CARRY_SPEED_RAD_S) -> Routine[None]:
-        """Draws the hand near the body; it keeps R_BH up to a turn about the vertical: the object stays upright."""
+        """Draws the hand near the body, and keeps the object upright: R_BH only turns about the vertical."""
         arm, hangs = self.arm, hangs_below(self.context.payload.corners_H, self.gripper)
         yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q, hangs), message, speed_rad_s)
 
@@ -353,7 +353,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return (yield from self.follow(trajectory, message, guard))
 
     def try_shift_hand(self, offset_B: FloatArray, message: str, *, clear_of_boxes: bool = False) -> Routine[bool]:
-        """Moves the hand straight by an offset (3,) in B; returns False when there is no straight path."""
+        """Moves the hand straight by an offset (3,) in B; returns False when no straight path exists."""
         p_BH = self.model.X_BH(self.q_rad()).translation() + offset_B
         with PlanningAttempt() as attempt:
             yield from self.move_straight(p_BH, message, clear_of_boxes=clear_of_boxes)
@@ -362,14 +362,14 @@ class ArmSkill(RoutineSkill[InputsT]):
     def shift_by_first(
         self, offsets_B: Iterable[FloatArray], message: str, *, clear_of_boxes: bool = False
     ) -> Routine[bool]:
-        """Moves the hand by the first offset (3,) with a straight path; returns False without one."""
+        """Moves the hand by the first offset (3,) that has a straight path; returns False when none has one."""
         for offset_B in offsets_B:
             if (yield from self.try_shift_hand(offset_B, message, clear_of_boxes=clear_of_boxes)):
                 return True
         return False
 
     def press(self, offset_B: FloatArray, direction_B: FloatArray, speed_rad_s: float, message: str) -> Routine[bool]:
-        """Moves the hand slowly by an offset (3,) in B; returns whether contact along a direction stopped it.
+        """Moves the hand slowly by an offset (3,) in B; returns whether contact along a direction stopped the hand.
 
         Ignores obstacles. Raises PlanningError when the arm cannot follow the line.
         """
@@ -379,7 +379,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return (yield from self.follow(trajectory, message, guard))
 
     def contact_guard(self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M) -> Callable[[FloatArray], bool]:
-        """A guard for `follow` that stops a slow hand at contact, when it lags along a direction."""
+        """A guard for `follow` that stops a slow hand at contact: when the hand lags by `lag_m` along a direction."""
 
         def guard(q_wanted_rad: FloatArray) -> bool:
             lag = self.model.X_BH(q_wanted_rad).translation() - self.model.X_BH(self.q_rad()).translation()
@@ -388,7 +388,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return guard
 
     def weigh(self, p_HO: FloatArray, message: str) -> Routine[float]:
-        """Measures the mass (kg) of the object that a still hand holds at p_HO (3,), with the body level."""
+        """Measures the mass (kg) of the object that a resting hand holds at p_HO (3,), with the body level."""
         scene = yield from self.compute(self.scene_now(), latency_s=0.05, name="prepare weighing", message=message)
         end_s, found = self.context.clock.now() + WEIGHING_S, []
         while self.context.clock.now() < end_s:
@@ -400,7 +400,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return float(np.median(found))
 
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
-        """Closes the empty gripper, if there is one, and folds the arm onto the body, unless it is stowed already."""
+        """Closes the empty gripper, if there is one, and folds the arm onto the body, unless it is folded already."""
         stowed, reading = self.model.stowed_rad, self.context.robot.gripper()
         gripper = self.context.robot.capabilities().gripper
         is_open = gripper is not None and not reading.holding and reading.opening > gripper.like_turn(_OPEN_RAD)
@@ -411,7 +411,7 @@ class ArmSkill(RoutineSkill[InputsT]):
             yield from self.move_gripper(closing, GRIPPER_FORCE_N, message)
 
     def try_stow(self) -> Routine[None]:
-        """Stows the arm after a failure; does nothing when that fails too."""
+        """Stows the arm after a failure; does nothing when stowing fails too."""
         try:
             yield from self.stow("stowing the arm after the failure")
         except SkillFailure:

@@ -1,8 +1,8 @@
-"""Clearance of convex shapes from boxes, in compiled loops: the arm's shapes in many configurations among many boxes.
+"""Clearance between convex shapes and boxes, compiled: the arm's shapes in many configurations, among many boxes.
 
-Each gap is the widest along candidate separating axes, so it never exceeds the distance. It is less than the distance
+A gap is the largest separation along candidate axes, so it never exceeds the distance. It is smaller than the distance
 only between a cylinder's rim, or a box's corner or edge, and an edge or corner. Shapes are spheres, capsules, cylinders
-and boxes about the origin of their own frame, the length of round ones along z.
+and boxes about the origin of their own frame; round ones extend along z.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _HALVINGS = 40
 
 
 class Kind(enum.IntEnum):
-    """Kind of a shape. Its half extents (3,) are its radius, its radius, and half its length without round caps."""
+    """Kind of a shape. The half extents (3,) of a round shape are radius, radius, and half the length without caps."""
 
     SPHERE = 0
     CAPSULE = 1
@@ -56,13 +56,13 @@ def touching(
     R_BX: FloatArray,
     p_BX: FloatArray,
 ) -> bool:
-    """Returns whether any of S shapes comes within a padding of any of N boxes on path_rad (K, J).
+    """Returns whether any of S shapes comes within `padding_m` of any of N boxes on path_rad (K, J).
 
-    Joint j turns about `axes` (J, 3) in its frame F, which is fixed to the link before it, the body for the first: R_PF
-    (J, 3, 3), p_PF (J, 3). Shapes come in G groups, one for each link: `group_joints` (G,) move the links, or `FIXED`
-    for the body itself, and `group_ends` (G,) are the numbers after each group's last shape. `group_spheres` (G, 4),
-    centre and radius, hold their shapes; spheres of `radii` (S,) hold one each. The first touch ends the check, unless
-    `found` (S,) collects all touching shapes.
+    Joint j turns about `axes` (J, 3) in its frame F, which is fixed to the previous link, for the first joint to the
+    body: R_PF (J, 3, 3), p_PF (J, 3). Shapes come in G groups, one per link: `group_joints` (G,) are the joints that
+    move the links, or `FIXED` for the body, and `group_ends` (G,) are one past the index of each group's last shape.
+    `group_spheres` (G, 4), centre and radius, bound the groups; spheres of `radii` (S,) bound single shapes. The first
+    contact ends the check, unless `found` (S,) collects all shapes in contact.
     """
     joints, groups, boxes = path_rad.shape[1], group_joints.shape[0], box_halves.shape[0]
     reach = np.sqrt(box_halves[:, 0] ** 2 + box_halves[:, 1] ** 2 + box_halves[:, 2] ** 2) + padding_m
@@ -103,7 +103,7 @@ def touching(
 def place_links(
     R: FloatArray, p: FloatArray, q_rad: FloatArray, axes: FloatArray, R_PF: FloatArray, p_PF: FloatArray
 ) -> None:
-    """Writes the poses of body and J links, in the body frame, into R (J + 1, 3, 3) and p (J + 1, 3)."""
+    """Writes the poses of the body and of J links, in the body frame, into R (J + 1, 3, 3) and p (J + 1, 3)."""
     R[0], p[0] = np.eye(3), np.zeros(3)
     for j in range(q_rad.shape[0]):
         _place(R[j + 1], p[j + 1], R[j], p[j], R_PF[j], p_PF[j])
@@ -120,7 +120,7 @@ def box_gaps(
     R_FX: FloatArray,
     p_FX: FloatArray,
 ) -> FloatArray:
-    """Gaps (K, N) in m of one box, after each of K moves (K, 3), to N others; negative where they overlap."""
+    """Gaps (K, N) in m between a box, after each of K moves (K, 3), and N others; negative where they overlap."""
     gaps = np.empty((moves.shape[0], others.shape[0]))
     for k in range(moves.shape[0]):
         for n in range(others.shape[0]):
@@ -141,7 +141,7 @@ def _place(
 
 @compiled
 def _turn(R: FloatArray, axis: FloatArray, angle_rad: float) -> None:
-    """Turns R about a unit axis of its own, by Rodrigues' formula."""
+    """Rotates R about a unit axis in its own frame, by Rodrigues' formula."""
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     x, y, z = axis[0], axis[1], axis[2]
     for i in range(3):
@@ -198,7 +198,7 @@ def _gap(
 
 @compiled
 def _centre_gap(x: float, y: float, z: float, half: FloatArray, R_BX: FloatArray, p_BX: FloatArray) -> float:
-    """Distance (m) of a point of the body frame from a box; a long box has a bounding sphere that holds too much."""
+    """Distance (m) from a point in the body frame to a box; tighter than the bounding sphere of a long box."""
     dx, dy, dz = x - p_BX[0], y - p_BX[1], z - p_BX[2]
     cx = R_BX[0, 0] * dx + R_BX[1, 0] * dy + R_BX[2, 0] * dz
     cy = R_BX[0, 1] * dx + R_BX[1, 1] * dy + R_BX[2, 1] * dz
@@ -208,7 +208,7 @@ def _centre_gap(x: float, y: float, z: float, half: FloatArray, R_BX: FloatArray
 
 @compiled
 def _from_box(x: float, y: float, z: float, half: FloatArray) -> float:
-    """Distance (m) of a point from a box about the origin; 0 inside."""
+    """Distance (m) from a point to a box about the origin; 0 inside."""
     x, y, z = max(0.0, abs(x) - half[0]), max(0.0, abs(y) - half[1]), max(0.0, abs(z) - half[2])
     return math.sqrt(x * x + y * y + z * z)
 
@@ -217,7 +217,7 @@ def _from_box(x: float, y: float, z: float, half: FloatArray) -> float:
 def _box_gap(
     half: FloatArray, R_FG: FloatArray, p_FG: FloatArray, other: FloatArray, R_FX: FloatArray, p_FX: FloatArray
 ) -> float:
-    """Gap (m) of two boxes by their fifteen separating axes; negative where they overlap.
+    """Gap (m) between two boxes along their fifteen separating axes; negative where they overlap.
 
     Gottschalk, Lin and Manocha, "OBBTree", 1996.
     """

@@ -1,4 +1,4 @@
-"""Collision checks of the arm against the body and boxes around it."""
+"""Collision checks between the arm, the body and the boxes around the robot."""
 
 from __future__ import annotations
 
@@ -39,20 +39,20 @@ _ALL_OR_NONE: Final = np.zeros(0, dtype=np.bool_)
 
 @dataclass(frozen=True)
 class Box:
-    """Box: pose of its centre in some frame, full extents in m."""
+    """Box: pose of its centre in a frame that the user of the box names, and full extents in m."""
 
     X_FG: RigidTransform
     size_m: tuple[float, float, float]
 
 
 def box_between(low: FloatArray, high: FloatArray, least_m: float = 0.0) -> Box:
-    """Returns the upright box between two corners (3,), each of its sides `least_m` long at least."""
+    """Returns the upright box between two corners (3,), with sides of at least `least_m`."""
     x, y, z = np.maximum(high - low, least_m)
     return Box(RigidTransform(0.5 * (low + high)), (float(x), float(y), float(z)))
 
 
 def gaps_m(box: Box, boxes: Sequence[Box], moves: FloatArray) -> FloatArray:
-    """Gaps (K, N) in m of a box, after each of K moves (K, 3), to N others; negative where they overlap.
+    """Gaps (K, N) in m between a box, after each of K moves (K, 3), and N others; negative where they overlap.
 
     All boxes and moves are in one frame.
     """
@@ -77,11 +77,11 @@ def box_corners(box: Box) -> FloatArray:
 
 
 class ArmScene:
-    """Collision scene of a standing robot with boxes around it, all in the body frame.
+    """Collision scene: a standing robot with boxes around it, all in the body frame.
 
     Legs stand at the given joint angles; the gripper's opening and the object in the hand may change between checks.
-    Drake checks the robot against itself and the held object. `clearance` checks both against the boxes; oriented
-    bounding boxes stand in for meshes and other shapes of the robot.
+    Drake checks self-collision, including the held object. `clearance` checks robot and held object against the boxes;
+    oriented bounding boxes replace meshes and other shapes of the robot.
     """
 
     def __init__(
@@ -123,14 +123,14 @@ class ArmScene:
             self.set_opening(opening_before)
 
     def beyond_body_m(self, q_rad: FloatArray) -> tuple[float, float]:
-        """Overhang (m) of the arm over the body's footprint, ahead and to a side; 0 without one."""
+        """Overhang (m) of the arm beyond the body's footprint, ahead and to a side; 0 where it does not overhang."""
         most_m = np.max(np.abs(np.asarray(self._capabilities.footprint_m)), axis=0)
         x, y, _ = self.model.points_B(q_rad).T
         ahead_m, beside_m = float(np.max(x) - most_m[0]), float(np.max(np.abs(y)) - most_m[1])
         return max(0.0, ahead_m + _LINK_RADIUS_M), max(0.0, beside_m + _LINK_RADIUS_M)
 
     def hold(self, boxes: Sequence[Box]) -> None:
-        """Replaces the boxes fixed to the hand (frame H), for a held object."""
+        """Replaces the boxes fixed to the hand (frame H), which represent a held object."""
         self._robot.hold(tuple(boxes))
         self._obstacles = None
 
@@ -150,22 +150,19 @@ class ArmScene:
         self._obstacles = None
 
     def set_padding(self, padding_m: float) -> None:
-        """Sets the distance (m) that the robot keeps from boxes in later checks."""
+        """Sets the minimum distance (m) between robot and boxes for later checks."""
         self._obstacles = self._obstacles if padding_m == self._padding_m else None
         self._padding_m = padding_m
 
     def free(self, q_rad: FloatArray) -> bool:
-        """Returns whether arm angles q_rad (J,) collide with nothing."""
+        """Returns whether the arm at angles q_rad (J,) is free of collision."""
         self._work.count("arm_configuration_checks")
         if self._around().meet(np.asarray(q_rad, dtype=float)[None]):
             return False
         return bool(self._robot.checker.CheckConfigCollisionFree(self._full(q_rad)))
 
     def free_as_usual(self, q_rad: FloatArray) -> bool:
-        """Returns whether arm angles q_rad (J,) are free with the lift of the torso at its usual height.
-
-        True on robots without a lift.
-        """
+        """Returns whether arm angles q_rad (J,) are free with the torso at its usual height; True without a lift."""
         lift, usual_m = self._capabilities.lift_joint, self._capabilities.standing_height_m
         if lift is None:
             return True
@@ -180,7 +177,7 @@ class ArmScene:
             self._turn_joints(joints)
 
     def edge_free(self, q_from_rad: FloatArray, q_to_rad: FloatArray) -> bool:
-        """Returns whether the straight joint motion between two configurations collides with nothing."""
+        """Returns whether the straight joint motion between two configurations is free of collision."""
         self._work.count("arm_edge_checks")
         steps = max(1, math.ceil(float(np.linalg.norm(q_to_rad - q_from_rad)) / EDGE_STEP_RAD))
         if self._around().meet(np.linspace(q_from_rad, q_to_rad, steps + 1)):
@@ -192,13 +189,13 @@ class ArmScene:
         return all(self.free(q) for q in path_rad)
 
     def gravity_efforts(self, q_rad: FloatArray) -> FloatArray:
-        """Efforts (J,), N m, with which the arm holds its own weight at angles q_rad (J,), the body level."""
+        """Efforts (J,), N m, that hold the arm's own weight at angles q_rad (J,) with a level body."""
         context = self._robot.checker.UpdatePositions(self._full(q_rad))
         held: FloatArray = -self._robot.plant.CalcGravityGeneralizedForces(context)[self._robot.arm_velocities]
         return held
 
     def contacts(self, q_rad: FloatArray) -> tuple[tuple[str, str], ...]:
-        """Names of the links in contact or closer than the padding, for messages; boxes are `AROUND`."""
+        """Names of the links in contact or closer than the padding, for messages; `AROUND` stands for boxes."""
         links = self._around().touched(np.asarray(q_rad, dtype=float))
         return *_contacts(self._robot.checker, self._full(q_rad)), *((link, AROUND) for link in links)
 
@@ -216,9 +213,9 @@ class ArmScene:
 
 @dataclass(frozen=True)
 class _Shape:
-    """Collision shape of the robot: its link, and the arm joint that moves it, `FIXED` for none.
+    """Collision shape of the robot, its link, and the arm joint that moves it (`FIXED` when none does).
 
-    X_LS is its frame in the link of that joint; in the body for `FIXED`.
+    X_LS is its pose in the link that this joint moves; in the body for `FIXED`.
     """
 
     link: str
@@ -229,7 +226,7 @@ class _Shape:
 
     @property
     def radius_m(self) -> float:
-        """Radius of a sphere around the shape."""
+        """Radius of a bounding sphere of the shape."""
         radius, other, length = self.half_m
         if self.kind is Kind.BOX:
             return math.hypot(radius, other, length)
@@ -248,11 +245,11 @@ class _Obstacles:
         self._any_fixed = self._touch(_ALL_OR_NONE, np.zeros((1, len(model.joints))), _rows(self._fixed))
 
     def meet(self, path_rad: FloatArray) -> bool:
-        """Returns whether the robot comes within the padding of a box at any of the arm's configurations (K, J)."""
+        """Returns whether the robot is within the padding of a box at any configuration of the arm (K, J)."""
         return self._any_fixed or self._touch(_ALL_OR_NONE, path_rad, self._moved_rows)
 
     def touched(self, q_rad: FloatArray) -> list[str]:
-        """Names of the links that come within the padding of a box, the arm at q_rad (J,)."""
+        """Names of the links within the padding of a box, with the arm at q_rad (J,)."""
         links: dict[str, None] = {}
         for shapes in (self._fixed, self._moved):
             found = np.zeros(len(shapes), dtype=np.bool_)
@@ -266,7 +263,7 @@ class _Obstacles:
 
 
 def _rows(shapes: Sequence[_Shape]) -> _Arrays:
-    """Arrays of shapes, those of one joint together, in the order of the arguments of `touching`."""
+    """Arrays of shapes, grouped by joint, in the order of the arguments of `touching`."""
     joints, ends, spheres = [], [], []
     X_LS = np.array([shape.X_LS.GetAsMatrix34() for shape in shapes]).reshape(-1, 3, 4)
     radii_m = np.array([shape.radius_m for shape in shapes])
@@ -290,14 +287,14 @@ def _rows(shapes: Sequence[_Shape]) -> _Arrays:
 
 @lru_cache(maxsize=4)
 def _robot_of(capabilities: Capabilities) -> _Robot:
-    """The robot of a description, cached because it is slow to build; copy it before a change."""
+    """The robot built from a description, cached because building is slow; copy it before a change."""
     fingers = () if capabilities.gripper is None else tuple(capabilities.gripper.finger_positions(0.0))
     without_visuals = re.sub(r"<visual\b.*?</visual>", "", capabilities.description, flags=re.DOTALL)
     return _Robot(without_visuals, arm_model(capabilities), fingers)
 
 
 class _Robot:
-    """Drake's collision checker of the robot alone, welded by its body, and the robot's shapes."""
+    """Drake's collision checker for the robot alone, welded at its body, and the robot's shapes."""
 
     def __init__(self, description: str, model: ArmModel, fingers: Sequence[str]) -> None:
         from pydrake.multibody.parsing import Parser
@@ -332,7 +329,7 @@ class _Robot:
         return other
 
     def set_joints(self, joint_positions: Mapping[str, float]) -> None:
-        """Sets all joints other than the checked ones; 0 for joints without a position."""
+        """Sets all joints that the checker does not vary; joints without a position become 0."""
         for name, start in self._positions.items():
             self._q[start] = joint_positions.get(name, 0.0)
 
@@ -357,7 +354,7 @@ class _Robot:
             self._held = boxes
 
     def shapes(self, positions: FloatArray) -> list[_Shape]:
-        """All shapes and the held boxes, with their joints; `positions` are those of the whole model."""
+        """All shapes and the held boxes, with their joints, at `positions` of the whole model."""
         plant, inspector = self.plant, self.checker.model().scene_graph().model_inspector()
         context = self.checker.UpdatePositions(positions)
         chain = [plant.GetBodyByName(joint.child) for joint in self._model.joints]
@@ -375,7 +372,7 @@ class _Robot:
         return sorted(shapes, key=lambda shape: shape.joint)
 
     def allow_stowed_contacts(self) -> None:
-        """Allows the contacts of the stowed arm, which rests on the body."""
+        """Allows the contacts between the stowed arm and the body on which it rests."""
         for a, b in _contacts(self.checker, self.positions(self._model.stowed_rad, {})):
             one, other = self.plant.GetBodyByName(a), self.plant.GetBodyByName(b)
             self.checker.SetCollisionFilteredBetween(one, other, True)
@@ -384,7 +381,7 @@ class _Robot:
 def _measured(
     inspector: SceneGraphInspector, geometry: GeometryId
 ) -> tuple[Kind, tuple[float, float, float], RigidTransform]:
-    """Kind, half extents (m) and pose in its link of a collision shape, or of its oriented bounding box."""
+    """Kind, half extents (m) and pose in the link, for a collision shape or its oriented bounding box."""
     from pydrake.geometry import Box as BoxShape
     from pydrake.geometry import Capsule, Cylinder, Sphere
 

@@ -1,4 +1,4 @@
-"""Forces at the hand from the efforts of the arm's joints: the mass of a held object, and a pull at the hand."""
+"""Forces at the hand, estimated from the efforts of the arm's joints: the mass of a held object, a pull at the hand."""
 
 import math
 from collections import deque
@@ -15,30 +15,30 @@ _DAMPING_M = 0.12
 
 
 def levers_m(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray) -> FloatArray:
-    """Translational Jacobian (3, J) of the point p_HO of the hand, in the body frame (m/rad)."""
+    """Translational Jacobian (3, J) of the point p_HO fixed to the hand, in the body frame (m/rad)."""
     R_BL, p_BL = model.links(q_rad)
     axes_B = np.einsum("jab,jb->ja", R_BL[1:], model.frames[0])
     return np.cross(axes_B, p_BL[-1] + R_BL[-1] @ p_HO - p_BL[1:]).T
 
 
 def held_mass_kg(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> float:
-    """Mass (kg) at p_HO of the hand that best explains the efforts `extra_nm` (J,), by least squares."""
+    """Mass (kg) at p_HO in the hand that best explains the efforts `extra_nm` (J,), by least squares."""
     lever_nm = _GRAVITY_M_S2 * levers_m(model, q_rad, p_HO)[2]
     return float(lever_nm @ extra_nm / (lever_nm @ lever_nm))
 
 
 def hand_force_n(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> FloatArray:
-    """Force (3,) at p_HO of the hand, in the body frame (N), from the joints' additional efforts `extra_nm` (J,)."""
+    """Force (3,) at p_HO on the hand, in the body frame (N), from the joints' additional efforts `extra_nm` (J,)."""
     J = levers_m(model, q_rad, p_HO)
     return np.asarray(-np.linalg.solve(J @ J.T + _DAMPING_M**2 * np.eye(3), J @ extra_nm))
 
 
 @dataclass
 class PullWatch:
-    """Detector of a pull at the hand: compares the mean of the last readings with a baseline from the first ones.
+    """Detects a pull at the hand: compares the mean of the last measurements with a baseline from the first ones.
 
-    A pull is a force beyond `threshold_n` at all readings of `pull_s`. The mean covers `mean_s`, the baseline the first
-    `baseline_s`. The arm gives a reading every `period_s`.
+    `threshold_n` and `pull_s`: a pull exceeds this force in all measurements for this time. `mean_s` and `baseline_s`:
+    spans of the mean and of the baseline. `period_s`: time between measurements of the arm.
     """
 
     model: ArmModel
@@ -55,14 +55,14 @@ class PullWatch:
     _felt: int = field(default=0, init=False)
 
     def feels_pull(self, stamp_s: float, q_rad: FloatArray, efforts_nm: FloatArray) -> bool:
-        """Processes a new reading; returns whether a person pulls."""
+        """Updates with a new measurement; returns whether a person pulls."""
         if stamp_s > self._stamp_s:
             self._stamp_s = stamp_s
             self._take(q_rad, efforts_nm)
         return self._felt >= self._readings(self.pull_s)
 
     def _readings(self, span_s: float) -> int:
-        """Number of readings in a time, at least one."""
+        """Number of measurements within a time span, at least one."""
         return max(1, round(span_s / self.period_s))
 
     def _take(self, q_rad: FloatArray, efforts_nm: FloatArray) -> None:

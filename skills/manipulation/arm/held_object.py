@@ -1,4 +1,4 @@
-"""Object in the hand: its corners, and the hand's rotations at which the object stands again."""
+"""Object in the hand: its corners, and the rotations of the hand at which the object is upright again."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -41,7 +41,7 @@ _TOP_DEPTH_M = 0.06
 
 @dataclass(frozen=True)
 class HeldObject:
-    """Object in the hand: the hand's rotation when the object stood, and its corners (N, 3) in the hand frame."""
+    """Object in the hand: rotation of the hand when the object stood, and its corners (N, 3) in the hand frame."""
 
     R_BH: RotationMatrix
     corners_H: FloatArray
@@ -57,17 +57,17 @@ class HeldObject:
         return box_between(self.corners_H.min(axis=0), self.corners_H.max(axis=0), _THINNEST_M)
 
     def box(self, X_BH: RigidTransform) -> Box:
-        """Upright box (B) around the object in a hand at X_BH, `OFF_SURFACE_M` above what the object stands on."""
+        """Upright box (B) around the object in a hand at X_BH; its bottom is raised by `OFF_SURFACE_M`."""
         corners_B = self.corners_H @ X_BH.rotation().matrix().T + X_BH.translation()
         return box_between(corners_B.min(axis=0) + [0.0, 0.0, OFF_SURFACE_M], corners_B.max(axis=0), _THINNEST_M)
 
     def drop_m(self, rotation: RotationMatrix) -> float:
-        """Distance (m) of the object's lowest point below the hand's origin, at a rotation of the hand."""
+        """Distance (m) from the hand's origin down to the object's lowest point, at a rotation of the hand."""
         return -float(np.min(self.corners_H @ rotation.matrix()[2]))
 
     @property
     def half_width_m(self) -> float:
-        """Half the object's width, seen from above as it stood."""
+        """Half the shorter horizontal side of the standing object."""
         return 0.5 * float(self._sides_m[self._level_axes[1]])
 
     @property
@@ -76,16 +76,16 @@ class HeldObject:
 
     @property
     def _level_axes(self) -> tuple[int, int]:
-        """Axes of the hand that were level while the object stood, the one along its longer side first."""
+        """Axes of the hand that were level while the object stood, the one along the object's longer side first."""
         upright = int(np.argmax(np.abs(self.R_BH.matrix()[2])))
         first, second = (axis for axis in range(3) if axis != upright)
         return (first, second) if self._sides_m[first] >= self._sides_m[second] else (second, first)
 
     def rotations(self, azimuth_rad: float, along_rad: float | None = None) -> list[RotationMatrix]:
-        """Returns rotations of the hand at which the object stands as before.
+        """Returns rotations of the hand at which the object is upright as before.
 
-        Fingers point down, or towards an azimuth and somewhat aside. The last rotations of downward fingers turn a long
-        object along a direction.
+        Fingers point down, or within 0.4 rad of an azimuth. The last rotations of downward fingers align a long object
+        with the direction `along_rad`.
         """
         x_axis = self.R_BH.matrix()[:, 0]
         level = math.hypot(x_axis[0], x_axis[1]) > _LEVEL
@@ -98,22 +98,22 @@ class HeldObject:
         return [RotationMatrix.MakeZRotation(turn) @ self.R_BH for turn in turns]
 
     def approaches(self) -> Sequence[tuple[float, float]]:
-        """Heights over the surface (m) and tilts (rad) from which the object can go down, the best first."""
+        """Heights above the surface (m) and tilts (rad) from which the object can be lowered, the best first."""
         tilted = [(LEAST_ABOVE_M, TILT_RAD)] if self._is_flat() else []
         return [(ABOVE_M, 0.0), (LEAST_ABOVE_M, 0.0), *tilted]
 
     def _is_flat(self) -> bool:
-        """Returns whether the object is too low for its width to fall over after a tilted release."""
+        """Returns whether the object is so flat that it cannot fall over after a tilted release."""
         x, y, height = np.ptp(self.corners_H @ self.R_BH.matrix().T, axis=0)
         return bool(height < _FLAT * min(x, y))
 
     def above(
         self, p_BT: FloatArray, p_BS: FloatArray, above_m: float, tilt_rad: float = 0.0, along_rad: float | None = None
     ) -> Iterator[RigidTransform]:
-        """Yields hand poses with the object, upright as before, at a height over a point p_BT of a surface.
+        """Yields hand poses that hold the object, upright as before, at a height above a point p_BT on a surface.
 
-        p_BS is the shoulder. Downward fingers may tilt a little away from the shoulder. A long object may lie along the
-        direction `along_rad`, such as that of the surface's edge.
+        p_BS is the shoulder. Downward fingers tilt by `tilt_rad` away from the shoulder. A long object may lie along
+        the direction `along_rad`, such as that of the surface's edge.
         """
         azimuth = math.atan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0])
         ahead = RotationMatrix.MakeZRotation(azimuth)
@@ -125,7 +125,7 @@ class HeldObject:
 
 
 def held_object(payload: Payload, gripper: GripperCapabilities, R_BH: RotationMatrix) -> HeldObject:
-    """Returns the object of the payload, or else a guess from the hand's rotation while it carries."""
+    """Returns the object that the payload describes; for an unknown object, a guess from the hand's rotation."""
     if payload.corners_H is not None and payload.R_BH is not None:
         return HeldObject(payload.R_BH, payload.corners_H)
     if abs(R_BH.matrix()[2, 2]) < _LEVEL:
@@ -136,11 +136,11 @@ def held_object(payload: Payload, gripper: GripperCapabilities, R_BH: RotationMa
 
 
 def square_hand_pose(X_BH: RigidTransform, p_HT: FloatArray) -> RigidTransform:
-    """Returns the hand pose that would have taken an upright object, held at p_HT of the hand, square to the fingers.
+    """Returns the hand pose that would have grasped an upright object, held at p_HT, square to the fingers.
 
     The fingers form a groove. An upright object in a slightly tilted hand turns in the groove until it is square to the
-    fingers (measured in the plant: from 10 to 0 degrees within half a minute), and stands upright below a level hand. A
-    hand with a larger tilt keeps its pose.
+    fingers (measured in the plant: from 10 to 0 degrees within half a minute), and is upright below a level hand. A
+    pose with a larger tilt is returned unchanged.
     """
     x, y, z = X_BH.rotation().matrix()[:, 0]
     if abs(z) > np.sin(_TURNS_BELOW_RAD):
@@ -151,6 +151,6 @@ def square_hand_pose(X_BH: RigidTransform, p_HT: FloatArray) -> RigidTransform:
 
 
 def held_box(X_HB: RigidTransform, box: Box) -> Box:
-    """Returns a box in B as the upright box around it in H, a little smaller, for the object once it is held."""
+    """Returns a box in B as the upright box around it in H, shrunk a little, for the object once it is held."""
     corners = box_corners(Box(X_HB @ box.X_FG, box.size_m))
     return box_between(corners.min(axis=0) + _LESS_M, corners.max(axis=0) - _LESS_M, _THINNEST_M)

@@ -1,4 +1,4 @@
-"""Watch over the object in the gripper: recognises a loss and a slip from the gripper's readings, within 0.3 s."""
+"""Monitor of the object in the gripper: detects a loss and a slip from the gripper's measurements, within 0.3 s."""
 
 import enum
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,7 @@ GRIP_AGAIN_S: Final = 4.0
 _FIRMER = 1.5
 """Factor by which a firmer grip is stronger."""
 _MOST_OF_FORCE = 0.95
-"""Largest force of a grip, as a part of the gripper's limit."""
+"""Largest force of a grip, as a fraction of the gripper's limit."""
 _TOLERANCE_S = 1e-6
 
 
@@ -28,13 +28,13 @@ class Grip(enum.Enum):
 
 @dataclass
 class HoldWatch:
-    """Monitor of the readings of a gripper that holds an object.
+    """Monitors the measurements of a gripper that holds an object.
 
-    An empty gripper counts after `patience_s`. An object slips when the gripper has closed by more than `slip_rad`, or
-    when its force has been below the part `slip_force` of its first value for `slip_s`. Both times span two readings.
-    After a firmer grip, a closing gripper means a further slip, judged `settle_s` later; fingers that stay apart have
-    `regrip_s` to feel the object before it counts as lost. A gripper that has opened by `released_rad` releases on
-    purpose.
+    `patience_s`: how long the gripper reports no object until the object counts as lost. `slip_rad`: closing by more
+    than this is a slip. `slip_force` and `slip_s`: so is a force below this fraction of its first value for this time.
+    `settle_s`: after a firmer grip, further closing is judged only after this time. `regrip_s`: fingers that stay apart
+    have this long to feel the object after a firmer grip. `released_rad`: opening by more than this is a deliberate
+    release.
     """
 
     patience_s: float = 0.05
@@ -53,9 +53,9 @@ class HoldWatch:
     _released: bool = field(default=False, init=False)
 
     def judge(self, reading: Gripper, now_s: float) -> Grip:
-        """Judges the newest reading at a time on the robot's clock (s).
+        """Classifies the newest measurement, at a time on the robot's clock (s).
 
-        `force_n` is the force at the first reading with an object, or after a firmer grip.
+        `force_n` is the force when the object was first felt, or after a firmer grip.
         """
         if self._opening is None:
             if not reading.holding:
@@ -70,7 +70,7 @@ class HoldWatch:
         return self._held(reading, now_s)
 
     def _missed(self, reading: Gripper, now_s: float) -> Grip:
-        """Judges a reading without an object; fingers that stay apart may still have it between them."""
+        """Classifies a measurement without an object; fingers that stay apart may still have it between them."""
         self._empty_since_s = now_s if self._empty_since_s is None else self._empty_since_s
         assert self._opening is not None
         apart = reading.opening > self._opening - self.slip_rad
@@ -79,7 +79,7 @@ class HoldWatch:
         return Grip.LOST if now_s - self._empty_since_s >= self.patience_s - _TOLERANCE_S else Grip.HELD
 
     def _held(self, reading: Gripper, now_s: float) -> Grip:
-        """Judges a reading with an object between the fingers."""
+        """Classifies a measurement with an object between the fingers."""
         if self._settling and self._gripped_again_s is not None:
             if now_s < self._gripped_again_s + self.settle_s:
                 return Grip.HELD
@@ -99,7 +99,7 @@ class HoldWatch:
 
 
 def hold_watch(capabilities: Capabilities) -> HoldWatch:
-    """Returns a watch with limits that suit a robot's gripper."""
+    """Returns a monitor with limits that suit a robot's gripper."""
     period_s, gripper = capabilities.sensor_period_s, capabilities.gripper
     usual = HoldWatch(patience_s=period_s, slip_s=period_s)
     if gripper is None:
@@ -109,12 +109,12 @@ def hold_watch(capabilities: Capabilities) -> HoldWatch:
 
 
 def firmer_n(force_n: float, capabilities: Capabilities) -> float:
-    """Force (N) to grip an object that slips at force_n: 1.5 times as much, within the gripper's limit."""
+    """Grip force (N) for an object that slips at force_n: 1.5 times as much, within the gripper's limit."""
     most_n = 0.0 if capabilities.gripper is None else _MOST_OF_FORCE * capabilities.gripper.max_force_n
     return min(_FIRMER * force_n, most_n)
 
 
 def grip_again(robot: Robot, force_n: float, *, clock: Clock, lease: Lease) -> CommandId:
-    """Grips an object that slips at force_n more firmly; other motion continues meanwhile."""
+    """Grips an object that slips at force_n more firmly, while other motion continues."""
     firmly_n = firmer_n(force_n, robot.capabilities())
     return robot.set_gripper(0.0, firmly_n, until_s=clock.now() + GRIP_AGAIN_S, lease=lease)

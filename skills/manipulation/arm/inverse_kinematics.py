@@ -1,10 +1,10 @@
 """Inverse kinematics of an arm with seven joints in closed form, and of any other arm by damped least squares.
 
-Seven joints are shoulder pan and lift, then roll and flex three times over.
+The seven joints are shoulder pan and lift, upper-arm roll, elbow flex, forearm roll, wrist flex and wrist roll.
 
-The shoulder pan stands for the seventh degree of freedom: the solver tries angles all over its range, and the other
-joints follow in closed form. A flex joint that bends to the other side, with half a turn of roll before and after it,
-gives the same link poses. Therefore elbow and wrist bend to the positive side, except in solutions near a given one.
+The shoulder pan is the redundant degree of freedom: the solver samples its whole range, and the other joints follow in
+closed form. A flex joint that bends to the other side, with half a turn of roll before and after it, gives the same
+link poses. Therefore elbow and wrist bend to the positive side, except in solutions near a given one.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ _SAME_RAD = 0.02
 
 @dataclass(frozen=True)
 class SevenJoints:
-    """Lengths of the arm (m): the pan joint in B, from there to the lift joint (ahead, up), upper arm, forearm, wrist.
+    """Dimensions (m): pan joint in B, from there to the lift joint (ahead, up), upper arm, forearm, and wrist.
 
-    `wrist_m` is from the wrist's flex joint, where its three axes meet, to the last joint, whose frame is turned by
-    `roll_rad` about its axis. Limits (7,) in rad.
+    `wrist_m` is the distance from the wrist's centre to the last joint, whose frame is rotated by `roll_rad` about its
+    axis. Limits (7,) are in rad.
     """
 
     p_BS: FloatArray
@@ -74,7 +74,7 @@ class SevenJoints:
         return np.asarray(found[np.argsort(np.max(strain, axis=1, initial=0.0), kind="stable")])
 
     def reaches(self, X_BL: RigidTransform, margin_rad: float) -> bool:
-        """Returns whether there are joint angles that put the last link at X_BL."""
+        """Returns whether joint angles exist that put the last link at X_BL."""
         found, pose, limits = np.empty((1, JOINTS)), self._pose(X_BL), self._limits(margin_rad)
         for pans in (self._pans(_PANS_FOR_REACH, margin_rad), self._pans(2 * _PANS, margin_rad)):
             if _solve(*pose, pans, *limits, False, True, found):
@@ -82,7 +82,7 @@ class SevenJoints:
         return False
 
     def nearest(self, X_BL: RigidTransform, q_near_rad: FloatArray, margin_rad: float) -> FloatArray | None:
-        """Returns the joint angles (7,) nearest to given ones, preferring a similar pan; None when there are none."""
+        """Returns the joint angles (7,) nearest to q_near_rad, preferring a similar pan; None when there are none."""
         found = np.empty((_MOST, JOINTS))
         low, high = self.lower_rad[0] + margin_rad, self.upper_rad[0] - margin_rad
         pans = np.clip(q_near_rad[0] + _BESIDE_RAD, low, high)
@@ -104,7 +104,7 @@ class SevenJoints:
         return np.array(lengths), self.lower_rad + margin_rad, self.upper_rad - margin_rad
 
     def _pose(self, X_BL: RigidTransform) -> tuple[FloatArray, FloatArray]:
-        """Rotation of the last link, and the wrist's centre from the pan joint."""
+        """Rotation of the last link, and position of the wrist's centre relative to the pan joint."""
         R = np.ascontiguousarray((X_BL.rotation() @ RotationMatrix.MakeXRotation(-self.roll_rad)).matrix())
         return R, np.asarray(X_BL.translation() - self.wrist_m * R[:, 0] - self.p_BS)
 
@@ -121,7 +121,7 @@ def _solve(
     first_only: bool,
     found: NDArray[np.float64],
 ) -> int:
-    """Writes solutions that are within the limits into the rows of `found` (N, 7); returns their number."""
+    """Writes solutions within the limits into the rows of `found` (N, 7); returns their number."""
     ahead, up, a, f = lengths
     count = 0
     for k in range(len(pans)):
@@ -166,7 +166,7 @@ def _solve(
 def _wrist(
     R: NDArray[np.float64], c1: float, s1: float, c2: float, s2: float, c3: float, s3: float, c4: float, s4: float
 ) -> tuple[float, float, float]:
-    """Returns the last three angles, by the cosines and sines of the first four, for the last link's rotation R."""
+    """Returns the last three angles for the last link's rotation R, from cosines and sines of the first four."""
     # Columns of Rz(q1) Ry(q2) Rx(q3) Ry(q4), first in the panned frame.
     y0, y1, y2 = s2 * s3, c3, c2 * s3
     u0, u1, u2 = s2 * c3, -s3, c2 * c3
@@ -190,7 +190,7 @@ def _wrist(
 
 @compiled
 def _wrapped(angle_rad: float) -> float:
-    """Returns an angle within half a turn of zero."""
+    """Returns an angle in [-pi, pi]."""
     return angle_rad - 2.0 * math.pi * math.floor(angle_rad / (2.0 * math.pi) + 0.5)
 
 
@@ -206,7 +206,7 @@ class AnyJoints:
 
     @cached_property
     def _starts(self) -> FloatArray:
-        """Joint angles (N, J), spread over the limits; those of endless joints over a turn."""
+        """Joint angles (N, J) spread over the limits; continuous joints over one turn."""
         low, high = np.maximum(self.lower_rad, -math.pi), np.minimum(self.upper_rad, math.pi)
         share = np.random.default_rng(0).random((_STARTS, len(low)))
         share[0] = 0.5
@@ -232,11 +232,11 @@ class AnyJoints:
         return self._descend(X_BL, self._starts, margin_rad, _STARTS)
 
     def reaches(self, X_BL: RigidTransform, margin_rad: float) -> bool:
-        """Returns whether a solution for the last link at X_BL is found from the starts."""
+        """Returns whether the iteration finds, from one of its starts, a solution for the last link at X_BL."""
         return bool(len(self._descend(X_BL, self._starts, margin_rad, 1)))
 
     def nearest(self, X_BL: RigidTransform, q_near_rad: FloatArray, margin_rad: float) -> FloatArray | None:
-        """Returns joint angles (J,) near to given ones, None when there are none."""
+        """Returns joint angles (J,) near q_near_rad; None when there are none."""
         near = np.clip(q_near_rad, self.lower_rad + margin_rad, self.upper_rad - margin_rad)[None]
         found = self._descend(X_BL, near, margin_rad, 1)
         if not len(found):
@@ -296,7 +296,7 @@ def _descend(
 
 @compiled
 def _differ(error: FloatArray, R: FloatArray, p: FloatArray, R_BT: FloatArray, p_BT: FloatArray) -> None:
-    """Writes the way to the target into `error` (6,): m, then the turn as a vector (rad times `_ROTATION_M`)."""
+    """Writes the pose error to the target into `error` (6,): m, then the rotation vector (rad times `_ROTATION_M`)."""
     M = R_BT @ R.T
     x, y, z = M[2, 1] - M[1, 2], M[0, 2] - M[2, 0], M[1, 0] - M[0, 1]
     sine = 0.5 * math.sqrt(x * x + y * y + z * z)

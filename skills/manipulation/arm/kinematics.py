@@ -1,9 +1,9 @@
-"""Kinematics of an arm, read from the robot's own URDF.
+"""Kinematics of an arm, read from the robot's URDF.
 
-All poses are in the body frame B; the hand frame H is the last arm link's, x along the fingers, z along their closing.
-Two families have inverse kinematics in closed form, with every branch and without seeds: one has a shoulder yaw, two
-parallel pitch joints and a spherical roll-pitch-roll wrist; the other seven joints (see `SevenJoints`). Other arms are
-solved by iteration (see `AnyJoints`), or by the solver of the robot's capabilities.
+All poses are in the body frame B; the hand frame H is that of the last arm link, x along the fingers, z along the
+closing direction. Two families have closed-form inverse kinematics, which need no seed: one has a shoulder yaw, two
+parallel pitch joints and a spherical roll-pitch-roll wrist; the other has seven joints (see `SevenJoints`). Other arms
+are solved by iteration (see `AnyJoints`), or by the solver in the robot's capabilities.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _EXPECTED_AXES = ((0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 
 class ChainJoint:
     """Revolute joint: X_PF is its frame in the parent link, limits in rad, `child` the link that it moves.
 
-    The limits of a joint that turns without end are infinite.
+    The limits of a continuous joint are infinite.
     """
 
     name: str
@@ -73,16 +73,16 @@ class ArmModel:
 
     @cached_property
     def endless(self) -> NDArray[np.bool_]:
-        """Mask (J,) of the joints that turn without end."""
+        """Mask (J,) of the continuous joints."""
         return np.isinf(self.upper_rad)
 
     @property
     def p_BS(self) -> FloatArray:
-        """Shoulder (3,) in the body frame, m."""
+        """Position (3,) of the shoulder in the body frame, m."""
         return np.asarray(self.joints[0].X_PF.translation())
 
     def X_BH(self, q_rad: FloatArray) -> RigidTransform:
-        """Pose of the hand for joint angles q_rad (J,)."""
+        """Pose of the hand at joint angles q_rad (J,)."""
         R_BL, p_BL = self.links(q_rad)
         return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R_BL[-1]), p_BL[-1])
 
@@ -92,7 +92,7 @@ class ArmModel:
 
     @cached_property
     def frames(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Axes (J, 3) of the joints, and their frames in the links before them: R_PF (J, 3, 3) and p_PF (J, 3)."""
+        """Axes (J, 3) of the joints, and the joints' frames in their parent links: R_PF (J, 3, 3) and p_PF (J, 3)."""
         X_PF = np.array([joint.X_PF.GetAsMatrix34() for joint in self.joints])
         axes = np.array([joint.axis for joint in self.joints], dtype=float)
         return axes, np.ascontiguousarray(X_PF[:, :, :3]), np.ascontiguousarray(X_PF[:, :, 3])
@@ -104,24 +104,24 @@ class ArmModel:
         return R_BL, p_BL
 
     def within_limits(self, q_rad: FloatArray, margin_rad: float = 0.0) -> bool:
-        """Returns whether q_rad keeps margin_rad from every limit."""
+        """Returns whether every joint in q_rad is at least margin_rad away from its limits."""
         return bool(np.all(q_rad >= self.lower_rad + margin_rad) and np.all(q_rad <= self.upper_rad - margin_rad))
 
     def turned_near(self, q_rad: FloatArray, q_near_rad: FloatArray) -> FloatArray:
-        """Returns the same posture with endless joints within half a turn of q_near_rad; both (J,)."""
+        """Returns the same posture with continuous joints within half a turn of q_near_rad; both (J,)."""
         if not self.endless.any():
             return q_rad
         turned = q_rad + math.tau * np.round((q_near_rad - q_rad) / math.tau)
         return np.where(self.endless, turned, q_rad)
 
     def off_rad(self, q_rad: FloatArray, q_other_rad: FloatArray) -> float:
-        """Largest turn of a joint between two postures; whole turns of endless joints do not count."""
+        """Largest joint difference between two postures; full turns of continuous joints do not count."""
         return float(np.max(np.abs(self.turned_near(q_rad, q_other_rad) - q_other_rad)))
 
     def inverse(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> tuple[FloatArray, ...]:
-        """Returns joint angles that put the hand at X_BH and keep margin_rad from the limits; empty when out of reach.
+        """Returns joint angles that put the hand at X_BH, margin_rad inside the limits; empty when out of reach.
 
-        In the family of six joints these are all solutions, else a choice.
+        For the family with six joints these are all solutions, for other arms a selection.
         """
         if self._own is not None:
             return tuple(self._own.solutions(X_BH, margin_rad))
@@ -130,7 +130,7 @@ class ArmModel:
         return tuple(q for q in self.solver(X_BH) if self.within_limits(q, margin_rad))
 
     def reaches(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> bool:
-        """Returns whether there are joint angles that put the hand at X_BH and keep margin_rad from the limits."""
+        """Returns whether joint angles exist that put the hand at X_BH, margin_rad inside the limits."""
         if self._own is not None:
             return self._own.reaches(X_BH, margin_rad)
         if self.solver is None:
@@ -139,7 +139,7 @@ class ArmModel:
 
     @cached_property
     def _own(self) -> SevenJoints | AnyJoints | None:
-        """Solver of an arm that is not of the family with six joints."""
+        """Solver for an arm outside the family with six joints; None for an arm in that family."""
         if self.solver is not None or (self.closed_form and len(self.joints) != JOINTS):
             return None
         if not self.closed_form:
@@ -155,7 +155,7 @@ class ArmModel:
         )
 
     def _closed_form(self, X_BH: RigidTransform, margin_rad: float) -> Iterator[FloatArray]:
-        """Iterates over the branches of an arm with shoulder yaw, two pitch joints and a spherical wrist."""
+        """Yields the IK solutions of an arm with shoulder yaw, two pitch joints and a spherical wrist."""
         R_BH, p_SW = X_BH.rotation().matrix(), X_BH.translation() - self.p_BS
         lower, upper = (self.lower_rad + margin_rad).tolist(), (self.upper_rad - margin_rad).tolist()
         for q_arm in self._arm_branches(p_SW):
@@ -170,14 +170,14 @@ class ArmModel:
     def nearest_inverse(
         self, X_BH: RigidTransform, q_near_rad: FloatArray, margin_rad: float = 0.03
     ) -> FloatArray | None:
-        """Returns the inverse solution nearest to q_near_rad, or None when out of reach."""
+        """Returns the IK solution nearest to q_near_rad; None when X_BH is out of reach."""
         if self._own is not None:
             return self._own.nearest(X_BH, q_near_rad, margin_rad)
         solutions = self.inverse(X_BH, margin_rad)
         return min(solutions, key=lambda q: float(np.max(np.abs(q - q_near_rad))), default=None)
 
     def _arm_branches(self, p_SW: FloatArray) -> list[tuple[float, float, float]]:
-        """Angles of the first three joints that put the wrist at p_SW from the shoulder."""
+        """IK solutions of the first three joints that put the wrist at p_SW, relative to the shoulder."""
         upper = float(self.joints[2].X_PF.translation()[0])
         fore_x, _, fore_z = self.joints[3].X_PF.translation()
         fore, bend = math.hypot(fore_x, fore_z), math.atan2(fore_z, fore_x)
@@ -196,12 +196,12 @@ class ArmModel:
 
 
 def _all_between(lower: Iterable[float], values: Iterable[float], upper: Iterable[float]) -> bool:
-    """Returns whether values, perhaps fewer than the limits, are within them."""
+    """Returns whether all values are within the limits; there may be fewer values than limits."""
     return all(low <= value <= high for value, low, high in zip(values, lower, upper, strict=False))
 
 
 def _wrist_branches(R: NDArray[np.float64]) -> list[tuple[float, float, float]]:
-    """Roll, pitch, roll angles whose product is R; at the singularity the first roll is zero."""
+    """Solutions for roll, pitch and roll whose product is R; at the singularity the first roll is zero."""
     sine = math.hypot(R[0, 1], R[0, 2])
     if sine < 1e-6:
         return [(0.0, 0.0 if R[0, 0] > 0 else math.pi, math.atan2(R[2, 1], R[1, 1]))]
@@ -216,7 +216,7 @@ def _wrist_branches(R: NDArray[np.float64]) -> list[tuple[float, float, float]]:
 
 
 def _roll(R: RotationMatrix) -> float:
-    """Angle of a turn about x."""
+    """Angle of a rotation about x."""
     return math.atan2(R.matrix()[2, 1], R.matrix()[1, 1])
 
 
@@ -249,7 +249,7 @@ def _read_joint(element: ElementTree.Element) -> ChainJoint:
 
 
 def _has_closed_form(joints: tuple[ChainJoint, ...]) -> bool:
-    """Returns whether a closed-form inverse fits the chain."""
+    """Returns whether the closed form for six joints applies to the chain."""
     axes = tuple(joint.axis for joint in joints)
     offsets = [joint.X_PF.translation() for joint in joints]
     turns = [joint.X_PF.rotation() for joint in joints]
@@ -278,7 +278,7 @@ def _read_model(description: str, names: tuple[str, ...], stowed: tuple[float, .
 
 
 def arm_model(capabilities: Capabilities) -> ArmModel:
-    """Returns the arm described by a robot's capabilities. Raises ValueError when there is none."""
+    """Builds the arm model from a robot's capabilities. Raises ValueError when the robot has no arm."""
     if capabilities.arm is None:
         raise ValueError("the robot has no arm")
     names, stowed, solver = capabilities.arm.joint_names, capabilities.arm.stowed_rad, capabilities.arm.inverse

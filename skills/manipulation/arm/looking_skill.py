@@ -28,9 +28,9 @@ _HEAD_EXPIRY_S = 5.0
 _ASK_AGAIN_S = 0.3
 """Pause after a dark picture or one without depth."""
 _OPEN_WIDE = 0.98
-"""Opening of a gripper that clears the view, as a part of its widest."""
+"""Opening of a gripper that clears the view, as a fraction of the maximum opening."""
 _OPEN_ENOUGH = 0.9
-"""Part of the widest opening from which on the gripper hides nothing."""
+"""Fraction of the maximum opening from which on the gripper occludes nothing."""
 _HEAD_TURNS = 6
 """Steps of the iteration for the head's angles."""
 _OFF_AXIS_RAD = 0.2
@@ -52,7 +52,7 @@ class LookingSkill(ArmSkill[InputsT]):
 
     @property
     def object_camera(self) -> CameraCapabilities:
-        """The camera that looks for objects. Raises SkillFailure with cause PRECONDITION when there is none."""
+        """The camera that searches for objects. Raises SkillFailure with cause PRECONDITION when there is none."""
         camera = self.context.robot.capabilities().object_camera
         if camera is None:
             raise SkillFailure(Cause.PRECONDITION, "the robot has no camera on hand or head, or ahead on its body")
@@ -66,10 +66,10 @@ class LookingSkill(ArmSkill[InputsT]):
         speed_rad_s: float | None = None,
         raised_m: float | None = None,
     ) -> Routine[None]:
-        """Points the object camera at p_BT.
+        """Points the object camera at p_BT. Raises SkillFailure when that is not possible.
 
-        A hand camera goes to the first free viewpoint within reach. For another camera the arm leaves the view, and the
-        body rises by up to `raised_m`; a camera of the body must have p_BT in view. Raises SkillFailure.
+        A hand camera moves to the first free viewpoint within reach. For another camera the arm leaves the view, and
+        the body rises by up to `raised_m`; a camera on the body must have p_BT in view.
         """
         camera, can = self.object_camera, self.context.robot.capabilities()
         head = can.head if camera.mount is Mount.HEAD else None
@@ -102,7 +102,7 @@ class LookingSkill(ArmSkill[InputsT]):
         yield from self.persist(attempt, message)
 
     def look_from(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[None]:
-        """Moves the hand camera to the configuration of `goal`; opens an empty gripper that would hide the view."""
+        """Moves the hand camera to the configuration of `goal`; opens an empty gripper that would occlude the view."""
         reading, gripper = self.context.robot.gripper(), self.context.robot.capabilities().gripper
         opens = gripper is not None and not reading.holding and reading.opening < _OPEN_ENOUGH * gripper.widest
         opening = _OPEN_WIDE * gripper.widest if gripper is not None and opens else None
@@ -112,8 +112,8 @@ class LookingSkill(ArmSkill[InputsT]):
         """Takes a picture with the object camera at rest; a head camera's picture has no depth on the robot's own arm.
 
         Tries again for a while when the picture is missing, old, dark or without depth; one attempt of a skill waits
-        `PATIENCE_S` in all for light and depth. A camera that may be too `near` for depth has one try. Raises
-        SkillFailure with cause EXECUTION when the camera gives no picture or an old one.
+        `PATIENCE_S` in total for light and depth. With `near`, when the camera may be too close for depth, it tries
+        once. Raises SkillFailure with cause EXECUTION when the camera returns no picture or an old one.
         """
         yield from self.pause(settle_s, message)
         robot, camera = self.context.robot, self.object_camera
@@ -132,7 +132,7 @@ class LookingSkill(ArmSkill[InputsT]):
         return image
 
     def _picture_now(self, camera: CameraCapabilities, message: str) -> Routine[Image]:
-        """Takes one picture. Raises SkillFailure with cause EXECUTION when there is none, or an old one."""
+        """Takes one picture. Raises SkillFailure with cause EXECUTION when there is none, or only an old one."""
         robot, clock, source, name = self.context.robot, self.context.clock, camera.source, camera.mount.value
 
         def taken() -> Image:
@@ -145,9 +145,9 @@ class LookingSkill(ArmSkill[InputsT]):
         return (yield from self.sense(taken, latency_s=PICTURE_LATENCY_S, name=f"{name} picture", message=message))
 
     def stays_at_rest(self, image: Image, p_W: FloatArray, within_m: float, message: str) -> Routine[bool]:
-        """Returns whether later depth pictures match `image` within a distance of p_W.
+        """Returns whether later depth images match `image` within a distance of p_W.
 
-        The intervals between them differ, because a rolling object may be back after one interval and not after two.
+        The intervals between them differ, because a rolling object may be back after one interval but not after two.
         """
         robot, source, before = self.context.robot, self.object_camera.source, image
         X_WO = self.context.localiser.estimate().X_WO
@@ -163,9 +163,9 @@ class LookingSkill(ArmSkill[InputsT]):
 
 
 def head_angles(head: HeadCapabilities, camera: CameraCapabilities, p_BT: FloatArray) -> tuple[float, float]:
-    """Returns pan and tilt (rad) that point the head's camera at p_BT (3,), roughly at the ends of their ranges.
+    """Returns pan and tilt (rad) that point the head's camera at p_BT (3,); the error may be larger near the limits.
 
-    Raises PlanningError when the head does not turn far enough, or the point is too near the head.
+    Raises PlanningError when the head cannot turn far enough, or the point is too near the head.
     """
     pan_rad = math.atan2(p_BT[1] - head.p_BP_m[1], p_BT[0] - head.p_BP_m[0])
     tilt_rad = 0.0
@@ -186,7 +186,7 @@ def _within(angle_rad: float, range_rad: tuple[float, float]) -> float:
 
 
 def mask_arm(image: Image, arm_B: FloatArray, held_radius_m: float | None = None) -> Image:
-    """Returns the picture without depth on the robot's own arm, a line of points (N, 3) in the body frame.
+    """Removes the depth on the robot's own arm, a line through points (N, 3) in the body frame.
 
     `held_radius_m` is the radius around the last segment of the line, where an object is held.
     """

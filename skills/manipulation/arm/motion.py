@@ -1,7 +1,7 @@
 """Collision-free arm paths and their timing.
 
-A path is an array (K, J) of joint angles. A joint motion is straight if that is free; otherwise OMPL's RRT-Connect
-plans it, and shortcuts shorten it. Straight lines of the hand come from the inverse kinematics.
+A path is an array (K, J) of joint angles. A motion is straight in joint space if that is free; otherwise OMPL's
+RRT-Connect plans it, and shortcuts shorten it. Straight lines of the hand come from the inverse kinematics.
 """
 
 from __future__ import annotations
@@ -45,29 +45,26 @@ class ArmPlanner(Protocol):
     def line(
         self, model: ArmModel, q_start_rad: FloatArray, X_BH_to: RigidTransform, scene: ArmScene | None = None
     ) -> FloatArray:
-        """Returns the joint path of a straight motion of the hand to X_BH_to, with that rotation.
+        """Returns the joint path of a straight motion of the hand to X_BH_to, with that rotation throughout.
 
-        Raises PlanningError.
+        Raises PlanningError when the line is not feasible.
         """
 
     def trajectory(
         self, path_rad: FloatArray, *, speed_rad_s: float | None = None, scene: ArmScene | None = None
     ) -> ArmTrajectory:
-        """Times a path from rest to rest; rounds corners where `scene` is given.
-
-        `speed_rad_s` replaces the usual speed.
-        """
+        """Times a path from rest to rest; rounds corners where `scene` is given. Without `speed_rad_s`: usual speed."""
 
 
 @dataclass(frozen=True)
 class RrtConnect:
-    """RRT-Connect: two rapidly exploring random trees that grow towards each other, then shortcuts; trapezoidal speeds.
+    """RRT-Connect: two rapidly exploring random trees grow towards each other, then shortcuts; trapezoidal speeds.
 
-    The arm leaves a start in contact by turns of up to `escape_rad`, or up to eight times that if needed. The trees
-    grow by `step_rad`, at most `iterations` times; then follow `shortcuts` attempts to shorten the path. A straight
-    line of the hand is checked each `line_step_m`; between checks no joint may turn by more than `line_jump_rad`.
-    Trajectories keep `speed_rad_s`, or the skill's speed, and `acceleration_rad_s2`, in samples of `sample_s`, from
-    points `dense_rad` apart.
+    `escape_rad`: the arm leaves a start in contact by rotations up to this, or up to eight times as much. `step_rad`
+    and `iterations`: step and limit for the growth of the trees. `shortcuts`: attempts to shorten the path.
+    `line_step_m` and `line_jump_rad`: distance between checks on a straight line of the hand, and largest joint
+    rotation between them. `speed_rad_s` (unless a skill sets its own) and `acceleration_rad_s2`: limits of a
+    trajectory. `sample_s` and `dense_rad`: its sampling time, and the spacing of the path's points before timing.
     """
 
     step_rad: Turn = 0.25
@@ -86,8 +83,8 @@ class RrtConnect:
     ) -> FloatArray:
         """Returns a free path from start to goal. Raises PlanningError when an end is blocked or no path was found.
 
-        Endless joints take the shorter turn. If the servos' error puts the start in contact, the path begins with the
-        smallest turn that frees it.
+        Continuous joints take the shorter turn. If the servo error puts the start in contact, the path begins with the
+        smallest rotation that frees the arm.
         """
         q_goal_rad = scene.model.turned_near(q_goal_rad, q_start_rad)
         if not scene.free(q_goal_rad):
@@ -100,9 +97,9 @@ class RrtConnect:
         return self._connected(scene, q_start_rad, q_goal_rad, rng)
 
     def _freed(self, scene: ArmScene, q_rad: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Returns a free configuration near one in contact, with no further contact in between.
+        """Returns a free configuration near one in contact; the motion to it adds no further contact.
 
-        Raises PlanningError.
+        Raises PlanningError when none is found.
         """
         touched = set(scene.contacts(q_rad))
         for growth in _ESCAPES:
@@ -117,7 +114,7 @@ class RrtConnect:
     def line(
         self, model: ArmModel, q_start_rad: FloatArray, X_BH_to: RigidTransform, scene: ArmScene | None = None
     ) -> FloatArray:
-        """Returns the joint path of a straight motion of the hand to X_BH_to, with that rotation.
+        """Returns the joint path of a straight motion of the hand to X_BH_to, with that rotation throughout.
 
         Without `scene` it ignores collisions. Raises PlanningError when the line leaves the reach, jumps or collides.
         """
@@ -137,9 +134,9 @@ class RrtConnect:
     def trajectory(
         self, path_rad: FloatArray, *, speed_rad_s: float | None = None, scene: ArmScene | None = None
     ) -> ArmTrajectory:
-        """Times a path from rest to rest, at the usual speed without `speed_rad_s`.
+        """Times a path from rest to rest; without `speed_rad_s`, at the usual speed.
 
-        Corners are rounded where the rounded path is free in `scene`, and stay without `scene`.
+        Corners are rounded only where the rounded path is free in `scene`.
         """
         dense = _resampled(path_rad, self.dense_rad)
         if scene is not None and len(path_rad) > 2:
@@ -153,9 +150,9 @@ class RrtConnect:
     def _connected(
         self, scene: ArmScene, q_start_rad: FloatArray, q_goal_rad: FloatArray, rng: np.random.Generator
     ) -> FloatArray:
-        """Plans with RRT-Connect (Kuffner and LaValle, ICRA 2000), then OMPL's shortcuts. Raises PlanningError.
+        """Plans with RRT-Connect (Kuffner and LaValle, ICRA 2000), then shortcuts. Raises PlanningError without a path.
 
-        Bounds count steps, not seconds, and the seed comes from `rng`: equal problems give equal paths.
+        Limits count steps, not seconds, and the seed comes from `rng`: equal problems give equal paths.
         """
         from ompl import base, geometric, util
 
@@ -195,7 +192,7 @@ class RrtConnect:
 
 
 def _after(count: int) -> Callable[[], bool]:
-    """Returns a condition that holds from its call number `count` on."""
+    """Returns a condition that is true from its `count`-th call on."""
     left = itertools.count(count, -1)
     return lambda: next(left) <= 0
 
@@ -219,7 +216,7 @@ def _resampled(path_rad: FloatArray, apart_rad: float) -> FloatArray:
 
 
 def _rounded(dense_rad: FloatArray, half_window: int = 8) -> FloatArray:
-    """Moving average of a path that keeps the ends."""
+    """Moving average of a path; the ends stay."""
     if len(dense_rad) < 4 * half_window:
         return dense_rad
     padded = np.concatenate(

@@ -1,4 +1,4 @@
-"""Arm poses: looking at a point with the hand camera, carrying an object near the body."""
+"""Arm configurations: looking at a point with the hand camera, carrying an object near the body."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _THICK_M = 0.1
 
 
 def camera_pose(p_BC: FloatArray, p_BT: FloatArray) -> RigidTransform:
-    """Returns X_BC of a camera at p_BC that looks at p_BT with the picture upright."""
+    """Returns X_BC of a camera at p_BC that looks at p_BT with an upright picture."""
     forward = (p_BT - p_BC) / np.linalg.norm(p_BT - p_BC)
     right = np.cross(forward, UP_B)
     right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.array([0.0, -1.0, 0.0])
@@ -58,7 +58,7 @@ def camera_pose(p_BC: FloatArray, p_BT: FloatArray) -> RigidTransform:
 def look_configuration(
     scene: ArmScene, X_HC: RigidTransform, viewpoints_B: Iterable[FloatArray], p_BT: FloatArray, q_near_rad: FloatArray
 ) -> FloatArray:
-    """Returns arm angles (J,) with the hand camera (X_HC) at the first feasible viewpoint, looking at p_BT.
+    """Returns arm angles (J,) that put the hand camera (X_HC) at the first feasible viewpoint, looking at p_BT.
 
     Raises PlanningError when no viewpoint is feasible.
     """
@@ -74,9 +74,9 @@ def look_configuration(
 def overview_viewpoints(
     model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.0, height_m: float = 0.0
 ) -> list[FloatArray]:
-    """Camera positions above the shoulder towards p_BT, high ones first, turned about the shoulder by shift_rad.
+    """Camera positions above the shoulder towards p_BT, high ones first, rotated about the shoulder by shift_rad.
 
-    For an object too high for the picture, viewpoints from further back come first.
+    For an object too tall for the picture, viewpoints from farther back come first.
     """
     backs_m = (_BACK_M, 0.0) if height_m > TALL_M else (0.0,)
     direction = np.arctan2(p_BT[1] - model.p_BS[1], p_BT[0] - model.p_BS[0]) + shift_rad
@@ -94,7 +94,7 @@ def close_viewpoints(
     below_rad: Sequence[float] = _CLOSE_BELOW_RAD,
     distances_m: Sequence[float] = _CLOSE_M,
 ) -> list[FloatArray]:
-    """Camera positions near p_BT that look down at p_BT from the shoulder's side, turned about it by aside_rad."""
+    """Camera positions near p_BT that look down at it from the shoulder's side, rotated about p_BT by aside_rad."""
     direction = np.arctan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0]) + aside_rad
     return [
         p_BT + distance * np.array([-np.cos(tilt) * np.cos(direction), -np.cos(tilt) * np.sin(direction), np.sin(tilt)])
@@ -103,7 +103,7 @@ def close_viewpoints(
 
 
 def sees_closely(X_BC: RigidTransform, p_BT: FloatArray) -> bool:
-    """Returns whether the view of p_BT from X_BC is about that of a `close_viewpoints` position."""
+    """Returns whether a camera at X_BC views p_BT about as closely as from `close_viewpoints`."""
     offset = p_BT - X_BC.translation()
     distance_m = float(np.linalg.norm(offset))
     off_axis_rad = np.arccos(np.clip(X_BC.rotation().matrix()[:, 2] @ offset / distance_m, -1.0, 1.0))
@@ -113,7 +113,7 @@ def sees_closely(X_BC: RigidTransform, p_BT: FloatArray) -> bool:
 
 
 def viewpoints_beside(p_BS: FloatArray, p_BC: FloatArray, p_BT: FloatArray, aside_m: float = 0.06) -> list[FloatArray]:
-    """Camera positions beside and above p_BC, from which p_BT may be hidden.
+    """Camera positions beside and above p_BC, for when p_BT is occluded from p_BC.
 
     The first ones lie on the side of p_BC, as seen from the shoulder at p_BS, away from the occluder.
     """
@@ -123,13 +123,13 @@ def viewpoints_beside(p_BS: FloatArray, p_BC: FloatArray, p_BT: FloatArray, asid
 
 
 def _left_of(p_B: FloatArray, p_BT: FloatArray) -> FloatArray:
-    """Level unit vector to the left of the line of sight from one point to another."""
+    """Horizontal unit vector to the left of the line of sight from one point to another."""
     ahead = (p_BT - p_B)[:2] / max(float(np.linalg.norm((p_BT - p_B)[:2])), 1e-6)
     return np.array([-ahead[1], ahead[0], 0.0])
 
 
 def towards_shoulder(p_BS: FloatArray, p_B: FloatArray) -> FloatArray:
-    """Level unit vector from a point towards the shoulder at p_BS; zero straight above or below the shoulder."""
+    """Horizontal unit vector from a point towards the shoulder at p_BS; zero straight above or below the shoulder."""
     home_B = (p_BS - p_B) * [1.0, 1.0, 0.0]
     return np.asarray(home_B / max(float(np.linalg.norm(home_B)), 1e-6))
 
@@ -137,11 +137,11 @@ def towards_shoulder(p_BS: FloatArray, p_B: FloatArray) -> FloatArray:
 def carry_configuration(
     scene: ArmScene, arm: ArmCapabilities, R_BH: RotationMatrix, q_near_rad: FloatArray, hangs: bool = False
 ) -> FloatArray:
-    """Returns arm angles (J,) with the hand near the body, the object as upright as in R_BH.
+    """Returns arm angles (J,) with the hand near the body and the object as upright as in R_BH.
 
-    If the object cannot stay upright, the hand points forward and slightly up: the object rests on a finger and leans
-    on the palm; else the hand points level, or down. An object that `hangs` far below downward fingers stays there,
-    ahead of the body, because its weight would turn it out of a level hand. Raises PlanningError when no pose is free.
+    If the object cannot stay upright, the hand points forward and slightly up, so that the object rests on a finger and
+    the palm; else the hand points level, or down. An object that `hangs` far below downward fingers stays there, ahead
+    of the body, because its weight would turn it out of a level hand. Raises PlanningError when no pose is free.
     """
     points_down = R_BH.matrix()[2, 0] < -0.8
     turns = _TURNS_HANGING_RAD if points_down else (0.0, 0.4, -0.4)
@@ -154,16 +154,16 @@ def carry_configuration(
 
 
 def hangs_below(corners_H: FloatArray | None, gripper: GripperCapabilities) -> bool:
-    """Returns whether the middle of a held object, given by its corners (N, 3), is well beyond the fingertips."""
+    """Returns whether the centre of a held object, given by its corners (N, 3), is well beyond the fingertips."""
     return corners_H is not None and float(np.mean(corners_H[:, 0])) > gripper.tip_x_m + _HANGS_M
 
 
 def tucked_configuration(
     scene: ArmScene, arm: ArmCapabilities, R_BH: RotationMatrix, q_near_rad: FloatArray
 ) -> FloatArray:
-    """Returns arm angles (J,) with the hand close to the body and turned to a side, the object as upright as in R_BH.
+    """Returns arm angles (J,) with the hand close to the body and turned aside, the object as upright as in R_BH.
 
-    Raises PlanningError without a free pose.
+    Raises PlanningError when no pose is free.
     """
     beside = _turned(R_BH, (0.5 * np.pi, -0.5 * np.pi))
     q = _best_free(scene, beside, arm.tuck_x_m, arm.carry_z_m, arm.tuck_x_m[0], q_near_rad)
@@ -182,7 +182,7 @@ def _best_free(
 ) -> FloatArray | None:
     """Returns the cheapest free arm angles with the hand at one of the rotations and positions ahead of the body.
 
-    A small overhang of the arm lets the robot drive along walls and up to furniture.
+    The cost favours a small overhang of the arm, so that the robot can drive along walls and up to furniture.
     """
     candidates = [
         (_carry_cost(x - best_x_m, z, q, q_near_rad) + sum(scene.beyond_body_m(q)), q)
@@ -199,14 +199,14 @@ def _carry_cost(off_x_m: float, z_m: float, q_rad: FloatArray, q_near_rad: Float
 
 
 def _turned(R_BH: RotationMatrix, turns_rad: Sequence[float]) -> list[RotationMatrix]:
-    """Returns R_BH turned about the vertical so that the hand points ahead, plus each of the angles."""
+    """Returns rotations: R_BH turned about the vertical until the hand points ahead, plus each of the angles."""
     x_axis = R_BH.matrix()[:, 0]
     ahead = -float(np.arctan2(x_axis[1], x_axis[0]))
     return [RotationMatrix.MakeZRotation(ahead + turn) @ R_BH for turn in turns_rad]
 
 
 def _forward(pitches_rad: tuple[float, ...]) -> list[RotationMatrix]:
-    """Rotations of hands that point ahead and down by an angle."""
+    """Rotations of hands that point ahead and down by each pitch."""
     return [
         RollPitchYaw(roll, pitch, 0.0).ToRotationMatrix()
         for roll, pitch in itertools.product((0.0, np.pi), pitches_rad)
@@ -214,7 +214,7 @@ def _forward(pitches_rad: tuple[float, ...]) -> list[RotationMatrix]:
 
 
 def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationMatrix:
-    """Returns R_BH of a hand with fingers tilt_rad below level towards azimuth_rad; side (1, -1) turns it over."""
+    """Returns R_BH of a hand with fingers tilt_rad below level towards azimuth_rad; side (1 or -1) flips the hand."""
     c, s, ahead, down = np.cos(azimuth_rad), np.sin(azimuth_rad), np.cos(tilt_rad), np.sin(tilt_rad)
     x_axis, z_axis = [ahead * c, ahead * s, -down], [-side * s, side * c, 0.0]
     y_axis = [-side * down * c, -side * down * s, -side * ahead]
@@ -222,7 +222,7 @@ def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationM
 
 
 def compact_configuration(can: Capabilities) -> FloatArray:
-    """Arm angles (J,), free of contact, with the least overhang over the footprint and into views; by a search."""
+    """Arm angles (J,), free of contact, that least overhang the footprint and occlude the cameras; by sampling."""
     model = arm_model(can)
     scene = ArmScene(can, model, {})
     low, high = np.maximum(model.lower_rad, -np.pi), np.minimum(model.upper_rad, np.pi)
@@ -243,6 +243,6 @@ def compact_configuration(can: Capabilities) -> FloatArray:
 
 
 def _in_view(points_C: FloatArray) -> NDArray[np.bool_]:
-    """Returns which points (3, N) of a camera's frame a wide view shows."""
+    """Mask (N,) of the points (3, N) in the camera frame that are in a wide field of view."""
     x, y, z = points_C
     return np.asarray(np.hypot(x, y) < _WIDE * z + _THICK_M)

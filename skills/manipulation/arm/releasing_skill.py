@@ -16,7 +16,7 @@ from skills.routine import Routine
 _RELEASE_RAD = 0.55
 """Opening at which the fingertip passes a bottle; a wider one would reach neighbours."""
 _WIDE = 0.75
-"""Largest opening of a hinged gripper for a release, as a part of its widest."""
+"""Largest opening of a hinged gripper for a release, as a fraction of the maximum opening."""
 _ASIDE_M = 0.018
 """Distance of fixed finger and palm from the object before the hand draws back, so that they do not drag it."""
 _LEVEL = 0.5
@@ -40,12 +40,12 @@ _LEAST_KG = 0.06
 class ReleasingSkill(LookingSkill[InputsT]):
     """Routine that releases the held object.
 
-    The output `released_W` of its end is the point of the release. Every later failure has the cause POSTCONDITION,
-    because the robot must then search for the object.
+    Its result has the output `released_W`, the point of the release. Every failure after the release has the cause
+    POSTCONDITION, because the robot must then search for the object.
     """
 
     def step(self) -> Step:
-        """Continues the routine; adds the point of the release to its end."""
+        """Continues the routine; adds the point of the release to its result."""
         step, released_W = super().step(), self.checkpoint.get("released_W")
         if isinstance(step, Running) or released_W is None:
             return step
@@ -55,7 +55,7 @@ class ReleasingSkill(LookingSkill[InputsT]):
         return ended
 
     def end(self) -> None:
-        """Withdraws the offer of the object."""
+        """Resets `Payload.offered`."""
         self.context.payload.offered = False
         super().end()
 
@@ -66,7 +66,7 @@ class ReleasingSkill(LookingSkill[InputsT]):
         return min(release, most * self.gripper.widest)
 
     def open_hand(self, message: str) -> Routine[bool]:
-        """Opens the gripper just far enough; returns whether it feels nothing then."""
+        """Opens the gripper just far enough; returns whether it then feels no object."""
         self.context.payload.offered = True  # the jaws leave a sticking object so slowly that it seems to slip, or lost
         yield from self.move_gripper(self.release_opening(), GRIPPER_FORCE_N, message)
         released_W = self.X_WB() @ self.model.X_BH(self.q_rad()) @ self.p_HT
@@ -78,7 +78,7 @@ class ReleasingSkill(LookingSkill[InputsT]):
     def shake_off(self, message: str, *, turns_hand: bool) -> Routine[bool]:
         """Opens and closes the jaws a little, wide at the end, to shake off an object that sticks to a finger.
 
-        With `turns_hand` the hand turns to and fro as well. Returns whether the gripper then feels no object.
+        With `turns_hand` the hand also turns to and fro. Returns whether the gripper then feels no object.
         """
         wide = _WIDE * self.gripper.widest
         for opening in (wide, wide - self.gripper.like_turn(_RELEASE_RAD), wide):
@@ -93,7 +93,7 @@ class ReleasingSkill(LookingSkill[InputsT]):
         return (yield from self._feels_nothing(message))
 
     def _feels_nothing(self, message: str) -> Routine[bool]:
-        """Waits until the gripper feels nothing; returns False when it still does after a while."""
+        """Waits until the gripper feels no object; returns False when it still feels one after the time limit."""
         end_s = self.context.clock.now() + _FREE_S
         while self.context.robot.gripper().holding:
             if self.context.clock.now() > end_s:
@@ -102,14 +102,14 @@ class ReleasingSkill(LookingSkill[InputsT]):
         return True
 
     def hangs_on_hand(self, held_kg: float | None, message: str) -> Routine[bool]:
-        """Returns whether the arm still bears most of the held weight; False for an immeasurably small weight."""
+        """Returns whether the arm still bears most of the held weight; False for a weight too small to measure."""
         if held_kg is None or held_kg < _LEAST_KG:
             return False
         yield from self.pause(_CALM_S, message)
         return (yield from self.weigh(self.p_HT, message)) > max(_STILL_HELD * held_kg, _LEAST_KG)
 
     def leave_object(self) -> Routine[bool]:
-        """Takes fixed finger and palm off a released object and draws the hand back; returns whether a path was found.
+        """Moves fixed finger and palm off a released object and draws the hand back; returns whether a path was found.
 
         Two moving fingers are off the object already.
         """
@@ -122,9 +122,9 @@ class ReleasingSkill(LookingSkill[InputsT]):
 
 
 def retreats_B(X_BH: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
-    """Shifts of the hand (B) away from a released object, best first: back along the fingers, up, up and back.
+    """Offsets of the hand (B) away from a released object, best first: back along the fingers, up, up and back.
 
-    The last ones point towards the shoulder at p_BS: a stretched arm has no others.
+    The last ones point towards the shoulder at p_BS: a stretched arm has no other retreat.
     """
     up_and_back_B = math.sqrt(0.5) * (UP_B + towards_shoulder(p_BS, X_BH.translation()))
     directions_B = (-X_BH.rotation().matrix()[:, 0], UP_B, up_and_back_B)

@@ -1,4 +1,4 @@
-"""Solid cells of the world within the arm's reach, from depth pictures and the map, and boxes around them."""
+"""Solid cells of the world within the arm's reach, from depth images and the map, and boxes around them."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -62,7 +62,7 @@ View = tuple[Image, RigidTransform]
 
 @dataclass(frozen=True)
 class Outline:
-    """Outline of the robot from above: the rectangle between two corners (2,) of the body frame at a pose X_WB."""
+    """Outline of the robot from above: the rectangle between two corners (2,) in the body frame, at a pose X_WB."""
 
     X_WB: RigidTransform
     low_m: FloatArray
@@ -76,10 +76,10 @@ class Outline:
 
 @dataclass(frozen=True)
 class OwnSpace:
-    """Space of the robot itself: its outline, and the surroundings of its arm, the `lines_W` (3, K), and held object.
+    """Space that the robot itself occupies: its outline, and the space around its arm (`lines_W`) and the held object.
 
-    It includes the space between the corners in `known_W`, and the box about the corners (N, 3) of the object `held_W`,
-    with their pose X_WH.
+    `lines_W` (3, K) are points along the arm. It includes the boxes between corners in `known_W`, and the box about the
+    corners (N, 3) of the object in `held_W`, with their pose X_WH.
     """
 
     outline: Outline
@@ -104,9 +104,9 @@ class OwnSpace:
 
 
 def add_picture(cells: Cells, image: Image, X_WO: RigidTransform, own: Outline) -> Cells:
-    """Returns the cells (N, 3) after a depth picture: adds cells with points and clears cells that it sees through.
+    """Returns the cells (N, 3) after a depth image: adds cells that contain points, clears cells that it sees through.
 
-    Points within the outline `own` are ignored.
+    Ignores points within the outline `own`.
     """
     X_WC, (x_C, y_C) = camera_pose_W(image, X_WO), lens_rays(image.depth_intrinsics)
     eye, body = X_WC.GetAsMatrix34(), own.X_WB.GetAsMatrix34()
@@ -126,7 +126,7 @@ def _keys(
     low_B: FloatArray,
     high_B: FloatArray,
 ) -> NDArray[np.int64]:
-    """Keys of the cells of all points of a depth picture except the robot's own; poses are (3, 4) matrices.
+    """Keys of the cells that contain points of a depth image, without the robot's own; poses are (3, 4) matrices.
 
     `x_C` and `y_C` are x/z of each column and y/z of each row.
     """
@@ -157,7 +157,7 @@ def _keys(
 def solid_boxes(
     cells: Cells, X_WB: RigidTransform, reach_m: float, left_out: Callable[[FloatArray], NDArray[np.bool_]]
 ) -> list[Box]:
-    """Boxes in the body frame around the cells within a reach, except those whose centres p_W (N, 3) are `left_out`.
+    """Boxes in the body frame around the cells within reach, except cells with a centre p_W (N, 3) that is `left_out`.
 
     Space behind a cell, up to 32 cm and within the reach, is unknown and counts as solid too, because the camera sees
     only the edge of a board.
@@ -177,7 +177,7 @@ def solid_boxes(
 
 
 def boxes_around(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArray], NDArray[np.bool_]]) -> list[Box]:
-    """Boxes in the body frame around the cells whose centres p_W (N, 3) are `chosen`."""
+    """Boxes in the body frame around the cells for whose centre p_W (N, 3) `chosen` is true."""
     X_BW = X_WB.inverse()
     return [_box(low, high, X_BW) for low, high in merge_cells(cells[chosen(cell_centres(cells))])]
 
@@ -186,7 +186,7 @@ def wall_columns(grids: Sequence[GridMap], surfaces: Iterable[Surface]) -> Cells
     """Columns (N, 2) of cells that are occupied in all grids of a map, and thus solid at all their heights.
 
     A grid has no heights, and a LiDAR's band shows table tops and their edges. So the columns exclude surveyed
-    surfaces, over which the arm reaches, and single posts, such as the legs of chairs.
+    surfaces, over which the arm reaches, and single posts, such as chair legs.
     """
     first, *others = sorted(grids, key=lambda grid: np.count_nonzero(grid.occupied))
     points_W = first.centres(np.argwhere(first.occupied))
@@ -207,7 +207,7 @@ def wall_columns(grids: Sequence[GridMap], surfaces: Iterable[Surface]) -> Cells
 def wall_boxes(
     columns: Cells, X_WB: RigidTransform, reach_m: float, left_out: Callable[[FloatArray], NDArray[np.bool_]]
 ) -> list[Box]:
-    """Boxes in the body frame around the wall columns within a reach, without the cells that are `left_out`."""
+    """Boxes in the body frame around the wall columns within reach, except cells for which `left_out` is true."""
     off_m = (columns + 0.5) * CELL_M - X_WB.translation()[:2]
     near = columns[np.linalg.norm(off_m, axis=1) < reach_m]
     cells = np.column_stack([np.repeat(near, len(_WALL_LEVELS), axis=0), np.tile(_WALL_LEVELS, len(near))])
@@ -220,12 +220,12 @@ def cell_centres(cells: Cells) -> FloatArray:
 
 
 def _cells(keys: NDArray[np.int64]) -> Cells:
-    """Returns the cells (N, 3) of keys (N,)."""
+    """Returns the cells (N, 3) that belong to keys (N,)."""
     return np.stack([keys // _STRIDES[0], keys // _STRIDES[1] % _SPAN, keys % _SPAN], axis=1) - _OFFSET
 
 
 def add_view(views: Sequence[View], image: Image, X_WO: RigidTransform) -> tuple[View, ...]:
-    """Returns the last views and a new one with each eighth row and column of its depth."""
+    """Returns the last views and a new one, with every eighth row and column of the image's depth."""
     lens, thin = image.depth_intrinsics, _STRIDE_PX
     depth_m = image.depth_m[thin // 2 :: thin, thin // 2 :: thin]
     lens = Intrinsics(
@@ -254,7 +254,7 @@ def never_seen(points_W: FloatArray, views: Iterable[View]) -> NDArray[np.bool_]
 
 
 def _seen_past(cells: Cells, image: Image, X_WO: RigidTransform) -> NDArray[np.bool_]:
-    """Mask (N,) of the cells that lie clearly before the depth of the picture at their pixel."""
+    """Mask (N,) of the cells that lie clearly in front of the depth at their pixel."""
     inside, z, depth = _at_pixels(cell_centres(cells), image, X_WO)
     return np.asarray(inside & (depth > z + _SEEN_PAST_M))
 
@@ -262,7 +262,7 @@ def _seen_past(cells: Cells, image: Image, X_WO: RigidTransform) -> NDArray[np.b
 def _at_pixels(
     points_W: FloatArray, image: Image, X_WO: RigidTransform
 ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
-    """Mask (N,) of the points that a depth picture covers, their depth, and the picture's depth at their pixel (m)."""
+    """Mask (N,) of the points inside a depth image, their depth, and the image's depth at their pixel (m)."""
     X_CW = camera_pose_W(image, X_WO).inverse()
     p_C = points_W @ X_CW.rotation().matrix().T + X_CW.translation()
     lens = image.depth_intrinsics
@@ -276,7 +276,7 @@ def _at_pixels(
 
 
 def merge_cells(cells: Cells) -> list[tuple[Cells, Cells]]:
-    """Returns few boxes (first cell, cell after the last) that cover exactly these cells: runs, merged if equal."""
+    """Returns few boxes (first cell, one past the last cell) that exactly cover the cells: runs, merged if equal."""
     boxes = np.concatenate([cells, cells + 1], axis=1)
     for axis, others in ((2, (0, 1, 3, 4)), (1, (0, 2, 3, 5)), (0, (1, 4, 2, 5))):
         boxes = _joined(boxes, axis, others)
@@ -284,9 +284,9 @@ def merge_cells(cells: Cells) -> list[tuple[Cells, Cells]]:
 
 
 def _joined(boxes: Cells, axis: int, others: Sequence[int]) -> Cells:
-    """Joins boxes (N, 6) along an axis where one begins in another's last cell or after it and `others` are equal.
+    """Joins boxes (N, 6) along an axis where the next begins at or before the end, and the columns `others` are equal.
 
-    They come in the order of the columns `others`, then along the axis.
+    The boxes must be sorted by the columns `others`, then along the axis.
     """
     boxes = boxes[np.lexsort([boxes[:, each] for each in (axis, *reversed(others))])]
     begins = np.ones(len(boxes), dtype=np.bool_)

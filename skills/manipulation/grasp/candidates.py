@@ -31,9 +31,9 @@ _THIN_ABOVE_M = 0.001
 _LEAST_GRIP_M = 0.008
 """Least height that the fingers must cover of a low object."""
 _LEAST_OF_THIN = 0.35
-"""The same for a thin object, as a part of its height."""
+"""The same for a thin object, as a fraction of its height."""
 _LEAST_BEYOND = 0.25
-"""Largest height of the fingertips above a flat object's middle, as a part of its height."""
+"""Largest height of the fingertips above a flat object's centre, as a fraction of its height."""
 _WELL_BEYOND_M = 0.006
 """Depth of the fingertips below an object's middle: rounded tips above it press a round handle out."""
 _PER_HIGH_M = 60.0
@@ -69,9 +69,9 @@ _SAME_PLACE_M = 0.03
 
 @dataclass(frozen=True)
 class GraspCandidate:
-    """Hand pose about an object, the width between the fingers (m), its cost, and its tilt (rad, 0 level).
+    """Hand pose at an object, the width between the fingers (m), its cost, and its tilt (rad, 0 level).
 
-    `lever_m` is the estimated level distance of the object's centre of mass from the grip, across the fingers.
+    `lever_m` is the estimated horizontal distance, across the fingers, from the grip to the object's centre of mass.
     """
 
     X_BH: RigidTransform
@@ -90,7 +90,7 @@ def grasp_candidates(
 ) -> list[GraspCandidate]:
     """Returns candidates, the best first; an empty list when the object is too wide or too flat. p_BS is the shoulder.
 
-    `beside_m` are the gaps beside the fixed finger, for an upright object and for a low one.
+    `beside_m` are the gaps at the fixed finger, for an upright object and for a low one.
     """
     ahead = _ahead_rad(target, p_BS)
     tried = [
@@ -107,12 +107,12 @@ def grasp_candidates(
 
 
 def _ahead_rad(target: Target, p_BS: FloatArray) -> float:
-    """Direction of an object from the shoulder."""
+    """Direction from the shoulder to an object."""
     return float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
 
 
 def _least_height_m(target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> float | None:
-    """Least height (m, in whole mm) at which the object has candidates; None when its height is not the reason."""
+    """Minimum height (m, in whole mm) at which the object has candidates; None when its height is not the reason."""
     for height_mm in range(int(1000 * target.height_m) + 1, _HIGHEST_FLAT_MM):
         if grasp_candidates(replace(target, height_m=0.001 * height_mm), p_BS, gripper):
             return 0.001 * height_mm
@@ -120,9 +120,9 @@ def _least_height_m(target: Target, p_BS: FloatArray, gripper: GripperCapabiliti
 
 
 def _attitudes(target: Target, placement: Placement, gripper: GripperCapabilities) -> Sequence[tuple[float, float]]:
-    """Tilts of the fingers below level and, for grasps from above, leans about the object's long axis (rad).
+    """Tilts of the fingers below level and, for grasps from above, roll angles about the object's long axis (rad).
 
-    At the first lean, fingers of different length end level on both sides of an object of this width.
+    At the first roll, fingers of different length end at equal height on both sides of an object of this width.
     """
     if placement.rim:
         return [(0.5 * np.pi, 0.0)]
@@ -172,7 +172,7 @@ def _candidate(
 
 
 def _top_grip(placement: Placement, tilt_rad: float, gripper: GripperCapabilities) -> tuple[float, float]:
-    """Depths of a grasp from above (m): of the grip below the top, and of the object's centre ahead of the hand."""
+    """Distances of a grasp from above (m): from the top down to the grip, and from the hand to the object's centre."""
     ahead_m = _BELOW_PALM_M + placement.half_depth_m * np.cos(tilt_rad)
     over_top_m = max(_OVER_TOP_M, gripper.tip_x_m - gripper.palm_x_m - placement.below_top_m)
     return ahead_m * float(np.sin(tilt_rad)) - over_top_m, gripper.palm_x_m + ahead_m
@@ -181,7 +181,7 @@ def _top_grip(placement: Placement, tilt_rad: float, gripper: GripperCapabilitie
 def _low_grip(
     R_BH: RotationMatrix, height_m: float, width_m: float, gripper: GripperCapabilities, beside_m: float
 ) -> tuple[float, float] | None:
-    """Depths of a grasp of a low object (m): of its middle ahead of the hand, and of the fingers beyond the middle.
+    """Distances of a grasp of a low object (m): from the hand to its centre, and from its centre to the fingertips.
 
     The lowest corner of the closed fingers stays just above the surface, and the higher fingertip limits the grip. None
     when the fingers cover too little of the object.
@@ -206,13 +206,13 @@ def _low_grip(
 
 
 def _uneven_m(R_BH: RotationMatrix, width_m: float, gripper: GripperCapabilities) -> float:
-    """Difference in height (m) of the ends of both fingers that are closed on a width."""
+    """Difference in height (m) between the tips of both fingers when they are closed on a width."""
     ahead_m, across_m = _closed_tip_x_m(gripper) - gripper.fixed_tip_x_m, width_m if _hinged(gripper) else 0.0
     return abs(float(R_BH.matrix()[2] @ [ahead_m, 0.0, across_m]))
 
 
 def _closed_tip_x_m(gripper: GripperCapabilities) -> float:
-    """Position (m) of the moving finger's tip along the hand on a narrow object: it reaches farthest half open."""
+    """Position (m) along the hand of the moving finger's tip on a narrow object: it reaches farthest half open."""
     return max(gripper.fixed_tip_x_m, gripper.tip_x_m - _SHORTER_CLOSED_M)
 
 
@@ -221,22 +221,22 @@ def _hinged(gripper: GripperCapabilities) -> bool:
 
 
 def _above_surface(height_m: float, spare_m: float) -> float:
-    """Distance of the fingertips from the surface (m): more for a high object, less for a flat one."""
+    """Distance between fingertips and surface (m): larger for a high object, smaller for a flat one."""
     usual = _ABOVE_SURFACE_M + 0.4 * max(0.0, height_m - 0.03)
     least = _THIN_ABOVE_M if height_m < THIN_M else _LEAST_ABOVE_SURFACE_M
     return float(np.clip(spare_m - 1e-6, least, usual))
 
 
 def least_mass_kg(kind: ObjectKind) -> float:
-    """Least mass of an object by its class, 0.0 when nothing is known of its class."""
+    """Minimum mass of an object by its class; 0.0 for a class without an entry."""
     mass_kg = class_form(kind.name).mass_kg
     return 0.0 if mass_kg is None else mass_kg[0]
 
 
 def why_too_heavy(kind: ObjectKind, max_payload_kg: float) -> str | None:
-    """Returns the reason if even the lightest of a class is too heavy for the arm; None when only weighing can decide.
+    """Returns why even the lightest object of a class is too heavy for the arm; None when only weighing can decide.
 
-    Size does not give the mass: a hose widens an extinguisher, and it may be empty.
+    Size does not determine the mass: a hose widens an extinguisher, which may be empty.
     """
     mass_kg = least_mass_kg(kind)
     if mass_kg <= max_payload_kg:

@@ -46,7 +46,7 @@ _TALLER_M = 0.05
 class CloseView:
     """Close view of an object and its obstacles, with X_WB at that time.
 
-    `others` are the objects among the boxes, without longer ones, such as walls.
+    `others` are the objects among the boxes, without long ones such as walls.
     """
 
     target: Target
@@ -56,7 +56,7 @@ class CloseView:
     others: tuple[Obstacle, ...] = ()
 
     def shift(self, offset_B: FloatArray) -> CloseView:
-        """Returns the view with the object shifted level by offset_B (3,)."""
+        """Returns the view with the object shifted horizontally by offset_B (3,)."""
         x, y = np.array(self.target.centre_B) + offset_B[:2]
         target = replace(self.target, points_B=self.target.points_B + offset_B, centre_B=(float(x), float(y)))
         box = Box(RigidTransform(offset_B) @ self.target_box.X_FG, self.target_box.size_m)
@@ -66,7 +66,7 @@ class CloseView:
 def square(
     position_W: tuple[float, float, float], height_m: float, name: str, half: float = LOOK_HALF_SIDE_M
 ) -> Surface:
-    """Returns a square patch around a point."""
+    """Returns a square surface around a point."""
     x, y, _ = position_W
     corners = ((x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half))
     return Surface(name, corners, height_m)
@@ -81,7 +81,7 @@ def examine(
     found: tuple[Detection3D, ...],
     within_m: float,
 ) -> CloseView | None:
-    """Looks for the object within a distance (m) of its last position; None when it is not there."""
+    """Finds the object within a distance (m) of its last position; None when it is not there."""
     highest_m = max(HIGHEST_M, seen.size_m[2] + _TALLER_M)
     view = segment_surface(image, place.X_WO, surface, margin_m=0.0, highest_m=highest_m)
     if view is None:
@@ -109,7 +109,7 @@ def examine(
 
 
 def _split_others(view: SurfaceView, own: Sequence[Detection3D], p_WC: FloatArray) -> SurfaceView:
-    """Splits clusters of touching objects, except along the object's own detections."""
+    """Splits clusters of touching objects, but keeps together what the object's own detections cover."""
     own_clusters = [each for one in own if (each := matching_cluster(view.clusters, one)) is not None]
     rest = tuple(each for each in view.clusters if not any(each is one for one in own_clusters))
     split = split_touching(replace(view, clusters=rest), p_WC)
@@ -133,7 +133,7 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
 def _same_object(
     view: SurfaceView, seen: ObjectObservation, found: Sequence[Detection3D], within_m: float
 ) -> Cluster | None:
-    """Returns the nearest cluster of the object's class, else the nearest of all; None when all are far."""
+    """Returns the nearest cluster of the object's class, else the nearest of any class; None when all are far."""
     expected = np.array(seen.position_W[:2])
 
     def off(cluster: Cluster) -> float:
@@ -148,7 +148,7 @@ def _same_object(
 
 
 def _observed(cluster: Cluster, name: str, beside: ObjectObservation, image: Image) -> ObjectObservation:
-    """Returns an observation of another object on the same surface."""
+    """Returns an observation of a neighbour, an object on the same surface."""
     (x, y), shape = cluster.shape.centre, cluster.shape
     return ObjectObservation(
         stamp_s=image.stamp_s,

@@ -1,7 +1,7 @@
-"""Placements of grasps on an object: points over its outline at which the fingers close, the local width, and a cost.
+"""Placements of grasps on an object: points on its outline where the fingers close, the local width, and a cost.
 
-Along a long object the local width counts, so that a hammer is taken by its handle, and over the height of an upright
-one, so that a bottle that is too wide for the gripper is taken by its neck.
+Along a long object the local width counts, so that a hammer is grasped by its handle, and over the height of an upright
+one, so that a bottle that is too wide for the gripper is grasped by its neck.
 """
 
 from __future__ import annotations
@@ -121,11 +121,11 @@ class Target:
 
     @property
     def upright(self) -> bool:
-        """Returns whether the object is high enough to be grasped from the side."""
+        """Returns whether the object is tall enough to be grasped from the side."""
         return self.height_m > UPRIGHT_M
 
     def slice(self, p_BS: FloatArray, low_m: float, high_m: float = np.inf) -> Target:
-        """Returns the part between two heights over the surface, as seen from p_BS; all of it where few points are."""
+        """Returns the slice between two heights above the surface, as seen from p_BS; the whole when points are few."""
         above = self.points_B[:, 2] - self.base_m
         points_B = self.points_B[(above > low_m) & (above < high_m)]
         if not _FEWEST_POINTS < len(points_B) < len(above):
@@ -141,10 +141,10 @@ class Target:
 
 @dataclass(frozen=True)
 class Placement:
-    """Position of a grasp: point (x, y), azimuth of the approach, local width and depth (m), cost.
+    """Placement of a grasp: point (x, y), azimuth of the approach, local width and depth (m), cost.
 
-    `lever_m` is the estimated level distance of the centre of mass. For an upright object, the point is `height_m` over
-    the surface, or the fingers reach `below_top_m` below its top from above. At a `rim` they point straight down.
+    `lever_m` is the estimated horizontal distance to the centre of mass. For an upright object, the point is `height_m`
+    above the surface, or the fingers reach `below_top_m` below its top from above. At a `rim` they point straight down.
     """
 
     xy: FloatArray
@@ -159,7 +159,7 @@ class Placement:
 
 
 def placements(target: Target, p_BS: FloatArray, ahead_rad: float) -> list[Placement]:
-    """Returns the positions of grasps on an object that lies at ahead_rad from the shoulder at p_BS."""
+    """Returns the grasp placements on an object in the direction ahead_rad from the shoulder at p_BS."""
     rims = list(_rims(target))
     if not target.upright:
         return [*(_round(target, ahead_rad) if target.round else _along(target, ahead_rad)), *rims]
@@ -179,7 +179,7 @@ def placements(target: Target, p_BS: FloatArray, ahead_rad: float) -> list[Place
 
 
 def _with_lever(placement: Placement, middle: FloatArray, usual_m: float) -> Placement:
-    """Returns the placement with its lever, the cost of that, and the cost of an unusual height."""
+    """Returns the placement with its lever, and with the costs of the lever and of an unusual height."""
     lever_m = float(np.linalg.norm(placement.xy - middle))
     off_m = 0.0 if placement.below_top_m else abs(placement.height_m - usual_m)
     cost = placement.cost + _PER_LEVER_M * lever_m + _PER_OFF_USUAL_M * off_m
@@ -187,7 +187,7 @@ def _with_lever(placement: Placement, middle: FloatArray, usual_m: float) -> Pla
 
 
 def _aside(target: Target, part: Target, height_m: float, ahead_rad: float) -> Iterator[Placement]:
-    """Yields positions of grasps of a slice from the side. A wider part below or above it keeps the palm off."""
+    """Yields placements on a slice from the side; a wider part below or above it keeps the palm off the slice."""
     beside = target.points_B[np.abs(target.points_B[:, 2] - target.base_m - height_m) < _HAND_HALF_M, :2]
     higher_B = target.points_B[target.points_B[:, 2] - target.base_m > height_m - _SLICE_M]
     for each in _round(part, ahead_rad) if part.round else _from_sides(part, higher_B, ahead_rad):
@@ -199,7 +199,7 @@ def _aside(target: Target, part: Target, height_m: float, ahead_rad: float) -> I
 
 
 def _above(target: Target, p_BS: FloatArray, ahead_rad: float, middle: FloatArray) -> Iterator[Placement]:
-    """Yields positions of grasps of an upright object from above, about its top, such as a handle or a neck."""
+    """Yields placements on an upright object from above, about its top, such as a handle or a neck."""
     widest_m = np.inf
     for depth_m in _TOP_DEPTHS_M:
         part = target.slice(p_BS, target.height_m - depth_m)
@@ -211,7 +211,7 @@ def _above(target: Target, p_BS: FloatArray, ahead_rad: float, middle: FloatArra
 
 
 def _rims(target: Target) -> Iterator[Placement]:
-    """Yields positions about the rim of a hollow object, which one finger enters from above."""
+    """Yields placements about the rim of a hollow object, into which one finger enters from above."""
     centre = np.array(target.centre_B)
     below_top_m = target.height_m + target.base_m - target.points_B[:, 2]
     for azimuth in np.arange(0.0, 2.0 * np.pi, _RIM_STEP_RAD):
@@ -230,7 +230,7 @@ def _rims(target: Target) -> Iterator[Placement]:
 
 
 def _round(target: Target, ahead_rad: float) -> list[Placement]:
-    """Approaches of a round object from several sides, the shoulder's side the cheapest."""
+    """Returns placements on a round object from several sides; approaching from the shoulder's side costs least."""
     centre, z = np.array(target.centre_B), target.points_B[:, 2]
     off = np.linalg.norm(target.points_B[:, :2] - centre, axis=1)
     touching = _touching(z, off, 0.5 * target.width_m, float(np.ptp(z))) if target.upright else 1.0
@@ -240,9 +240,9 @@ def _round(target: Target, ahead_rad: float) -> list[Placement]:
 
 
 def _from_sides(target: Target, higher_B: FloatArray, ahead_rad: float) -> Iterator[Placement]:
-    """Yields positions of grasps of an upright box from its sides, with its width as far as the fingers reach in.
+    """Yields placements on an upright box from its sides; the width counts as deep as the fingers reach.
 
-    Its back is hidden: how wide it is from beside is seen at its top, among the points `higher_B`.
+    The object's back is occluded: its lateral width is measured at its top, among the points `higher_B`.
     """
     centre = np.array(target.centre_B)
     for azimuth in (wrap(target.yaw_rad + turn) for turn in (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi)):
@@ -265,9 +265,9 @@ def _from_sides(target: Target, higher_B: FloatArray, ahead_rad: float) -> Itera
 
 
 def _along(target: Target, ahead_rad: float, middle_B: FloatArray | None = None) -> Iterator[Placement]:
-    """Yields positions along a box's axes with the local width there; both axes of a box that is nearly square.
+    """Yields placements along a box's axes with the local width there; along both axes of a nearly square box.
 
-    The best is at the centre of mass `middle_B` (x, y), or at the one that the outline suggests.
+    The cheapest is at the centre of mass `middle_B` (x, y), or where the outline suggests the centre of mass.
     """
     square, centre = target.length_m < _SQUARE_RATIO * target.width_m, np.array(target.centre_B)
     for yaw in (target.yaw_rad, target.yaw_rad + 0.5 * np.pi) if square else (target.yaw_rad,):
@@ -296,7 +296,7 @@ def _along(target: Target, ahead_rad: float, middle_B: FloatArray | None = None)
 
 
 def _beyond_end_m(along_m: FloatArray, at_m: float) -> float:
-    """Length (m) by which fingers at a position along an outline reach beyond its end: they slide off a tapered one."""
+    """Length (m) by which fingers at a position extend beyond the end of an outline: they slide off a tapered end."""
     return max(0.0, _FINGER_HALF_M - min(at_m - float(np.min(along_m)), float(np.max(along_m)) - at_m))
 
 
@@ -307,7 +307,7 @@ def _aligned(xy: FloatArray, yaw_rad: float) -> float:
 
 
 def _turned(azimuth_rad: float) -> FloatArray:
-    """Level unit vectors along an azimuth and to the left of it, as rows (2, 2)."""
+    """Horizontal unit vectors along an azimuth and to the left of it, as rows (2, 2)."""
     c, s = np.cos(azimuth_rad), np.sin(azimuth_rad)
     return np.array([[c, s], [-s, c]])
 
@@ -318,17 +318,17 @@ def _width_cost(width_m: float) -> float:
 
 
 def _touching_both(s: FloatArray, t: FloatArray, low_m: float, high_m: float, length_m: float | None = None) -> float:
-    """The lesser part of their breadth by which two fingers touch that close at low_m and high_m (see `_touching`)."""
+    """The smaller contact fraction of two fingers that close at low_m and high_m (see `_touching`)."""
     length_m = float(np.ptp(s)) if length_m is None else length_m
     return min(_touching(s, -t, -low_m, length_m), _touching(s, t, high_m, length_m))
 
 
 def _touching(s: FloatArray, t: FloatArray, edge_m: float, length_m: float) -> float:
-    """Part of a finger's breadth that touches an outline (s along, t across, m) when it closes at edge_m.
+    """Fraction of a finger's breadth in contact with an outline (s along, t across, m) when it closes at edge_m.
 
     A finger at the cheek of a hammer's head touches at one end of its breadth only, and the hammer turns out of it; so
     does a finger half beyond the end of a handle. For an object shorter (length_m) than the finger's breadth, the
-    object's length counts.
+    fraction refers to the object's length.
     """
     bins = np.round(s / _BIN_M).astype(int)
     touched = [np.percentile(t[bins == k], 98) > edge_m - _FINGER_YIELDS_M for k in np.unique(bins)]
@@ -336,7 +336,7 @@ def _touching(s: FloatArray, t: FloatArray, edge_m: float, length_m: float) -> f
 
 
 def _balance(s: FloatArray, t: FloatArray) -> float:
-    """Position along a long object (s along, t across, m) of its centre of mass, taken as a solid of revolution.
+    """Position of the centre of mass along a long object (s along, t across, m), taken as a solid of revolution.
 
     A hammer is heavy at its head: held by the far end of its handle it would turn in the gripper.
     """

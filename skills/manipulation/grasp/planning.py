@@ -1,4 +1,4 @@
-"""Grasp planning: the first candidate that the arm can reach, approach and lift."""
+"""Grasp planning: selects the first candidate that the arm can reach, approach and lift."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _ALIKE_RAD = 0.3
 
 @dataclass(frozen=True)
 class GraspPlan:
-    """Grasp with the motions to its pre-grasp and to the grasp, the last bit slowly, and the lift (B)."""
+    """Grasp with the motions to its pre-grasp and to the grasp, whose last stretch is slow, and the lift (B)."""
 
     candidate: GraspCandidate
     to_pregrasp: ArmTrajectory
@@ -54,14 +54,14 @@ class GraspPlan:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """Object beside the one to grasp: its observation and its boxes in B."""
+    """Neighbour of the object to grasp: its observation and its boxes in B."""
 
     seen: ObjectObservation
     boxes: tuple[Box, ...]
 
     @property
     def centre_B(self) -> FloatArray:
-        """Centre (3,) of its boxes."""
+        """Centre (3,) of the neighbour's boxes."""
         return np.asarray(np.mean([box.X_FG.translation() for box in self.boxes], axis=0))
 
 
@@ -69,7 +69,7 @@ class Obstacle:
 class Surroundings:
     """Obstacles around the object, and the object itself, as boxes in B; `up_B` points up in the body frame.
 
-    `others` are the objects among the boxes. `name` and `reach_m`, the arm's largest reach, serve the message when
+    `others` are the objects among the boxes. `name` and the arm's largest reach, `reach_m`, are for the message when
     there is no grasp.
     """
 
@@ -81,11 +81,11 @@ class Surroundings:
     reach_m: float = np.inf
 
     def lets_rise(self, lift_B: FloatArray) -> bool:
-        """Returns whether a straight path up is free for the object.
+        """Returns whether the object can rise along `lift_B` without contact.
 
-        The check takes the object a little smaller than its box, so that its support and neighbours do not touch it. A
-        box that still overlaps is a part of the object: from high up, a screwdriver's shaft is detected as an object
-        next to the handle.
+        The check shrinks the object's box a little, so that its support and neighbours do not touch it. A box that
+        still overlaps is part of the object: viewed from high up, a screwdriver's shaft is detected as an object next
+        to the handle.
         """
         steps = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(lift_B) / _LIFT_STEP_M))
         x, y, z = (max(side - 2.0 * _OFF_M, 0.005) for side in self.target.size_m)
@@ -93,18 +93,19 @@ class Surroundings:
         return bool(np.all((gaps > _LIFT_MARGIN_M) | (gaps[0] < 0.0)))
 
     def without(self, others: Sequence[Obstacle]) -> Surroundings:
-        """Returns the surroundings without some of the other objects."""
+        """Returns the surroundings without `others`."""
         gone = {id(box) for other in others for box in other.boxes}
         return replace(self, boxes=[box for box in self.boxes if id(box) not in gone])
 
 
 @dataclass(frozen=True)
 class GeometricGraspPlanner:
-    """Grasp planner by the object's outline: takes the first candidate that the arm can reach, approach and lift.
+    """Plans grasps from the object's outline: selects the first candidate that the arm can reach, approach and lift.
 
-    The hand keeps `padding_m` from all obstacles on its path, and `final_padding_m` on the straight approach. Joints
-    are at most as fast as `approach_rad_s` on the approach, and `last_rad_s` on its last bit. The gap at the fixed
-    finger is `beside_fixed_m`, or `beside_fixed_low_m` for low objects, which would stop a finger that lands on them.
+    `padding_m` and `final_padding_m`: clearance of the hand from obstacles on its path, and on the straight approach.
+    `approach_rad_s` and `last_rad_s`: joint speed limits on the approach, and on its last stretch. `beside_fixed_m` and
+    `beside_fixed_low_m`: gap at the fixed finger, and the gap for low objects, which would stop a finger that lands on
+    them.
     """
 
     padding_m: Margin = 0.01
@@ -115,10 +116,7 @@ class GeometricGraspPlanner:
     beside_fixed_low_m: Margin = 0.017
 
     def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
-        """Returns grasps, the best first; an empty list for an object that is too wide or too flat.
-
-        p_BS is the shoulder.
-        """
+        """Returns grasps, the best first; none for an object that is too wide or too flat. p_BS is the shoulder."""
         return grasp_candidates(target, p_BS, gripper, (self.beside_fixed_m, self.beside_fixed_low_m))
 
     def plan(
@@ -161,9 +159,9 @@ class GeometricGraspPlanner:
         around: Surroundings,
         arm_planner: ArmPlanner,
     ) -> tuple[Obstacle, ...]:
-        """Returns the object, or all near ones, that block every grasp, nearest first; empty without any.
+        """Returns the one object, or all near ones, that block every grasp, nearest first; empty when none blocks.
 
-        Only the best candidates are checked again.
+        Checks only the best candidates again.
         """
 
         def graspable(space: Surroundings) -> bool:
@@ -189,7 +187,7 @@ class GeometricGraspPlanner:
         around: Surroundings,
         arm_planner: ArmPlanner,
     ) -> tuple[FloatArray, FloatArray]:
-        """Returns the straight approach from the pre-grasp, and the lift (frame B). Raises PlanningError."""
+        """Returns the straight approach from the pre-grasp, and the lift (B). Raises PlanningError without them."""
         scene.set_boxes(around.boxes)
         scene.set_padding(self.final_padding_m)
         reason, no_lift_rad = _OUT_OF_REACH, list[FloatArray]()
@@ -219,7 +217,7 @@ def _out_of_reach(model: ArmModel, around: Surroundings) -> str:
 
 
 def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -> str:
-    """Returns the message on blocking objects: before the object as seen from the shoulder, or close to its side."""
+    """Returns the message on blocking objects: in front, as seen from the shoulder, or close to the object's side."""
     p_ST = around.target.X_FG.translation() - model.p_BS
     before = any((other.centre_B - model.p_BS) @ p_ST < p_ST @ p_ST for other in others)
     names = " and ".join(f"the {other.seen.kind}" for other in others)
@@ -227,7 +225,7 @@ def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -
 
 
 def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, margin_rad: float = 0.08) -> bool:
-    """Returns whether the arm reaches a grasp, its pre-grasp and the end of its lift; contact is not checked."""
+    """Returns whether the arm reaches a grasp, its pre-grasp and the end of its lift; ignores contact."""
     X_BH, distance = candidate.X_BH, PREGRASPS_M[-1]
     if not (model.reaches(X_BH, margin_rad) and model.reaches(candidate.retreat(distance), margin_rad)):
         return False
@@ -236,16 +234,13 @@ def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, m
 
 
 def lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[FloatArray]:
-    """Returns the lifts from a grasp (B), the best first."""
+    """Returns lift offsets from a grasp (B), the best first."""
     back = towards_shoulder(model.p_BS, X_BH.translation())
     return [up_m * up_B + back_m * back for up_m, back_m in LIFTS_M]
 
 
 def _lift(scene: ArmScene, q_rad: FloatArray, around: Surroundings, arm_planner: ArmPlanner) -> FloatArray:
-    """Returns the first lift that the arm can follow without contact of arm or object.
-
-    Raises PlanningError.
-    """
+    """Returns the first lift that the arm can follow without contact. Raises PlanningError when there is none."""
     X_BH = scene.model.X_BH(q_rad)
     for lift_B in lifts(scene.model, X_BH, around.up_B):
         if not around.lets_rise(lift_B):
@@ -260,7 +255,7 @@ def _lift(scene: ArmScene, q_rad: FloatArray, around: Surroundings, arm_planner:
 
 
 def pull_back_B(X_BH: RigidTransform, p_BS: FloatArray) -> FloatArray:
-    """Level direction out of a grasp: against the fingers, or towards the shoulder where they point down."""
+    """Horizontal direction out of a grasp: against the fingers, or towards the shoulder where they point down."""
     against = -X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
     if np.linalg.norm(against) < _LEVEL:
         against = (p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]

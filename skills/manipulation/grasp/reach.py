@@ -64,11 +64,11 @@ _SURFACE_BAND_M = 0.06
 _KNOWN_ABOVE_M = 0.34
 """Height above the object's base up to which the space around it is known."""
 WIDE: Final = 0.9
-"""Opening of a hinged gripper for the approach, as a part of its widest."""
+"""Opening of a hinged gripper for the approach, as a fraction of the maximum opening."""
 _NARROW: Final = 0.6
 """The same among neighbours."""
 _WIDE_PARALLEL: Final = 0.98
-"""Opening of a parallel gripper for the approach, as a part of its widest."""
+"""Opening of a parallel gripper for the approach, as a fraction of the maximum opening."""
 _GAP_BESIDE_M = 0.045
 """Clearance at an object's sides for a gripper that opens only as far as needed."""
 _LEAST_BESIDE_M = 0.025
@@ -92,7 +92,7 @@ CandidatesOf = Callable[[Target], list[GraspCandidate]]
 
 @dataclass(frozen=True)
 class Reached:
-    """Body height with a grasp within reach, and the cost of the grasp above the cheapest candidate's."""
+    """Body height with a grasp within reach, and by how much the grasp costs more than the cheapest candidate."""
 
     cost: float
     height_m: float
@@ -100,10 +100,10 @@ class Reached:
 
 @dataclass(frozen=True)
 class ReachCheck:
-    """Check of the arm's reach to an object from a pose of the body.
+    """Checks the arm's reach to an object from a pose of the body.
 
-    `boxes` are the obstacles without the object, in the body frame at X_WB. `beside` are boxes of its neighbours, too
-    large because they come from cells: a grasp that touches only these is a last choice.
+    `boxes` are the obstacles without the object, in the body frame at X_WB. `beside` are boxes around the cells of its
+    neighbours, and too large for that reason: a grasp that touches only these is a last choice.
     """
 
     scene: ArmScene
@@ -116,7 +116,7 @@ class ReachCheck:
     wide: float = WIDE
 
     def best(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> Reached | None:
-        """Returns the cheapest height with its grasp, None when no grasp is within reach.
+        """Returns the cheapest body height with its grasp; None when no grasp is within reach.
 
         `at` returns X_WB for a height; the first of `heights_m` is the usual one.
         """
@@ -124,7 +124,7 @@ class ReachCheck:
         return min(found, key=lambda reached: reached.cost, default=None)
 
     def all(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> list[Reached]:
-        """Returns the best grasp from each height; only the usual height's when that grasp is cheap enough."""
+        """Returns the best grasp from each height; only that from the usual height when it is cheap enough."""
         found = []
         for height_m in heights_m:
             best, cost = self._best(at(height_m))
@@ -136,7 +136,7 @@ class ReachCheck:
         return found
 
     def arm_W(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> FloatArray:
-        """Points (N, 3) in the world along the arm and above it at the best grasp, before it and after a lift."""
+        """Points (N, 3) in the world along and above the arm at the best grasp, before that grasp and after a lift."""
         reached = self.best(at, heights_m)
         X_WB = None if reached is None else at(reached.height_m)
         best = None if X_WB is None else self._best(X_WB)[0]
@@ -148,7 +148,7 @@ class ReachCheck:
         return np.concatenate([along_W, along_W + [0.0, 0.0, _ABOVE_ARM_M]])
 
     def _best(self, X_WB: RigidTransform) -> tuple[GraspCandidate | None, float]:
-        """Returns the best grasp within reach from X_WB, and its cost above the cheapest candidate's."""
+        """Returns the best grasp within reach from X_WB, and by how much it costs more than the cheapest candidate."""
         reached, least = reached_grasps(self.scene.model, self.candidates_of, X_WB, self.seen)
         self.scene.set_padding(_PADDING_M)
         spaces = [(self.boxes, self.wide, _BESIDE_COST if self.beside else 0.0)]
@@ -166,10 +166,7 @@ class ReachCheck:
 def reached_grasps(
     model: ArmModel, candidates_of: CandidatesOf, X_WB: RigidTransform, seen: ObjectObservation
 ) -> tuple[list[GraspCandidate], float]:
-    """Returns the grasps within the arm's reach from X_WB, best first, and the cost of the cheapest candidate.
-
-    Contact is not checked.
-    """
+    """Returns the grasps within reach from X_WB, best first, and the cheapest candidate's cost; ignores contact."""
     candidates = candidates_of(observed_target(seen, X_WB))
     reached = (each for each in candidates if within_reach(model, each, up_B(X_WB), _MARGIN_RAD))
     return list(islice(reached, _MOST_CHECKED)), candidates[0].cost if candidates else np.inf
@@ -200,14 +197,14 @@ def _along(points_B: FloatArray) -> FloatArray:
 
 
 def wide_share(gripper: GripperCapabilities) -> float:
-    """Opening of a gripper that reaches for an object, as a part of its widest."""
+    """Opening of a gripper that reaches for an object, as a fraction of its maximum opening."""
     return WIDE if gripper.kind is GripperKind.HINGED else _WIDE_PARALLEL
 
 
 def openings(candidates: Sequence[GraspCandidate], gripper: GripperCapabilities) -> tuple[float, ...]:
-    """Returns openings for the approach: wide and, for lack of space among neighbours, only as far as needed.
+    """Returns openings for the approach: a wide one and, for tight space among neighbours, two narrower ones.
 
-    The narrow ones are for the narrowest and the widest grasp. An opening is about proportional to the finger's angle.
+    The narrower ones fit the narrowest and the widest grasp. An opening is about proportional to the finger's angle.
     """
     widths_m, found = [each.width_m for each in candidates], [wide_share(gripper) * gripper.widest]
     for width_m in (min(widths_m), max(widths_m)):
@@ -220,16 +217,16 @@ def openings(candidates: Sequence[GraspCandidate], gripper: GripperCapabilities)
 def passing(
     candidates: Sequence[GraspCandidate], opening: float, gripper: GripperCapabilities
 ) -> Sequence[GraspCandidate]:
-    """Returns the grasps whose object passes between the fingers at one of the `openings`."""
+    """Returns the grasps whose object passes between the fingers at an opening."""
     if opening >= wide_share(gripper) * gripper.widest:
         return candidates
     return [each for each in candidates if gripper.opening_for(each.width_m + _LEAST_BESIDE_M) <= opening]
 
 
 def body_heights_m(base_m: float, capabilities: Capabilities) -> tuple[float, ...]:
-    """Body heights (m over the floor) for an object that stands base_m over the floor, the usual one first.
+    """Body heights (m above the floor) for an object base_m above the floor, the usual one first.
 
-    A robot whose body cannot change its height has one.
+    A robot whose body height is fixed has only one.
     """
     low, high = capabilities.height_range_m
     lowest, usual = min(capabilities.standing_height_m, low + _BELOW_LIMIT_M), capabilities.standing_height_m
@@ -264,7 +261,7 @@ def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
 def raise_onto_surface(seen: ObjectObservation, surfaces: Sequence[Surface]) -> ObjectObservation:
     """Returns the observation raised onto its surface, because fingers cannot get around a sunken object.
 
-    From a distance a flat object seems too low, by up to its height.
+    From a distance the estimated height of a flat object is too low, by up to the object's height.
     """
     x, y, z = seen.position_W
     top_m = max((surface.height_m for surface in surfaces if surface.name == seen.surface), default=-np.inf)
@@ -274,9 +271,9 @@ def raise_onto_surface(seen: ObjectObservation, surfaces: Sequence[Surface]) -> 
 def space_about(
     seen: ObjectObservation, half_m: float = _SURFACE_AROUND_M
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
-    """Least and greatest corners (world, m) of the space around an object on its surface, and of its own space.
+    """Lowest and highest corners (world, m) of the space around an object on its surface, and of its own space.
 
-    A tall object's own space is higher than the known space: the cells of its top are no obstacle.
+    A tall object's own space is taller than the known space: the cells at its top are no obstacle.
     """
     x, y, z = seen.position_W
     length_m, width_m, height_m = seen.size_m
@@ -290,7 +287,7 @@ def space_about(
 
 
 def _beside(seen: ObjectObservation, p_W: FloatArray) -> NDArray[np.bool_]:
-    """Mask (N,) of the points around an object, without its own and those just above its surface."""
+    """Mask (N,) of the points around an object, without its own points and those just above its surface."""
     base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
     low, high = space_about(seen)[0]
     inside = np.all((p_W > low) & (p_W < high), axis=1) & (p_W[:, 2] > base_m + _LOW_M)
@@ -300,7 +297,7 @@ def _beside(seen: ObjectObservation, p_W: FloatArray) -> NDArray[np.bool_]:
 
 
 def _less(box: Box) -> Box:
-    """Returns the box a little smaller, because cells are larger than their content."""
+    """Returns the box shrunk a little, because cells are larger than their content."""
     x, y, z = (max(side - 2.0 * _LESS_M, 0.01) for side in box.size_m)
     return Box(box.X_FG, (x, y, z))
 
@@ -310,8 +307,8 @@ def reach_check(
 ) -> Callable[[], ReachCheck]:
     """Returns a function that builds, inside a Worker job, the check of how a skill's arm reaches an object.
 
-    Obstacles are the surfaces, and the camera's occupied cells within the arm's reach and `beyond_m`, except just
-    around the object.
+    Obstacles are the surfaces, and the cameras' solid cells within the arm's reach plus `beyond_m`, except just around
+    the object.
     """
     X_WB, known_W = skill.X_WB(), skill.known_W
     seen = raise_onto_surface(seen, surfaces)
@@ -324,7 +321,7 @@ def reach_check(
     scene_now, widest, wide = skill.scene_now(boxes), skill.gripper.widest, wide_share(skill.gripper)
 
     def check() -> ReachCheck:
-        """The check, with a collision scene of its own boxes."""
+        """Builds the check, with a collision scene of its own."""
         return ReachCheck(scene_now(), boxes, X_WB, seen, candidates, widest, beside, wide)
 
     return check
@@ -333,7 +330,7 @@ def reach_check(
 def choose_with_look(
     skill: LookingSkill[Any], seen: ObjectObservation, choose: Callable[[], Routine[tuple[ChosenT, FloatArray]]]
 ) -> Routine[ChosenT]:
-    """Returns the choice of `choose`, which also returns the arm's points (N, 3, world) for this choice.
+    """Returns the choice that `choose` makes; `choose` also returns the arm's points (N, 3, world) for that choice.
 
     Looks once at points near the object that no picture has shown yet, and then chooses again. The hand camera looks
     down at objects: the board above a shelf is in no picture, and the arm would hit it.
@@ -347,7 +344,7 @@ def choose_with_look(
 def look_into_unseen(skill: LookingSkill[Any], seen: ObjectObservation, arm_W: FloatArray) -> Routine[bool]:
     """Looks at the arm's points (world) near an object that no picture has shown; returns whether it looked.
 
-    Does not look at an object too far away to show its surroundings, nor without a path of the arm to a viewpoint.
+    Does not look when the object is too far away to show its surroundings, or when no path leads to a viewpoint.
     """
     if not skill.object_camera.on_hand:  # a head camera views from above what the arm would meet
         return False
@@ -369,7 +366,7 @@ def look_into_unseen(skill: LookingSkill[Any], seen: ObjectObservation, arm_W: F
 
 
 def level_viewpoints(model: ArmModel, p_BT: FloatArray) -> list[FloatArray]:
-    """Camera positions about as high as p_BT on the shoulder's side; low ones first, with boards in view from below."""
+    """Camera positions about as high as p_BT on the shoulder's side; low ones first, which see boards from below."""
     ahead = (p_BT - model.p_BS) * [1.0, 1.0, 0.0]
     ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-6)
     places = (
@@ -380,7 +377,7 @@ def level_viewpoints(model: ArmModel, p_BT: FloatArray) -> list[FloatArray]:
 
 
 def heights_to_grasp(skill: LookingSkill[Any], seen: ObjectObservation) -> Routine[list[float]]:
-    """Chooses body heights (m) from which the arm seems to reach the object, the best first; at least one."""
+    """Chooses body heights (m) from which the arm is likely to reach the object, the best first; at least one."""
     base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
     heights_m = body_heights_m(base_m, skill.context.robot.capabilities())
 

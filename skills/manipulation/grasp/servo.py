@@ -1,7 +1,7 @@
-"""Visual servoing: the shift of an object in the hand camera's view from just before the grasp.
+"""Visual servoing: measures how an object has shifted, in the hand camera's view from just before the grasp.
 
 It shifts the object's known points until their outline fits the picture best (analysis by synthesis). Pixels nearer
-than the camera's least depth have no depth, and count as part of the object.
+than the camera's minimum depth have no depth, and count as part of the object.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ _BEHIND_M = 0.03
 _NEAREST_M = 0.22
 """Least depth of the camera."""
 _OF_HEIGHT = 0.3
-"""Part of the object's height below which its points do not count."""
+"""Fraction of the object's height below which its points do not count."""
 _LEAST_HEIGHT_M = 0.004
 """Least height over the surface of the object's points that count."""
 _WINDOW_PX = 9
 """Width of the window around the outline in which solid pixels count."""
 _LOOKS_DOWN = 0.5
-"""Least vertical share of a camera's axis at which it measures shifts in both level directions, not only across."""
+"""Least vertical component of a camera's axis at which it measures horizontal shifts in both directions."""
 _PER_M = 0.5
 """Overlap that a shift of one metre must gain."""
 _AIMED_M = 0.003
@@ -58,16 +58,16 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class SeenShift:
-    """Level shift (3,) in B of an object, and the overlap of its shifted outline with the picture."""
+    """Horizontal shift (3,) of an object in B, and the overlap of its shifted outline with the picture."""
 
     offset_B: FloatArray
     overlap: float
 
 
 def measure_shift(target: Target, image: Image, X_BC: RigidTransform) -> SeenShift | None:
-    """Returns the shift of the object since `target` was seen, by the depth of a picture taken at X_BC.
+    """Returns the shift of the object since `target` was observed, from the depth of a picture taken at X_BC.
 
-    None when its position is out of view. The body is level: its z axis points up.
+    None when the object's position is out of view. The body must be level: its z axis points up.
     """
     picture = _Picture.around(target, image, X_BC)
     if not picture.shows_place:
@@ -89,7 +89,7 @@ Aim = tuple[FloatArray, tuple[ArmTrajectory, ArmTrajectory] | None]
 def aim_approach(
     found: SeenShift | None, plan: GraspPlan, model: ArmModel, scene_now: Callable[[], ArmScene]
 ) -> Aim | None:
-    """Aims a grasp across the fingers at the object's present position; None when the object is no longer there."""
+    """Shifts a grasp across the fingers to the object's present position; None when the object is no longer there."""
     if found is None:
         return np.zeros(3), None
     if found.overlap < _LEAST_OVERLAP or np.linalg.norm(found.offset_B) > _FAR_OFF_M:
@@ -106,7 +106,7 @@ def aim_approach(
 
 
 def shift_trajectory(model: ArmModel, trajectory: ArmTrajectory, offset_B: FloatArray) -> ArmTrajectory | None:
-    """Returns a trajectory with the hand shifted by offset_B (3,) at each time; None beyond the arm's reach."""
+    """Returns the trajectory with the hand shifted by offset_B (3,) throughout; None when the arm cannot reach."""
     positions = list[FloatArray]()
     for q_rad in trajectory.positions_rad:
         X_BH = model.X_BH(q_rad)
@@ -123,7 +123,7 @@ def _length(offset_B: FloatArray) -> float:
 
 
 def _offsets(X_BC: RigidTransform, step_m: float, reach_m: float) -> Iterator[FloatArray]:
-    """Yields measurable level shifts (3,): a grid, or only shifts across for a camera that looks ahead."""
+    """Yields measurable horizontal shifts (3,): a grid, or only lateral shifts for a camera that looks ahead."""
     axis = X_BC.rotation().matrix()[:, 2]
     ahead = np.array([axis[0], axis[1], 0.0])
     ahead = ahead / np.linalg.norm(ahead) if np.linalg.norm(ahead) > 1e-3 else np.array([1.0, 0.0, 0.0])
@@ -135,7 +135,7 @@ def _offsets(X_BC: RigidTransform, step_m: float, reach_m: float) -> Iterator[Fl
 
 @dataclass(frozen=True)
 class _Picture:
-    """Reduced depth picture: pixels of the object's space (`solid`), and pixels with information (`known`)."""
+    """Reduced depth image: pixels on the object's space (`solid`), and pixels with information (`known`)."""
 
     solid: Mask
     known: Mask
@@ -146,7 +146,7 @@ class _Picture:
 
     @classmethod
     def around(cls, target: Target, image: Image, X_BC: RigidTransform) -> _Picture:
-        """Reduces a picture around a target."""
+        """Reduces an image to the region around a target."""
         lens = image.depth_intrinsics
         stride = max(1, lens.width // _WIDTH_PX)
         depth = image.depth_m[::stride, ::stride].astype(np.float64)
@@ -165,7 +165,7 @@ class _Picture:
 
     @property
     def shows_place(self) -> bool:
-        """Returns whether the known pixels show at least half of the object's former outline."""
+        """Returns whether the known pixels cover at least half of the object's former outline."""
         outline = self._outline(np.zeros(3))
         return bool(outline.sum() > 0 and (outline & self.known).sum() > 0.5 * outline.sum())
 
@@ -190,19 +190,19 @@ class _Picture:
 
 
 def _rays(lens: Intrinsics, stride: int) -> FloatArray:
-    """Directions (H, W, 3) in the camera's frame with z = 1, of each pixel of the reduced picture."""
+    """Directions (H, W, 3) in the camera frame with z = 1, one for each pixel of the reduced picture."""
     x = (np.arange(0, lens.width, stride) - lens.cx) / lens.fx
     y = (np.arange(0, lens.height, stride) - lens.cy) / lens.fy
     return np.stack([*np.meshgrid(x, y), np.ones((len(y), len(x)))], axis=-1)
 
 
 def _lowest_m(target: Target) -> float:
-    """Least height over the surface of an object's points that count; lower points are too near the surface."""
+    """Minimum height above the surface of the points that count; lower points are too near the surface."""
     return max(_OF_HEIGHT * target.height_m, _LEAST_HEIGHT_M)
 
 
 def _filled(target: Target) -> FloatArray:
-    """Points (N, 3) all over an object: the observed ones, and points below them down to `_lowest_m`."""
+    """Points (N, 3) that fill an object: the observed ones, and points below them down to `_lowest_m`."""
     low_m = target.base_m + _lowest_m(target)
     seen = target.points_B[target.points_B[:, 2] > low_m]
     seen = seen[:: max(1, len(seen) // _POINTS)]

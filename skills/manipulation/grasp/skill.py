@@ -1,4 +1,4 @@
-"""The grasp skill: looks closely, chooses a grasp, takes and lifts the object, and checks that it is held."""
+"""The grasp skill: views the object closely, plans a grasp, grasps and lifts the object, and checks that it is held."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -41,7 +41,7 @@ from skills.world_model import IN_THE_WAY
 _PER_KG_N = 12.0
 """Additional force per kilogram of the object."""
 _MOST_OF_FORCE = 0.95
-"""Largest force of a grip, as a part of the gripper's limit."""
+"""Largest force of a grip, as a fraction of the gripper's limit."""
 _PER_LEVER_N_M = 400.0
 """Additional force per metre between the grip and the centre of mass; the tips would press a thin object out."""
 _RELAX_M = 0.002
@@ -75,7 +75,7 @@ _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
 @dataclass(frozen=True)
 class GraspInputs:
-    """Object as it was seen; grasps like those in `avoid` are the last choice."""
+    """Observed object; grasps similar to those in `avoid` are the last choice."""
 
     observation: ObjectObservation
     avoid: tuple[TriedGrasp, ...] = ()
@@ -83,10 +83,10 @@ class GraspInputs:
 
 @dataclass(frozen=True)
 class GraspOptions:
-    """Gripping force (N), and limits beyond which the object counts as lost.
+    """Grip force (N), and limits beyond which the object counts as lost.
 
-    The skill looks for the object within `same_object_m` of its last position. A gripper that opens or closes by
-    `slip_rad` during the lift has lost the object. After the lift the hand draws back by `pull_back_m`.
+    `same_object_m`: search radius around the object's last position. `slip_rad`: a gripper that opens or closes by more
+    than this during the lift has lost the object. `pull_back_m`: how far the hand draws back after the lift.
     """
 
     force_n: Force = 80.0
@@ -98,8 +98,8 @@ class GraspOptions:
 class Grasp(LookingSkill[GraspInputs]):
     """Grasps an object and holds it near the body. On failure it opens the gripper and stows the arm.
 
-    The output `tried` is `avoid` and the grasp of this attempt, also after a failure. After a failure for want of a
-    plan, `in_the_way` are the objects that block every grasp, the nearest first; else it is empty.
+    The output `tried` is `avoid` plus the grasp of this attempt, also after a failure. When no grasp can be planned,
+    the output `in_the_way` lists the objects that block every grasp, the nearest first; otherwise it is empty.
     """
 
     name = "grasp"
@@ -121,7 +121,7 @@ class Grasp(LookingSkill[GraspInputs]):
     lost_message = "the object fell out of the gripper while it was lifted"
 
     def begin(self, inputs: GraspInputs) -> None:
-        """Forgets an earlier attempt, except for the grasps that `inputs` names."""
+        """Resets the state of an earlier attempt, and starts from the grasps that `inputs` names."""
         self._tried = inputs.avoid
         super().begin(inputs)
 
@@ -135,7 +135,7 @@ class Grasp(LookingSkill[GraspInputs]):
         return None if self.context.robot.gripper().holding else f"the {inputs.observation.kind} is not in the gripper"
 
     def run(self, inputs: GraspInputs) -> Routine[Succeeded]:
-        """Looks, plans, takes, lifts and carries."""
+        """Views, plans, grasps, lifts and carries."""
         seen, name = inputs.observation, str(inputs.observation.kind)
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "the gripper holds something already")
@@ -156,7 +156,7 @@ class Grasp(LookingSkill[GraspInputs]):
         return Succeeded(f"holding the {name}", self._outputs())
 
     def run_again(self, inputs: GraspInputs) -> Routine[Succeeded]:
-        """Keeps an object in the gripper; starts again with an empty gripper."""
+        """Secures an object in the gripper; with an empty gripper, makes a new attempt."""
         seen, self._watch = inputs.observation, None
         yield from self.pause(_FEEL_S, "feeling what the gripper holds")
         at_object = self.is_hand_near(np.array(seen.position_W), _AT_OBJECT_M)
@@ -182,15 +182,15 @@ class Grasp(LookingSkill[GraspInputs]):
         yield from self.stand_as_usual(message)
 
     def _with_outputs(self, failure: SkillFailure) -> SkillFailure:
-        """Returns the failure with the tried grasps and the blocking objects."""
+        """Adds the tried grasps and the blocking objects to the failure's outputs."""
         return SkillFailure(failure.cause, failure.message, {**self._outputs(), **failure.outputs})
 
     def _outputs(self) -> Mapping[str, object]:
-        """Outputs while nothing is in the way."""
+        """Outputs while no object blocks the grasps."""
         return {"tried": self._tried, IN_THE_WAY: ()}
 
     def _take_where_it_is(self, inputs: GraspInputs) -> Routine[tuple[CloseView, GraspPlan]]:
-        """Looks, plans and takes; looks once more when the object has moved meanwhile. Raises SkillFailure."""
+        """Views, plans and grasps; retries once when the object has moved. Fails when the retry fails too."""
         seen = inputs.observation
         heights_m = yield from heights_to_grasp(self, seen)
         attempt = partial(self._look_and_plan, seen, inputs.avoid)
@@ -202,7 +202,7 @@ class Grasp(LookingSkill[GraspInputs]):
         return view, plan
 
     def _take_unmoved(self, view: CloseView, plan: GraspPlan, inputs: GraspInputs) -> Routine[bool]:
-        """Reaches for the object and takes it; returns False when it has moved away."""
+        """Reaches for the object and grasps it; returns False when it has moved away."""
         seen = inputs.observation
         self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
         aimed = yield from self._reach(view, plan, str(seen.kind))
@@ -211,7 +211,7 @@ class Grasp(LookingSkill[GraspInputs]):
         return aimed is not None
 
     def _reach(self, view: CloseView, plan: GraspPlan, name: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
-        """Brings the hand to the pre-grasp; returns view and plan as they are aimed there (see `_aimed`)."""
+        """Brings the hand to the pre-grasp; returns view and plan corrected there (see `_aimed`)."""
         yield from self.follow(plan.to_pregrasp, f"reaching for the {name}")
         return (yield from self._aimed(view, plan, name))
 
@@ -244,12 +244,12 @@ class Grasp(LookingSkill[GraspInputs]):
     def _look_and_plan(
         self, seen: ObjectObservation, avoid: tuple[TriedGrasp, ...]
     ) -> Routine[tuple[CloseView, GraspPlan]]:
-        """Looks at the object from the body's present height, and plans its grasp."""
+        """Views the object from the body's present height, and plans its grasp."""
         view = yield from self._look_closely(seen)
         return view, (yield from self._plan(view, str(seen.kind), avoid))
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
-        """Views the object and its neighbours from 0.4 m, and from aside if a part of it is hidden.
+        """Views the object and its neighbours from 0.4 m, and also from aside if a part of the object is occluded.
 
         Raises SkillFailure with cause PRECONDITION when the object is not in view.
         """
@@ -274,7 +274,7 @@ class Grasp(LookingSkill[GraspInputs]):
         return best
 
     def _view_from(self, seen: ObjectObservation, base_m: float, aside_rad: float) -> Routine[CloseView | None]:
-        """Views the object with the camera turned about it by an angle; None when the object is not there."""
+        """Views the object with the camera rotated about it by an angle; None when the object is not there."""
         message = f"looking closely at the {seen.kind}"
         surface = square(seen.position_W, base_m, seen.surface or "surface")
         p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
@@ -302,7 +302,7 @@ class Grasp(LookingSkill[GraspInputs]):
         return camera.on_hand and open_wide and sees_closely(self.model.X_BH(self.q_rad()) @ camera.X_FC, p_BT)
 
     def _plan(self, view: CloseView, name: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
-        """Plans a grasp and opens the gripper for it. Raises SkillFailure with cause PLANNING."""
+        """Plans a grasp and opens the gripper for it. Raises SkillFailure with cause PLANNING when none is feasible."""
         self.boxes = view.boxes
         candidates = self.context.stack.grasp_planner.candidates(view.target, self.model.p_BS, self.gripper)
         candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
@@ -319,7 +319,7 @@ class Grasp(LookingSkill[GraspInputs]):
             return stack.grasp_planner.plan(scene, q, grasps, space, stack.arm_planner, self._rng), opening
 
         def plan() -> tuple[GraspPlan, float]:
-            """Plans for the first opening with a plan; only the last opening is asked for the objects in the way."""
+            """Plans with each opening until one has a plan; only with the last one looks for the blocking objects."""
             scene = scene_now()
             for opening in first:
                 with suppress(PlanningError):
@@ -333,10 +333,10 @@ class Grasp(LookingSkill[GraspInputs]):
         return found
 
     def _take(self, view: CloseView, plan: GraspPlan, seen: ObjectObservation) -> Routine[None]:
-        """Closes with the force for the least mass, lifts, weighs, and grips with the force for the measured mass.
+        """Closes with the force for the minimum mass, lifts, weighs, and grips with the force for the measured mass.
 
-        Raises SkillFailure with cause POSTCONDITION when the gripper has no object then, PRECONDITION for too heavy an
-        object.
+        Raises SkillFailure with cause POSTCONDITION when the gripper then holds no object, and PRECONDITION when the
+        object is too heavy.
         """
         name, least_kg = str(seen.kind), least_mass_kg(seen.kind)
         yield from self.follow(plan.to_grasp, f"reaching for the {name}")
@@ -368,11 +368,11 @@ class Grasp(LookingSkill[GraspInputs]):
         yield from self.move_gripper(0.0, self._grip_n(force_n, max(mass_kg, least_kg)), f"lifting the {name}")
 
     def _grip_n(self, least_n: float, mass_kg: float) -> float:
-        """Returns the gripping force (N) for a mass, within the gripper's limit."""
+        """Returns the grip force (N) for a mass, within the gripper's limit."""
         return min(least_n + _PER_KG_N * mass_kg, _MOST_OF_FORCE * self.gripper.max_force_n)
 
     def _check_reached(self, X_BH: RigidTransform, name: str) -> None:
-        """Raises SkillFailure with cause EXECUTION for fingers that end before the object and would press it out."""
+        """Raises SkillFailure with cause EXECUTION when the fingers end short of the object and would push it out."""
         short_m = float((self.model.X_BH(self.q_rad()).inverse() @ X_BH).translation()[0])
         if short_m > _SHORT_M:
             where = f"{100.0 * short_m:.0f} cm before it was about the {name}"
@@ -389,7 +389,7 @@ class Grasp(LookingSkill[GraspInputs]):
         raise SkillFailure(Cause.PRECONDITION, f"the {name} weighs {mass_kg:.1f} kg, and {most}")
 
     def _to_the_ground(self, ahead_B: FloatArray, touched: bool, relax_m: float, message: str) -> Routine[None]:
-        """Lowers downward fingers onto the surface, because its height is known only to a few millimetres."""
+        """Lowers downward fingers onto the surface, whose height is known only to a few millimetres."""
         if not touched and ahead_B @ up_B(self.X_WB()) < -_DOWN:
             with suppress(PlanningError):
                 touched = yield from self.press(_FEEL_M * ahead_B, ahead_B, _FEEL_RAD_S, message)
@@ -397,12 +397,12 @@ class Grasp(LookingSkill[GraspInputs]):
             yield from self.try_shift_hand(-relax_m * ahead_B, message)
 
     def _lift(self, planned_B: Sequence[FloatArray], message: str) -> Routine[bool]:
-        """Lifts as planned or, if the hand has left the plan, along another path; returns whether it found one."""
+        """Lifts as planned or, if the hand is off the plan, along another path; returns whether a path was found."""
         others_B = lifts(self.model, self.model.X_BH(self.q_rad()), up_B(self.X_WB()))
         return (yield from self.shift_by_first([*planned_B, *others_B], message))
 
     def _check_held(self, name: str, opening_before: float | None) -> float:
-        """Returns the gripper's opening; the robot carries the object from the first check on.
+        """Returns the gripper's opening, and tells the robot that it carries the object.
 
         Raises SkillFailure with cause POSTCONDITION when the object is not held.
         """
@@ -428,7 +428,7 @@ class Grasp(LookingSkill[GraspInputs]):
         self._check_held(name, opening)
 
     def _let_go(self, draw_back: bool = True) -> Routine[None]:
-        """After a failure: opens the gripper, draws back from the object and stows; skips what fails."""
+        """After a failure: opens the gripper, draws back from the object and stows; skips steps that fail."""
         for recovery in (*((self._open, self._draw_back) if draw_back else ()), self.try_stow, self.stand_as_usual):
             with suppress(SkillFailure):
                 yield from recovery()

@@ -1,4 +1,4 @@
-"""The hand-over skill: holds the object out to a person, and releases it at their pull or the operator's word."""
+"""The hand-over skill: holds the object out to a person, and releases it when they pull or the operator says so."""
 
 import itertools
 import math
@@ -44,7 +44,7 @@ _HOLD_OUT_RAD_S = 0.8
 
 @dataclass(frozen=True)
 class HandOverInputs:
-    """Names of the person and of the object, for messages; the skill takes the nearest person in sight."""
+    """Names of the person and of the object, for messages; the skill chooses the nearest person in sight."""
 
     person: str
     thing: str = "object"
@@ -52,11 +52,12 @@ class HandOverInputs:
 
 @dataclass(frozen=True)
 class HandOverOptions:
-    """Positions of the robot and of the object, and the condition of the release.
+    """Positions of the robot and of the object, and the condition for the release.
 
-    The robot stands `stand_off_m` from the person's axis, or stays within `stand_off_range_m`. The hand holds the
-    object at `height_m`, at the first reachable distance of `gaps_m` from the person's axis, at most `furthest_m`. The
-    gripper releases it at a pull beyond `pull_n`; the arm draws the object in when nobody has taken it within `wait_s`.
+    `stand_off_m` and `stand_off_range_m`: distance from the person's axis to which the robot drives, and the range
+    within which it stays. `height_m`: height of the object. `gaps_m` and `furthest_m`: distances between object and
+    person's axis, of which the first reachable one is used, and the largest allowed. `pull_n`: pull beyond which the
+    gripper releases. `wait_s`: time after which the arm draws the object in when nobody has taken it.
     """
 
     stand_off_m: Length = 1.5
@@ -69,9 +70,9 @@ class HandOverOptions:
 
 
 class HandOver(HandOverVerification[HandOverInputs]):
-    """Finds a person by LiDAR, goes there, holds the object out, lets go when they take it, and checks who has it.
+    """Finds a person by LiDAR, goes there, holds the object out, releases it when they pull, and checks who has it.
 
-    The output `released_W` is where the hand has let the object go, also after a failure; a failure before has none.
+    The output `released_W` is the point of the release, also after a later failure; a failure before it has none.
     """
 
     name = "hand_over"
@@ -95,12 +96,12 @@ class HandOver(HandOverVerification[HandOverInputs]):
     lost_message = "the object was lost before it was held out"
 
     def begin(self, inputs: HandOverInputs) -> None:
-        """Forgets an earlier attempt."""
+        """Resets the state of an earlier attempt."""
         self.checkpoint = {}
         super().begin(inputs)
 
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
-        """Finds the person, goes there, holds the object out and lets go; tries again when that fails."""
+        """Finds the person, goes there, holds the object out and releases it; tries again when that fails."""
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to hand over")
         for _ in range(_TRIES):
@@ -111,7 +112,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
         return self._given(inputs, seen)
 
     def _give(self, inputs: HandOverInputs) -> Routine[Seen]:
-        """Holds the object out and lets go; returns the outcome of the check."""
+        """Holds the object out and releases it; returns the result of the check."""
         self._watch = self.hold_watch()
         person = yield from self._find(inputs.person)
         if not _well_placed(self._ahead(person), self.options.stand_off_range_m):
@@ -130,7 +131,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
         return (yield from self._let_go(inputs, held_kg))
 
     def run_again(self, inputs: HandOverInputs) -> Routine[Succeeded]:
-        """Continues an interrupted attempt: after the release it checks whether the person has the object."""
+        """Continues an interrupted attempt; after the release it only checks whether the person has the object."""
         self._watch = None
         if not self.checkpoint.get("lets_go"):
             return (yield from self.run(inputs))
@@ -154,9 +155,9 @@ class HandOver(HandOverVerification[HandOverInputs]):
         return Succeeded(f"gave the {name} to {person}")
 
     def _pulled(self, inputs: HandOverInputs) -> Routine[bool]:
-        """Waits for a pull at the object or the operator's answer; returns False after a timeout.
+        """Waits for a pull at the object or the operator's answer; returns False when `wait_s` is over.
 
-        Returns True as well when the object has left the gripper: a person pulled it out, or it has fallen.
+        Also returns True when the object has left the gripper: a person pulled it out, or it has fallen.
         """
         message, robot = f"holding the {inputs.thing} out to {inputs.person}", self.context.robot
         period_s = robot.capabilities().sensor_period_s
@@ -178,7 +179,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
             asked.withdraw()
 
     def _let_go(self, inputs: HandOverInputs, held_kg: float | None) -> Routine[Seen]:
-        """Opens the gripper until it feels nothing, draws back without dragging the object, and checks who has it."""
+        """Opens the gripper until it feels no object, draws back without dragging the object, and checks who has it."""
         name, message = inputs.thing, f"giving the {inputs.thing} to {inputs.person}"
         if not self.checkpoint.get("lets_go"):
             corners_H = self.context.payload.corners_H
@@ -193,7 +194,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
     def _find(self, name: str) -> Routine[SeenPerson]:
         """Finds the nearest person in several scans, preferring people ahead; waits for missing scans.
 
-        Raises SkillFailure when there are no new scans, or nobody is seen in them.
+        Raises SkillFailure when there are no new scans, or when they show nobody.
         """
         clock, patience, seen = self.context.clock, Patience(self.context.clock), list[SeenPerson]()
         stamp_s, end_s = -math.inf, clock.now() + _SCAN_PATIENCE_S
@@ -229,7 +230,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
     def _hold_out(self, person: SeenPerson, name: str) -> Routine[None]:
         """Stretches the arm towards the person, with the object in its grasped pose, or else in its carried pose.
 
-        An object that rests on a finger in the carried pose would stay there when the gripper opens.
+        In the carried pose an object may rest on a finger, where it would stay when the gripper opens.
         """
         grasped_R_BH, R_BH = self.context.payload.R_BH, self.model.X_BH(self.q_rad()).rotation()
         rotations = [R_BH] if grasped_R_BH is None else [grasped_R_BH, R_BH]
@@ -253,7 +254,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
             raise SkillFailure(Cause.EXECUTION, f"the object is held {off:.2f} m from {name}, which is too far")
 
     def _ahead(self, person: SeenPerson) -> FloatArray:
-        """Axis (x, y) of the person in the body frame."""
+        """Position (x, y) of the person's axis in the body frame."""
         return np.asarray((self.X_WB().inverse() @ np.array([*person.place_W, 0.0]))[:2])
 
 
@@ -266,7 +267,7 @@ def hold_out_configuration(
     gaps_m: Sequence[float],
     q_near_rad: FloatArray,
 ) -> FloatArray:
-    """Returns arm angles (J,) with the object before the person; level_m is its height in B.
+    """Returns arm angles (J,) with the object in front of the person; level_m is the object's height in B.
 
     The hand has the first feasible rotation of `rotations` (R_BH), turned about the vertical towards the person. The
     person's axis is at p_BP (2,), the object's centre at p_HT. Raises PlanningError when the person is out of reach.
@@ -298,6 +299,6 @@ def _well_placed(p_BP: FloatArray, range_m: tuple[float, float]) -> bool:
 
 
 def _same(people: list[SeenPerson], other: SeenPerson) -> list[SeenPerson]:
-    """Returns the person at the position of an earlier detection, as a list; empty without one."""
+    """Returns the person at the position of an earlier detection, as a list; empty when nobody is there."""
     near = [p for p in people if math.dist(p.place_W, other.place_W) < _SAME_PERSON_M]
     return near[:1]

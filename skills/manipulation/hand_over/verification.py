@@ -72,7 +72,7 @@ _HIGHEST_CAMERA_M = 1.4
 
 
 class Seen(enum.Enum):
-    """Outcome of the check of a released object."""
+    """Result of checking a released object."""
 
     GIVEN = "given"  # the object is at the release point or a little lower: a person holds it
     FELL = "fell"  # it lies near the floor
@@ -83,7 +83,7 @@ class Seen(enum.Enum):
 
 @dataclass(frozen=True)
 class Sight:
-    """Outcome of one picture, and its point (3,) in the world (m)."""
+    """Result of checking one picture, and the point (3,) in the world (m) where the object was looked for or found."""
 
     seen: Seen
     p_W: FloatArray
@@ -91,7 +91,7 @@ class Sight:
 
 @dataclass(frozen=True)
 class Release:
-    """Point of a release in the world: the object's level centre, its lowest and its highest point (m)."""
+    """Release of an object: its horizontal centre in the world, and the heights of its lowest and highest point (m)."""
 
     x_m: float
     y_m: float
@@ -105,7 +105,7 @@ class Release:
 
 
 def release_of(X_WH: RigidTransform, p_HT: FloatArray, corners_H: FloatArray | None) -> Release:
-    """Returns the release of an object at p_HT (3,) of a hand; corners_H (8, 3) are those of its box, if known."""
+    """Returns the release of an object at p_HT (3,) in a hand; corners_H (8, 3) are the corners of its box."""
     points_W = X_WH.rotation().matrix() @ (p_HT[None, :] if corners_H is None else corners_H).T
     heights_m = points_W[2] + X_WH.translation()[2]
     x_m, y_m, _ = X_WH @ p_HT
@@ -115,7 +115,7 @@ def release_of(X_WH: RigidTransform, p_HT: FloatArray, corners_H: FloatArray | N
 def judge_release(
     image: Image, X_WO: RigidTransform, found: Iterable[Detection3D], names: Sequence[str], release: Release
 ) -> Sight:
-    """Judges the release from a picture without the robot's arm and the objects detected in it.
+    """Judges the release from a picture without the robot's arm, and from the objects detected in it.
 
     The object counts as given in three cases: a detection of its class lies near the release point, points there are as
     high as its upper half was, or an object lies there on a level plate. Without `names`, every class except people
@@ -140,7 +140,7 @@ def _off_m(found: Detection3D, release: Release) -> float:
 
 
 def lies_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
-    """Returns whether a picture shows something on a level plate at about the height of the release."""
+    """Returns whether a picture shows an object on a level plate at about the height of the release."""
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     square = tuple((release.x_m + _PLATE_M * x, release.y_m + _PLATE_M * y) for x, y in corners)
     view = segment_surface(image, X_WO, Surface("plate", square, release.low_m))
@@ -151,7 +151,7 @@ def lies_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
 
 
 def stands_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
-    """Returns whether a picture's depth has points as high as a tall object's upper half at the release."""
+    """Returns whether a picture's depth has points at the release as high as a tall object's upper half."""
     tall_m = release.top_m - release.low_m
     if tall_m < _TALL_M:
         return False
@@ -197,7 +197,7 @@ class HandOverVerification(ReleasingSkill[InputsT]):
         return Seen.NOT_SEEN
 
     def _seen(self, name: str, release: Release, message: str) -> Routine[Seen]:
-        """Judges a picture from here; two more pictures tell whether an object that somebody bears is at rest."""
+        """Judges a picture from the present pose; two more pictures show whether a carried object is at rest."""
         try:
             image = yield from self.picture(message)
             sight = yield from self._sight(image, name, release, message)
@@ -209,9 +209,9 @@ class HandOverVerification(ReleasingSkill[InputsT]):
         return Seen.GIVEN if at_rest else Seen.MOVES
 
     def _looks(self, release: Release) -> Sequence[tuple[FloatArray, Sequence[FloatArray]]]:
-        """Points of the world to look at, with viewpoints (B): the release, then the floor.
+        """World points to look at, with viewpoints (B): the release, then the floor.
 
-        The hand camera cannot look steeply enough to see the floor right before the body.
+        The hand camera cannot look steeply enough to see the floor right in front of the body.
         """
         p_WT, p_WF = (np.array([release.x_m, release.y_m, level_m]) for level_m in (release.low_m, 0.0))
         if not self.object_camera.on_hand:
@@ -227,7 +227,7 @@ class HandOverVerification(ReleasingSkill[InputsT]):
         return [(p_WT, first), (p_WT, second), (self.X_WB() @ p_BF, overview_viewpoints(self.model, p_BF))]
 
     def _turn_to(self, p_WT: FloatArray, viewpoints_B: Sequence[FloatArray], name: str, message: str) -> Routine[None]:
-        """Points the camera at a point of the world; a hand without a path looks from where it is."""
+        """Points the camera at a point in the world; a hand without a path looks from where it is."""
         try:
             yield from self.look_at(self.X_WB().inverse() @ p_WT, viewpoints_B, message)
         except SkillFailure as failure:
@@ -249,7 +249,7 @@ class HandOverVerification(ReleasingSkill[InputsT]):
         """Stows the arm around the hands or the tray under the object.
 
         For a head camera the hand first comes near the body, because a long detour would swing it through unseen space.
-        Without a path the robot backs off a little and tries again.
+        When there is no path the robot backs off a little and tries again.
         """
         around_person = self.boxes
         for backs_off in (False, True):
@@ -269,7 +269,7 @@ class HandOverVerification(ReleasingSkill[InputsT]):
         self.boxes = around_person
 
     def _borne(self, release: Release) -> list[Box]:
-        """Boxes (B) of the hands or the tray, of the object in any turn, and of the floor."""
+        """Boxes (B) that stand for the hands or the tray, the object in any rotation, and the floor."""
         X_BW, boxes = self.X_WB().inverse(), list[Box]()
         borne = (_BORNE_M, release.low_m - _DEEP_M, release.low_m + _OVER_M)
         for side_m, low_m, high_m in (borne, (_OWN_M, release.low_m, release.top_m + _OVER_TOP_M)):

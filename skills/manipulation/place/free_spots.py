@@ -64,13 +64,13 @@ _OVER_M = 0.1
 
 
 def spots(surface: Surface, edge_m: float = EDGE_M) -> FloatArray:
-    """Points (N, 2) of a surface at least edge_m from its edges; its middle when it is small."""
+    """Points (N, 2) on a surface at least edge_m from its edges; its centre when it is small."""
     inside = grid_inside(surface.polygon_W, _GRID_M, first_m=edge_m, margin_m=_ROUNDING_M - edge_m)
     return inside if len(inside) else np.asarray([np.mean(surface.polygon_W, axis=0)])
 
 
 def clear_spots(candidates: FloatArray, circles_W: Sequence[tuple[float, float, float]]) -> FloatArray:
-    """Returns the candidates (N, 2) that lie in none of the circles (x, y, radius)."""
+    """Returns the candidates (N, 2) outside all circles (x, y, radius)."""
     for x, y, radius_m in circles_W:
         candidates = candidates[np.linalg.norm(candidates - [x, y], axis=1) > radius_m]
     return candidates
@@ -88,25 +88,25 @@ def free_spots(view: SurfaceView, candidates: FloatArray, clearance_m: float = C
 
 
 def clearances_m(view: SurfaceView, points_W: FloatArray) -> FloatArray:
-    """Distances (N,) of points (N, 2) from the nearest object of a view; infinite without one."""
+    """Distances (N,) from points (N, 2) to the nearest object in a view; infinite when the view has none."""
     return distances_m(objects_W(view), points_W)
 
 
 def objects_W(view: SurfaceView | None) -> FloatArray:
-    """Points (M, 2) of all objects of a view; none without a view."""
+    """Points (M, 2) on all objects in a view; none when there is no view."""
     clusters = () if view is None else view.clusters
     return np.concatenate([np.empty((0, 2)), *(cluster.points.p_W[:, :2] for cluster in clusters)])
 
 
 def distances_m(of_W: FloatArray, points_W: FloatArray) -> FloatArray:
-    """Distances (N,) of points (N, 2) from the nearest of others (M, 2); infinite without others."""
+    """Distances (N,) from points (N, 2) to the nearest of `of_W` (M, 2); infinite when that is empty."""
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(of_W).query(points_W)[0]) if len(of_W) else np.full(len(points_W), np.inf)
 
 
 def unseen_view(surface: Surface, standing_W: FloatArray) -> SurfaceView:
-    """Returns a level view of a surface that no picture shows; points (N, 3) of objects stand on it.
+    """Returns a level view of a surface that no picture shows, with objects at the points (N, 3) that stand on it.
 
     The surface counts as seen except within CLEARANCE_M of those points.
     """
@@ -131,7 +131,7 @@ def merged(views: Sequence[SurfaceView]) -> SurfaceView:
 
 
 def spaced_spots(free: FloatArray, apart_m: float = _ANOTHER_M) -> list[FloatArray]:
-    """Returns spots (N, 2) in their order, without those near an earlier one."""
+    """Returns spots (N, 2) in their order, without those within apart_m of an earlier one."""
     spaced = list[FloatArray]()
     for spot in free:
         if all(float(np.linalg.norm(spot - other)) > apart_m for other in spaced):
@@ -148,7 +148,7 @@ class FreeArea:
     corners_H: FloatArray
 
     def takes(self, X_WH: RigidTransform) -> bool:
-        """Returns whether the object in a hand at X_WH has its outline there, seen from above."""
+        """Returns whether the outline, from above, of the object in a hand at X_WH lies in the area."""
         import shapely
 
         outline = self._outline(X_WH)
@@ -163,7 +163,7 @@ class FreeArea:
 
 
 def free_area(surface: Surface, held: HeldObject, view: SurfaceView | None = None) -> FreeArea:
-    """Returns the area of a surface inside its edges, clear of the objects of a view.
+    """Returns the area of a surface inside its edges, clear of the objects in a view.
 
     Too large an object may extend over the edge.
     """
@@ -188,7 +188,7 @@ def longest_edge_rad(surface: Surface) -> float:
 
 @dataclass
 class SpotSearch:
-    """Search for a free spot on a surface for an object, in none of the circles `clear_of` (x, y, radius).
+    """Searches a surface for a free spot for an object, outside all circles `clear_of` (x, y, radius).
 
     Spots with much clearance come first, then those that no picture shows yet, and at the end `tight` ones, on which
     the object only just fits.
@@ -202,7 +202,7 @@ class SpotSearch:
     _tried: list[FloatArray] = field(default_factory=list)
 
     def spots(self) -> FloatArray:
-        """Spots (N, 2) of the surface, free or not."""
+        """Spots (N, 2) on the surface, free or not."""
         edge_m = min(EDGE_M, self.held.half_width_m + BESIDE_M) if self.tight else EDGE_M
         return clear_spots(spots(self.surface, edge_m), self.clear_of)
 
@@ -212,20 +212,20 @@ class SpotSearch:
         return free_spots(view, self.spots(), clearance_m)
 
     def seen(self) -> SurfaceView | None:
-        """All that was seen of the surface; None before the first picture."""
+        """Union of all views of the surface; None before the first picture."""
         return merged(self._views) if self._views else None
 
     def area(self) -> FreeArea:
-        """Area of the surface that is free by all that was seen."""
+        """Free area of the surface according to all views."""
         return free_area(self.surface, self.held, self.seen())
 
     def add(self, view: SurfaceView, spot_W: FloatArray) -> None:
-        """Adds a picture that was taken where the arm tries to put the object down on a spot (2,) or near it."""
+        """Adds a view taken where the arm tries to put the object down on a spot (2,) or near it."""
         self._views.append(view)
         self._tried.append(spot_W)
 
     def pass_over(self, spots_W: Sequence[FloatArray]) -> None:
-        """Gives up spots (2,) before which the robot cannot stand."""
+        """Discards spots (2,) that no base placement serves."""
         self._tried.extend(spots_W)
 
     def others(self, here_W: FloatArray) -> list[FloatArray]:
@@ -251,7 +251,7 @@ class SpotSearch:
         return spaced_spots(spots)
 
     def why_none(self) -> str:
-        """Reason why the search found no spot, by all that was seen."""
+        """Reason why the search found no spot, according to all views."""
         seen, name = merged(self._views), self.surface.name
         middles = np.array([cluster.shape.centre for cluster in seen.clusters]).reshape(-1, 2)
         count = len(spaced_spots(middles, _SAME_OBJECT_M))
@@ -268,7 +268,7 @@ def _drive_m(spots_W: FloatArray, here_W: FloatArray) -> FloatArray:
 
 
 def _from_edge_m(surface: Surface, points_W: FloatArray) -> FloatArray:
-    """Distances (N,) of points (N, 2) from a surface's edges."""
+    """Distances (N,) from points (N, 2) to a surface's edges."""
     import shapely
 
     return np.asarray(shapely.distance(shapely.Polygon(surface.polygon_W).exterior, shapely.points(points_W)))
@@ -276,7 +276,7 @@ def _from_edge_m(surface: Surface, points_W: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class PrePlacePose:
-    """Joint angles (J,) with the object above its spot, and the height (m) of its lowest point over the surface."""
+    """Joint angles (J,) with the object above its spot, and the height (m) of its lowest point above the surface."""
 
     q_rad: FloatArray
     height_m: float
@@ -291,11 +291,11 @@ def above_goal(
     takes: Callable[[RigidTransform], bool] = lambda X_BH: True,
     along_rad: float | None = None,
 ) -> Goal:
-    """Returns a goal with the object, upright as before, over the first point of a surface within reach.
+    """Returns a goal with the object, upright as before, above the first point on a surface within reach.
 
-    `takes` judges whether the object fits below a hand pose X_BH; a long object may lie along `along_rad` (B). The
+    `takes` returns whether the object fits below a hand pose X_BH; a long object may lie along `along_rad` (B). The
     hand, open to `opening`, must be able to leave the object without contact with the boxes `beside` (B). The goal
-    raises PlanningError without a reachable point.
+    raises PlanningError when no point is within reach.
     """
 
     def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
@@ -347,7 +347,7 @@ def _can_put_down(
 
 
 def clear_heights(heights_m: Sequence[float], now_m: float, held_W: FloatArray, surface: Surface) -> Sequence[float]:
-    """Returns the body heights (m) at which the held object presses on no surface, always with the first height.
+    """Returns the body heights (m) at which the held object presses on no surface, always including the first.
 
     `held_W` are the object's corners (N, 3) while the body is `now_m` high; the arm stays in its posture. Only an
     object above the surface or its edge can press on it.

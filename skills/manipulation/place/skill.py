@@ -1,4 +1,4 @@
-"""The place skill: finds a free spot on a surface, lowers the object until it stands, lets go, and checks the spot."""
+"""The place skill: finds a free spot on a surface, lowers the object until it stands, releases it, and checks."""
 
 import itertools
 import math
@@ -83,7 +83,7 @@ _OVER_SPOT_M = 0.45
 class PlaceInputs:
     """Surface to put the object on.
 
-    The object's centre comes to rest in none of the circles `clear_of` (x, y, radius) of the world.
+    The object's centre must come to rest outside all circles `clear_of` (x, y, radius) in the world.
     """
 
     surface: Surface
@@ -94,8 +94,8 @@ class PlaceInputs:
 class PlaceOptions:
     """Speed of lowering, and limits of the search for a spot.
 
-    No joint is faster than `lower_rad_s` while the object is lowered. The object must be seen again within
-    `seen_again_m` of its spot. When no free spot is within reach, the robot moves at most `moves` times.
+    `lower_rad_s`: joint speed limit while the object is lowered. `seen_again_m`: distance from its spot within which
+    the object must be seen again. `moves`: how often the robot drives at most when no free spot is within reach.
     """
 
     lower_rad_s: TurnRate = 0.2
@@ -104,9 +104,9 @@ class PlaceOptions:
 
 
 class Place(PlaceVerification[PlaceInputs]):
-    """Puts the held object down on a surface and stows the arm. Goes nearer when no free spot is within reach.
+    """Puts the held object down on a surface and stows the arm. Drives nearer when no free spot is within reach.
 
-    The output `released_W` is where the hand has let the object go, also after a failure; a failure before has none.
+    The output `released_W` is the point of the release, also after a later failure; a failure before it has none.
     """
 
     name = "place"
@@ -131,7 +131,7 @@ class Place(PlaceVerification[PlaceInputs]):
         return "the object is still in the gripper" if self.context.robot.gripper().holding else None
 
     def run(self, inputs: PlaceInputs) -> Routine[Succeeded]:
-        """Goes near, looks, puts down, looks again."""
+        """Drives near, views the surface, puts the object down, and checks."""
         surface = inputs.surface
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
@@ -149,7 +149,7 @@ class Place(PlaceVerification[PlaceInputs]):
         return Succeeded(f"put the object down on the {surface.name}")
 
     def _put_down(self, search: SpotSearch, carried: RotationMatrix) -> Routine[None]:
-        """Finds a spot, lowers the object, lets go, checks, stows."""
+        """Finds a spot, lowers and releases the object, checks, and stows the arm."""
         surface, held = search.surface, search.held
         above = yield from self._find_spot(search, carried)
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
@@ -163,7 +163,7 @@ class Place(PlaceVerification[PlaceInputs]):
         yield from self.stow()
 
     def run_again(self, inputs: PlaceInputs) -> Routine[Succeeded]:
-        """Checks, with an empty gripper, whether the object stands on its spot; else starts again."""
+        """Checks, with an empty gripper, whether the object stands on its spot; else makes a new attempt."""
         surface = inputs.surface
         yield from self.pause(_FEEL_S, "feeling what the gripper holds")
         spot = self.checkpoint.get("spot_W")
@@ -184,14 +184,14 @@ class Place(PlaceVerification[PlaceInputs]):
         return Succeeded(f"the object stood on the {surface.name} already")
 
     def _carried(self) -> RotationMatrix:
-        """Rotation of the hand while it carried the object, from the note of an interrupted attempt."""
+        """Rotation of the hand while it carried the object, from the checkpoint of an interrupted attempt."""
         noted = self.checkpoint.get("carried")
         rotation = self.model.X_BH(self.q_rad()).rotation() if noted is None else RotationMatrix(np.array(noted))
         self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist()}
         return rotation
 
     def _find_spot(self, search: SpotSearch, carried: RotationMatrix) -> Routine[PrePlacePose]:
-        """Brings the object over a free spot; without one within reach, drives before others until none is left."""
+        """Brings the object over a free spot; when none is within reach, drives to others until none is left."""
         surface, spot_W = search.surface, _by_distance(search.spots(), self.X_WB())[0]
         heights_m, standing, moves = self._heights_m(surface), f"standing up to the {surface.name}", 0
         while True:
@@ -218,7 +218,7 @@ class Place(PlaceVerification[PlaceInputs]):
             spot_W = yield from self._go_on(search)
 
     def _go_on(self, search: SpotSearch) -> Routine[FloatArray]:
-        """Drives before the next spot that the robot can stand before. Raises SkillFailure when none is left."""
+        """Drives to the next spot that has a base placement. Raises SkillFailure when none is left."""
         while others := search.others(self.X_WB().translation()[:2])[:_OTHER_SPOTS]:
             try:
                 return (yield from self._go_before(others, search))
@@ -229,7 +229,7 @@ class Place(PlaceVerification[PlaceInputs]):
         raise SkillFailure(Cause.PLANNING, search.why_none())
 
     def _view(self, search: SpotSearch, spot_W: FloatArray) -> Routine[SurfaceView]:
-        """Looks at the surface; if the object hides it, uses earlier pictures and the LiDAR for the objects on it."""
+        """Views the surface; if the object occludes it, uses earlier pictures and the LiDAR for the objects on it."""
         surface, standing_W = search.surface, self._standing_W(search.surface)
         hidden = surface.height_m < _FLOOR_M and self.object_camera.on_hand
         if hidden:
@@ -244,7 +244,7 @@ class Place(PlaceVerification[PlaceInputs]):
     def _standing_W(self, surface: Surface) -> FloatArray:
         """Points (N, 3, world) above a surface from the LiDAR and earlier pictures.
 
-        They stand in for the hand camera when a large object in the gripper hides its view.
+        They replace the hand camera when a large object in the gripper occludes its view.
         """
         scan, capabilities = self.context.robot.scan(), self.context.robot.capabilities()
         seen = [cell_centres(self.context.solid.cells)]
@@ -276,9 +276,9 @@ class Place(PlaceVerification[PlaceInputs]):
         yield from self._go_before(near, search)
 
     def _go_before(self, candidates: Sequence[FloatArray], search: SpotSearch) -> Routine[FloatArray]:
-        """Drives to a pose within reach of one of some spots, or as near as possible; returns the spot.
+        """Drives to a pose within reach of one of the candidates, or as near as possible; returns that spot.
 
-        Raises SkillFailure with cause PLANNING when no spot has a free place before it.
+        Raises SkillFailure with cause PLANNING when no spot has a free base placement.
         """
         yield from self._draw_in(search.held)
         context, pose, arm = self.context, self.context.pose(), self.arm
@@ -297,13 +297,13 @@ class Place(PlaceVerification[PlaceInputs]):
         return spot
 
     def _tucked(self) -> bool:
-        """Returns whether the hand is drawn in to the body."""
+        """Returns whether the hand is tucked in at the body."""
         X_BH, tuck_x_m = self.model.X_BH(self.q_rad()), self.arm.tuck_x_m
         beside = abs(float(X_BH.rotation().matrix()[1, 0])) > _BESIDE
         return bool(tuck_x_m) and beside and float(X_BH.translation()[0]) < max(tuck_x_m) + _TUCKED_M
 
     def _draw_in(self, held: HeldObject) -> Routine[bool]:
-        """Draws in an object that would stick out over the surface during a drive; returns whether the arm can."""
+        """Draws in an object that would overhang the surface during a drive; returns whether the arm can."""
         arm, R_BH = self.arm, self.model.X_BH(self.q_rad()).rotation()
         if not arm.tuck_x_m or self._tucked():
             return bool(arm.tuck_x_m)
@@ -319,7 +319,7 @@ class Place(PlaceVerification[PlaceInputs]):
             self.held = ()
 
     def _reach(self, search: SpotSearch) -> Callable[[FloatArray], Callable[[Pose2D], float | None]]:
-        """Returns a function for the cost of putting the object down on a spot from a pose; None when out of reach.
+        """Returns, for a spot, the function from a pose to the cost of putting the object down; None when out of reach.
 
         Omits the highest approach, because the next one reaches as far.
         """
@@ -338,7 +338,7 @@ class Place(PlaceVerification[PlaceInputs]):
         return lambda spot: partial(cost, spot)
 
     def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView | None]:
-        """Views the floor with the cameras at the body's front, because the held object hides it from a hand camera."""
+        """Views the floor with the cameras at the body's front, because the held object occludes the hand camera."""
         message, robot = f"looking for a free spot on the {surface.name}", self.context.robot
         X_WO, views = self.context.localiser.estimate().X_WO, list[SurfaceView]()
         for camera in robot.capabilities().body_cameras:
@@ -370,7 +370,7 @@ class Place(PlaceVerification[PlaceInputs]):
         return PrePlacePose(q_rad, float(X_BH.translation()[2] - on_top[0][2]) - held.drop_m(X_BH.rotation()))
 
     def _bring(self, goal: Goal, held: HeldObject, message: str) -> Routine[FloatArray]:
-        """Moves to a goal on a path without contact of the held object; without such a path, ignores the object."""
+        """Moves to a goal without contact of the held object; when no such path exists, ignores the object."""
         found: list[FloatArray] = []
 
         def noted(scene: ArmScene, q: FloatArray) -> FloatArray:
@@ -389,7 +389,7 @@ class Place(PlaceVerification[PlaceInputs]):
 
         The path down begins at its planned angles, not at the arm's present ones: near a singular posture their small
         difference decides whether a path exists. After contact the arm rises a little, or it would dip onto the surface
-        as the gripper releases. Raises SkillFailure with cause PLANNING.
+        as the gripper releases. Raises SkillFailure with cause PLANNING when no path exists.
         """
         message = f"putting the object down on the {surface.name}"
         p_BH = self.model.X_BH(above.q_rad).translation() - (above.height_m - _SURELY_FREE_M) * UP_B
@@ -401,7 +401,7 @@ class Place(PlaceVerification[PlaceInputs]):
             yield from self.try_shift_hand(_RELAX_M * UP_B, message)
 
     def _press_down(self, message: str) -> Routine[bool]:
-        """Presses the object slowly onto the surface; returns whether contact stopped it. Raises SkillFailure."""
+        """Presses the object slowly down; returns whether contact stopped it. Fails when no line is feasible."""
         why: PlanningError | None = None
         for part in (1.0, 0.85, 0.7, 0.5):
             try:

@@ -66,8 +66,8 @@ class PlaceVerification(ReleasingSkill[InputsT]):
     ) -> Routine[None]:
         """Raises SkillFailure with cause POSTCONDITION unless an object rests within `within_m` of the spot (2,).
 
-        `before_W` (N, 2) are the points of the objects that stood there before. The arm avoids `put_down`, the object's
-        box (B), on its path.
+        `before_W` (N, 2) are points on the objects that stood there before. The arm avoids `put_down`, the object's box
+        (B), on its path.
         """
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
@@ -88,7 +88,7 @@ class PlaceVerification(ReleasingSkill[InputsT]):
     def _seen_again(
         self, surface: Surface, spot_W: FloatArray, put_down: Sequence[Box], before_W: FloatArray, within_m: float
     ) -> Routine[Image | None]:
-        """Returns a picture with the object near its spot, by depth or class, from a near viewpoint if needed."""
+        """Returns a picture that shows the object near its spot, by depth or class, from a near viewpoint if needed."""
 
         def new(points_W: FloatArray) -> Mask:
             near = np.linalg.norm(points_W - spot_W, axis=1) < within_m
@@ -108,7 +108,7 @@ class PlaceVerification(ReleasingSkill[InputsT]):
         return None
 
     def _is_detected(self, image: Image, surface: Surface, new: Callable[[FloatArray], Mask]) -> Routine[bool]:
-        """Returns whether the detector finds a `new` object of the class: a flat one hardly stands out."""
+        """Returns whether the detector finds a `new` object of the class, which depth may miss when it is flat."""
         context, kind = self.context, self.checkpoint.get("kind")
         if kind not in context.detector.class_names:
             return False
@@ -125,10 +125,10 @@ class PlaceVerification(ReleasingSkill[InputsT]):
     def seen_on(
         self, surface: Surface, spot_W: FloatArray, beside: Sequence[Box] = (), *, near: bool = False
     ) -> Routine[tuple[Image, SurfaceView | None]]:
-        """Takes a picture, from afar or near, and segments the surface; no view when the held object hides it.
+        """Takes a picture, from afar or near, and segments the surface; no view when the held object occludes it.
 
-        The object hides at least the picture's lower half, so from afar the camera looks low. Raises SkillFailure with
-        cause PLANNING when the surface is out of view.
+        The object occludes at least the picture's lower half, so from afar the camera looks low. Raises SkillFailure
+        with cause PLANNING when the surface is out of view.
         """
         message = f"looking for a free spot on the {surface.name}"
         X_WB, p_BS = self.X_WB(), self.model.p_BS
@@ -147,7 +147,7 @@ class PlaceVerification(ReleasingSkill[InputsT]):
         return image, view
 
     def is_hidden(self, image: Image) -> bool:
-        """Returns whether the held object hides a picture, and the LiDAR has to do."""
+        """Returns whether the held object occludes a picture, so that the LiDAR must replace it."""
         robot = self.context.robot
         near = float(np.mean(image.depth_m < _AT_HAND_M))
         return near > _HIDDEN and robot.gripper().holding and robot.scan() is not None

@@ -10,10 +10,10 @@ from skills.detection import Detector
 
 @dataclass(frozen=True)
 class Cascade:
-    """Cascade of networks in an ONNX `file`; Errand's own unless one is named.
+    """Cascade of networks in an ONNX `file`; the project's own when none is named.
 
-    With `views`, a picture of the hand camera that leaves doubts is judged in several views (test-time augmentation).
-    `objects` are folders of `errand object import`: own objects, which are recognised by their models.
+    `views`: a picture of the hand camera with doubtful scores is judged in several views (test-time augmentation).
+    `objects`: folders written by `errand object import`, whose objects are recognised by their models.
     """
 
     file: str | None = None

@@ -1,7 +1,7 @@
-"""Test-time augmentation: detections of mirrored and smaller views of one picture, fused.
+"""Test-time augmentation: detections in mirrored and smaller views of one picture, fused.
 
-Boxes of one object in several views are fused after Solovyev et al., "Weighted boxes fusion" (2021). Only the views
-that show an object neither small nor very large judge it. The detector skips the other views where the first one leaves
+Boxes of one object in several views are fused after Solovyev et al., "Weighted boxes fusion" (2021). Only the views in
+which an object is neither small nor very large contribute. The detector skips the other views when the first one leaves
 no doubt.
 """
 
@@ -36,7 +36,7 @@ class View:
     scale: float = 1.0
 
     def apply(self, picture: Picture) -> Picture:
-        """Makes the view of a picture (H, W) or (H, W, 3), of the same size."""
+        """Computes the view of a picture (H, W) or (H, W, 3), of the same size."""
         flipped = picture[:, ::-1] if self.mirrored else picture
         if self.scale == 1.0:
             return np.ascontiguousarray(flipped)
@@ -46,14 +46,14 @@ class View:
         return framed
 
     def box_in_picture(self, box: Box, width_px: int) -> Box:
-        """Converts a box of the view to the picture, which is width_px wide."""
+        """Converts a box in the view to the picture, which is width_px wide."""
         u0, v0, u1, v1 = (value / self.scale for value in box)
         return (width_px - u1, v0, width_px - u0, v1) if self.mirrored else (u0, v0, u1, v1)
 
     def suits(self, box: Box, shape: Sequence[int], *, large: bool) -> bool:
-        """Returns whether the view shows a box of a picture (H, W, ...) at a size that the networks judge well.
+        """Returns whether the view shows a box in a picture (H, W, ...) at a size for which the networks are reliable.
 
-        The size is that in the letterbox. Objects of a `large` class have limits of their own.
+        The size is measured in the letterbox. Objects of a `large` class have limits of their own.
         """
         letterbox = Letterbox(width_px=shape[1], height_px=shape[0])
         side_px = max(box[2] - box[0], box[3] - box[1]) * self.scale * letterbox.scale_xy[0]
@@ -67,7 +67,7 @@ VIEWS: Final = (View(), View(mirrored=True), View(scale=0.7), View(True, 0.5), V
 
 @dataclass(frozen=True)
 class AugmentationOptions:
-    """The views; the first one is enough when no score, of alternatives either, lies between `low` and `high`."""
+    """The views; the first suffices when no score, alternatives included, lies between `low` and `high`."""
 
     views: tuple[View, ...] = VIEWS
     low: float = 0.3
@@ -82,9 +82,9 @@ class AugmentedDetector(DetectorWrapper):
         self._networks, self._options = networks, options or AugmentationOptions()
 
     def detect_in_views(self, picture: Picture, least_score: float | None = None) -> Detections:
-        """Fuses the detections of the views, from the threshold or from `least_score` on.
+        """Fuses the detections in all views, from the threshold or from `least_score` on.
 
-        Raises ValueError for anything but a picture.
+        Raises ValueError when the array is no picture.
         """
         check_picture(picture)
         options, views = self._networks.options, self._options.views
@@ -103,7 +103,7 @@ class AugmentedDetector(DetectorWrapper):
         )
 
     def _in_doubt(self, found: Sequence[Detection]) -> bool:
-        """Returns whether the first view leaves doubts."""
+        """Returns whether the first view has a score between `low` and `high`."""
         scores = [score for one in found for score in (one.score, *(score for _, score in one.alternatives))]
         return any(self._options.low < score < self._options.high for score in scores)
 
@@ -111,7 +111,7 @@ class AugmentedDetector(DetectorWrapper):
 def _fused(
     views: Sequence[View], found: Sequence[Sequence[Detection]], shape: Sequence[int], class_names: Sequence[str]
 ) -> Candidates:
-    """Fuses the detections of all views to one candidate for each object and class."""
+    """Fuses the detections in all views to one candidate for each object and class."""
     groups: list[_Group] = []
     for one, number in sorted(_numbered(found), key=lambda pair: -pair[0].score):
         box = views[number].box_in_picture(one.box, shape[1])
@@ -130,7 +130,7 @@ def _fused(
 
 @dataclass
 class _Group:
-    """One object in several views: score and box by the view's number; `box` has the best score."""
+    """One object in several views: score and box by the number of the view; `box` has the highest score."""
 
     class_name: str
     box: Box
@@ -141,7 +141,7 @@ class _Group:
         return class_name == self.class_name and box_overlap(self.box, box) > _SAME_OBJECT
 
     def row(self, views: Sequence[View], shape: Sequence[int]) -> tuple[NDArray[np.float64], float, str]:
-        """Mean box, weighted by the scores, mean score, and class, over the views that suit the object, or over all."""
+        """Mean box, weighted by the scores, mean score, and class, over the views that suit the object, or else all."""
         large = self.class_name in _LARGE_CLASSES
         suiting = [k for k, view in enumerate(views) if view.suits(self.box, shape, large=large)] or range(len(views))
         own = [self.seen[number] for number in suiting if number in self.seen]

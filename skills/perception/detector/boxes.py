@@ -1,4 +1,4 @@
-"""Boxes of the detector: the letterbox, crops of it, and non-maximum suppression to one detection for each object."""
+"""Boxes of the detector: the letterbox, crops from it, and non-maximum suppression to one detection per object."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ Floats = NDArray[np.float32]
 class Letterbox:
     """Placement of a picture of width_px x height_px in the letterbox: from the upper left corner, scaled by scale_xy.
 
-    Both scales differ only by the rounding to whole pixels. Boxes are (N, 4) rows of (u0, v0, u1, v1): edges in
-    pixels, so that a whole picture is (0, 0, width, height).
+    Both scales differ only by the rounding to whole pixels. Boxes are (N, 4) rows of (u0, v0, u1, v1): edges in pixels,
+    so that a whole picture is (0, 0, width, height).
     """
 
     width_px: int
@@ -39,7 +39,7 @@ class Letterbox:
 
     @property
     def inside_px(self) -> tuple[int, int]:
-        """Width and height of the part that shows the picture; the rest, at right or bottom, is padding."""
+        """Width and height of the region with the picture; the rest, at right or bottom, is padding."""
         scale = min(WIDTH_PX / self.width_px, HEIGHT_PX / self.height_px)
         return max(1, round(self.width_px * scale)), max(1, round(self.height_px * scale))
 
@@ -57,16 +57,16 @@ class Letterbox:
 
 
 def letterbox(picture: Picture) -> tuple[Picture, Letterbox]:
-    """Scales a picture (H, W, 3) RGB or (H, W) grey with its aspect, and pads it to (480, 640, 3) RGB.
+    """Scales a picture (H, W, 3) RGB or (H, W) grey, keeping its aspect ratio, and pads it to (480, 640, 3) RGB.
 
-    Raises ValueError for anything but such a picture.
+    Raises ValueError when the array is no such picture.
     """
     filled = np.empty((HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
     return filled, fill_letterbox(picture, filled)
 
 
 def fill_letterbox(picture: Picture, into: Picture) -> Letterbox:
-    """Writes the letterbox of a picture `into` an array (480, 640, 3), such as one of a batch. Raises ValueError."""
+    """Writes a picture's letterbox `into` an array (480, 640, 3), such as one of a batch. Raises ValueError."""
     check_picture(picture)
     placed = Letterbox(width_px=picture.shape[1], height_px=picture.shape[0])
     width, height = placed.inside_px
@@ -86,7 +86,7 @@ def check_picture(picture: Picture) -> None:
 
 
 def _resized(picture: Picture, width: int, height: int) -> Picture:
-    """Averages pixels where the result is smaller, and interpolates where it is larger."""
+    """Averages pixels when scaling down, and interpolates when scaling up."""
     rows, columns = picture.shape[:2]
     if (columns, rows) == (width, height):
         return picture
@@ -103,7 +103,7 @@ class Scales:
     half: Picture
 
     def warp(self, affine: NDArray[np.floating], size_px: tuple[int, int]) -> Picture:
-        """Warps the picture by an affine map (2, 3) of pixel edges into (width, height), with padding."""
+        """Warps the picture by an affine map (2, 3) between pixel edges into (width, height), with padding."""
         picture, to_crop = self.full, affine.astype(np.float64)
         if np.sqrt(abs(np.linalg.det(to_crop[:, :2]))) < _HALF_BELOW:
             picture, to_crop = self.half, to_crop @ np.diag([2.0, 2.0, 1.0])
@@ -111,7 +111,7 @@ class Scales:
 
 
 def warp(picture: Picture, affine: NDArray[np.floating], size_px: tuple[int, int]) -> Picture:
-    """Warps a picture by an affine map (2, 3) of pixel edges into (width, height), with padding."""
+    """Warps a picture by an affine map (2, 3) between pixel edges into (width, height), with padding."""
     to_crop = affine.astype(np.float64)
     to_crop[:, 2] += to_crop[:, :2] @ (0.5, 0.5) - 0.5
     grey = (PADDING, PADDING, PADDING)
@@ -120,19 +120,19 @@ def warp(picture: Picture, affine: NDArray[np.floating], size_px: tuple[int, int
 
 
 def halve(picture: Picture) -> Picture:
-    """Scales a picture (H, W, 3) of even sides to half its size."""
+    """Scales a picture (H, W, 3) with even sides to half its size."""
     half = cv2.resize(picture, (picture.shape[1] // 2, picture.shape[0] // 2), interpolation=cv2.INTER_AREA)
     return np.asarray(half, dtype=np.uint8)
 
 
 @dataclass(frozen=True)
 class SuppressionOptions:
-    """Overlaps (intersection over union) at which boxes are one object, and limits of their number.
+    """Overlaps (intersection over union) at which boxes are one object, and limits on their number.
 
-    Boxes of one class that overlap by more than `same_class` are one object. So are boxes of two classes that overlap
-    by more than `other_class`, if the better one has at least `sure_score`. Boxes of other classes that overlap a
-    detection by more than `alternative` are its alternatives. At most `most_candidates` boxes of a picture are
-    considered, and `most_kept` of them become detections.
+    `same_class`: boxes of one class that overlap by more are one object. `other_class` and `sure_score`: boxes of two
+    classes that overlap by more are one object when the better one has this score. `alternative`: boxes of other
+    classes that overlap a detection by more are its alternatives. `most_candidates` and `most_kept`: how many boxes of
+    a picture are considered, and how many of them become detections.
     """
 
     same_class: float = 0.45
@@ -155,18 +155,18 @@ class Candidates:
         return len(self.scores)
 
     def at(self, rows: NDArray[np.int64]) -> Candidates:
-        """Candidates at some rows."""
+        """Candidates at these rows."""
         return Candidates(self.boxes[rows], self.scores[rows], self.classes[rows])
 
     def from_score(self, threshold: float) -> Candidates:
-        """Candidates with at least a score."""
+        """Candidates with at least the threshold as score."""
         return self.at(np.flatnonzero(self.scores >= threshold))
 
 
 def select_candidates(boxes: Floats, scores: Floats, threshold: float, most: int) -> Candidates:
     """Selects the `most` best pairs of box (A, 4) and class whose scores (A, K) reach the threshold.
 
-    Leaves out boxes that are not finite or have no area. Equal scores keep their order.
+    Omits boxes that are not finite or have no area. Equal scores keep their order.
     """
     rows, classes = np.nonzero(scores >= threshold)
     sound = are_sound(boxes[rows])
@@ -177,7 +177,7 @@ def select_candidates(boxes: Floats, scores: Floats, threshold: float, most: int
 
 
 def are_sound(boxes: Floats) -> NDArray[np.bool_]:
-    """Returns which boxes (N, 4) are finite and have an area."""
+    """Mask of the boxes (N, 4) that are finite and have an area."""
     return np.asarray(np.isfinite(boxes).all(axis=1) & (boxes[:, 2:] > boxes[:, :2]).all(axis=1))
 
 
@@ -196,7 +196,7 @@ def select_distinct(boxes: Floats, overlap: float) -> NDArray[np.int64]:
 
 
 def _greedy_rows(replaced: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Rows that stay when each row that stays removes the later ones that it replaces (N, N)."""
+    """Rows kept when each kept row removes the later ones that it replaces (N, N)."""
     alive = np.ones(len(replaced), dtype=bool)
     for k in range(len(replaced)):
         if alive[k]:
@@ -207,7 +207,7 @@ def _greedy_rows(replaced: NDArray[np.bool_]) -> NDArray[np.int64]:
 def detections_from(
     candidates: Candidates, class_names: Sequence[str], threshold: float, options: SuppressionOptions
 ) -> tuple[Detection, ...]:
-    """Detections of a picture: candidates from the threshold on after suppression, with their alternatives."""
+    """Detections in a picture: candidates from the threshold on after suppression, with their alternatives."""
     candidates = candidates.at(np.flatnonzero((candidates.boxes[:, 2:] > candidates.boxes[:, :2]).all(axis=1)))
     selected = suppress(candidates.from_score(threshold), options)
     rows = zip(
@@ -228,7 +228,7 @@ def detections_from(
 def alternative_scores(
     selected: Candidates, candidates: Candidates, options: SuppressionOptions
 ) -> list[dict[int, float]]:
-    """Best scores of the other classes on the object of each selected candidate, by class."""
+    """For each selected candidate, the best score of each other class on the same object."""
     alike = overlaps(selected.boxes, candidates.boxes) > options.alternative
     alike &= selected.classes[:, None] != candidates.classes[None, :]
     alternatives: list[dict[int, float]] = [{} for _ in range(len(selected))]

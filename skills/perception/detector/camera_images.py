@@ -1,6 +1,6 @@
-"""Detection in camera images, which are first turned upright and brightened, as the detector's training pictures are.
+"""Detection in camera images, first turned upright and brightened like the detector's training pictures.
 
-Spot's right camera hangs upside down. Dim pictures are brightened as a camera's automatic exposure would do.
+Spot's right camera is mounted upside down. Dim pictures are brightened as a camera's automatic exposure would do.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _DOWN_IS_UP = -float(np.cos(np.radians(LEAST_ROLL_DEG)))
 
 
 def detect_in_image(detector: Detector, image: Image, least_score: float | None = None) -> Detections:
-    """Detects the objects in an image, in several views if the detector can; then from `least_score` on, if given."""
+    """Detects the objects in an image, in several views if the detector can, with scores from `least_score` on."""
     picture = _prepared(image, image.grey if image.colour is None else image.colour)
     return detector.detect_with_depth(image, _as_taken(image, detector.detect_in_views(picture, least_score)))
 
@@ -42,7 +42,7 @@ def rotate_180(picture: Picture) -> Picture:
 
 
 def rotate_boxes_180(found: Sequence[Detection], width_px: int, height_px: int) -> Detections:
-    """Rotates the boxes of detections by half a turn in a picture of a size."""
+    """Rotates the boxes of detections by half a turn in a picture of width_px x height_px."""
 
     def rotated(one: Detection) -> Detection:
         u0, v0, u1, v1 = one.box
@@ -52,7 +52,7 @@ def rotate_boxes_180(found: Sequence[Detection], width_px: int, height_px: int) 
 
 
 def turn_upright(image: Image, found: Sequence[Detection]) -> tuple[Picture, Detections]:
-    """Turns the picture of an image by quarter turns until its top is up, with the boxes of its detections."""
+    """Rotates an image's picture by quarter turns until its top is up, and the boxes of its detections with it."""
     picture = image.grey if image.colour is None else image.colour
     up_C = image.frames.pose(image.camera_frame).rotation().matrix()[2]
     for _ in range(round(float(np.arctan2(up_C[0], -up_C[1])) / (np.pi / 2.0)) % 4):
@@ -62,13 +62,13 @@ def turn_upright(image: Image, found: Sequence[Detection]) -> tuple[Picture, Det
 
 
 def _turned(box: tuple[float, float, float, float], width_px: int) -> tuple[float, float, float, float]:
-    """Turns a box with a picture by a quarter turn to the left."""
+    """Rotates a box with its picture by a quarter turn to the left."""
     u0, v0, u1, v1 = box
     return v0, width_px - u1, v1, width_px - u0
 
 
 def brighten(picture: Picture) -> Picture:
-    """Brightens a dim picture (H, W) or (H, W, 3) by up to eight times; returns any other unchanged."""
+    """Brightens a dim picture (H, W) or (H, W, 3) by up to eight times; returns any other picture unchanged."""
     mean = float(picture.mean())
     if mean >= _DIM_MEAN:
         return picture
@@ -77,12 +77,12 @@ def brighten(picture: Picture) -> Picture:
 
 
 def is_dark(image: Image) -> bool:
-    """Returns whether a picture is black all over."""
+    """Returns whether a picture is entirely black."""
     return bool(image.grey.mean() < _DARK_MEAN and image.grey.std() < _DARK_SPREAD)
 
 
 def lacks_depth(image: Image) -> bool:
-    """Returns whether an image that should have depth has none anywhere."""
+    """Returns whether an image that should have depth has none at all."""
     return image.depth_m.size > 0 and not bool(np.any(image.depth_m > 0.0))
 
 

@@ -52,15 +52,15 @@ Outputs = Mapping[str, tuple[str, int]]
 
 
 class ModelFileError(InputError):
-    """A model file cannot be used."""
+    """Error of a model file that cannot be used."""
 
 
 @dataclass(frozen=True)
 class NetworkKind:
     """Expected format, inputs and outputs of a model file; `hint` says how to make a new one.
 
-    For a number of classes, `inputs` are ("uint8" or "float", shape of a row) by name, and `outputs` ("float", length
-    of the last axis).
+    As functions of the number of classes, `inputs` maps a name to ("uint8" or "float", shape of a row), and `outputs`
+    to ("float", length of the last axis).
     """
 
     format: str
@@ -157,13 +157,13 @@ def load_model(file: Path = MODEL_FILE, *, networks: int = 3) -> DetectorModel:
 
 
 def _check_belongs(found: Network, file: Path, key: str, before: Network, source: Path, kind: NetworkKind) -> None:
-    """Raises ModelFileError unless the metadata of a network hold the digest of the one `before` it."""
+    """Raises ModelFileError unless a network's metadata contain the digest of the network `before` it."""
     if found.metadata.get(key) != before.digest or found.class_names != before.class_names:
         raise ModelFileError(f"it belongs to another network than {source.name}", hint=kind.hint, file=file)
 
 
 def load_network(file: Path, kind: NetworkKind) -> Network:
-    """Loads the network of a file. Raises ModelFileError."""
+    """Loads the network in a file. Raises ModelFileError when the file is missing, damaged or of another format."""
     reader = _Reader(file, kind)
     content = reader.content()
     session = reader.session(content)
@@ -176,7 +176,7 @@ def load_network(file: Path, kind: NetworkKind) -> Network:
 
 
 def seal(content: bytes) -> bytes:
-    """Appends the digest of a model file to its metadata, so that damage is noticed."""
+    """Appends the digest of a model file to its metadata, so that damage is detected."""
     return content + _seal_of(content)
 
 
@@ -187,13 +187,13 @@ def _seal_of(content: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class _Reader:
-    """The steps of loading a model file; each raises ModelFileError."""
+    """Steps of loading a model file; each raises ModelFileError when the file fails it."""
 
     file: Path
     kind: NetworkKind
 
     def error(self, message: str) -> ModelFileError:
-        """Returns an error of this file."""
+        """Returns an error that names this file."""
         return ModelFileError(message, hint=self.kind.hint, file=self.file)
 
     def content(self) -> bytes:
@@ -209,7 +209,7 @@ class _Reader:
         return content
 
     def session(self, content: bytes) -> onnxruntime.InferenceSession:
-        """Makes the network ready to run."""
+        """Creates the inference session."""
         import onnxruntime
 
         try:
@@ -219,7 +219,7 @@ class _Reader:
             raise self.error(f"the model of the detector is damaged or no ONNX file ({reason})") from error
 
     def check_format(self, metadata: Mapping[str, str]) -> None:
-        """Checks that this version of Errand reads the format."""
+        """Checks that this version of the project reads the format."""
         found = metadata.get("format")
         if found != self.kind.format:
             what = f"a model of format '{found[:40]}'" if found else "no model of this detector"
@@ -236,7 +236,7 @@ class _Reader:
         return tuple(names)
 
     def check_ports(self, session: onnxruntime.InferenceSession, classes: int) -> None:
-        """Checks that inputs and outputs are those of the format."""
+        """Checks that inputs and outputs match the format."""
         inputs = {port.name: (port.type, tuple(port.shape[1:])) for port in session.get_inputs()}
         outputs = {port.name: (port.type, port.shape[-1] if port.shape else None) for port in session.get_outputs()}
         wanted_inputs = {name: (f"tensor({of})", shape) for name, (of, shape) in self.kind.inputs(classes).items()}
@@ -245,7 +245,7 @@ class _Reader:
             raise self.error(f"the model has other inputs or outputs: {_ports_text(inputs)} -> {_ports_text(outputs)}")
 
     def try_out(self, session: onnxruntime.InferenceSession, classes: int) -> None:
-        """Runs once on zeros: the first run takes longer, and shows damage that loading does not."""
+        """Runs once on zeros: the first run takes longer, and reveals damage that loading does not."""
         ports = self.kind.inputs(classes)
         zeros = {name: np.zeros((1, *shape), dtype=_NUMPY[of]) for name, (of, shape) in ports.items()}
         try:

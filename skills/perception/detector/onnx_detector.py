@@ -46,11 +46,11 @@ _LOWEST_SCORE: Final = 1e-4
 
 @dataclass(frozen=True)
 class ProposalOptions:
-    """Selection of the boxes that are proposals.
+    """Selection of the boxes that become proposals.
 
-    Takes the `most_candidates` best boxes of any class with at least `least_score`, drops those that overlap a better
-    one by more than `same`, and keeps `most`. Where the next network gives at least `mirrored_from`, it also sees the
-    mirror image.
+    `most_candidates` and `least_score`: only so many of the best boxes of any class, with at least this score, are
+    considered. `same`: a box that overlaps a better one by more is dropped. `most`: number of proposals kept.
+    `mirrored_from`: where the next network gives at least this score, it also judges the mirror image.
     """
 
     least_score: float = 0.01
@@ -66,10 +66,10 @@ CLASSIFIER_PROPOSALS: Final = ProposalOptions(least_score=0.05, same=1.0, most=1
 
 @dataclass(frozen=True)
 class DetectorOptions:
-    """Thresholds of detections and of their alternative classes, and the options of the stages.
+    """Thresholds for detections and for their alternative classes, and the options of the stages.
 
-    The refinement network judges `proposals`, and the classifier network `reclassified` of its results. A quick search
-    for one class uses only the proposals that give that class at least `quick_score`.
+    `proposals` are judged by the refinement network, and `reclassified` of its results by the classifier network.
+    `quick_score`: a search for one class uses only the proposals that give the class at least this score.
     """
 
     threshold: float = 0.5
@@ -82,7 +82,7 @@ class DetectorOptions:
 
 @dataclass(frozen=True)
 class OnnxDetector(Detector):
-    """Detector of loaded networks. Several threads may use it at once."""
+    """Detector that runs loaded networks. Several threads may use it at once."""
 
     model: DetectorModel
     options: DetectorOptions = field(default_factory=DetectorOptions)
@@ -95,8 +95,8 @@ class OnnxDetector(Detector):
     def detect(self, pictures: Sequence[Picture], least_score: float | None = None) -> list[Detections]:
         """Detects the objects in each picture, best first; boxes are in the picture's own pixels.
 
-        Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. `least_score` replaces the threshold. Raises
-        ValueError for anything else.
+        Pictures are (H, W, 3) RGB or (H, W) grey, of any size. `least_score` replaces the threshold. Raises ValueError
+        when an array is no picture.
         """
         threshold = self.options.threshold if least_score is None else least_score
         return _in_parallel(partial(self._detect, threshold=threshold), pictures)
@@ -104,8 +104,8 @@ class OnnxDetector(Detector):
     def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[Detections]:
         """Detects the objects of one class in each picture, quickly.
 
-        The later networks see only the proposals that may be of the class. Raises ValueError for anything but
-        pictures, and for an unknown class.
+        The later networks judge only the proposals that may be of the class. Raises ValueError when an array is no
+        picture, or the class is unknown.
         """
         if class_name not in self.class_names:
             raise ValueError(f"the detector knows no class {class_name!r}")
@@ -126,12 +126,12 @@ class OnnxDetector(Detector):
         return tuple(one for one in found if one.class_name == self.class_names[number])
 
     def _propose(self, image: Picture) -> tuple[Floats, Floats]:
-        """Boxes (A, 4) and scores (A, K) of the proposal network in a letterbox (H, W, 3)."""
+        """Boxes (A, 4) and scores (A, K) from the proposal network in a letterbox (H, W, 3)."""
         boxes, scores = self.model.proposal.session.run(["boxes", "scores"], {"images": image[None]})
         return boxes[0], scores[0]
 
     def _judge(self, image: Picture, placed: Letterbox, boxes: Floats, scores: Floats, threshold: float) -> Detections:
-        """Runs the later stages on proposals, boxes (A, 4) and scores (A, K), of a letterbox."""
+        """Runs the later stages on the proposals in a letterbox: boxes (A, 4) and scores (A, K)."""
         model, scales, options = self.model, Scales(image, halve(image)), self.options
         if model.refinement is not None:
             boxes, scores = refine(model.refinement.session, scales, boxes, scores, options.proposals)
@@ -148,7 +148,7 @@ class OnnxDetector(Detector):
 
 
 def load_detector(file: Path = MODEL_FILE, options: DetectorOptions | None = None) -> OnnxDetector:
-    """Loads the detector of a file. Raises `skills.perception.detector.model_files.ModelFileError`."""
+    """Loads the detector in a file. Raises `ModelFileError` when its networks cannot be used."""
     return OnnxDetector(load_model(file), options or DetectorOptions())
 
 
@@ -171,7 +171,7 @@ class Proposals:
 
 
 def select_proposals(boxes: Floats, scores: Floats, options: ProposalOptions) -> Proposals:
-    """Selects the proposals among boxes (A, 4) with scores (A, K) of a network, best first."""
+    """Selects the proposals, best first, among a network's boxes (A, 4) with scores (A, K)."""
     rows = _proposal_rows(boxes, scores, options)
     return Proposals(boxes[rows], logits(scores[rows]))
 
@@ -186,7 +186,7 @@ def _proposal_rows(boxes: Floats, scores: Floats, options: ProposalOptions) -> N
 
 
 def logits(scores: Floats) -> Floats:
-    """Logits of scores from 0 to 1, limited to those of 1e-4 and 1 - 1e-4."""
+    """Logits of scores from 0 to 1, clipped to 1e-4 and 1 - 1e-4."""
     sound = np.clip(scores, _LOWEST_SCORE, 1.0 - _LOWEST_SCORE)
     return np.asarray(np.log(sound / (1.0 - sound)), dtype=np.float32)
 
@@ -214,7 +214,7 @@ def refine(
 
 
 def crop_inputs(scales: Scales, proposals: Proposals, *, mirrored: bool = False) -> dict[str, NDArray[Any]]:
-    """Inputs of a later network: crops about proposals, or their mirror images, the proposals in them, and logits."""
+    """Inputs of a later network: crops around proposals or their mirror images, the proposals in them, and logits."""
     maps = _crop_maps(proposals, mirrored)
     return {
         "chips": np.stack([scales.warp(to_crop, (CROP_PX, CROP_PX)) for to_crop in maps]),
@@ -230,14 +230,14 @@ def _crop_maps(proposals: Proposals, mirrored: bool) -> Floats:
 def _run_on_crops(
     session: InferenceSession, scales: Scales, proposals: Proposals, *, mirrored: bool
 ) -> tuple[Floats, Floats]:
-    """Boxes in the letterbox and scores of a network on the crops about proposals, or on their mirror images."""
+    """Boxes in the letterbox and scores from a network on the crops around proposals, or on their mirror images."""
     found, scores = session.run(["boxes", "scores"], crop_inputs(scales, proposals, mirrored=mirrored))
     back = np.stack([cv2.invertAffineTransform(to_crop) for to_crop in _crop_maps(proposals, mirrored)])
     return transform_boxes(found, back), scores
 
 
 def crop_map(box: NDArray[np.floating], *, mirrored: bool = False) -> Floats:
-    """Affine map (2, 3) from the letterbox to the crop about a box (4,), which fills about two thirds of the crop.
+    """Affine map (2, 3) from the letterbox to the crop around a box (4,), which fills about two thirds of the crop.
 
     A very small box fills less. `mirrored` flips the crop from left to right.
     """
@@ -249,7 +249,7 @@ def crop_map(box: NDArray[np.floating], *, mirrored: bool = False) -> Floats:
 
 
 def transform_boxes(boxes: NDArray[np.floating], affine: NDArray[np.floating]) -> Floats:
-    """Boxes about the corners of boxes (N, 4) under an affine map (2, 3), or under one map each (N, 2, 3)."""
+    """Bounding boxes of the corners of boxes (N, 4) under an affine map (2, 3), or under one map each (N, 2, 3)."""
     u0, v0, u1, v1 = np.asarray(boxes, dtype=np.float64).T
     corners = np.stack([np.stack([u0, u1, u0, u1], axis=1), np.stack([v0, v0, v1, v1], axis=1)], axis=1)
     moved = affine[..., :2] @ corners + affine[..., 2:]

@@ -1,7 +1,7 @@
-"""Converter of an event log to a ROS 2 bag (MCAP with CDR messages) that RViz, Foxglove and `ros2 bag` read.
+"""Converts an event log to a ROS 2 bag (MCAP with CDR messages) that RViz, Foxglove and `ros2 bag` read.
 
 The map, transforms, laser scans, joint states, poses, paths and pictures become the usual message types; all others
-become `std_msgs/String` with their JSON. Times are those of the wall clock, if the log has its start.
+become `std_msgs/String` with their JSON. Times are those of the wall clock, if the log states when it began.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ Data = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class BagMessage:
-    """Message of a bag: topic, type and fields."""
+    """Message in a bag: topic, type and fields."""
 
     topic: str
     kind: str
@@ -96,7 +96,7 @@ class BagMessage:
 def write_bag(events: Iterable[Event], folder: Path, name: str) -> int:
     """Writes the events as a ROS 2 bag with `metadata.yaml` into an existing folder; returns the number of messages.
 
-    Raises InputError when it cannot be written.
+    Raises InputError when the bag cannot be written.
     """
     file = f"{name}_0.mcap"
     written = _write(events, folder / file)
@@ -105,16 +105,13 @@ def write_bag(events: Iterable[Event], folder: Path, name: str) -> int:
 
 
 def write_ros2(events: Iterable[Event], path: Path) -> int:
-    """Writes the events as one MCAP file of ROS 2; returns the number of messages.
-
-    Raises InputError when it cannot be written.
-    """
+    """Writes the events as one ROS 2 MCAP file; returns the message count. Raises InputError if it fails."""
     return _write(events, path).count
 
 
 @dataclass
 class _Written:
-    """Messages of a bag by topic and type, and its first and last time (ns since 1970)."""
+    """Counts the written messages by topic and type, with the times of the first and the last (ns since 1970)."""
 
     counts: Counter[tuple[str, str]] = field(default_factory=Counter)
     first_ns: int = 0
@@ -122,15 +119,15 @@ class _Written:
 
     @property
     def count(self) -> int:
-        """Number of messages."""
+        """Number of messages written."""
         return self.counts.total()
 
 
 class _BagWriter(Writer):
-    """Writer of ROS 2 messages whose channels name their quality of service."""
+    """Writer of ROS 2 messages, which gives each channel its quality of service."""
 
     def write_message(self, topic: str, schema: Any, *rest: Any) -> None:
-        """Writes a message; the first one of a topic registers the channel."""
+        """Writes a message; registers the channel at a topic's first message."""
         if topic not in self._channel_ids:
             qos = {"offered_qos_profiles": _qos(topic)}
             self._channel_ids[topic] = self._writer.register_channel(topic, "cdr", schema.id, qos)
@@ -160,7 +157,7 @@ def _write(events: Iterable[Event], path: Path) -> _Written:
 
 
 def _qos(topic: str) -> str:
-    """Quality of service of a topic, as a bag has it: the map and static transforms stay for late listeners."""
+    """Quality of service for a topic, as bags state it: late subscribers still get the map and static transforms."""
     profile = {
         "history": _KEEP_LAST,
         "depth": 10,
@@ -176,7 +173,7 @@ def _qos(topic: str) -> str:
 
 
 def _metadata(written: _Written, file: str) -> dict[str, Any]:
-    """Content of `metadata.yaml` in the form of ROS 2 Humble, which later releases read, too."""
+    """Content of `metadata.yaml` in the format of ROS 2 Humble, which later releases also read."""
     times = {
         "duration": {"nanoseconds": written.last_ns - written.first_ns},
         "starting_time": {"nanoseconds_since_epoch": written.first_ns},
@@ -216,7 +213,7 @@ class _Converter:
     statics: dict[str, Data] = field(default_factory=dict)
 
     def messages(self, event: Event) -> Iterator[BagMessage]:
-        """Iterates over the messages of an event; none for one that repeats another."""
+        """Yields the ROS 2 messages for an event; none for an event that repeats another one."""
         data, robot = event.data, str(event.data.get("robot") or "")
         space = f"/{ros_name(robot)}" if robot else "/errand"
         header = self._header(data, event.stamp_s)
@@ -249,7 +246,7 @@ class _Converter:
         return {"stamp": {"sec": when["sec"], "nanosec": when["nsec"]}, "frame_id": data.get("frame_id", "world")}
 
     def _scan(self, header: Data, data: Data, robot: str, space: str) -> Iterator[BagMessage]:
-        """Scan in the frame of the LiDAR, and the transform of this frame, if it is new."""
+        """Scan in the frame of the LiDAR, preceded by the frame's transform if it is new."""
         lidar = f"{ros_name(robot)}/lidar"
         if lidar not in self.statics:
             at = {"translation": data["pose"]["position"], "rotation": data["pose"]["orientation"]}
@@ -257,7 +254,7 @@ class _Converter:
         yield BagMessage(f"{space}/{SCAN}", _SCAN, _laser_scan({**header, "frame_id": lidar}, data))
 
     def _static(self, transform: Data) -> BagMessage:
-        """All static transforms, with a new one; listeners that come late get the last message alone."""
+        """Message with all static transforms and the new one, because late subscribers get only the last message."""
         self.statics[str(transform["child_frame_id"])] = transform
         return BagMessage(TF_STATIC, _TF, {"transforms": list(self.statics.values())})
 

@@ -45,12 +45,12 @@ LEFT_M: Final = 1.5
 
 
 def silence(line: str) -> None:
-    """Drops a line that a caller would show."""
+    """Discards a line instead of showing it."""
 
 
 @dataclass
 class Dispatch(Assigner):
-    """Assigner of a store's missions to robots of a backend.
+    """Dispatcher of a fleet: assigns the missions in a store to the robots of a backend.
 
     A robot whose battery is low returns its mission once its gripper is empty, and charges by its mission in `docks`.
     `tell` shows a line; `offers` builds the bids of the robots.
@@ -139,7 +139,7 @@ class Dispatch(Assigner):
         return True
 
     def recall(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
-        """Returns the robots that must stop, with the reason: low battery and empty gripper, or nothing left to do."""
+        """Returns the robots that must stop, each with the reason: its battery is low, or no mission is left."""
         self._release_following(seen)
         under_way = self._auction.under_way
         low: dict[str, RobotStatus] = {}
@@ -154,7 +154,7 @@ class Dispatch(Assigner):
         return {**why, **dict.fromkeys(idle, "nothing is left to do")}
 
     def _release_following(self, seen: Mapping[str, RobotStatus]) -> None:
-        """Lets a second part begin once the robot of the first has left the table or is no longer sent to its dock."""
+        """Lets the second part of a split mission begin once the first robot has left the table or does not charge."""
         for name, robot in self._robots.items():
             if robot.leaves is None:
                 continue
@@ -166,14 +166,14 @@ class Dispatch(Assigner):
                 self._auction.done(number)
 
     def tick(self, progress: Progress) -> None:
-        """Takes the changes of each robot's tree."""
+        """Updates the progress of each robot's mission with the changes of its tree."""
         for name, note in progress.notes.items():
             journal = self._robots[name].journal
             if journal is not None:
                 journal.note(note)
 
     def mission_ended(self, end: MissionEnd) -> None:
-        """Ends a robot's mission, or hands its rest to another robot."""
+        """Ends the mission of a robot, or queues the unfinished part for another robot."""
         name = end.result.robot_name
         robot = self._robots[name]
         recalled, robot.recalled = robot.recalled, False
@@ -208,7 +208,7 @@ class Dispatch(Assigner):
             self._send_to_dock(name)
 
     def _leave_in_queue(self, name: str, end: MissionEnd) -> None:
-        """Leaves a robot's mission to the next run, or cancels it if its progress is unknown."""
+        """Leaves the rest of a robot's mission in the queue, or ends the mission if no other robot can continue it."""
         why = self._stuck(name, holding=end.seen is not None and end.seen.holding)
         if why is not None:
             self._end(name, replace(end.result, message=f"{end.result.message}; {why}"))
@@ -239,7 +239,7 @@ class Dispatch(Assigner):
         return True
 
     def _hand_on(self, name: str, result: RobotResult) -> None:
-        """Queues the rest of a robot's mission for another robot."""
+        """Queues the unfinished part of a robot's mission for another robot."""
         number = self._requeue(name, result)
         self.tell(f"Mission {number} waits for another robot: {result.message}")
 
@@ -249,7 +249,7 @@ class Dispatch(Assigner):
         self._robots[name].to_dock = True
 
     def _update_robot(self, robot: FleetRobot, end: MissionEnd) -> str | None:
-        """Updates a robot's state at the end of a mission; returns why it must stop working (None: it need not)."""
+        """Updates a robot's state at the end of a mission; returns why the robot must stop working, or None."""
         robot.free_at_s = self._now_s
         if end.seen is None:
             return end.gone
@@ -266,7 +266,7 @@ class Dispatch(Assigner):
         return "it does not know where it is" if lost or end.seen.pose is None else None
 
     def close(self) -> None:
-        """Fails the returned missions that no other robot took; the others stay in the queue."""
+        """Fails the missions that a robot returned and no other robot took; all others stay in the queue."""
         assigned = self._given.all()
         for number in self._auction.waiting if self._stopped is None else ():
             given = assigned.get(number)
@@ -308,12 +308,12 @@ class Dispatch(Assigner):
         return replace(entry, tree=prepared.tree, speaker_W=speaker_W)
 
     def spare(self) -> Sequence[RunEntry]:
-        """Returns the robots as they stand before their first mission."""
+        """Returns the robots at their starts, before any of them has a mission."""
         options = next((mission.options for mission in self.missions.values()), {})
         return [self._robot_entry(name, options[name]) for name in self.robots if name in options]
 
     def _robot_entry(self, name: str, prepared: Prepared) -> RunEntry:
-        """Returns the robot with its faults and estimators, which are built once for all its missions."""
+        """Returns the robot with its faults and estimators, which are built once and serve all its missions."""
         robot = self._robots[name]
         if robot.entry is None:
             disturbed = replace(prepared.request, scenario=Scenario(robot.faults))
@@ -340,7 +340,7 @@ class Dispatch(Assigner):
         return f"{name} had begun it, and it is not known how far it came"
 
     def _requeue(self, name: str, result: RobotResult) -> int:
-        """Queues the rest of a robot's mission; returns its number."""
+        """Queues the unfinished part of a robot's mission; returns the number of the mission."""
         number = self._auction.hand_back(name)
         mission, robot = self.missions[number], self._robots[name]
         done, known = robot.progress.done, robot.last_known
@@ -372,9 +372,9 @@ class Dispatch(Assigner):
         self._finish(number, MissionState(result.outcome.value), message)
 
     def _end_part(self, number: int, share: Share, seen: Mapping[str, Any] | None) -> None:
-        """Ends a part of a mission: the robot leaves the table to the next one; the last part judges the whole.
+        """Ends one part of a split mission; the referee judges the whole mission at the end of the last part.
 
-        Does nothing for a mission that is no part.
+        A robot that has a dock then leaves the table free for the next robot. Does nothing for an unsplit mission.
         """
         given = self._given.all()
         mission, whole = self.missions[number], given[number].part_of
@@ -402,6 +402,6 @@ class Dispatch(Assigner):
         self._log_missions()
 
     def _log_missions(self) -> None:
-        """Logs the assignments."""
+        """Writes the assignments of the missions into the log."""
         if self.log is not None:
             self.log(MISSIONS, missions_message(self.store, missions_json(self.store, list(self.missions))))

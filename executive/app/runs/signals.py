@@ -16,10 +16,9 @@ HUNG_UP: Final = _REASON.format(signal.SIGHUP.name)
 
 @contextmanager
 def ended_by_signals(end: Callable[[str], None]) -> Iterator[None]:
-    """Calls `end` with the reason at Ctrl-C, SIGTERM and the end of the terminal; nested blocks call the inner first.
+    """Calls `end` with the reason at Ctrl-C, SIGTERM, and when the terminal closes; an inner block is called first.
 
-    A second Ctrl-C raises KeyboardInterrupt. Output after the end of the terminal is dropped. Under `nohup` the end of
-    the terminal ends nothing.
+    A second Ctrl-C raises KeyboardInterrupt. Output to a closed terminal is dropped. `nohup` ignores its closing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -38,7 +37,7 @@ def ended_by_signals(end: Callable[[str], None]) -> Iterator[None]:
 
 
 class _Ending:
-    """Handler of the signals."""
+    """Signal handler that calls `end` once."""
 
     def __init__(self, end: Callable[[str], None], terminals: Sequence[int]) -> None:
         self._end, self._terminals = end, terminals
@@ -60,7 +59,7 @@ class _Ending:
 
 @contextmanager
 def interrupted_by_hang_up() -> Iterator[None]:
-    """Treats the end of the terminal as Ctrl-C, for commands that move no robot; later output is dropped."""
+    """Treats a closed terminal as Ctrl-C, for commands that move no robot; drops later output."""
     terminals = [output for output in _OUTPUTS if os.isatty(output)]
 
     def on_signal(_number: int, _frame: FrameType | None) -> None:

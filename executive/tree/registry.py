@@ -1,8 +1,8 @@
 """Registry of the skills that a tree may use, by name: installed distributions register them as entry points.
 
 A distribution registers a skill in the group `errand.skills`, name = skill's name, value = "module:Class". The shipped
-skills stand in `pyproject.toml` in the same way. This is the only mechanism: users' packages have the same abilities as
-the shipped skills, and a folder on the path never becomes a skill by accident.
+skills stand in `pyproject.toml` in the same way. There is no other mechanism: users' skills can do all that the shipped
+skills can, and a folder on the path never becomes a skill by accident.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ SkillClass = type[Skill[Any]]
 
 
 class SkillRegistry(Mapping[str, SkillClass]):
-    """Skills by name. Skills of other distributions are loaded at first use.
+    """Skills by name; skills from other distributions are loaded when they are first used.
 
     Iteration loads all of them; `names` loads none.
     """
 
     def __init__(self, ours: Mapping[str, SkillClass], others: Mapping[str, tuple[EntryPoint, ...]]) -> None:
-        """`others` are the entry points of other distributions by name; several with one name are refused."""
+        """`others` are the entry points from other distributions by name; if several have one name, all are refused."""
         self._ours, self._others = ours, others
         self._loaded: dict[str, SkillClass | InputError] = {}
 
@@ -47,7 +47,7 @@ class SkillRegistry(Mapping[str, SkillClass]):
         return {name: error for name, error in found.items() if error is not None}
 
     def why_broken(self, name: str) -> InputError | None:
-        """Returns the error of a broken skill of another distribution; None if it works, or does not exist."""
+        """Returns the error of a broken skill from another distribution; None if the skill works or does not exist."""
         found = self._of_others(name)
         return found if isinstance(found, InputError) else None
 
@@ -67,7 +67,7 @@ class SkillRegistry(Mapping[str, SkillClass]):
         return sum(1 for _ in self)
 
     def _of_others(self, name: str) -> SkillClass | InputError | None:
-        """Returns the skill of another distribution, loaded once, or its error."""
+        """Returns the skill from another distribution, loaded once, or the error that loading it raised."""
         if name not in self._loaded and name in self._others:
             try:
                 self._loaded[name] = _only(self._others[name], self._ours)
@@ -77,7 +77,7 @@ class SkillRegistry(Mapping[str, SkillClass]):
 
 
 def missing_skill(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, str]:
-    """Message and hint for a name that is no skill of the registry."""
+    """Message and hint for a name that the registry does not know."""
     broken = registry.why_broken(name) if isinstance(registry, SkillRegistry) else None
     if broken is not None:
         return broken.message, broken.hint
@@ -88,9 +88,9 @@ def missing_skill(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, s
 def installed_skills() -> SkillRegistry:
     """Returns all registered skills in the order of their names.
 
-    A skill that cannot be loaded, breaks a rule for skills, or has the name of another is broken: it does not affect
-    the others, and never replaces a shipped one. Raises InputError when the shipped skills are not registered, or one
-    of them is broken.
+    A skill is broken if it cannot be loaded, breaks a rule for skills, or has the name of another skill: it does not
+    affect other skills, and never replaces a shipped skill. Raises InputError when the shipped skills are not
+    registered, or one of them is broken.
     """
     found = tuple(entry_points(group=GROUP))
     if not any(distribution_of(entry) == OURS for entry in found):
@@ -110,7 +110,7 @@ def built_in_skills() -> dict[str, SkillClass]:
 
 
 def skills_of(entries: Iterable[EntryPoint], *, limit_s: float = LIMIT_S) -> dict[str, SkillClass]:
-    """Loads and checks the skills of entry points within a time limit; returns them by name. Raises InputError."""
+    """Loads and checks the skills behind entry points within a time limit; returns them by name. Raises InputError."""
     named: dict[str, tuple[EntryPoint, ...]] = {}
     for entry in sorted(entries, key=lambda entry: (entry.name, distribution_of(entry))):
         named[entry.name] = (*named.get(entry.name, ()), entry)
@@ -118,7 +118,7 @@ def skills_of(entries: Iterable[EntryPoint], *, limit_s: float = LIMIT_S) -> dic
 
 
 def _only(entries: Sequence[EntryPoint], ours: Mapping[str, SkillClass], limit_s: float = LIMIT_S) -> SkillClass:
-    """Loads and checks the skill of one name. Raises InputError when it is broken, or another has its name."""
+    """Loads and checks the skill with a name. Raises InputError when it is broken, or several have the name."""
     first, *others = entries
     owners = [OURS] if first.name in ours else []
     owners += [distribution_of(each) for each in (first, *(other for other in others if other.value != first.value))]
@@ -142,7 +142,7 @@ def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:
 
 
 def faults_of(skill: Any, *, registered_as: str) -> Iterator[tuple[str, str]]:
-    """Iterates over the rules for skills that a class breaks, as messages with hints."""
+    """Yields a message with a hint for each rule for skills that a class breaks."""
     if not (inspect.isclass(skill) and issubclass(skill, Skill)):
         yield "it is no subclass of skills.api.Skill", "register the skill's class"
         return
@@ -165,7 +165,7 @@ def faults_of(skill: Any, *, registered_as: str) -> Iterator[tuple[str, str]]:
 
 
 def _port_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
-    """Iterates over the errors in the declarations of the ports, with hints."""
+    """Yields the errors in the declarations of a skill's ports, with hints."""
     inputs = getattr(skill, "Inputs", None)
     frozen = dataclasses.is_dataclass(inputs) and inputs.__dataclass_params__.frozen  # type: ignore[union-attr]
     if not (inspect.isclass(inputs) and frozen):
@@ -187,7 +187,7 @@ def _port_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
 
 
 def _cause_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
-    """Iterates over the errors in the documentation of the causes, with hints."""
+    """Yields the errors in the documentation of a skill's causes, with hints."""
     if not (isinstance(skill.causes, Mapping) and skill.causes):
         yield "it documents no causes of failure", "set causes = {Cause.PRECONDITION: 'when ...', ...}"
         return

@@ -69,7 +69,7 @@ class BatteryFacts(_Facts):
 
 
 class Place(_Facts):
-    """Room: other names, the pose of a robot in it, its outline (world frame, m)."""
+    """Room: other names, outline (world frame, m), and the pose of a robot in the room."""
 
     pose: Pose = Field(description="pose of a robot in it")
     polygon: Polygon = Field(description="outline, corners (x, y)")
@@ -77,7 +77,7 @@ class Place(_Facts):
 
 
 class Door(_Facts):
-    """Narrow passage between two rooms: its middle (world frame, m) and clear width (m)."""
+    """Narrow passage between two rooms: its centre (world frame, m) and clear width (m)."""
 
     between: tuple[str, str] = Field(description="the rooms on its two sides")
     at: Corner = Field(description="its middle (x, y)")
@@ -88,7 +88,7 @@ class Door(_Facts):
 
 
 class SurfaceFacts(_Facts):
-    """Flat top in a room: other names, height above the floor (m), outline, poses from which a robot sees it whole."""
+    """Flat top in a room: other names, height above the floor (m), outline, and poses that have it all in view."""
 
     place: str = Field(description="the room that it is in")
     height: TopHeight = Field(description="of the top above the floor, m")
@@ -98,7 +98,7 @@ class SurfaceFacts(_Facts):
 
 
 class ObjectFacts(_Facts):
-    """Facts about a class of objects: other names, its categories, the surfaces where such objects usually are."""
+    """Facts about an object class: other names, categories, and the surfaces where such objects usually are."""
 
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
     categories: tuple[Name, ...] = Field(default=(), description='as in "a drink"')
@@ -106,7 +106,7 @@ class ObjectFacts(_Facts):
 
 
 class Person(_Facts):
-    """Person: other names, the usual place, and the exact pose when it is known."""
+    """Person: other names, usual place, and exact pose if it is known."""
 
     at: str = Field(description="the place where they usually are")
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
@@ -114,9 +114,9 @@ class Person(_Facts):
 
 
 class TagFacts(_Facts):
-    """AprilTag of family 36h11 with the side of its black square (m), on an object, at the dock, or on a wall or door.
+    """AprilTag of family 36h11: side of its black square (m), on an object, at the dock, or on a wall or door.
 
-    A tag on an object stands `on` its class; any other one has a place and a heading in the world frame.
+    For a tag on an object, `on` is the object's class; any other tag has a position and a heading in the world frame.
     """
 
     id: TagNumber = Field(description="its number in the family")
@@ -133,7 +133,7 @@ class TagFacts(_Facts):
 
 
 class Knowledge(_Facts):
-    """All knowledge of one world. Names match without regard to case."""
+    """All knowledge about one world. Names match without regard to case."""
 
     robot: RobotFacts = Field(default=RobotFacts(name="Alice"), description="the robot")
     robots: RobotsFile | None = Field(
@@ -156,42 +156,42 @@ class Knowledge(_Facts):
     )
 
     def known_tags(self) -> tuple[Tag, ...]:
-        """Tags as the skills know them."""
+        """Tags as the skills' own data type."""
         return tuple(Tag(tag.id, tag.size, tag.on, tag.at, tag.yaw) for tag in self.tags)
 
     def known_zones(self) -> tuple[Zone, ...]:
-        """Zones as the skills know them, in the file's order."""
+        """Zones as the skills' own data type, in the file's order."""
         rooms = {name: place.polygon for name, place in self.places.items()}
         return tuple(facts.zone(name, rooms) for name, facts in self.zones.items())
 
     def with_zones(self, zones: Mapping[str, ZoneFacts]) -> Knowledge:
-        """Adds the zones of a mission; one whose name is taken gets another."""
+        """Adds the zones that a mission declares; a zone whose name is taken gets another name."""
         more = {f"{name} (mission)" if name in self.zones else name: facts for name, facts in zones.items()}
         return self.model_copy(update={"zones": {**self.zones, **more}}) if more else self
 
     def place(self, name: str) -> str | None:
-        """Own name of the room or surface that `name` means; None when it is unknown."""
+        """Name in the file of the room or surface that `name` means; None when `name` is unknown."""
         return _resolve(name, self.places) or _resolve(name, self.surfaces)
 
     def room(self, place: str) -> str:
-        """Room of a known place; a room is its own."""
+        """Room that contains a known place; a room contains itself."""
         return self.surfaces[place].place if place in self.surfaces else place
 
     def surfaces_in(self, place: str) -> tuple[str, ...]:
-        """Surfaces of a room, in the file's order; a surface is its own only one."""
+        """Surfaces in a room, in the file's order; for a surface, only the surface itself."""
         return tuple(name for name, surface in self.surfaces.items() if place in (name, surface.place))
 
     def place_pose(self, place: str) -> Pose:
-        """Pose of a robot at a known room (its pose) or surface (its first viewpoint)."""
+        """Pose of a robot at a known room (the room's pose) or surface (its first viewpoint)."""
         return self.surfaces[place].viewpoints[0] if place in self.surfaces else self.places[place].pose
 
     def object_name(self, name: str) -> str | None:
-        """Own name of the class or category that `name` means; None when it is unknown."""
+        """Name in the file of the class or category that `name` means; None when `name` is unknown."""
         own = _resolve(name, self.things) or next((c for c in self.categories() if c.lower() == name.lower()), None)
         return own or _UNNAMED.get(name.lower())
 
     def classes(self, name: str) -> tuple[str, ...]:
-        """Classes that a class, alias or category includes, in the file's order; empty when it is unknown."""
+        """Classes that a class, alias or category includes, in the file's order; empty when the name is unknown."""
         known = _resolve(name, self.things)
         if known is None and self.object_name(name) in _UNNAMED:
             return tuple(self.things)
@@ -202,19 +202,19 @@ class Knowledge(_Facts):
         return tuple(dict.fromkeys(category for facts in self.things.values() for category in facts.categories))
 
     def usual_surfaces(self, name: str) -> tuple[str, ...]:
-        """Usual surfaces of objects of a class or category, the likeliest first."""
+        """Surfaces where objects of a class or category usually are, the likeliest first."""
         return tuple(dict.fromkeys(place for c in self.classes(name) for place in self.things[c].usual))
 
     def person(self, name: str) -> str | None:
-        """Own name of the person that `name` means; None when it is unknown."""
+        """Name in the file of the person that `name` means; None when `name` is unknown."""
         return _resolve(name, self.people)
 
     def somebody(self, name: str) -> str | None:
-        """Own name of the person that `name` means, `ANYBODY` for any person; None for any other name."""
+        """Name in the file of the person that `name` means; `ANYBODY` for any person, None for an unknown name."""
         return self.person(name) or (ANYBODY if name.lower() == ANYBODY else None)
 
     def rooms_to_search(self, person: str, place: str | None) -> tuple[str, ...]:
-        """Rooms in which to look for a person: the room of the place, or all rooms, the person's usual room first."""
+        """Rooms in which to look for a person: the place's room, or all rooms, the person's usual room first."""
         if place is not None:
             return (self.room(place),)
         usual = (self.room(self.people[person].at),) if person in self.people else ()
@@ -224,7 +224,7 @@ class Knowledge(_Facts):
         """Place for `task` on an object of a class or category when the speaker names no place.
 
         The table of defaults decides first, by the task or else by grasp, and by the class or else by its categories;
-        then the usual room of the objects.
+        if it has no entry, the room where the objects usually are is taken.
         """
         words = [name, *(category for c in self.classes(name) for category in self.things[c].categories)]
         tables = [self.defaults.get(t.value, {}) for t in (task, Task.GRASP) if t is not None]
@@ -240,7 +240,7 @@ class Knowledge(_Facts):
         return (*self.places, *self.surfaces)
 
     def spellings(self, names: Iterable[str]) -> tuple[str, ...]:
-        """Names with all their aliases, to guess the meaning of a misspelled name."""
+        """Names with all their aliases, from which to guess the meaning of a misspelled name."""
         groups: tuple[Mapping[str, Place | SurfaceFacts | ObjectFacts | Person], ...]
         groups = (self.places, self.surfaces, self.things, self.people)
         aliases = {name: facts.aliases for group in groups for name, facts in group.items()}
@@ -258,7 +258,7 @@ def _resolve(
 
 
 def load_knowledge(path: Path | str, own: Collection[str] = ()) -> Knowledge:
-    """Reads a world's `knowledge.yaml`; `own` are the names of imported objects, which it need not mention.
+    """Reads a world's `knowledge.yaml`; `own` are the names of imported objects, which the file may omit.
 
     Raises:
         InputError: with file, line and hint, for broken YAML, unknown or missing keys, wrong values, and for names
@@ -268,9 +268,9 @@ def load_knowledge(path: Path | str, own: Collection[str] = ()) -> Knowledge:
 
 
 def knowledge_of_source(source: YamlSource, own: Collection[str] = (), below: Knowledge | None = None) -> Knowledge:
-    """Reads the knowledge of a parsed document, which may repeat zones of the knowledge `below`.
+    """Reads the knowledge in a parsed document, which may repeat zones from the knowledge `below`.
 
-    Raises InputError as `load_knowledge`.
+    Raises InputError like `load_knowledge`.
     """
     knowledge = validate(Knowledge, source)
     for error in _cross_errors(knowledge, source, own):
@@ -281,7 +281,7 @@ def knowledge_of_source(source: YamlSource, own: Collection[str] = (), below: Kn
 
 
 def with_own_objects(knowledge: Knowledge, own: Iterable[str]) -> Knowledge:
-    """Adds the names of imported objects that are not known yet. Raises InputError if one means another object."""
+    """Adds imported objects by name. Raises InputError if a new name already means another object."""
     new = [name for name in own if name not in knowledge.things]
     for name in new:
         for word in (name, name.replace("_", " ")):
@@ -293,7 +293,7 @@ def with_own_objects(knowledge: Knowledge, own: Iterable[str]) -> Knowledge:
 
 
 def _cross_errors(knowledge: Knowledge, source: YamlSource, own: Collection[str]) -> Iterator[InputError]:
-    """Errors in references from one part of the file to another."""
+    """Yields errors in references between sections of the file."""
     tasks = [task.value for task in Task]
     for index, door in enumerate(knowledge.doors):
         for side, room in enumerate(door.between):
@@ -334,7 +334,7 @@ def _unless_known(
 
 
 def _doubles(knowledge: Knowledge, source: YamlSource) -> Iterator[InputError]:
-    """Errors for names that mean two things of the same kind."""
+    """Yields errors for names that mean two things of the same kind."""
     for kinds in (("places", "surfaces"), ("things",), ("people",)):
         seen: dict[str, str] = {}
         for kind in kinds:

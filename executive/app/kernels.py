@@ -1,4 +1,4 @@
-"""Compiles the numeric code of driving, scans and arms into numba's cache by short runs of each."""
+"""Compiles the numeric code for driving, scans and arms into numba's cache by short test runs."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -53,10 +53,9 @@ def newly_compiled() -> int:
 
 
 def kernel_steps() -> Sequence[Callable[[], None]]:
-    """Functions that run numeric code for a short time: drives, an arm, scans, and those of plug-ins.
+    """Functions that each run numeric code briefly: drives, an arm, scans, and the functions of plug-ins.
 
-    All together take some seconds if the cache holds their code already. A step of a plug-in raises InputError if it
-    fails.
+    All together take a few seconds if their code is cached. A plug-in's function raises InputError if it fails.
     """
     drives = (partial(_drive, kind, stack) for kind, stack in _DRIVES)
     of_plugins = (partial(_compile_plugin, entry) for entry in installed_plugins(KERNELS))
@@ -129,7 +128,7 @@ def _match_scan() -> None:
 
 
 def _see_blocks() -> None:
-    """Takes a scan and a picture with the scripted robot: threads of the tests of skills would all compile at once."""
+    """Takes a scan and a picture with the scripted robot, so that parallel tests find the code compiled."""
     from plant.robots.robot_kind import robot_kind
     from skills.testing.blocks import Block, block_array, distances_from
     from skills.testing.clock import VirtualClock

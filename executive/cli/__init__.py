@@ -1,4 +1,4 @@
-"""The command line: one module for each group of commands."""
+"""Command line: one module for each group of commands."""
 
 import os
 

@@ -47,7 +47,7 @@ def check(
 
 
 def _check(checker: Checker, request: Request, context: typer.Context, advance: Callable[[], None]) -> Checked:
-    """Checks a request for a file; what the file leaves open is as the file of defaults says."""
+    """Checks a mission file as a request; options that the file leaves open are taken from the file of defaults."""
     with suppress(InputError):  # the check reports it
         request = yielding(request, context)
     checked = checker.check(request)
@@ -56,7 +56,7 @@ def _check(checker: Checker, request: Request, context: typer.Context, advance: 
 
 
 def to_json(checked: Sequence[Checked]) -> dict[str, Any]:
-    """Returns one object for all files: `ok`, errors, warnings, the number of nodes, commands, and estimates."""
+    """Returns one object on all files: `ok`, errors, warnings, number of nodes, commands, and estimates."""
     trees = [tree for one in checked for tree in one.trees]
     return {
         "ok": all(one.ok for one in checked),
@@ -87,7 +87,7 @@ def _error_json(error: InputError) -> dict[str, Any]:
 
 
 def _show(one: Checked, console: Console, *, verbose: bool) -> None:
-    """Prints a line on the file and its errors; with `verbose` also its commands and its tree."""
+    """Prints a line on the file, and its errors; with `verbose` also the commands and the tree."""
     mark = "[green]✓[/green]" if one.ok else "[red]✗[/red]"
     found = _in_words(one.estimate) if one.ok else count_text(len(one.errors), "error")
     console.print(f"{mark} [bold]{escape(one_line(str(one.file)))}[/bold]: {found}")

@@ -1,4 +1,4 @@
-"""Defaults of options from `errand.toml`, or from `[tool.errand]` in `pyproject.toml`, of this folder or one above."""
+"""Defaults for options from `errand.toml`, or from `[tool.errand]` in `pyproject.toml`, of this folder or one above."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _NAMES: Final = frozenset({"world", "stack"})
 
 
 def default_map(folder: Path) -> dict[str, Any]:
-    """Returns the defaults of each command's options from the nearest file; {} without one. Raises InputError."""
+    """Returns the defaults for each command's options from the nearest file; {} without a file. Raises InputError."""
     file, values = _nearest(folder)
     found: dict[str, Any] = {}
     for key, value in values.items():
@@ -49,7 +49,7 @@ def default_map(folder: Path) -> dict[str, Any]:
 
 
 def _nearest(folder: Path) -> tuple[Path, Mapping[str, Any]]:
-    """Returns the nearest file of defaults with its values, in a folder or above it. Raises InputError."""
+    """Returns the nearest file of defaults, in a folder or above it, with its values. Raises InputError."""
     for each in (folder, *folder.resolve().parents):
         if (file := each / FILE).is_file():
             return file, _values(file)
@@ -69,18 +69,18 @@ def _values(file: Path) -> dict[str, Any]:
 
 
 def _path(folder: Path, value: str, *, is_name: bool) -> str:
-    """Returns a path that counts from the folder of the file; a name without such a file stays."""
+    """Returns a path relative to the folder of the defaults file; a name that is no file there stays the same."""
     path = folder / value
     return value if is_name and not path.exists() else os.path.relpath(path)
 
 
 def typed_options(context: Any) -> frozenset[str]:
-    """Returns the names of the options that stand in the command line."""
+    """Returns the names of the options that the user has typed."""
     return frozenset(name for name in context.params if context.get_parameter_source(name).name == "COMMANDLINE")
 
 
 def yielding(request: Request, context: Any) -> Request:
-    """Drops the defaults of the file that the command line or the mission file decides otherwise. Raises InputError."""
+    """Drops the defaults that the command line or the mission file overrides. Raises InputError."""
     from executive.app.prepare.mission_files import mission_file
     from executive.mission.request import Request
     from skills.inputs.yaml_source import read_yaml

@@ -26,7 +26,7 @@ MOST_PIXELS_TOGETHER: Final = 8_000_000
 
 @dataclass(frozen=True)
 class PictureResult:
-    """Result for a picture file: detections and time (ms), or the error why it cannot be read."""
+    """Result for a picture file: detections and time (ms), or the error that prevented reading it."""
 
     file: Path
     drawing: Path | None
@@ -36,7 +36,7 @@ class PictureResult:
     error: InputError | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Returns JSON values; with `error` only if there is one."""
+        """Returns JSON values; the key `error` is there only if the picture could not be read."""
         found = [
             {"class": one.class_name, "score": round(one.score, 4), "box": [round(value, 2) for value in one.box]}
             for one in self.found
@@ -107,7 +107,7 @@ def _detect(detector: Detector, group: Sequence[PictureResult]) -> Iterator[Pict
 
 
 def _drawing_names(images: Sequence[Path], folder: Path) -> Sequence[Path]:
-    """Returns a file for each picture's drawing, under the picture's name; equal names get numbers."""
+    """Returns a file for each picture's drawing, named like the picture; equal names get numbers."""
     names = list[Path]()
     for image in images:
         stems = [image.stem, *(f"{image.stem}-{k}" for k in range(2, len(images) + 1))]

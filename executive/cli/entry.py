@@ -74,14 +74,14 @@ COMMANDS: Final[Mapping[str, _Command]] = {
 
 @dataclass(frozen=True)
 class _PluginCommand:
-    """Command of a plug-in of this project: the plug-in's distribution, and the command's help."""
+    """Command that one of this project's plug-ins registers: the plug-in's distribution, and the command's help."""
 
     distribution: str
     help: str
 
     @property
     def missing(self) -> str:
-        """Dimmed line of the help where the plug-in is not installed."""
+        """Dimmed help line for a plug-in that is not installed."""
         return typer.style(f"Not installed: pip install {self.distribution}", dim=True)
 
 
@@ -104,7 +104,7 @@ def shipped_command(name: str) -> Any:
 
 
 def as_command(name: str, found: Any) -> Any:
-    """Converts a `typer.Typer`, or a function with typer's options, to a command. Raises TypeError."""
+    """Converts a `typer.Typer`, or a function with typer's options, to a command. Raises TypeError for others."""
     if isinstance(found, typer.Typer):
         found._add_completion = False  # only the root installs it
         return _with_epilog(get_command(found))
@@ -118,7 +118,7 @@ def as_command(name: str, found: Any) -> Any:
 
 
 def _with_epilog(command: Any) -> Any:
-    """Adds the exit codes to the help of a command and of the commands below it."""
+    """Adds the exit codes to the help of a command and of its subcommands."""
     command.epilog = command.epilog or EXIT_CODES
     for each in getattr(command, "commands", {}).values():
         _with_epilog(each)
@@ -126,9 +126,9 @@ def _with_epilog(command: Any) -> Any:
 
 
 def help_lines() -> dict[str, str]:
-    """Returns the help of the commands of plug-ins by name, without importing them.
+    """Returns the help for commands of plug-ins, by name, without importing the plug-ins.
 
-    A command that this project has no help for gets the summary of its distribution. Reads the metadata files itself,
+    A command that this project has no help for gets the summary of its distribution. Reads the metadata files directly,
     because importing `importlib.metadata` takes longer than the whole help.
     """
     lines = dict[str, str]()
@@ -182,9 +182,9 @@ def plugin_command(name: str) -> Any | None:
 
 
 def with_plugin_commands(name: str, group: TyperGroup, typed: str) -> None:
-    """Adds the commands of plug-ins to a group of Errand: lists all, and loads the one that is typed.
+    """Adds the commands of plug-ins to a command group: lists all of them, and loads the one that is typed.
 
-    Raises InputError as `plugin_command` does.
+    Raises InputError like `plugin_command`.
     """
     for each, line in help_lines().items():
         above, _, short = each.rpartition(".")
@@ -194,7 +194,7 @@ def with_plugin_commands(name: str, group: TyperGroup, typed: str) -> None:
 
 
 class _Listed(TyperCommand):
-    """Command of a plug-in that the help lists, and that is loaded when it is called."""
+    """Command of a plug-in as the help lists it; it is loaded when it is called."""
 
 
 class _LazyGroup(TyperGroup):
@@ -206,7 +206,7 @@ class _LazyGroup(TyperGroup):
             self.add_command(TyperCommand(name, help=entry.help))
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Lists all names, those of plug-ins last."""
+        """Lists all commands, those of plug-ins last."""
         for name, line in help_lines().items():
             if name not in self.commands and "." not in name:
                 self.add_command(_Listed(name, short_help=line))
@@ -219,7 +219,7 @@ class _LazyGroup(TyperGroup):
         return super().resolve_command(ctx, args)
 
     def _load(self, name: str, typed: str) -> None:
-        """Imports the command of a name, for its group the command that is typed below it. Raises InputError."""
+        """Imports a command; for a group, loads the subcommand that is typed. Raises InputError."""
         if name in COMMANDS:
             command = shipped_command(name)
             if isinstance(command, TyperGroup):
@@ -229,7 +229,7 @@ class _LazyGroup(TyperGroup):
             self.add_command(found, name)
 
     def invoke(self, ctx: Any) -> Any:
-        """Invokes a command as typer does; bad input ends it with one line, and long messages are cut."""
+        """Invokes a command as typer does; bad input ends it with one line, and long messages are shortened."""
         try:
             return super().invoke(ctx)
         except (InputError, OSError) as error:
@@ -276,9 +276,9 @@ def _errand(
 
 
 def main() -> NoReturn:
-    """Runs the command line, and ends the process when output is flushed and all threads have ended.
+    """Runs the command line; ends the process once output is flushed and all threads have ended.
 
-    Python's own end would destroy all modules first, which takes longer than some commands.
+    Python's own shutdown would first destroy all modules, which takes longer than some commands.
     """
     gc.set_threshold(*_COLLECTED_AFTER)
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else it reads the files of all distributions
@@ -300,9 +300,9 @@ def main() -> NoReturn:
 
 
 def command_line() -> None:
-    """Runs the command of the arguments. Always raises SystemExit.
+    """Runs the command that the arguments name. Always raises SystemExit.
 
-    Refuses arguments that are no UTF-8 text, because no log, store or JSON can hold them.
+    Refuses arguments that are not valid UTF-8, because no log, store or JSON can hold them.
     """
     for argument in sys.argv[1:]:
         try:

@@ -100,13 +100,13 @@ _FOR_FILE: Final = "write missions, worlds, seeds, faults and stacks into it"
 
 
 def _refuse_options(given: bool, what: str, hint: str, file: Path | None = None) -> None:
-    """Raises InputError if options are given that do not fit."""
+    """Raises InputError for given options that do not fit the kind of evaluation."""
     if given:
         raise InputError(what, hint=hint, file=file)
 
 
 def _own_results(out: Path, evaluation: Evaluation) -> Path:
-    """Returns the results file of a folder; an earlier one of other or of finished runs gets another name."""
+    """Returns the results file in a folder; renames a file with the results of other runs or of finished runs."""
     from executive.app.evaluate.results import ResultsFile
     from executive.app.evaluate.workers import installed_code
 
@@ -122,7 +122,7 @@ def _own_results(out: Path, evaluation: Evaluation) -> Path:
 
 
 def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> Evaluation:
-    """Builds the runs of a request at many seeds; asks its questions once. Raises InputError."""
+    """Builds the runs of a request at many seeds; asks its questions only once. Raises InputError."""
     from executive.app.evaluate.evaluation_file import evaluation_at_seeds, seed_range
     from executive.app.prepare.from_request import prepare_checked
 
@@ -134,7 +134,7 @@ def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> 
 
 
 def _show_seeds(cases: Sequence[Case], console: Console) -> dict[str, Any]:
-    """Shows the runs of a mission at many seeds, a table for each condition; returns JSON values."""
+    """Shows the runs of a mission at many seeds, with one table for each condition; returns JSON values."""
     from executive.app.evaluate.evaluation_file import CONDITION
     from executive.app.evaluate.summary import totals_of
 
@@ -198,7 +198,7 @@ def _show(evaluation: Evaluation, found: Results, console: Console) -> dict[str,
 
 
 def _show_cases(console: Console, found: Results) -> None:
-    """Shows success by groups, claims against verdicts, and each run to inspect with the folder of its log."""
+    """Shows success by groups, claims against verdicts, and each run to inspect with its log folder."""
     from executive.app.evaluate.results import Standing
     from executive.app.evaluate.summary import cases_to_inspect, groups_of, standing_rows
 
@@ -269,7 +269,7 @@ def report(
 
 
 def _results(stored: ResultsFile) -> Results:
-    """Returns all runs that have a result. Raises InputError if there are none."""
+    """Returns all runs that have a result. Raises InputError if no run has one."""
     found = stored.results()
     if not found.cases:
         raise InputError("it holds no result yet", hint="repeat the command that writes it", file=stored.path)

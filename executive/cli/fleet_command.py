@@ -105,9 +105,9 @@ def _store(queue: Path) -> Path:
 
 
 def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
-    """Returns the queued missions; queues or fails the missions of an interrupted run of a fleet first.
+    """Returns the queued missions; first queues again or fails the missions that an interrupted fleet run left.
 
-    Raises InputError if another command's mission was interrupted, or no mission is queued.
+    Raises InputError if a mission of another command was interrupted, or no mission is queued.
     """
     given = GivenMissions(missions)
     known = given.all()
@@ -149,7 +149,7 @@ def resumable_lines(missions: MissionStore, queue: Path | None = None) -> Sequen
 
 
 def _faults(words: Sequence[str], robots: Sequence[str]) -> Mapping[str, Sequence[str]]:
-    """Returns the faults of each robot. Raises InputError if there is no such fault."""
+    """Returns the faults for each robot. Raises InputError for words that describe no fault."""
     from skills.faults.faulty_robot import parse_fault
 
     faults: dict[str, list[str]] = {name: [] for name in robots}
@@ -172,7 +172,7 @@ def _achieved(mission: Mapping[str, Any]) -> bool:
 
 
 def _row(mission: Mapping[str, Any], names: Mapping[int, str]) -> tuple[str, ...]:
-    """Returns a mission's row of `errand fleet status`."""
+    """Returns the row for a mission in `errand fleet status`."""
     number, referee = mission["id"], mission["referee"]
     seen = "" if referee is None else VERDICTS[referee["success"]]
     after = "" if mission["after"] is None else mission["after"]

@@ -81,7 +81,7 @@ def _to_ros2(history: History, out: Path) -> int:
 
 
 def _show(history: History, console: Console, *, every_node: bool) -> None:
-    """Prints the timeline as a table, and the traceback of each defect below it."""
+    """Prints the timeline as a table, followed by the traceback of each internal error."""
     entries = list(timeline(history.events, leaves_only=not every_node))
     prefix = _common([entry.about for entry in entries if entry.state is not None])
     several = len(history.robots) > 1
@@ -95,7 +95,7 @@ def _show(history: History, console: Console, *, every_node: bool) -> None:
 
 
 def _common(path_ids: Sequence[str]) -> str:
-    """Returns the prefix of robot and mission that all path ids share; empty if they differ."""
+    """Returns the prefix (robot and mission) that all path ids share; empty if they share none."""
     starts = {"/".join(path_id.split("/")[:2]) + "/" for path_id in path_ids}
     return starts.pop() if len(starts) == 1 else ""
 
@@ -183,7 +183,7 @@ def tree(
 
 
 def _view(text: str | None, request: Request, at_s: float | None, robot: str | None) -> NodeView:
-    """Returns the tree of a log (.mcap), of a mission file (.yaml, a file, or a shipped one), or of a sentence."""
+    """Returns the tree from a log (.mcap), a mission file (.yaml, a file, or a shipped one), or a sentence."""
     if text is not None and text.endswith(LOG_SUFFIX):
         history = read_history(Path(text))
         if robot is None and len(history.robots) > 1:
@@ -204,7 +204,7 @@ def _view(text: str | None, request: Request, at_s: float | None, robot: str | N
 
 
 def _request(text: str | None, request: Request) -> Request:
-    """Returns the request whose tree is shown. Raises InputError if none or two are given."""
+    """Returns the request whose tree is shown. Raises InputError unless exactly one is given."""
     from executive.app.prepare.mission_files import shipped_missions
 
     if text is None and request.sentence is None:

@@ -83,12 +83,12 @@ def listener_for(
     """Builds a listener for the robot of a world, or for several robots, and loads the recogniser.
 
     Args:
-        knowledge: knowledge of the world, with its names.
-        open_words: whether names are grounded in no world.
+        knowledge: knowledge of the world, which contains its names.
+        open_words: whether to accept names that the world does not have.
         require_wake: whether a sentence must call the robot by name.
-        vocabulary: a file of names, in place of the names of the world.
-        robot_name: name of the robot, in place of the name in `knowledge`.
-        robots: names of several robots, in place of the only robot.
+        vocabulary: a file of names that replace the names in the world.
+        robot_name: name of the robot, which replaces the name in `knowledge`.
+        robots: names of several robots, which replace the only robot.
 
     Raises:
         InputError: the extra `speech` is not installed, the vocabulary cannot be read, or names of robots sound alike.
@@ -104,15 +104,15 @@ def listener_for(
 
 
 def called_robots(robots: Sequence[RobotConfig], knowledge: Knowledge) -> tuple[str, ...]:
-    """Returns the spoken names of several robots: the given ones, else those of the world."""
+    """Returns the spoken names of several robots: the given names, else those in the world."""
     return tuple(each.name for each in robots) or tuple(map(display_name, knowledge.robots or ()))
 
 
 def hear_request(wav: Path, request: Request, *, console: Console) -> str:
-    """Recognises the sentence in a recording, for the robots and the world of a request, and prints it.
+    """Recognises the sentence in a recording, for the request's robots and world, and prints the sentence.
 
     Raises:
-        InputError: the request has a sentence or a file itself, the extra `speech` is not installed, the recording
+        InputError: the request already has a sentence or a file, the extra `speech` is not installed, the recording
             cannot be read, or it has no speech.
     """
     if request.file is not None or request.sentence is not None:

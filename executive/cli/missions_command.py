@@ -1,4 +1,4 @@
-"""`errand missions` and `errand init`: the shipped missions."""
+"""`errand missions` and `errand init` list and copy the shipped missions."""
 
 from __future__ import annotations
 
@@ -35,6 +35,6 @@ def init(
 
 
 def _first_words(file: Path) -> str:
-    """Returns the first comment line of a mission file."""
+    """Returns the text of the first comment line in a mission file."""
     lines = file.read_text(encoding="utf-8").splitlines()
     return next((line[1:].strip() for line in lines if line[:1] == "#" and not line.startswith(_FOR_EDITORS)), "")

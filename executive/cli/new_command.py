@@ -39,17 +39,17 @@ def skill(
 
 @dataclass(frozen=True)
 class PackageTemplates:
-    """Templates of an installable package with one part of a kind, for example a skill.
+    """Templates for an installable package that contains one part of a kind, for example a skill.
 
-    Each file `*.template` of `folder` has the words `$name`, `$dashed` and `$package` of the part, and what `render` is
-    given; the folder `package` gets the package's name.
+    In each file `*.template` of `folder`, `$name`, `$dashed`, `$package` and the values given to `render` are replaced;
+    the folder `package` gets the package's name.
     """
 
     kind: str
     folder: Path
 
     def check(self, name: str, taken: Collection[str]) -> None:
-        """Raises InputError if a part cannot have a name, or has it already."""
+        """Raises InputError if a part cannot have this name, or if a part already has it."""
         if not _NAME.fullmatch(name) or keyword.iskeyword(name):
             hint = "use lower-case words joined by _, as in wave_arm"
             raise InputError(f"'{name}' cannot be the name of a {self.kind}", hint=hint)
@@ -57,7 +57,7 @@ class PackageTemplates:
             raise InputError(f"a {self.kind} '{name}' exists already", hint="choose another name")
 
     def package(self, name: str) -> str:
-        """Returns the name of the Python package of a part."""
+        """Returns the name of the Python package that contains a part."""
         return f"errand_{self.kind}_{name}"
 
     def render(

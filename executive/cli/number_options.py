@@ -1,4 +1,4 @@
-"""Options and arguments that are numbers; each has a quantity with a range for its messages."""
+"""Options and arguments that are numbers; each is of a quantity, which has a range and a name for messages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from skills.quantities import QuantityError, number_in, range_text
 
 
 class OutOfRangeError(typer.BadParameter):
-    """Error of an option whose text is no number of its quantity; shown in one line."""
+    """Raised for an option whose text is no number of the option's quantity; shown in one line."""
 
     def show(self, file: IO[Any] | None = None) -> None:
         """Writes the line to standard error."""
@@ -22,12 +22,12 @@ class OutOfRangeError(typer.BadParameter):
 
 @dataclass(frozen=True)
 class NumberReader:
-    """Parser of an option's text to a number of a quantity; a duration may have units."""
+    """Parser from an option's text to a number of a quantity; a duration may have units."""
 
     hint: Any
 
     def __call__(self, words: Any) -> Any:
-        """Returns the number. Raises OutOfRangeError if the text is no number or out of range."""
+        """Returns the number. Raises OutOfRangeError if the text is no number or the number is out of range."""
         if not isinstance(words, str):
             return words
         try:
@@ -37,7 +37,7 @@ class NumberReader:
 
 
 def quantity_option(hint: Any, *names: str, help: str, show_default: bool = True, group: str | None = None) -> Any:
-    """Returns a typer option that takes a number of a quantity; `group` is its heading in the help."""
+    """Returns a typer option that takes a number of a quantity; `group` is the option's heading in the help."""
     reader = NumberReader(hint)
     return typer.Option(
         *names,
@@ -50,5 +50,5 @@ def quantity_option(hint: Any, *names: str, help: str, show_default: bool = True
 
 
 def quantity_argument(hint: Any, *, metavar: str, help: str) -> Any:
-    """Returns a typer argument that is a number of a quantity."""
+    """Returns a typer argument that takes a number of a quantity."""
     return typer.Argument(parser=NumberReader(hint), metavar=metavar, help=help)

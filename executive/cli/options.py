@@ -1,4 +1,4 @@
-"""Options that several commands share; `executive.mission.request` declares the options of a request."""
+"""Options that several commands share; `executive.mission.request` declares the options for a request."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _NUMERIC: Final = re.compile(r"[-+]?\.?\d[\d.,]*(?:e[-+]?\d+)?", re.IGNORECASE)
 
 
 def grouped(group: Group, *names: str, **settings: Any) -> Any:
-    """Returns a typer option that stands under a heading of the help."""
+    """Returns a typer option that appears under a heading in the help."""
     return typer.Option(*names, rich_help_panel=group.value, **settings)
 
 
@@ -86,7 +86,7 @@ FOXGLOVE = Annotated[
 
 
 class StartCommand(TyperCommand):
-    """Command with `--start` of three numbers or one word, optional values, and groups in its help."""
+    """Command that accepts three numbers or a word after `--start`, optional values, and groups in its help."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Joins the values of options that take any number of words, and parses as click does."""
@@ -125,7 +125,7 @@ def join_values(arguments: Sequence[str]) -> list[str]:
 
 @dataclasses.dataclass(frozen=True)
 class _Typed:
-    """Field of a request with an option; `part` is the field of the request that holds it (empty: the request)."""
+    """Field with an option; `part` is the field of the request that contains it (empty: the request itself)."""
 
     part: str
     name: str
@@ -135,7 +135,7 @@ class _Typed:
 
     @property
     def several(self) -> bool:
-        """True if the option can be repeated."""
+        """True if the option may be repeated."""
         return get_origin(self.kind) is tuple
 
     @property
@@ -162,13 +162,13 @@ class _Typed:
         return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
 
     def value(self, typed: Any) -> Any:
-        """Returns the field's value of a typed value; the default without one. Raises InputError."""
+        """Converts a typed value to the field's value; returns the default if none is typed. Raises InputError."""
         if self.option.read is not None:
             return self.default if typed in (None, False) or typed == [] else self.option.read(typed)
         return tuple(typed or ()) if self.several else typed
 
     def arguments(self, value: Any) -> list[str]:
-        """Returns the command-line arguments that give a value."""
+        """Returns the command-line arguments that produce a value."""
         if self.option.argument:
             return [str(value)]
         if isinstance(value, bool):
@@ -190,7 +190,7 @@ def _text(value: Any) -> str:
 
 
 def _typed_fields(model: Any = Request, part: str = "") -> Iterator[_Typed]:
-    """Yields the fields with an option, also those of the request's parts."""
+    """Yields the fields that have an option, including those inside parts of the request."""
     hints = get_type_hints(model, include_extras=True)
     for each in dataclasses.fields(model):
         hint = hints[each.name]
@@ -208,18 +208,18 @@ REQUEST_OPTIONS: Final = frozenset(each.name for each in _typed_fields()) - {"fi
 
 
 def stay_s(view: float) -> float | None:
-    """Time (s) that a page stays by the value of `--view`; None: until Ctrl-C."""
+    """Time (s) for which a page is served, from the value of `--view`; None: until Ctrl-C."""
     return None if view >= _UNTIL_CTRL_C_S else view
 
 
 def start_pose(text: str | None) -> Pose2D | None:
-    """Parses a pose in `X Y YAW`; None without one. Raises InputError."""
+    """Parses a pose in the form `X Y YAW`; returns None for no text. Raises InputError."""
     start = None if text is None else parse_start(text)
     return start if isinstance(start, Pose2D) else None
 
 
 def request_arguments(request: Request) -> list[str]:
-    """Returns the arguments of `errand run` that give this request."""
+    """Returns the arguments of `errand run` that produce this request."""
     arguments = list[str]()
     for each in _typed_fields():
         value = getattr(getattr(request, each.part) if each.part else request, each.name)
@@ -231,14 +231,14 @@ def request_arguments(request: Request) -> list[str]:
 def takes_request(
     *names: str, without: Sequence[str] = (), **defaults: Any
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Gives a command the options of these fields, by default of all, and the Request as its first argument.
+    """Gives a command the options for these fields (by default all), and the Request as its first argument.
 
-    `defaults` replace the defaults of the fields.
+    `defaults` replace the fields' own defaults.
     """
     fields = [each for each in _typed_fields() if (not names or each.name in names) and each.name not in without]
 
     def decorated(function: Callable[..., None]) -> Callable[..., None]:
-        """Returns the command with the options of the fields before its own."""
+        """Returns the command with the options for the fields, followed by its own."""
         signature = inspect.signature(function, eval_str=True)
         _, *own = (each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values())
         context = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
@@ -259,7 +259,7 @@ def takes_request(
 
 
 def _request(typed: Iterable[tuple[_Typed, Any]]) -> Request:
-    """Builds the request of typed values. Raises InputError."""
+    """Builds the request from typed values. Raises InputError."""
     values: dict[str, Any] = {}
     for each, words in typed:
         part = values if not each.part else values.setdefault(each.part, {})

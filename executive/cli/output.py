@@ -33,7 +33,7 @@ _SHOWN: Final = 100
 
 
 def console_for(as_json: bool) -> Console:
-    """Returns the console for people: standard error if standard output belongs to a script."""
+    """Returns the console for people: standard error if scripts read standard output."""
     from rich.console import Console
 
     return Console(stderr=as_json, highlight=False, soft_wrap=True)
@@ -53,7 +53,7 @@ def print_json(value: Mapping[str, Any] | Sequence[Any]) -> None:
 def finish(
     values: Mapping[str, Any] | Sequence[Any], as_json: bool, *, good: bool = True, otherwise: int = NOT_ACHIEVED
 ) -> None:
-    """Ends a command: prints its result if `as_json`, and exits with the status `otherwise` unless it is `good`."""
+    """Ends a command: prints the result if `as_json`, and exits with the status `otherwise` unless `good`."""
     if as_json:
         print_json(values)
     if not good:
@@ -64,7 +64,7 @@ def finish(
 def progress_bar(console: Console, what: str, total: int) -> Iterator[Callable[..., None]]:
     """Shows a bar over `total` steps with the time left; nothing without a terminal, or for a single step.
 
-    The yielded function ends a step; given a text, it names the next one.
+    Call the yielded function at the end of each step, perhaps with the name of the next step.
     """
     if not console.is_terminal or total < 2:
         yield lambda *_: None
@@ -136,7 +136,7 @@ def new_folder(out: Path) -> Iterator[Path]:
 
 
 def terminal_answerer() -> Answerer | None:
-    """Returns the function that asks at the terminal; None without a terminal, as in scripts."""
+    """Returns the function that asks questions at the terminal; None if there is no terminal, as in scripts."""
     attended = sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
     return ask_at_terminal if attended else None
 

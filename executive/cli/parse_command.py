@@ -69,13 +69,13 @@ def parse(
 
 
 def _values(meaning: Understanding, explained: bool) -> dict[str, object]:
-    """Returns a meaning as JSON values, with its steps if `explained`."""
+    """Returns a sentence's meaning as JSON values, with the steps of understanding if `explained`."""
     steps = None if meaning.trace is None else explain(meaning.trace)
     return {**meaning.to_json(), "steps": steps} if explained else meaning.to_json()
 
 
 def _show(meaning: Understanding, as_json: bool, explained: bool) -> None:
-    """Prints the commands on standard output, perhaps with the steps, or the reason on standard error."""
+    """Prints the commands on standard output, perhaps with the steps, or the reason for a refusal on standard error."""
     if explained and meaning.trace is not None:
         _echo(explanation_lines(meaning.trace), as_json)
     elif meaning.steps:

@@ -39,7 +39,7 @@ _MORE_S: Final = 30.0
 
 @dataclass(frozen=True)
 class Plugin:
-    """Entry point of another distribution; `broken` says why it cannot be used (None: it can)."""
+    """Entry point of another distribution; `broken` says why it cannot be used (None: it can be used)."""
 
     group: str
     name: str
@@ -69,7 +69,7 @@ def plugins(
 
 
 def _rows(found: Sequence[Plugin]) -> Iterator[tuple[str, ...]]:
-    """Yields the rows of the core, of the plug-ins, and of this project's plug-ins that are not installed."""
+    """Yields the rows for the core, for the plug-ins, and for this project's plug-ins that are not installed."""
     yield (OURS, version(OURS), "", "", "", "the core")
     last = ""
     for each in sorted(found, key=lambda each: each.distribution):
@@ -98,7 +98,7 @@ def _key(entry: EntryPoint) -> str:
 
 
 def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
-    """Loads a plug-in in a process of its own; returns the result."""
+    """Loads a plug-in in a separate process; returns the result."""
     plugin = Plugin(
         entry.group, entry.name, distribution_of(entry), entry.dist.version if entry.dist else "", entry.value
     )
@@ -120,7 +120,7 @@ def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
 
 
 def _unusable(name: str) -> str | None:
-    """Returns why a name cannot be that of a command; None if it can."""
+    """Returns why a name is not allowed for a command; None if it is allowed."""
     group, dot, short = name.rpartition(".")
     if _WORD.fullmatch(short) is None or (dot and _WORD.fullmatch(group) is None):
         return "a command's name is a word in lower case, or GROUP.WORD"
@@ -165,7 +165,7 @@ stack = typer.Typer(
 
 @stack.callback()
 def _group() -> None:
-    """Keeps `show` a command of the group, although it is the only one."""
+    """Makes `show` a subcommand even though the group has no other."""
 
 
 @stack.command()

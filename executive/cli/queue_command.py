@@ -141,7 +141,7 @@ def run(
 def _runs(
     store: Path, console: Console, quiet: bool, foxglove: str | None
 ) -> Iterator[tuple[MissionStore, MissionRuns]]:
-    """Claims a store for the block, and yields it with the runner of its missions."""
+    """Claims a store while the block runs; yields the store with the runner for its missions."""
     with MissionStore(store, create=False) as missions, missions.claim():
         from executive.app.runs.queue import MissionRuns
         from executive.cli.screen import ConsoleScreen
@@ -157,7 +157,7 @@ def _in_turn(
 ) -> list[MissionResult]:
     """Runs the queued missions one after another with a progress bar.
 
-    Runs the mission `first` before them; alone, if it is none of a queue. Stops after a cancelled mission.
+    Runs the mission `first` before them, or only `first` if it is not queued. Stops after a cancelled mission.
     """
     from executive.app.runs.queue import queued_missions, run_in_turn
 
@@ -170,7 +170,7 @@ def _in_turn(
 
 
 def _row(mission: StoredMission, standing: Mapping[int, StandingMission]) -> tuple[str, ...]:
-    """Returns a mission's row of `errand queue list`."""
+    """Returns the row for a mission in `errand queue list`."""
     asked, commands = mission.request, "\n".join(mission.request.commands)
     state = "running or interrupted" if mission.state is MissionState.RUNNING else mission.state.value
     trigger = f"{mission.standing}: {mission.why}" if mission.why else ""
@@ -195,13 +195,13 @@ def _mission_json(mission: StoredMission, standing: Mapping[int, StandingMission
 
 
 def _due(standing: StandingMission) -> datetime | None:
-    """Next time of a standing mission, in local time."""
+    """Next time at which a standing mission is due, in local time."""
     due = standing.due_next(utc_now(), None)
     return None if due is None else due.astimezone()
 
 
 def _trigger(at: str | None, every: str | None, on: str | None, missed: Missed | None) -> Trigger | None:
-    """Returns the trigger of the options; None without one. Raises InputError."""
+    """Returns the trigger that the options describe; None if they describe none. Raises InputError."""
     given: list[Trigger] = [schedule_of(at)] if at is not None else []
     given += [Every.from_text(every)] if every is not None else []
     given += [event_of(on)] if on is not None else []
@@ -278,9 +278,9 @@ def resume(
 
 
 def _interrupted(missions: MissionStore, number: int | None) -> StoredMission:
-    """Returns the mission to resume: the named one, an interrupted one, or the newest if it was cancelled.
+    """Returns the mission to resume: the named mission, an interrupted one, or the newest if it was cancelled.
 
-    Raises InputError if there is none.
+    Raises InputError if there is no such mission.
     """
     if number is None:
         begun = [each for each in missions.missions() if each.starts]

@@ -74,7 +74,7 @@ def teleop(
         hands = Teleop(context)
 
         def save(name: str | None) -> str:
-            """Saves the pose under a name, or under a free one; returns a sentence."""
+            """Saves the pose under a name, or under a free name if none is given; returns a sentence."""
             return f"saved as {save_pose(poses, name, hands.pose(), world=opened.name)}"
 
         feed, scene = Feed(), simulation.show_live()
@@ -112,7 +112,7 @@ def context_for(world: World, robot: Robot, clock: Clock, start: Pose2D) -> Skil
 
 
 def drive(hands: Teleop, context: SkillContext, limit_s: float | None, report: Callable[[], None]) -> None:
-    """Drives until the limit (s, robot's clock), never faster than real time; calls `report` in each period."""
+    """Drives until the limit (s, robot's clock), at most in real time; calls `report` in each period."""
     begun_s = context.clock.now()
     due_s = time.monotonic()
     while limit_s is None or context.clock.now() - begun_s < limit_s:
@@ -123,7 +123,7 @@ def drive(hands: Teleop, context: SkillContext, limit_s: float | None, report: C
 
 
 def advance(hands: Teleop, context: SkillContext) -> None:
-    """Updates the estimates, sends the commands of one period, and advances the clock by it."""
+    """Updates the estimates, sends the commands for one period, and advances the clock by the period."""
     context.localiser.update(context.robot)
     context.costmap.update(context.robot, context.localiser.estimate())
     hands.tick()
@@ -131,13 +131,13 @@ def advance(hands: Teleop, context: SkillContext) -> None:
 
 
 class TerminalKeys:
-    """Keys of a terminal, which sends presses and repeats of a held key, but no releases."""
+    """Keys of a terminal, which reports presses and repeats of a held key, but no releases."""
 
     def __init__(self, hands: Teleop, save: Callable[[str | None], str], say: Callable[[str], None]) -> None:
         self._hands, self._save, self._say = hands, save, say
 
     def press(self, key: str) -> None:
-        """Commands the motion of a key, or saves the pose; any other key stops the robot."""
+        """Commands the motion for a key, or saves the pose; any other key stops the robot."""
         self._hands.ask(axis_values([key]))
         if key == SAVE_KEY:
             try:
@@ -147,7 +147,7 @@ class TerminalKeys:
 
 
 def page_actions(hands: Teleop, save: Callable[[str | None], str], scene: Scene | None) -> Mapping[str, Action]:
-    """Returns the page's actions: `teleop` with held keys and sticks, `save_pose` with a name."""
+    """Returns the actions for the page: `teleop` with held keys and sticks, `save_pose` with a name."""
 
     def ask(values: Mapping[str, Any]) -> str:
         try:
@@ -167,7 +167,7 @@ def page_actions(hands: Teleop, save: Callable[[str | None], str], scene: Scene 
 
 
 def _state(hands: Teleop) -> dict[str, Any]:
-    """Returns the state for the page."""
+    """Returns the robot's state for the page."""
     pose = hands.pose()
     return {
         "note": hands.note,

@@ -95,7 +95,7 @@ def run(
 
 
 def _tell(console: Console, timing: Profile | None, report: RunReport | None) -> None:
-    """Prints the CPU times and the report as JSON, if they are wanted."""
+    """Prints the CPU times, and the report as JSON, if the user asked for them."""
     from executive.record.work import lines
 
     if timing is not None:
@@ -126,7 +126,7 @@ def refuse_unaddressed(request: Request) -> None:
 
 
 def _robot_of(world: str) -> dict[str, Any]:
-    """Returns the robot in the knowledge file of a world; {} if it names none or several."""
+    """Returns the robot that a world's knowledge file names; {} if it names no robot or several."""
     worlds = find_spec("plant.worlds")
     folders = [Path(world), *(Path(each) / world for each in (worlds and worlds.submodule_search_locations) or ())]
     file = next(file for folder in folders if is_file(file := folder / "knowledge.yaml") or folder is folders[-1])

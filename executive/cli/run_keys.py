@@ -31,7 +31,7 @@ _ERASE: Final = frozenset("\x7f\b")
 class Typing:
     """State of typing: `text` is an answer or, with `saying`, a sentence to the robot; `reply` is the last reply.
 
-    `can_say` says whether the robot takes sentences.
+    `can_say` is True if the robot accepts sentences.
     """
 
     text: str = ""
@@ -41,7 +41,7 @@ class Typing:
 
 
 class Keys:
-    """Controller of a run by keys. While a question with a free answer waits, keys write the answer.
+    """Controls a run by keys. While a question that accepts any text is open, keys write the answer.
 
     A colon or Enter begins a sentence, Enter sends it to `say`, and Escape drops it.
     """
@@ -132,7 +132,7 @@ def prompt_lines(state: ControlState, now_s: float, typing: Typing = Typing()) -
 
 @contextmanager
 def read_keys(press: Callable[[str], object], descriptor: int | None = None) -> Iterator[bool]:
-    """Calls `press` with each key, in a thread, while the block runs; yields False without a terminal.
+    """Calls `press` with each key from a thread while the block runs; yields False if there is no terminal.
 
     `descriptor` is by default standard input. The terminal's mode is restored at the end.
     """

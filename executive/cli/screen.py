@@ -39,7 +39,7 @@ SILENCE: Final = Silence()
 
 @contextmanager
 def voice_for(aloud: bool) -> Iterator[Voice]:
-    """Yields a voice, silent unless `aloud`; waits for its last sentence. Raises InputError if there is no voice."""
+    """Yields a voice, silent unless `aloud`; finally waits for its last sentence. Raises InputError without a voice."""
     if not aloud:
         yield SILENCE
         return
@@ -52,11 +52,11 @@ def voice_for(aloud: bool) -> Iterator[Voice]:
 
 @dataclass(frozen=True)
 class SpeechOutput(RunVisitor):
-    """Output of a robot's speech: by a voice that does not block, and on the console unless `quiet`.
+    """Visitor that outputs a robot's speech: by a voice that does not block, and on the console unless `quiet`.
 
-    What a robot says in a silent zone is only shown.
+    Speech in a silent zone appears only on the console.
 
-    The console shows it at the end of the tick, behind the skills that ended before it.
+    The console shows speech at the end of the tick, after the skills that have ended.
     """
 
     console: Console
@@ -65,7 +65,7 @@ class SpeechOutput(RunVisitor):
     _said: list[str] = field(default_factory=list, init=False)
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Says a speech message."""
+        """Says the text of a speech message."""
         if topic == SPEECH:
             robot, text = (str(message.get(name, "")) for name in ("robot", "text"))
             if not self.quiet:
@@ -75,7 +75,7 @@ class SpeechOutput(RunVisitor):
         return message
 
     def tick(self, progress: Progress) -> None:
-        """Prints the speech of the tick."""
+        """Prints the speech since the last tick."""
         self._print()
 
     def end(self, result: RunResult) -> None:
@@ -92,8 +92,8 @@ class SpeechOutput(RunVisitor):
 class ConsoleScreen:
     """Display and control of runs on the console.
 
-    `page` builds the live page of a run, and `shown_page` is the last one; `live` sends what the runs log. With
-    `whole_tree` it shows all nodes of the tree at the end. `profile` measures the time of subsystems.
+    `page` builds the live page of a run, and `shown_page` is the last page; `live` sends the messages that runs log.
+    With `whole_tree` the console shows all nodes of the tree at the end. `profile` times the subsystems.
     """
 
     console: Console
@@ -146,7 +146,7 @@ class ConsoleScreen:
             self.console.print(line)
 
     def name_files(self, out: Path) -> None:
-        """Names the files in a folder with their content, those to open first at the top; hidden files are internal."""
+        """Names the files in a folder with their content, the most important first; omits hidden files."""
         names = {path.name for path in out.iterdir() if not path.name.startswith((".", "missions."))}
         known = [name for name in WRITTEN if name in names]
         width = max(map(len, names), default=0)
@@ -198,7 +198,7 @@ def live_view(
 
 
 class _Lines(RunVisitor):
-    """Printer of a line for each ended skill."""
+    """Visitor that prints a line for each ended skill."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -229,13 +229,13 @@ class _Lines(RunVisitor):
 
 
 class _Picture(RunVisitor):
-    """Live tree, redrawn a few times a second, with the `lines` above and `prompt(now_s)` below."""
+    """Live tree, redrawn a few times a second, with `lines` above and `prompt(now_s)` below."""
 
     def __init__(self, lines: _Lines, live: Live, prompt: Callable[[float], Sequence[str]]) -> None:
         self._lines, self._live, self._prompt, self._drawn_s = lines, live, prompt, 0.0
 
     def tick(self, progress: Progress) -> None:
-        """Prints lines, and redraws the tree if it is time."""
+        """Prints lines, and redraws the tree if enough time has passed."""
         self._lines.tick(progress)
         now = time.perf_counter()
         if now - self._drawn_s < REFRESH_S:
@@ -267,20 +267,20 @@ def visible_rows(picture: Text, rows: int) -> Text:
 
 
 def _shown_skills(node: NodeView, above: NodeView | None = None) -> dict[str, str]:
-    """Returns the titles of the skills below a node by path id."""
+    """Returns the titles of the skills below a node, by path id."""
     if node.behaviour.logged:
         return {node.path_id: node.title(above)}
     return {path_id: title for child in node.children for path_id, title in _shown_skills(child, node).items()}
 
 
 def skill_line(title: str, state: NodeState, took_s: float) -> Text:
-    """Returns the line of an ended skill: mark, duration, title, cause and message."""
+    """Returns the line for an ended skill: mark, duration, title, cause and message."""
     style, what = style_of(state), printable(": ".join(filter(None, (title, state.cause_text, state.message))))
     return Text.assemble((style.symbol, style.rich), f" {took_s:6.1f} s  {what}")
 
 
 def progress_line(states: Iterable[NodeState], now_s: float) -> Text:
-    """Returns the line of the running skill: time, progress if the skill reports it, and message."""
+    """Returns the line for the running skill: time, progress if the skill reports it, and message."""
     running = [state for state in states if state.status is Status.RUNNING]
     state = running[-1] if running else NodeState()
     done = round((state.progress or 0.0) * BAR_CELLS)

@@ -1,4 +1,4 @@
-"""Conversation with a robot during a run: addressing, follow-ups, questions, and missions."""
+"""Conversation with a robot during a run: address, follow-ups, questions, and missions."""
 
 import re
 import threading
@@ -51,7 +51,7 @@ REMEMBERED_S: Final = 60.0
 
 @dataclass(frozen=True)
 class _Spoken:
-    """Request: its commands, its memory, its time (s), and the name of its mission.
+    """Remembered request: commands, memory for follow-ups, time (s), and the name of the mission that it started.
 
     `steps` is the whole mission if the request has conditions, loops, waits or other control flow.
     """
@@ -70,7 +70,7 @@ _When = Literal["first", "instead", "afterwards"]
 class Conversation(RunVisitor):
     """Conversation with one robot during a run. All methods may be called from any thread.
 
-    With `require_wake` the robot hears only sentences with its name, and answers to its questions.
+    With `require_wake` the robot hears only sentences that contain its name, and answers to its own questions.
     """
 
     def __init__(
@@ -88,11 +88,11 @@ class Conversation(RunVisitor):
         self._listeners: tuple[Callable[[Waiting | None], None], ...] = ()
 
     def listen(self, listener: Callable[[Waiting | None], None]) -> None:
-        """Calls `listener` after each sentence with the open question, or None."""
+        """Calls `listener` after each sentence, with the question that is then open, or None."""
         self._listeners = (*self._listeners, listener)
 
     def set_mission(self, tree: CompiledTree, *, memory: Memory | None = None, now_s: float = 0.0) -> None:
-        """Sets the mission with which the run begins. Sentences may refer to it and correct it."""
+        """Sets the mission that the run begins with. Later sentences may refer to this mission and correct it."""
         with self._lock:
             self._names |= {tree.mission_name}
             steps = tree.steps if any(step.is_block for step in tree.steps) else ()
@@ -108,7 +108,7 @@ class Conversation(RunVisitor):
     def hear(self, text: str, now_s: float | None = None) -> Reply:
         """Carries out a sentence and returns the reply. `now_s` is the robot's clock, by default that of the run.
 
-        Never raises on text.
+        Never raises, whatever the text.
         """
         with self._lock:
             seen_s = 0.0 if self._progress is None else self._progress.now_s
@@ -123,7 +123,7 @@ class Conversation(RunVisitor):
     # -- to whom -----------------------------------------------------------------------------------------------------
 
     def _addressed(self, text: str, now_s: float) -> tuple[str, Reply | None]:
-        """Text without the wake phrase, and a reply if it is not for this robot."""
+        """Text without the wake phrase, and a reply if the text is not for this robot."""
         name = self._speech.robot_name
         short = text[:_MOST_LETTERS]
         if not self._require_wake:
@@ -154,7 +154,7 @@ class Conversation(RunVisitor):
     # -- answers -----------------------------------------------------------------------------------------------------
 
     def _answer_mission(self, text: str, now_s: float) -> Reply | None:
-        """Answers a question that the mission asks."""
+        """Answers a question of the mission with a sentence; returns None if the sentence answers none."""
         said = text.strip(" .,!?").lower()
         begun = said.replace(",", " ").split()[:1]  # "yes, I am" begins with the answer
         for each in self._control.state.questions:
@@ -168,7 +168,7 @@ class Conversation(RunVisitor):
         return None
 
     def _answer_own(self, text: str, now_s: float) -> Reply | None:
-        """Answers the open question of the robot."""
+        """Answers the robot's own open question with a sentence; returns None if the sentence does not answer it."""
         waiting, self._open = self._waiting(now_s), None
         if waiting is None:
             return None
@@ -189,7 +189,7 @@ class Conversation(RunVisitor):
     # -- requests ----------------------------------------------------------------------------------------------------
 
     def _remembered(self, now_s: float) -> _Spoken | None:
-        """Last request, while it is remembered."""
+        """Last request, as long as the robot remembers it."""
         return self._last if self._last is not None and now_s - self._last.at_s <= REMEMBERED_S else None
 
     def _understood(self, text: str, now_s: float) -> Understanding:
@@ -197,14 +197,14 @@ class Conversation(RunVisitor):
         return self._speech.understand(text, None if last is None else last.memory or self._memory_of(last.commands))
 
     def _memory_of(self, commands: Sequence[Command]) -> Memory | None:
-        """Memory of a file's commands, as if somebody had said them."""
+        """Memory for follow-ups to commands from a file, as if a user had said the commands."""
         item = next((c.object or c.item for c in commands if c.object or c.item), None)
         goal = next((c.goal for c in reversed(commands) if c.goal not in (None, _START)), None)
         said = f"find the {item}" if item is not None else f"go to {goal}" if goal is not None else ""
         return self._speech.understand(said, None).memory if said else None
 
     def _request(self, text: str, now_s: float) -> Reply:
-        """Carries out a request that refers to no earlier one."""
+        """Carries out a request that does not refer to an earlier one."""
         meant = self._understood(text, now_s)
         if meant.status is not Status.OK:
             return self._not_ok(meant, text, now_s)
@@ -225,7 +225,7 @@ class Conversation(RunVisitor):
         return refusal(meant.reason or "I did not understand")
 
     def _follow_up(self, text: str, now_s: float) -> Reply | None:
-        """Carries out a follow-up to the last request, while that is remembered."""
+        """Carries out a follow-up to the last request, as long as the robot remembers that request."""
         last, follow_up = self._remembered(now_s), parse_follow_up(text)
         if follow_up is None or last is None or self._understood(text, now_s).steps:
             return None
@@ -248,7 +248,7 @@ class Conversation(RunVisitor):
         return self._begin(changed, when, now_s)
 
     def _named(self, follow_up: FollowUp, now_s: float) -> Amendment | Understanding:
-        """Grounds a short follow-up like a whole sentence; returns an Understanding with the reason if that fails."""
+        """Grounds the names in a short follow-up; returns an Understanding with the reason if that fails."""
         if follow_up.said.lower() in _COUNTS:
             return Amendment(count=_COUNTS[follow_up.said.lower()])
         said = follow_up.said if re.match(_DETERMINED, follow_up.said, re.IGNORECASE) else f"the {follow_up.said}"
@@ -267,7 +267,7 @@ class Conversation(RunVisitor):
         return next((each for each in both if each.status is Status.QUESTION), both[0])
 
     def _old_name(self, said: str, now_s: float) -> str | None:
-        """Known name that the follow-up replaces."""
+        """Known name that the follow-up replaces by another."""
         if not said:
             return None
         bare = re.sub(r"^(?:the|a|an|my|some)\s+", "", said, flags=re.IGNORECASE)
@@ -289,7 +289,7 @@ class Conversation(RunVisitor):
         memory: Memory | None = None,
         steps: tuple[Step, ...] = (),
     ) -> Reply:
-        """Starts a mission of commands, or of steps with them, and remembers it."""
+        """Starts a mission from commands, or from steps that contain them, and remembers it."""
         state = self._control.state
         if state.mode is Mode.ENDED:
             return refusal(OVER)
@@ -328,7 +328,7 @@ class Conversation(RunVisitor):
         return last is not None and (last.mission in missions or last.mission not in self._seen)
 
     def _held(self) -> ObjectKind | None:
-        """Object in the gripper, as far as the last request says."""
+        """Object in the gripper, as known from the last request; None if that is unknown."""
         status = None if self._progress is None else self._progress.robots.get(self._speech.robot_name)
         missions = self._control.state.missions.get(self._speech.robot_name, ())
         if status is None or not status.holding or self._last is None or self._last.mission not in missions[-1:]:

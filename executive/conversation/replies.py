@@ -1,4 +1,4 @@
-"""Replies of a robot in conversation, and its answers to remarks about the run."""
+"""Replies of a robot in a conversation, and its answers to remarks about the run."""
 
 import enum
 from collections.abc import Callable, Mapping, Sequence
@@ -32,8 +32,8 @@ NEVER_MIND: Final = "all right, never mind"
 class Speech:
     """Understanding of sentences for one robot.
 
-    `understand` takes a sentence without wake phrase and the memory of earlier ones; `compile` makes a mission of
-    steps, with a name that differs from the given ones, and raises InputError.
+    `understand` takes a sentence without wake phrase and the memory of earlier sentences. `compile` compiles steps to a
+    mission with a name that is not taken, and raises InputError if the mission is impossible.
     """
 
     knowledge: Knowledge
@@ -64,7 +64,7 @@ class Reply:
 
 @dataclass(frozen=True)
 class Waiting:
-    """Open question of the robot about a sentence, which waits for an answer until `until_s` (robot's clock)."""
+    """Robot's open question about a sentence, which may be answered until `until_s` (s on the robot's clock)."""
 
     question: ClarifyingQuestion
     sentence: str
@@ -97,7 +97,7 @@ _HELD: Final = frozenset({Mode.PAUSED, Mode.STOPPED, Mode.LEASE_LOST})
 class RemarkAnswers:
     """Handler of remarks: stops, pauses, resumes or cancels the robot, and describes its place and work.
 
-    A remark concerns the addressed robot. `progress` is the latest of the run.
+    A remark concerns the addressed robot. `progress` is the latest progress of the run.
     """
 
     def __init__(self, speech: Speech, control: Control) -> None:
@@ -120,7 +120,7 @@ class RemarkAnswers:
         )
 
     def answer_to(self, remark: Remark, text: str) -> Reply:
-        """Carries out a remark, said in the words of `text`, and returns the reply."""
+        """Carries out a remark, which was said as `text`, and returns the reply."""
         acts = remark in (Remark.FREEZE, Remark.STOP, Remark.WAIT, Remark.GO_ON, Remark.CANCEL)
         if acts and self._control.state.mode is Mode.ENDED:
             return refusal(OVER)
@@ -131,7 +131,7 @@ class RemarkAnswers:
 
     @property
     def _held(self) -> bool:
-        """Whether the robot stands still by order."""
+        """Returns whether a person has ordered the robot to stand still."""
         state = self._control.state
         return state.robots.get(self._speech.robot_name, state).mode in _HELD
 
@@ -161,7 +161,7 @@ class RemarkAnswers:
 
     @property
     def _one(self) -> str | None:
-        """Name of the robot if there are several; None for the only one."""
+        """Name of the robot if the run has several robots; None if it has one."""
         return self._speech.robot_name if len(self._control.state.missions) > 1 else None
 
     def _where(self) -> Reply:
@@ -172,7 +172,7 @@ class RemarkAnswers:
 
 
 def place_in_words(pose: Pose2D | None, knowledge: Knowledge) -> str:
-    """Room of a pose (world frame) and the surface next to it, in words. None stands for a robot that is lost."""
+    """Room that contains a pose (world frame), and the surface beside the pose, in words; None means not localised."""
     if pose is None:
         return "I do not know where I am; I am looking for my place"
     here = (pose.x_m, pose.y_m)
@@ -188,7 +188,7 @@ def place_in_words(pose: Pose2D | None, knowledge: Knowledge) -> str:
 
 
 def doing_in_words(progress: Progress | None, state: ControlState, robot_name: str) -> str:
-    """Mission and step of the robot in words, with the reason if it stands still."""
+    """Robot's mission and step in words, with the reason if the robot stands still."""
     if state.mode is Mode.ENDED:
         return "I have nothing to do; the mission is over"
     tree = None if progress is None else progress.trees.get(robot_name)
@@ -206,7 +206,7 @@ def doing_in_words(progress: Progress | None, state: ControlState, robot_name: s
 
 
 def _step(states: Snapshot) -> str:
-    """Deepest running node, with its message."""
+    """Deepest running node, with the node's message."""
     running = [(path_id, node) for path_id, node in states.items() if node.status is Status.RUNNING]
     if not running:
         return ""
@@ -216,7 +216,7 @@ def _step(states: Snapshot) -> str:
 
 
 def _last_failure(states: Snapshot) -> str:
-    """Last skill that failed, with its cause and message."""
+    """Last skill that failed, with cause and message."""
     for path_id, node in reversed([*states.items()]):
         if node.status is Status.FAILURE and node.cause is not None and node.message:
             return f"{_name(path_id)} failed ({node.cause.value}: {node.message})"
@@ -224,5 +224,5 @@ def _last_failure(states: Snapshot) -> str:
 
 
 def _name(path_id: str) -> str:
-    """Last part of a path id, as words."""
+    """Last part of a path id, written as words."""
     return path_id.rpartition("/")[2].replace("-", " ").replace("_", " ")

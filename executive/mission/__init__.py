@@ -1,1 +1,1 @@
-"""Missions: their files, and missions made of sentences."""
+"""Reads, parses and resolves missions, from files or from sentences."""

@@ -1,8 +1,8 @@
-"""Check for conditions that always or never hold, by the ranges of their readings: `battery > 30`, `n > 3 and n < 2`.
+"""Checks for conditions that always or never hold, by the ranges of their readings: `battery > 30`, `n > 3 and n < 2`.
 
 A comparison of one value with a number is evaluated at the points where its answer can change, within the value's
-range, and between them. Any other part of a condition may be true or false. Parameters have been replaced before: a
-condition of numbers and truths alone is not checked.
+range, and between them. Any other part of a condition may be true or false. Parameters have already been replaced: a
+condition of numbers and truth values alone is not checked.
 """
 
 import ast
@@ -26,7 +26,7 @@ _DAY_MIN: Final = 24 * 60
 
 
 def refuse_certain_comparisons(expression: Expression, ranges: Ranges) -> None:
-    """Refuses a comparison that the range of its value decides.
+    """Refuses a comparison whose answer follows from the range of the compared value.
 
     Raises:
         ExpressionError: names the comparison, the range and the likely mistake.
@@ -65,7 +65,7 @@ def refuse_certain(condition: Condition, ranges: Ranges) -> None:
 
 @dataclass(frozen=True)
 class _Line:
-    """Comparison of `slope * name + shift` with zero."""
+    """Comparison of `slope * name + shift` with zero; `name` is None if the comparison reads no value."""
 
     name: str | None
     slope: Fraction
@@ -73,24 +73,24 @@ class _Line:
     compare: ast.cmpop
 
     def holds(self, value: Fraction) -> bool:
-        """Answer at a value of the name."""
+        """Answer of the comparison if the name has this value."""
         return bool(COMPARISONS[type(self.compare)](self.slope * value + self.shift, 0))
 
     @property
     def turn(self) -> Fraction | None:
-        """Value at which the answer can change; None where it never does."""
+        """Value at which the answer can change; None if it never changes."""
         return None if self.slope == 0 else -self.shift / self.slope
 
     def points(self, ranges: Ranges) -> list[Fraction]:
-        """Values on all sides of the turn, within the range of the name."""
+        """Values on both sides of the turn and at the turn, within the range of the name."""
         return _samples([] if self.turn is None else [self.turn], *_limits(self.name, ranges))
 
 
 @dataclass
 class _Cases:
-    """Readings of a condition, with the values of each that may change the answer.
+    """Readings that a condition depends on, each with the values at which the answer may change.
 
-    A look takes time: with a look in the condition, each part reads values of its own (`apart`).
+    A look takes time: with a look in the condition, each part of it reads its own values (`apart`).
     """
 
     ranges: Ranges
@@ -101,7 +101,7 @@ class _Cases:
     part: int = 0
 
     def of(self, condition: Condition) -> Decided:
-        """Answer of a condition by the values that it reads."""
+        """Answer of a condition as a function of the values that it reads."""
         match condition:
             case AllOf(parts=parts):
                 return _joined(all, [self.of(part) for part in parts])
@@ -142,13 +142,13 @@ class _Cases:
         return self._free()
 
     def _read(self, name: str, values: list[Any], test: Callable[[Any], bool]) -> Decided:
-        """Answer of a test on a reading with these possible values."""
+        """Answer of a test on a reading, which may have any of these values."""
         key = f"{name} {self.part}"
         self.reads, self.points[key] = True, values
         return lambda case: test(case[key])
 
     def _free(self) -> Decided:
-        """Answer that may be true or false."""
+        """Answer that may be true or false, independently of all others."""
         key = f" {len(self.points)}"
         self.points[key] = [False, True]
         return lambda case: bool(case[key])
@@ -159,14 +159,14 @@ def _joined(every: Callable[[Iterator[bool]], bool], parts: Sequence[Decided]) -
 
 
 def _pairs(node: ast.Compare) -> Iterator[ast.Compare]:
-    """Comparisons of a chain: `0 < n < 3` has two."""
+    """Comparisons in a chain: `0 < n < 3` has two."""
     sides = (node.left, *node.comparators)
     for first, op, second in zip(sides, node.ops, sides[1:], strict=False):
         yield ast.Compare(first, [op], [second])
 
 
 def _line(pair: ast.Compare) -> _Line | None:
-    """Comparison as one of a line with zero; None where it is not linear."""
+    """Comparison, rewritten as a comparison of a linear term with zero; None if it is not linear."""
     if isinstance(pair.left, ast.Constant) and not isinstance(pair.comparators[0], ast.Constant):
         turned = {ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE}
         swapped = turned.get(type(pair.ops[0]), type(pair.ops[0]))()
@@ -185,7 +185,7 @@ def _line(pair: ast.Compare) -> _Line | None:
 
 
 def _affine(node: ast.expr) -> tuple[str | None, Fraction, Fraction] | None:
-    """Name, slope and shift of a linear term; None for other terms."""
+    """Name, slope and shift of a linear term; None if the term is not linear."""
     match node:
         case ast.Constant(bool()):
             return None
@@ -230,7 +230,7 @@ def _scaled(line: _Affine | None, factor: Fraction) -> _Affine | None:
 
 
 def _words(pair: ast.Compare) -> tuple[str, str, bool] | None:
-    """Name, text and whether they must be equal, of a comparison of a name with a text."""
+    """Name, text, and whether both must be equal, read from a comparison of a name with a text."""
     sides = (pair.left, pair.comparators[0])
     names = [each.id for each in sides if isinstance(each, ast.Name) and each.id != CLOCK]
     texts = [each.value for each in sides if isinstance(each, ast.Constant) and isinstance(each.value, str)]
@@ -240,7 +240,7 @@ def _words(pair: ast.Compare) -> tuple[str, str, bool] | None:
 
 
 def _limits(name: str | None, ranges: Ranges) -> tuple[Fraction | None, Fraction | None]:
-    """Least and greatest value of a name; None where there is none."""
+    """Least and greatest value that a name can have; None for an end without limit."""
     if name == CLOCK:
         return Fraction(0), Fraction(_DAY_MIN - 1)
     if name is not None and "(" in name:
@@ -251,7 +251,7 @@ def _limits(name: str | None, ranges: Ranges) -> tuple[Fraction | None, Fraction
 
 
 def _samples(turns: Sequence[Fraction] | set[Fraction], low: Fraction | None, high: Fraction | None) -> list[Fraction]:
-    """Turns within a range, its ends, and values between and beyond them."""
+    """Values to test: the turns within a range, the ends of the range, and values between and beyond these."""
     inside = {turn for turn in turns if (low is None or turn >= low) and (high is None or turn <= high)}
     known = sorted(inside | {end for end in (low, high) if end is not None})
     between = [(first + second) / 2 for first, second in itertools.pairwise(known)]
@@ -261,7 +261,7 @@ def _samples(turns: Sequence[Fraction] | set[Fraction], low: Fraction | None, hi
 
 
 def _range_words(line: _Line, ranges: Ranges) -> tuple[str, str]:
-    """Range of the value in a comparison, and a hint."""
+    """Range of the value in a comparison, in words, and a hint."""
     if line.name == CLOCK:
         return "from 00:00 to 23:59", "write a time after midnight and before 23:59"
     if line.name is None or line.name not in ranges:

@@ -1,4 +1,4 @@
-"""Object in the gripper during a mission, if all commands succeed."""
+"""Predicts the object in the gripper during a mission in which all commands succeed."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -12,8 +12,8 @@ from skills.api import ObjectKind
 class InGripper:
     """Object in the gripper.
 
-    `kind` is None where only its presence is known, and not even that unless `sure`. `perhaps` are the candidates,
-    where they are known.
+    `kind` is None if only the object's presence is known; if not `sure`, the gripper may also be empty. `perhaps` are
+    the candidates, if they are known.
     """
 
     kind: ObjectKind | None = None
@@ -30,7 +30,7 @@ UNSURE: Final = InGripper(sure=False)
 
 
 def held_after_either(*held: InGripper | None) -> InGripper:
-    """Object in the gripper where any of these may be in it, or none."""
+    """Object in the gripper after one of several branches: it may be any of these objects, or none."""
     kinds: list[ObjectKind] = []
     for each in held:
         if each is not None and each.kind is None and not each.perhaps:
@@ -40,21 +40,21 @@ def held_after_either(*held: InGripper | None) -> InGripper:
 
 
 def held_after(command: Command, held: InGripper | None, knowledge: Knowledge) -> InGripper | None:
-    """Object in the gripper after a command that succeeded; None for none."""
+    """Object in the gripper after a command that succeeded; None if the gripper is empty."""
     if command.task is Task.GRASP:
         return held if is_same(held, command.object, knowledge) else InGripper(command.object)
     return held if _carried(command) is None else None
 
 
 def is_same(held: InGripper | None, item: ObjectKind | None, knowledge: Knowledge) -> bool:
-    """Returns whether the held object, or each candidate, is one that `item` asks for."""
+    """Returns whether the held object, or each candidate for it, is of the kind `item`."""
     if held is None:
         return False
     return all(_fits(one, item, knowledge) for one in map(InGripper, held.perhaps or (held.kind,)))
 
 
 def objection(command: Command, held: InGripper | None, knowledge: Knowledge) -> tuple[str, str] | None:
-    """Reason why a command is impossible with the held object, and a hint; None when it is possible."""
+    """Reason why a command is impossible with this object in the gripper, and a hint; None if it is possible."""
     if command.task is Task.GRASP:
         if held is None or not held.sure or is_same(held, command.object, knowledge):
             return None
@@ -70,17 +70,17 @@ def objection(command: Command, held: InGripper | None, knowledge: Knowledge) ->
 
 
 def grasp_objection(held: InGripper, what: str) -> tuple[str, str]:
-    """Reason why nothing can be grasped while an object is held, and a hint."""
+    """Reason why nothing else can be grasped while an object is held, and a hint."""
     return f"{what} cannot be grasped: the gripper holds {held} then", f"put {held} down before"
 
 
 def _carried(command: Command) -> ObjectKind | None:
-    """Object that a command carries."""
+    """Object that a command carries; None if it carries none."""
     return command.object if command.task is Task.PLACE and command.item is None else command.item
 
 
 def _fits(held: InGripper, item: ObjectKind | None, knowledge: Knowledge) -> bool:
-    """Returns whether the held object surely is an `item`; an unknown object may be any."""
+    """Returns whether the held object is certainly of the kind `item`; an object of unknown kind is accepted."""
     if held.kind is None or item is None:
         return True
     of_held, asked = (set(knowledge.classes(knowledge.object_name(one.name) or one.name)) for one in (held.kind, item))

@@ -1,4 +1,4 @@
-"""Reading of mission files, with parameters and places of steps, and of stack files."""
+"""Reads mission files, with parameters and the locations of steps, and stack files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN, text: str | 
 
 
 def locate(value: Any, document: YamlSource, path: KeyPath) -> None:
-    """Sets the place of each step in a value that was read from `path` of a document."""
+    """Sets the location of each step in a value that was read from `path` in a document."""
     if isinstance(value, Step):
         value._place = Place(document, path)
     if isinstance(value, BaseModel):
@@ -54,7 +54,7 @@ def locate(value: Any, document: YamlSource, path: KeyPath) -> None:
 
 
 def mission_of_robot(mission: Mission, robot: str, part: str | None = None) -> Mission:
-    """Mission of one robot of several: the part named `part`, or all steps."""
+    """Returns the mission for one of several robots: the part named `part`, or all steps if there are no parts."""
     own = None if part is None or mission.parts is None else mission.parts[part]
     laid_over = {} if own is None else {key: getattr(own, key) for key in own.model_fields_set - {"after"}}
     alone = mission.model_copy(update={**laid_over, "robot": robot, "robots": None, "parts": None})
@@ -65,15 +65,15 @@ def mission_of_robot(mission: Mission, robot: str, part: str | None = None) -> M
 
 
 def import_folders(mission: Mission) -> tuple[Path, ...]:
-    """Folders of a mission's imports."""
+    """Folders that a mission imports."""
     folder = Path() if mission.document is None else mission.document.path.parent
     return tuple(folder / each for each in mission.imports or ())
 
 
 def routes_of_people(mission: Mission, knowledge: Knowledge) -> dict[str, Route]:
-    """Routes of a mission's people by name, with a point for every place.
+    """Returns the routes of a mission's people by name, with each place replaced by a point.
 
-    Raises InputError when a place is not known; with the line in the file.
+    Raises InputError with the line in the file when a place is unknown.
     """
     problems, routes = Problems(), dict[str, Route]()
     for name, route in (mission.people or {}).items():
@@ -100,11 +100,11 @@ def _point(mission: Mission, path: tuple[str | int, ...], at: Corner | str, know
 
 
 def knowledge_of_mission(mission: Mission, knowledge: Knowledge) -> Knowledge:
-    """Merges a mission's own knowledge into that of its world.
+    """Merges the knowledge in a mission file into the knowledge of its world.
 
     Mappings are merged key by key; lists and single values are replaced.
 
-    Raises InputError when the result is not valid knowledge; with the line in the mission file.
+    Raises InputError with the line in the mission file when the result is not valid knowledge.
     """
     document = mission.document
     if not mission.knowledge or document is None:
@@ -125,13 +125,13 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any
 
 
 def stack_file(given: Path) -> Path:
-    """Path of a stack file: the given one, or the shipped file of that name."""
+    """Path of a stack file: the given path, or the shipped file with that name."""
     own = DEFAULT_FILE.with_name(f"{given.name}_stack.yaml")
     return own if given == Path(given.name) and not is_there(given) and is_file(own) else given
 
 
 def load_stack(path: Path | None) -> RobotStack:
-    """Reads the stack of a file, or the default one. Raises InputError with file and line."""
+    """Reads the stack in a file, or the default stack. Raises InputError with file and line when the file is wrong."""
     if path is None:
         return default_stack()
     source = read_yaml(path)

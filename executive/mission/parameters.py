@@ -1,6 +1,6 @@
 """Parameters of mission files: `${name}` in a value stands for the parameter's value; `$${` is a plain `${`.
 
-A file declares a parameter by its default, whose type it has, or as {type: .., default: .., choices: [..]}.
+A file declares a parameter by a default value, which fixes its type, or as {type: .., default: .., choices: [..]}.
 
 A value that is only `${name}` takes the parameter's own type, so that `timeout: ${limit}` can be a number; within a
 longer text the parameter's text is inserted.
@@ -38,7 +38,7 @@ Given = Mapping[str, Any]
 
 
 def parse_values(settings: Iterable[str]) -> dict[str, Any]:
-    """Parses values in the form NAME=VALUE, each as in YAML: `2.5` is a number. Raises InputError."""
+    """Parses values in the form NAME=VALUE, each as in YAML: `2.5` is a number. Raises InputError for other forms."""
     values: dict[str, Any] = {}
     for setting in settings:
         name, equals, text = setting.partition("=")
@@ -57,7 +57,7 @@ def parse_values(settings: Iterable[str]) -> dict[str, Any]:
 
 
 def parse_json_values(text: bytes) -> dict[str, Any]:
-    """Parses values in a JSON object; an empty text has none. Raises InputError."""
+    """Parses values in a JSON object; an empty text gives no values. Raises InputError for other texts."""
     hint = 'give one such as {"room": "kitchen"}, or nothing'
     values = json_object(text, what="the values", hint=hint)
     wrong = next((name for name, value in values.items() if not _can_be_given(name, value)), None)
@@ -76,7 +76,7 @@ def _can_be_given(name: str, value: Any) -> bool:
 def with_parameters(source: YamlSource, given: Given) -> YamlSource:
     """Replaces the parameters of a document by the given values, or else by their defaults.
 
-    Raises InputError when a name is no word, a parameter has no value, or `${name}` is not declared.
+    Raises InputError when a name is no identifier, a parameter has no value, or `${name}` is not declared.
     """
     if not isinstance(source.data, dict):
         return source
@@ -106,7 +106,7 @@ def with_parameters(source: YamlSource, given: Given) -> YamlSource:
 
 
 def _fitting(parameter: Parameter, value: Any, name: str, source: YamlSource, *, is_given: bool) -> Any:
-    """Converts a value to the parameter's type. Raises InputError when it does not fit, or is none of the choices."""
+    """Converts a value to the parameter's type. Raises InputError when it does not fit or is not among the choices."""
     if value is None:
         return None
     if parameter.type in _TEXTS and isinstance(value, int | float) and not isinstance(value, bool):
@@ -126,16 +126,16 @@ def _fitting(parameter: Parameter, value: Any, name: str, source: YamlSource, *,
 
 
 def round_source(source: YamlSource, steps: KeyPath, data: Any, name: str, value: Value) -> YamlSource:
-    """Makes a document of the steps `data` of a `for_each`, at a path, with a round's value inserted.
+    """Builds the document of a round of a `for_each`: the steps `data`, at their path, with the round's value inserted.
 
-    Raises InputError when `${..}` names neither the round's value nor that of a `for_each` within.
+    Raises InputError when `${..}` names neither the round's value nor that of an inner `for_each`.
     """
     below = source.below(steps[:-1], {steps[-1]: data})
     return replace(below, data=_put_in(below.data, {name: value}, below, ()))
 
 
 def _declared(source: YamlSource) -> dict[str, Parameter]:
-    """Declared parameters; one without a type takes any plain value. The schema checks entries of another form."""
+    """Declared parameters; one without a type takes any plain value. Leaves malformed entries to the schema."""
     declared = source.data.get(DECLARED)
     if not isinstance(declared, dict):
         return {}
@@ -163,7 +163,7 @@ def _declared(source: YamlSource) -> dict[str, Parameter]:
 def _put_in(
     value: Any, values: Mapping[str, Any], source: YamlSource, path: KeyPath, rounds: frozenset[str] = frozenset()
 ) -> Any:
-    """Replaces parameters in a value. `rounds` are names of the `for_each` blocks around it, which stay."""
+    """Replaces parameters in a value; keeps `rounds`, the names that enclosing `for_each` blocks will replace."""
     if isinstance(value, str):
         return _text(value, values, source, path, rounds)
     if isinstance(value, dict):
@@ -178,7 +178,7 @@ def _put_in(
 
 
 def _rounds_name(step: Mapping[str, Any]) -> frozenset[str]:
-    """Name that a `for_each` gives to the value of each round."""
+    """Name under which the steps of a `for_each` read the value of each round."""
     repeat = step.get("repeat")
     name = repeat.get("as") if isinstance(repeat, Mapping) and "for_each" in repeat else None
     return frozenset({name}) if isinstance(name, str) else frozenset()

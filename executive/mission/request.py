@@ -1,4 +1,4 @@
-"""Request of a user with all options of its run, in one form for the command line, the store and the queue."""
+"""Request of a user with all options for its run, in one form for the command line, the store and the queue."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Start = Pose2D | Literal["unknown"]
 
 
 def parse_start(text: str) -> Start:
-    """Parses a start such as "1.5 2 0" (m, m, rad) or "unknown". Raises InputError."""
+    """Parses a start such as "1.5 2 0" (m, m, rad) or "unknown". Raises InputError for any other text."""
     if text == "unknown":
         return "unknown"
     try:
@@ -40,7 +40,7 @@ def parse_start(text: str) -> Start:
 
 
 def _time_of_day(text: str) -> str:
-    """Parses a time of day such as "08:30". Raises InputError."""
+    """Parses a time of day such as "08:30". Raises InputError for any other text."""
     try:
         return clock_text(text)
     except QuantityError as error:
@@ -48,7 +48,7 @@ def _time_of_day(text: str) -> str:
 
 
 def _given(settings: list[str]) -> Mapping[str, Any]:
-    """Parses parameter values such as "speed=0.5". Raises InputError."""
+    """Parses parameter values such as "speed=0.5". Raises InputError for any other text."""
     from executive.mission.parameters import parse_values
 
     return parse_values(settings)
@@ -61,14 +61,14 @@ def _stack_file(path: Path) -> Path:
 
 
 def _robots(text: str) -> tuple[RobotConfig, ...]:
-    """Parses robots such as "alice=spot,bob=fetch". Raises InputError."""
+    """Parses robots such as "alice=spot,bob=fetch". Raises InputError for any other text."""
     return parse_robots(text, [kind.name for kind in installed_plugins("errand.robots")])
 
 
 class RequestFields(TypedDict, total=False):
-    """Fields of a request as keyword arguments, in the form in which they are typed at the command line.
+    """Fields of a request as keyword arguments, in the form that users type at the command line.
 
-    `faults` are those of the scenario; `light`, `clutter`, `people` and `friction` those of the variation.
+    `faults` belong to the scenario; `light`, `clutter`, `people` and `friction` belong to the variation.
     """
 
     world: str
@@ -98,7 +98,7 @@ _READERS: Final[Mapping[str, Callable[[Any], Any]]] = {
 
 
 def with_fields(request: Request, fields: RequestFields) -> Request:
-    """Copies a request with other fields. Raises InputError for a value or a name that cannot be used."""
+    """Copies a request with other fields. Raises InputError for an unknown field or an invalid value."""
     changed: dict[str, Any] = {}
     for name, value in fields.items():
         part = next((each for each in ("variation", "scenario") if hasattr(getattr(request, each), name)), None)
@@ -118,14 +118,14 @@ def with_fields(request: Request, fields: RequestFields) -> Request:
 class Request:
     """Request of a user: a sentence, a mission file, or only commands after a conversation.
 
-    A field with an `Option` is an option of the command line. `world` is the typed name; `require_wake` says whether
-    the sentence must begin with the robot's name (None: the world decides); `answers` answer the questions that the
-    request leaves open, in order, and `questions` is the policy for further ones. `given` are values of a file's
-    parameters; the robot stands at `start`, by default at the world's. `out` is the folder for the run's files, `stack`
-    the file of the robot's components, `map` the folder of a map that replaces the world's own. `scenario` has faults
-    and events, `scenario_files` add more; `variation` changes the world.
+    A field with an `Option` is an option of the command line. `world` is the typed name. `require_wake` says whether
+    the sentence must begin with the robot's name (None: the world decides). `answers` answer open questions in order,
+    and `questions` is the policy for further questions. `given` are values for the file's parameters. The robot stands
+    at `start`, by default at the world's start. `out` is the folder for the run's files, `stack` the file with the
+    robot's components, `map` the folder with a map that replaces the world's map. `scenario` has faults and events,
+    `scenario_files` add more; `variation` changes the world.
 
-    `robots` are the robots of a run with several, or with another kind or start than the world's.
+    `robots` are the robots of the run, if there are several or if kind or start differ from the world's.
 
     The run begins at `time_of_day` ("14:30"; None: now) and ends after `time_limit_s` (None: the default).
 
@@ -248,16 +248,16 @@ class Request:
 
     @property
     def only_commands(self) -> bool:
-        """Returns whether there is neither a sentence nor a file."""
+        """Returns whether the request has neither a sentence nor a file."""
         return self.sentence is None and self.file is None and bool(self.commands)
 
     def to_json(self) -> str:
-        """Returns the JSON form, which `from_json` reads; default values are left out."""
+        """Returns the JSON form, which `from_json` reads; omits default values."""
         return _form().dump_json(self, exclude_defaults=True).decode()
 
     @staticmethod
     def from_json(text: str | bytes) -> Request:
-        """Reads the JSON form of a request. Raises ValueError."""
+        """Reads the JSON form of a request. Raises ValueError for any other text."""
         return _form().validate_json(text)
 
     def from_anywhere(self) -> Request:

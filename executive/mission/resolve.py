@@ -1,4 +1,4 @@
-"""Resolution of a mission: sentences are understood, and names are checked against the world."""
+"""Resolves missions: understands their sentences, and checks their names against the world."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ def mission_from_file(
     knowledge: Knowledge,
     answer: Answerer | None = None,
 ) -> Mission:
-    """Resolves the mission of a file: understands its sentences and checks its names against `knowledge`.
+    """Resolves the mission in a file: understands its sentences and checks its names against `knowledge`.
 
-    `knowledge` includes the file's own (`knowledge_of_mission`). `answer` answers the questions of ambiguous sentences;
-    by default the file's policy decides.
+    `knowledge` includes the knowledge in the file (`knowledge_of_mission`). `answer` answers questions about ambiguous
+    sentences; by default the file's policy decides.
 
     Raises:
         InputError: with file, line and hint, also for a sentence that is not understood, for unknown names, and for
@@ -69,7 +69,7 @@ def mission_from_file(
 
 @dataclass(frozen=True)
 class _Scope:
-    """File of the steps that are resolved, and the chain of files that led to it, itself the last."""
+    """File whose steps are resolved, and the chain of files that use one another, up to and including this file."""
 
     file: Mission
     chain: tuple[Path, ...] = ()
@@ -91,7 +91,7 @@ _Error = Callable[[KeyPath, str, str], InputError]
 
 @dataclass
 class _Resolver:
-    """Resolver of a file and all files that it uses, for one robot in one world."""
+    """Resolves a file and all files that it uses, for one robot in one world."""
 
     parser: DependencyParser
     knowledge: Knowledge
@@ -103,7 +103,7 @@ class _Resolver:
     understood: dict[str, Understanding] = field(default_factory=dict)
 
     def mission(self, file: Mission, chain: tuple[Path, ...]) -> Mission:
-        """Resolves the mission of a file; `chain` are the files that led to it, itself the last."""
+        """Resolves the mission in a file; `chain` are the files that led to it, the file itself last."""
         if file.parts is not None:
             what = "its parts are for several robots, and this is for one"
             hint = "run the file by `errand run`, and name them: 'robots: {alice: spot, bob: fetch}', or --robots"
@@ -128,7 +128,7 @@ class _Resolver:
         return file.model_copy(update=resolved).with_notes(tuple(notes))
 
     def _steps(self, scope: _Scope, steps: Steps) -> Steps:
-        """Resolves steps in order. Raises InputError with all their errors."""
+        """Resolves steps in order. Raises InputError with the errors of all steps."""
         if self.depth == MAX_NESTING:
             what = f"steps are nested more than {MAX_NESTING} deep"
             raise steps[0].error((), what, "write some of them one after the other")
@@ -165,7 +165,7 @@ class _Resolver:
         return step.model_copy(update=self._parts(scope, step.error, step, ()))
 
     def _parts(self, scope: _Scope, error: _Error, model: BaseModel, path: KeyPath) -> dict[str, Any]:
-        """Resolves the steps and conditions in the fields of a model."""
+        """Resolves the steps and conditions in a model's fields."""
         found = {}
         for name, facts in type(model).model_fields.items():
             if name not in Policy.model_fields:
@@ -191,7 +191,7 @@ class _Resolver:
         return value
 
     def _zone(self, error: _Error, zone: ZoneFacts, path: KeyPath) -> ZoneFacts:
-        """Resolves the room of a zone to the world's own name."""
+        """Replaces the room that a zone names by the world's own name for it."""
         if zone.mask is not None:
             what = "a zone of a mission has a room or a polygon, and no mask"
             raise error((*path, "mask"), what, "write a zone with a mask below 'knowledge: zones:'")
@@ -205,7 +205,7 @@ class _Resolver:
         return zone.model_copy(update={"place": room})
 
     def _condition(self, scope: _Scope, error: _Error, condition: Condition, path: KeyPath) -> Condition:
-        """Resolves a condition to the world's own names.
+        """Replaces the names in a condition by the world's own names.
 
         Raises:
             InputError: for an unknown name, a sentence that is no question, or a condition that always or never holds.
@@ -237,9 +237,9 @@ class _Resolver:
         return condition.model_copy(update=self._parts(scope, error, condition, path))
 
     def _command(self, error: _Error, of: Do | Look, path: KeyPath = ()) -> Command:
-        """Resolves the command of a step or of a look to the world's own names.
+        """Replaces the names in the command of a step or a look by the world's own names.
 
-        Raises InputError when a part is no name, or the world does not have it.
+        Raises InputError when a part cannot be parsed, or the world does not have a name.
         """
         try:
             command = of.command
@@ -252,7 +252,7 @@ class _Resolver:
         return in_world_names(command, self.knowledge)
 
     def _person(self, error: _Error, name: str, path: KeyPath) -> str:
-        """Own name of the person, perhaps anybody."""
+        """World's own name for a person, or `ANYBODY`."""
         known = self.knowledge.somebody(ANYBODY if name.strip().lower() == "anybody" else name)
         if known is None:
             hint = suggestion(name, ("anybody", *self.knowledge.people))
@@ -260,7 +260,7 @@ class _Resolver:
         return known
 
     def _door(self, error: _Error, rooms: tuple[str, ...], path: KeyPath) -> tuple[str, str]:
-        """Rooms of the door in the order of the knowledge file."""
+        """Rooms that a door joins, in the order of the knowledge file."""
         facts, named = self.knowledge, list[str]()
         for n, room in enumerate(rooms):
             known = facts.place(room)
@@ -278,7 +278,7 @@ class _Resolver:
         raise error(path, f"no door of {rooms_text} is known", hint)
 
     def _meaning(self, error: _Error, path: KeyPath, sentence: str) -> Understanding:
-        """Understands a sentence, once for all its occurrences. Raises InputError when it is not understood."""
+        """Understands a sentence once, even if it occurs several times. Raises InputError when it is not understood."""
         from executive.language.understand import Status, ask_until_clear, understand
 
         if sentence not in self.understood:
@@ -298,7 +298,7 @@ class _Resolver:
         return meant
 
     def _rounds(self, scope: _Scope, step: ForEach) -> Steps:
-        """Makes one group for each value of a `for_each`. Raises InputError."""
+        """Builds one group of steps for each value of a `for_each`. Raises InputError with the errors of all rounds."""
         place, name = step.place, step.loop.name
         assert place is not None and name is not None
         made = []
@@ -310,7 +310,7 @@ class _Resolver:
         return tuple(made)
 
     def _round_values(self, step: ForEach) -> Sequence[Value]:
-        """Values of the rounds. Raises InputError when there are none or too many, or one is no plain value."""
+        """Values for the rounds. Raises InputError when there are none or too many, or one is not a plain value."""
         at, listed = ("repeat", "for_each"), step.loop.for_each
         if isinstance(listed, str):
             values = list[Value](self._known_values(step.error, listed, at))
@@ -325,7 +325,7 @@ class _Resolver:
         return values
 
     def _known_values(self, error: _Error, of: str, path: KeyPath) -> tuple[str, ...]:
-        """Rooms, people or surfaces of a world, perhaps only those in one room."""
+        """Rooms, people or surfaces in a world, or only the people or surfaces in one room."""
         facts, (kind, _, room) = self.knowledge, of.partition(" in ")
         if kind not in ("rooms", "people", "surfaces") or (kind == "rooms" and room):
             hint = "write a list, or one of rooms, people, people in ROOM and surfaces in ROOM"
@@ -342,7 +342,7 @@ class _Resolver:
         return tuple(name for name, who in people if place is None or inside & {who.at, facts.room(who.at)})
 
     def _refuse_unknown(self, file: Mission, name: str, parameter: Parameter) -> None:
-        """Refuses a parameter whose default is no place, object or person of the world."""
+        """Refuses a parameter with a default that is no place, object or person in the world."""
         known = {
             "place": (self.knowledge.place, self.knowledge.place_names()),
             "object": (self.knowledge.object_name, self.knowledge.object_names()),
@@ -357,7 +357,7 @@ class _Resolver:
                 raise file.error(("parameters", name), what, hint)
 
     def _used(self, scope: _Scope, step: UseMission) -> Mission:
-        """Resolves the mission of the file that a step uses."""
+        """Resolves the mission in the file that a step uses."""
         used_path, chain = _found(scope, step), scope.chain
         if used_path.resolve() in chain:
             names = [one.name for one in (*chain[chain.index(used_path.resolve()) :], used_path)]
@@ -376,13 +376,13 @@ class _Resolver:
 
 
 def _group(step: Step, steps: Steps, name: str) -> Group:
-    """Makes a group of steps in place of a step, with its policy. Any text may be its name."""
+    """Builds a group that replaces a step and keeps its policy; any text may be the group's name."""
     policy = {key: getattr(step, key) for key in Policy.model_fields}
     return Group.model_construct(steps=steps, name=name, **policy).with_place(step.place)
 
 
 def _refuse_decided(error: _Error, expression: str | Expression, path: KeyPath) -> None:
-    """Refuses an expression that cannot be parsed, or compares a reading with a value out of its range."""
+    """Refuses an expression that cannot be parsed, or a comparison that a reading's range decides."""
     try:
         read = Expression(expression) if isinstance(expression, str) else expression
         refuse_certain_comparisons(read, RANGES)
@@ -391,9 +391,9 @@ def _refuse_decided(error: _Error, expression: str | Expression, path: KeyPath) 
 
 
 def _found(scope: _Scope, step: UseMission) -> Path:
-    """Finds the file that a step uses, from the folder of the file with the step.
+    """Finds the file that a step uses, relative to the file that contains the step.
 
-    Raises InputError when there is none, or it lies outside the folder of the first file.
+    Raises InputError when there is no such file, or it lies outside the folder of the first file.
     """
     use, found = step.use, scope.folder / step.use
     home = scope.chain[0].parent if scope.chain else scope.folder.resolve()
@@ -409,7 +409,7 @@ def _found(scope: _Scope, step: UseMission) -> Path:
 
 
 def _refuse_top_keys(used: Mission, user: Mission) -> None:
-    """Refuses keys for a whole run in a used file, unless the using file has the same value."""
+    """Refuses keys that apply to a whole run in a used file, unless the using file has the same value."""
     for key in _ONLY_AT_THE_TOP:
         said = getattr(used, key)
         if key in used.model_fields_set and said is not None and said != getattr(user, key):

@@ -19,9 +19,9 @@ RandomFaults = Annotated[int, Quantity(ge=0, le=100)]
 class Scenario:
     """Scenario of a run: faults in their text form, the number of random faults, and events as plain data.
 
-    `people` are routes by name, `answers` those of people to the robot's questions, and `crowd` is the number of people
-    who wander about. `doors` are doorways with the times at which they close and open, `moves` objects with the time
-    and destination of their move. All points are in the world frame, in metres.
+    `people` are routes by the person's name, `answers` are people's answers to the robot's questions, and `crowd` is
+    the number of people who wander about. `doors` are doorways with the times at which they close and open, `moves` are
+    objects with the time and destination of their move. All points are in the world frame, in metres.
     """
 
     faults: Annotated[
@@ -47,11 +47,11 @@ class Scenario:
 
     @property
     def moving(self) -> set[str]:
-        """Names of the moved people and doors; in one run, only one scenario may move each."""
+        """Names of the people and doors that the scenario moves; in a run, only one scenario may move each."""
         return {*self.people, *(door["name"] for door in self.doors)}
 
     def merge(self, other: Scenario) -> Scenario:
-        """Merges two scenarios."""
+        """Combines two scenarios into one."""
         return Scenario(
             (*self.faults, *other.faults),
             self.random + other.random,
@@ -63,7 +63,7 @@ class Scenario:
         )
 
     def with_drawn(self, faults: tuple[str, ...]) -> Scenario:
-        """Copies the scenario, with drawn faults in place of the random ones."""
+        """Copies the scenario with drawn faults instead of a number of random faults."""
         return replace(self, faults=(*self.faults, *faults), random=0)
 
     def lines(self) -> tuple[str, ...]:
@@ -82,7 +82,7 @@ class Scenario:
 
 
 def _verb(route: Mapping[str, Any]) -> str:
-    """Verb of a person's walk."""
+    """Verb that describes how a person walks."""
     return "is ready to follow" if route.get("follows") else "wanders off" if route.get("wanders") else "sets off"
 
 

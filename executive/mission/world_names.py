@@ -1,4 +1,4 @@
-"""Names of a command in a world: those that the world does not have, and the world's own ones."""
+"""Compares the names in a command with a world's: finds unknown names, and replaces aliases."""
 
 from collections.abc import Iterator, Sequence
 
@@ -9,7 +9,7 @@ from skills.inputs.errors import suggestion
 
 
 def unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
-    """Yields the names that a world does not have: the key, a sentence and a hint for each."""
+    """Yields each name that the world does not have: the command's key, a sentence and a hint."""
 
     def unknown(kind: str, name: str, known: Sequence[str]) -> tuple[str, str]:
         return f"unknown {kind} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
@@ -30,7 +30,7 @@ def unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str,
 
 
 def _wrong_with_people(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
-    """Yields the faults of a command to follow, guide or greet people: the key, a sentence and a hint for each."""
+    """Yields the faults in a command to follow, guide or greet people: the command's key, a sentence and a hint."""
     whom = command.object
     assert command.task is not None and whom is not None
     if whom.name != SPEAKER and (whom.attributes or knowledge.somebody(whom.name) is None):
@@ -46,7 +46,7 @@ def _wrong_with_people(command: Command, knowledge: Knowledge) -> Iterator[tuple
 
 
 def in_world_names(command: Command, knowledge: Knowledge) -> Command:
-    """Replaces the names of a command by the world's own names."""
+    """Replaces the names in a command by the world's own names."""
 
     def named(item: ObjectKind | None) -> ObjectKind | None:
         known = item and (knowledge.object_name(item.name) or knowledge.somebody(item.name))

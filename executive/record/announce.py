@@ -1,4 +1,4 @@
-"""First messages of a log: the run's facts, one message for each command, and the map."""
+"""Publishes the first messages in a log: facts about the run, one message for each command, and the map."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def announce(
 ) -> None:
     """Publishes the run's facts, then one message for each command of a robot.
 
-    `scenario` lists the faults and events of the run, `robots` the kind of each of several robots. Raises KeyError for
-    a class without a number.
+    `scenario` lists the faults and events of the run, `robots` has the kind of each robot if there are several. Raises
+    KeyError if an object class has no number.
     """
     texts = [str(command) for command in commands]
     facts = {"world": world, "seed": seed, "commands": texts, "versions": versions(PACKAGES)}
@@ -56,8 +56,8 @@ def announce(
 def _task_message(command: Command, knowledge: Knowledge) -> Mapping[str, Any]:
     """Encodes a command as numbers.
 
-    Types are class ids, several for a category ("drink"); 0 is Nothing. `goal_x`, `goal_y` are in the world frame (m),
-    NaN where the goal was left open. `cmd_type`: 0 go or take, 1 grasp, 2 find, 3 place, 4 wait, 5 charge.
+    Object types are class ids, several for a category ("drink"), 0 for none. `goal_x` and `goal_y` are in the world
+    frame (m), NaN if the command names no goal. `cmd_type`: 0 go or take, 1 grasp, 2 find, 3 place, 4 wait, 5 charge.
     """
 
     def ids(item: ObjectKind | None) -> tuple[int, ...]:
@@ -80,12 +80,12 @@ def _task_message(command: Command, knowledge: Knowledge) -> Mapping[str, Any]:
 
 
 def command_type(task: Task | None) -> int:
-    """Number of a task: 0 for Nothing, else its position among the tasks, from 1."""
+    """Number of a task: 0 for Nothing, else its place in the list of tasks, counted from 1."""
     return 0 if task is None else [*Task].index(task) + 1
 
 
 def goal_position(knowledge: Knowledge, command: Command) -> tuple[float, float]:
-    """Position of a command's goal, (x, y) in the world frame (m); NaN where it was left open."""
+    """Position of a command's goal, (x, y) in the world frame (m); NaN if the command names no goal."""
     if command.goal is None:
         return math.nan, math.nan
     person = knowledge.person(command.goal)
@@ -97,7 +97,7 @@ def goal_position(knowledge: Knowledge, command: Command) -> tuple[float, float]
 
 
 def versions(packages: Sequence[str]) -> dict[str, str]:
-    """Returns the versions of Python and of packages; "not installed" for a missing one."""
+    """Returns the versions of Python and of packages; "not installed" for a package that is missing."""
     found = {"python": platform.python_version()}
     for package in packages:
         try:

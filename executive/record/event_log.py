@@ -1,6 +1,6 @@
 """Writer of the event log: one MCAP file of JSON messages, stamped by the robot's clock, readable after a kill.
 
-Two runs of one seed give equal logs: wall times stand in one topic only.
+Two runs with the same seed give equal logs, except for the one topic that has wall times.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ Message = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class LoggedMessage:
-    """Message as it is logged: channel, topic, schema, the robot's clock (s), JSON values, and the same as text.
+    """Message as it is logged: channel, topic, schema, robot's clock (s), and the JSON values, also as text.
 
-    The channel of one of several robots has its name before the topic.
+    Among several robots, the channel consists of the robot's name and the topic.
     """
 
     channel: str
@@ -82,13 +82,13 @@ Listener = Callable[[LoggedMessage], None]
 
 
 class EventLog(RunVisitor):
-    """Open event log; it logs all messages of a run that it visits, and once a second the durations of the ticks.
+    """Event log: a visitor that logs all messages of a run, and once a second the durations of the ticks.
 
     Call it to log a message (`skills.api.Publish`); `close` it at the end.
 
-    Messages older than a second of the robot's clock are in the file, so that a killed process leaves a readable log.
-    When the disk is full, nothing more is written, and the log stays readable. `bytes` counts all messages except those
-    with wall times, which differ from run to run.
+    Messages are written to the file within a second of the robot's clock, so that a killed process leaves a readable
+    log. When the disk is full, nothing more is written, and the log stays readable. `bytes` counts all messages except
+    those with wall times, which differ from run to run.
 
     With `apart` each robot's messages go to channels of its own, such as `bob/pose`, so that log viewers keep several
     robots apart; the channel's metadata names the topic.
@@ -115,7 +115,7 @@ class EventLog(RunVisitor):
         self._has_zones = False
 
     def begin(self, settings: RunSettings, worker: Worker) -> None:
-        """Notes the wall time, and the tick period; a tick that takes longer overruns."""
+        """Stores the wall time and the tick period; a tick that takes longer than the period is an overrun."""
         self._tick_limit_s = settings.tick_period_s
         self._start_s = round(time.time() - self._clock.now(), 3)
 
@@ -125,14 +125,14 @@ class EventLog(RunVisitor):
         return message
 
     def tick(self, progress: Progress) -> None:
-        """Collects the duration of the tick on the wall clock, and logs the durations once a second."""
+        """Collects the tick's duration on the wall clock, and logs the durations once a second."""
         self._ticks_s.append(progress.tick_wall_s)
         if progress.now_s - self._ticks_logged_s >= TICKS_EVERY_S:
             self._ticks_logged_s = progress.now_s
             self._log_ticks({"overruns": progress.overruns})
 
     def end(self, result: RunResult) -> None:
-        """Logs the remaining ticks, and the duration of the whole run."""
+        """Logs the remaining durations of ticks, and the duration of the whole run."""
         if self._failure is None:
             self._log_ticks({"overruns": result.overruns, "wall_time_s": result.wall_time_s})
 
@@ -141,11 +141,11 @@ class EventLog(RunVisitor):
         self(WALL, {"start_s": self._start_s, "tick_s": ticks, "limit_s": self._tick_limit_s, **more})
 
     def listen(self, listener: Listener) -> None:
-        """Passes every message to `listener` from now on."""
+        """Passes every later message to `listener`."""
         self._listeners.append(listener)
 
     def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
-        """Logs a message under a topic. Raises ValueError on a closed log, OSError when it cannot be written."""
+        """Logs a message under a topic. Raises ValueError on a closed log, OSError when the file cannot be written."""
         if self._closed:
             raise ValueError("the event log is closed")
         if self._failure is not None:
@@ -183,7 +183,7 @@ class EventLog(RunVisitor):
         self._writer.flush()
 
     def close(self) -> None:
-        """Completes the file; idempotent. Raises OSError when it cannot be written, but not twice for one reason."""
+        """Completes the file; idempotent. Raises OSError when it cannot be written, but only once for each cause."""
         if self._closed:
             return
         self._closed, broken = True, self._failure is not None
@@ -214,7 +214,7 @@ def _plain(value: Any) -> Any:
 
 
 def viewer_messages(topic: str, message: Message, now_s: float) -> Iterator[tuple[str, Message]]:
-    """Iterates over the message as it is logged, and messages that repeat it for viewers, each with its topic."""
+    """Yields the message as it is logged, and copies of it in the form that viewers need, each with its topic."""
     yield topic, compress_picture(_foxglove_form(topic, message, now_s), now_s)
     if topic == DETECTIONS and isinstance(message.get("image"), np.ndarray):
         yield BOXES, box_annotations(message.get("detections", ()), now_s)
@@ -227,7 +227,7 @@ def viewer_messages(topic: str, message: Message, now_s: float) -> Iterator[tupl
 
 
 def _foxglove_form(topic: str, message: Message, now_s: float) -> Message:
-    """Converts paths, scans and joint states to the form of their schema."""
+    """Converts paths, scans and joint states to the form that their Foxglove schema demands."""
     robot, scan, joints = str(message.get("robot", "")), message.get("scan"), message.get("joints")
     if topic == PATH:
         return _path(message, now_s)
@@ -239,7 +239,7 @@ def _foxglove_form(topic: str, message: Message, now_s: float) -> Message:
 
 
 def compress_picture(message: Message, now_s: float) -> Message:
-    """Compresses the numpy picture (RGB or grey, uint8) under "image" of a message, if there is one."""
+    """Compresses the numpy picture (RGB or grey, uint8) under the key "image" of a message, if there is a picture."""
     picture = message.get("image")
     if not isinstance(picture, np.ndarray):
         return message
@@ -253,7 +253,7 @@ def compress_picture(message: Message, now_s: float) -> Message:
 
 
 def box_annotations(detections: Sequence[Message], now_s: float) -> Message:
-    """Converts detections to annotations of the picture: boxes (u0, v0, u1, v1) with class and score."""
+    """Converts detections to annotations for a picture: boxes (u0, v0, u1, v1) with class and score."""
     when, points, texts = stamp(now_s), [], []
     outline = {"outline_color": _BOX_COLOUR, "outline_colors": [], "fill_color": _CLEAR}
     colours = {"text_color": _BOX_COLOUR, "background_color": _BACK}
@@ -267,7 +267,7 @@ def box_annotations(detections: Sequence[Message], now_s: float) -> Message:
 
 
 def planar_pose(x_m: float, y_m: float, yaw_rad: float) -> Message:
-    """Converts a planar pose to position and orientation."""
+    """Converts a planar pose to a position and an orientation in 3D."""
     turn = {"x": 0.0, "y": 0.0, "z": math.sin(yaw_rad / 2), "w": math.cos(yaw_rad / 2)}
     return {"position": {"x": x_m, "y": y_m, "z": 0.0}, "orientation": turn}
 

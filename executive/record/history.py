@@ -1,4 +1,4 @@
-"""Reader of event logs, also of a killed process: the trees at any time, a timeline, the detected objects."""
+"""Reads event logs, even of a killed process: the trees at any time, a timeline, and the detected objects."""
 
 from __future__ import annotations
 
@@ -61,9 +61,9 @@ class Event:
 
 
 def read_events(path: Path) -> tuple[Event, ...]:
-    """Reads all events in the order in which they were written; of a log that was cut off, those before the cut.
+    """Reads all events in the order in which they were written; a truncated log is read up to its last whole event.
 
-    Raises InputError if there is no such file, or it is no event log.
+    Raises InputError if the file is missing or is no event log.
     """
     plain_file(path, most_bytes=MOST_BYTES, hint=_EXISTS)
     try:
@@ -77,7 +77,7 @@ def read_events(path: Path) -> tuple[Event, ...]:
 
 
 def _refuse_other_logs(path: Path) -> None:
-    """Refuses logs of other programs by name. Raises InputError, and what the readers of damaged files raise."""
+    """Raises InputError for a log of another program, and an error of the log reader for a damaged file."""
     with path.open("rb") as file:
         start = file.read(len(_ROS_1))
     kind = {_ROS_1: "a bag of ROS 1", _SQLITE[: len(_ROS_1)]: "a database, perhaps a bag of ROS 2"}.get(start)
@@ -108,13 +108,13 @@ _KEYS: Final = ("node", "from", "to", "cause", "message")
 
 @dataclass(frozen=True)
 class History:
-    """History of a run: the events of one log, and its file."""
+    """History of a run: the events read from one log, and the log's file."""
 
     file: Path
     events: tuple[Event, ...]
 
     def transitions(self) -> Iterator[dict[str, Any]]:
-        """Iterates over the transitions of the nodes: `t` (s), `node`, `from`, `to`, `cause`, `message`."""
+        """Yields the transitions of the nodes: `t` (s), `node`, `from`, `to`, `cause`, `message`."""
         for event in self.events:
             if event.topic == TRANSITIONS:
                 yield {"t": event.data.get("t", event.stamp_s), **{key: event.data.get(key) for key in _KEYS}}
@@ -125,7 +125,10 @@ class History:
         return tuple(sorted({name for event in self.events if (name := robot_of(event))}))
 
     def of_robot(self, name: str) -> History:
-        """Selects the events of one robot, and those of no robot. Raises InputError if the log has no such robot."""
+        """Selects the events of one robot and the events that belong to no robot.
+
+        Raises InputError if the log has no such robot.
+        """
         known = find_robot(name, self.robots)
         if known is None:
             hint = f"there are: {', '.join(self.robots)}" if self.robots else "no robot's messages are in it"
@@ -133,7 +136,7 @@ class History:
         return replace(self, events=tuple(event for event in self.events if robot_of(event) in ("", known)))
 
     def trees(self, until_s: float | None = None) -> tuple[NodeView, ...]:
-        """Returns the trees in the order of their beginning, in their last state or at a time (s, robot's clock).
+        """Returns the trees in the order in which they began, in their last state or at a time (s, robot's clock).
 
         Raises InputError if the log holds no tree, or a broken one.
         """
@@ -150,12 +153,12 @@ class History:
 
 
 def robot_of(event: Event) -> str:
-    """Name of the robot that an event belongs to; empty if it belongs to none."""
+    """Name of the robot that an event belongs to; empty if it belongs to no robot."""
     return str(event.data.get("robot") or event.data.get("robot_name") or "")
 
 
 def read_history(path: Path) -> History:
-    """Reads the history of a log, even of one that was cut off. Raises InputError for a file that is no log."""
+    """Reads the history of a run from its log, even a truncated one. Raises InputError for a file that is no log."""
     return History(path, read_events(path))
 
 
@@ -168,18 +171,18 @@ def logged_state(data: Mapping[str, Any]) -> NodeState:
 
 @dataclass(frozen=True)
 class _LoggedTree:
-    """Logged message of a tree, and the states of its nodes by path id."""
+    """Tree as it was logged, and the states of its nodes by path id."""
 
     data: Mapping[str, Any]
     states: dict[str, NodeState] = field(default_factory=dict)
 
     def view(self) -> NodeView:
-        """View of the tree. Raises KeyError, TypeError or ValueError for a broken one."""
+        """View of the tree. Raises KeyError, TypeError or ValueError if the logged tree is malformed."""
         return logged_view(self.data["root"], self.states)
 
 
 def _apply(event: Event, found: list[_LoggedTree]) -> None:
-    """Adds a logged tree, or applies a change of a node to the robot's latest tree."""
+    """Adds a logged tree, or applies a logged change of a node to the robot's latest tree."""
     if event.topic == TREE:
         found.append(_LoggedTree(event.data))
     elif event.topic in (TRANSITIONS, ACTIVITY) and found:
@@ -187,7 +190,7 @@ def _apply(event: Event, found: list[_LoggedTree]) -> None:
 
 
 def _latest(found: Sequence[_LoggedTree], robot: Any) -> _LoggedTree:
-    """The robot's latest tree, or the latest tree if no robot is named."""
+    """The robot's latest tree, or the latest of all trees if the robot has none."""
     mine = [each for each in found if each.data.get("robot") == robot]
     return mine[-1] if mine else found[-1]
 
@@ -207,17 +210,17 @@ class Entry:
 
 
 def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[Entry]:
-    """Iterates over the lines of a log's timeline.
+    """Yields the lines of a log's timeline.
 
-    `leaves_only` omits changes of inner nodes that did not fail, and ticks that took too long.
+    With `leaves_only`, the timeline omits changes of inner nodes that did not fail, and ticks that took too long.
     """
     return (replace(entry, robot=robot_of(event)) for event, entry in _entries(events, leaves_only))
 
 
 def _ticks_of(events: Iterable[Event]) -> Iterator[tuple[Sequence[Event], Collection[str]]]:
-    """Iterates over the events of each tick, with the path ids of the expected failures at its end.
+    """Yields the events of each tick, and the path ids of the failures that are expected at its end.
 
-    Speech stands behind the changes of nodes, which are logged when the tick ends.
+    Speech comes after the changes of nodes, although these are logged only when the tick ends.
     """
     found = list[_LoggedTree]()
     for _, group in groupby(events, key=attrgetter("stamp_s")):
@@ -312,11 +315,11 @@ _TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
 
 
 def seen_objects(events: Iterable[Event]) -> tuple[ObjectObservation, ...]:
-    """Returns the confirmed objects of a run, each once, in the order of the searches.
+    """Returns the objects confirmed in a run, each once, in the order of the searches.
 
     An object is confirmed as in `detect`: seen from two viewpoints, and of the same most probable class at the end of
-    the search. Objects without a class are left out. Two objects of one class from different searches are the same if
-    they are within `SAME_WITHIN_M`. The log has no sizes, so sizes are 0; the score is the belief.
+    the search. Objects without a class are omitted. Two objects of one class from different searches are the same if
+    they are within `SAME_WITHIN_M`. Sizes are 0, because the log has none; the score is the probability of the class.
     """
     searches: list[list[ObjectObservation]] = []
     open_searches: dict[str, int] = {}

@@ -1,6 +1,6 @@
-"""Messages that other tools expect: laser scans, joint states, transforms of the body, and the map as a grid.
+"""Converts messages for other tools: laser scans, joint states, transforms of the body, and the map as a grid.
 
-Scans and joint states are measured; transforms and the grid follow from the messages of pose and map.
+Scans and joint states are measured; transforms and the grid are computed from logged poses and the logged map.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ Message = Mapping[str, Any]
 
 
 def ros_name(robot: str) -> str:
-    """Name of a robot in topics and frames: "Alice" is "alice"."""
+    """Name of a robot as used in topics and frames: "Alice" becomes "alice"."""
     return slug(robot).replace("-", "_")
 
 
 def body_frame(robot: str) -> str:
-    """Name of the frame of a robot's body."""
+    """Name of the frame that is fixed to a robot's body."""
     return f"{ros_name(robot)}/body"
 
 
 def scan_message(scan: Scan, robot: str) -> Message:
-    """Encodes the ring of a LiDAR scan that is nearest to the horizontal; a range of 0 is a beam without a return."""
+    """Encodes the ring of a LiDAR scan that is nearest to the horizontal; range 0 is a beam without a return."""
     ring = int(np.argmin(np.abs(scan.elevations_rad)))
     ranges = scan.ranges_m[ring, ::_STEP] * np.cos(scan.elevations_rad[ring])
     p, q = scan.X_BL.translation(), scan.X_BL.rotation().ToQuaternion()
@@ -59,7 +59,7 @@ def scan_message(scan: Scan, robot: str) -> Message:
 
 
 def joints_message(joints: Joints, robot: str) -> Message:
-    """Encodes positions, velocities and efforts of the joints."""
+    """Encodes positions, velocities and efforts of the robot's joints."""
     states = [
         {
             "name": name,
@@ -73,7 +73,7 @@ def joints_message(joints: Joints, robot: str) -> Message:
 
 
 def transform_of(pose: Message) -> Message:
-    """Transform from the world to the body, of a message of the robot's pose."""
+    """Transform from the world to the body, read from a message with the robot's pose."""
     return {
         "timestamp": pose["timestamp"],
         "parent_frame_id": pose["frame_id"],
@@ -84,7 +84,7 @@ def transform_of(pose: Message) -> Message:
 
 
 def grid_of(data: Message, now_s: float) -> Message:
-    """Map as a grid of occupancies from 0 to 100, 255 where unknown; row 0 is at the smallest y."""
+    """Map as an occupancy grid with values from 0 to 100, and 255 for unknown; row 0 is at the smallest y."""
     grey = grey_map(data)
     cells = occupancies(grey).astype(np.uint8)
     cell = data["resolution_m"]
@@ -102,7 +102,7 @@ def grid_of(data: Message, now_s: float) -> Message:
 
 
 def scene_of(zones: Sequence[Message], now_s: float) -> Message:
-    """Zones as outlines on the floor with their rules; it replaces all zones before."""
+    """Zones with their rules as outlines on the floor; the message replaces all zones sent before."""
     when = stamp(now_s)
     level = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
     entities = []
@@ -122,13 +122,13 @@ def scene_of(zones: Sequence[Message], now_s: float) -> Message:
 
 
 def grey_map(data: Message) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """Grey picture of a message of the map, row 0 at the smallest y."""
+    """Grey picture from a map message, with row 0 at the smallest y."""
     content = np.frombuffer(base64.b64decode(data["data"]), np.uint8)
     return np.asarray(cv2.imdecode(content, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)[::-1]
 
 
 def occupancies(grey: np.ndarray[Any, np.dtype[np.uint8]]) -> np.ndarray[Any, np.dtype[np.int8]]:
-    """Occupancies of a map's picture as ROS has them: 0 free, 100 occupied, -1 unknown."""
+    """Occupancies of a map's picture in the convention of ROS: 0 free, 100 occupied, -1 unknown."""
     return np.select([grey == 0, grey == 255], [100, 0], -1).astype(np.int8)
 
 

@@ -1,7 +1,7 @@
-"""Converter of an event log to a ROS 2 bag (MCAP with CDR messages) that RViz, Foxglove and `ros2 bag` read.
+"""Converts an event log to a ROS 2 bag (MCAP with CDR messages) that RViz, Foxglove and `ros2 bag` read.
 
 The map, transforms, laser scans, joint states, poses, paths and pictures become the usual message types; all others
-become `std_msgs/String` with their JSON. Times are those of the wall clock, if the log has its start.
+become `std_msgs/String` with their JSON. Times are those of the wall clock, if the log states when it began.
 """
 
 from __future__ import annotations

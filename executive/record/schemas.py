@@ -1,4 +1,4 @@
-"""Topics of the event log and their JSON schemas (`schemas.yaml`); images and poses have Foxglove's schemas."""
+"""Maps the topics of the event log to their JSON schemas (`schemas.yaml`); images and poses have Foxglove's schemas."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Schema:
 
 @cache
 def schemas() -> Mapping[str, Schema]:
-    """Returns the schemas by topic."""
+    """Returns the schemas by the topic that they belong to."""
     data = dict(read_yaml(Path(__file__).with_name("schemas.yaml")).data)
     types = data.pop("types")
     found = dict[str, Schema]()
@@ -76,12 +76,12 @@ def schemas() -> Mapping[str, Schema]:
 
 
 def schema_of(topic: str, message: Mapping[str, Any]) -> Schema:
-    """Returns the schema of a topic: one for pictures of any topic, and an open one for unknown topics."""
+    """Returns a topic's schema: the picture schema for any topic with pictures, an open schema for an unknown topic."""
     known = schemas()
     return known[_PICTURE] if message.get("format") == "jpeg" else known.get(topic, known[_OTHERS])
 
 
 def stamp(time_s: float) -> dict[str, int]:
-    """Converts seconds to the time of the message formats: seconds and nanoseconds."""
+    """Converts seconds to a time in the message formats: seconds and nanoseconds."""
     nanoseconds = round(time_s * 1e9)
     return {"sec": nanoseconds // 10**9, "nsec": nanoseconds % 10**9}

@@ -1,4 +1,4 @@
-"""Counters of what a run computed, equal for equal seeds, and its CPU time by subsystem."""
+"""Counts what a run computed, equal for equal seeds, and measures CPU time by subsystem."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ResultT = TypeVar("ResultT")
 
 
 class Work:
-    """Counters by name (`skills.api.WorkCounter`), which threads may share."""
+    """Counters by name (`skills.api.WorkCounter`), which several threads may use at once."""
 
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
@@ -34,7 +34,7 @@ class Work:
 
 
 class CountedDetector(DetectorWrapper):
-    """Detector that counts the pictures of another one by method."""
+    """Detector that counts the pictures passed to another detector, by method."""
 
     def __init__(self, detector: Detector, work: Work) -> None:
         super().__init__(detector)
@@ -50,7 +50,7 @@ OTHER: Final = "other threads and the end"
 
 
 class Profile:
-    """Profile of CPU seconds by subsystem; a second counts once, for the innermost timed call of its thread."""
+    """CPU seconds by subsystem; each second counts once, for the innermost timed call of its thread."""
 
     def __init__(self) -> None:
         self._spent: dict[str, float] = {}
@@ -59,11 +59,11 @@ class Profile:
         self._began_s: float | None = None
 
     def timed(self, name: str, call: Callable[..., ResultT]) -> Callable[..., ResultT]:
-        """Wraps a call so that its time counts for the subsystem of this name."""
+        """Wraps a call so that its time counts for the named subsystem."""
 
         @functools.wraps(call)
         def timed_call(*arguments: Any, **options: Any) -> ResultT:
-            """Adds the time of the call, without the timed calls within, to the subsystem's time."""
+            """Adds the call's time, without the time of timed calls inside it, to the subsystem's time."""
             begun_s = self.enter()
             try:
                 return call(*arguments, **options)
@@ -73,12 +73,12 @@ class Profile:
         return timed_call
 
     def enter(self) -> float:
-        """Notes that a call begins in this thread; returns the thread's CPU time (s)."""
+        """Records that a call begins in this thread; returns the thread's CPU time (s)."""
         self._calls().append(0.0)
         return time.thread_time()
 
     def leave(self, name: str, begun_s: float) -> None:
-        """Notes that the last call of a subsystem has ended."""
+        """Records that the last call in this thread has ended, and adds its time to a subsystem."""
         whole_s, calls = time.thread_time() - begun_s, self._calls()
         within_s = calls.pop()
         if calls:
@@ -87,12 +87,12 @@ class Profile:
             self._spent[name] = self._spent.get(name, 0.0) + whole_s - within_s
 
     def attach(self, name: str, owner: object, *methods: str) -> None:
-        """Times methods of one object from now on."""
+        """Times the named methods of one object from now on."""
         for method in methods:
             setattr(owner, method, self.timed(name, getattr(owner, method)))
 
     def begin(self) -> None:
-        """Notes that the run begins; CPU time until now counts as START."""
+        """Records that the run begins; CPU time until now counts as START."""
         self._began_s = time.process_time()
 
     def table(self) -> Mapping[str, float]:
@@ -103,7 +103,7 @@ class Profile:
         return {**spent, OTHER: max(0.0, other_s), START: began_s}
 
     def _calls(self) -> list[float]:
-        """Stack of this thread's timed calls: for each the time (s) that was spent in the calls within."""
+        """Stack of this thread's timed calls: for each the time (s) spent in timed calls inside it."""
         if not hasattr(self._inner, "calls"):
             self._inner.calls = []
         calls: list[float] = self._inner.calls
@@ -111,7 +111,7 @@ class Profile:
 
 
 def lines(table: Mapping[str, float]) -> tuple[str, ...]:
-    """Formats the table as text: subsystem, CPU seconds, share of all."""
+    """Formats the table as text: subsystem, CPU seconds, fraction of the total."""
     whole_s = sum(table.values()) or 1.0
     rows = [f"{name:<28}{spent_s:8.2f} s{100 * spent_s / whole_s:7.1f} %" for name, spent_s in table.items()]
     return (f"{'CPU time by subsystem':<28}{whole_s:8.2f} s", *rows)

@@ -66,7 +66,7 @@ def _for_any_thread(control: type[Control]) -> type[Control]:
 
 @_for_any_thread
 class Control:
-    """Control of one run. `attended` says that somebody is there to answer questions.
+    """Controls one run from outside. With `attended`, an operator is there to answer questions.
 
     While a run is held, and while an attended run has an open question, simulated time passes at most `pace` times as
     fast as the wall clock (None: without a limit).
@@ -106,7 +106,7 @@ class Control:
         )
 
     def wait(self, version: int, timeout_s: float | None = None) -> ControlState:
-        """Blocks until the state is newer than `version`, or the time on the wall clock is over; returns the state."""
+        """Blocks until the state is newer than `version` or the timeout (wall clock) expires; returns the state."""
         self._changed.wait_for(lambda: self._version > version, timeout_s)
         return self.state
 
@@ -125,7 +125,7 @@ class Control:
         return self._holds.get((None, Mode.PAUSED))
 
     def resume(self, *, robot: str | None = None) -> None:
-        """Ends a pause, a breakpoint or steps, or one robot's own pause; a pressed stop button stays pressed."""
+        """Ends a pause, a breakpoint or stepping, or one robot's own pause; a pressed stop button stays pressed."""
         if robot is None:
             self._at = self._stride = None
         self._end_hold(robot, Mode.PAUSED, "resume", "the mission goes on")
@@ -138,10 +138,10 @@ class Control:
             self.resume()
 
     def step(self, ticks: int | None = None) -> None:
-        """Runs until a node changes its status, or for some ticks, and pauses again.
+        """Runs until a node changes its status, or for the given number of ticks, and then pauses again.
 
-        Skills in motion are suspended between steps, so a few ticks may be too short for any motion.
-        Raises ValueError when `ticks` is below 1.
+        Skills in motion are suspended between steps, so a few ticks may be too short for any motion. Raises ValueError
+        when `ticks` is below 1.
         """
         if ticks is not None and ticks < 1:
             raise ValueError(f"a step of {ticks} ticks: at least 1 is needed")
@@ -150,10 +150,9 @@ class Control:
         self._note("step", "until a node changes" if ticks is None else f"for {ticks} ticks")
 
     def cancel(self, reason: str = "cancelled by the operator", *, robot: str | None = None) -> None:
-        """Ends the run, or one robot's mission, and its pause; of several reasons the first counts.
+        """Ends the run or one robot's mission, even if it is paused; the first of several reasons counts.
 
-        A second call ends them at once, without the steps under `always`. Raises ValueError when the run has no such
-        robot.
+        A second call ends them at once, without the steps under `always`. Raises ValueError for an unknown robot.
         """
         if robot is not None:
             self._refuse_stranger(robot)
@@ -170,7 +169,7 @@ class Control:
             self._note("cancel", f"once more: {reason}")
 
     def press(self, button: str) -> None:
-        """Presses a button. Raises ValueError when no mission of the run waits for it or decides by it."""
+        """Presses a button. Raises ValueError when no mission of the run waits for it or uses it in a condition."""
         if self._begun and button not in self._buttons:
             known = f"there are: {', '.join(self._buttons)}" if self._buttons else "there are none"
             raise ValueError(f"the run has no button '{button}'; {known}")
@@ -190,7 +189,7 @@ class Control:
         self._hold(robot, Mode.STOPPED, "stop button", reason)
 
     def release_stop_button(self, *, robot: str | None = None) -> None:
-        """Releases the stop button of all robots, or of one; a pause that was there before stays."""
+        """Releases the stop button of all robots or of one robot; an earlier pause remains."""
         self._end_hold(robot, Mode.STOPPED, "stop button released", "the stop button is released")
 
     def stop_pressed(self, robot: str) -> str | None:
@@ -210,26 +209,26 @@ class Control:
             self._note("breakpoint cleared", path_id)
 
     def preempt(self, tree: CompiledTree) -> None:
-        """Inserts a mission before the rest of the present one, which is suspended and continues afterwards.
+        """Begins a mission at once; the present mission is suspended and continues afterwards.
 
-        Raises ValueError when the run has no such robot, or the mission is under way already.
+        Raises ValueError when the run has no such robot, or when the mission is already under way or requested.
         """
         self._request(MissionRequest(tree, Turn.FIRST), "preempt", f"first '{tree.mission_name}'")
 
     def then(self, tree: CompiledTree) -> None:
-        """Appends a mission to the one that the robot began with. Raises ValueError like `preempt`."""
+        """Appends a mission after the mission that the robot began with. Raises ValueError like `preempt`."""
         self._request(MissionRequest(tree, Turn.LATER), "then", f"afterwards '{tree.mission_name}'")
 
     def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
-        """Gives up the present mission, or the mission `instead_of`, and begins another in its place.
+        """Ends the present mission, or the mission `instead_of`, and begins another mission in its place.
 
-        A mission `instead_of` that still waits never begins; one that is suspended or over stays as it is, and the
-        other begins as with `preempt`. Raises ValueError when the run has no such robot.
+        A mission `instead_of` that still waits never begins; one that is suspended or has ended remains so, and the
+        other mission begins as with `preempt`. Raises ValueError when the run has no such robot.
         """
         self._request(MissionRequest(tree, Turn.INSTEAD, instead_of), "replace", f"instead '{tree.mission_name}'")
 
     def answer(self, question_id: str, text: str) -> None:
-        """Answers an open question. Raises ValueError when it is not open, or `text` is none of its options."""
+        """Answers an open question. Raises ValueError when it is not open, or `text` is none of the choices."""
         pending = self._questions.get(question_id)
         if pending is None:
             raise ValueError(f"the question '{question_id[:80]}' is not open")
@@ -244,7 +243,7 @@ class Control:
         self._close_question(pending, said, "answer", text)
 
     def begin(self, missions: Mapping[str, CompiledTree]) -> None:
-        """Notes that the run begins. Raises ValueError for a breakpoint at an unknown node, and for a second run."""
+        """Records that the run begins. Raises ValueError for a breakpoint at an unknown node, and for a second run."""
         if self._begun:
             raise ValueError("a Control controls one run only; make another")
         self._begun = True
@@ -254,7 +253,7 @@ class Control:
             self._refuse_unknown(path_id)
 
     def mission_begun(self, robot_name: str, tree: CompiledTree) -> None:
-        """Notes that a mission begins, on top of those that the robot has begun. Idempotent."""
+        """Records that a robot begins a mission, which interrupts the robot's other missions. Idempotent."""
         before = self._missions.get(robot_name, ())
         if before[-1:] == (tree.mission_name,):
             return
@@ -264,12 +263,12 @@ class Control:
         self._bump()
 
     def mission_ended(self, robot_name: str) -> None:
-        """Notes that a robot's present mission is over."""
+        """Records that a robot's present mission has ended."""
         self._missions[robot_name] = self._missions.get(robot_name, ())[:-1]
         self._bump()
 
     def poll(self) -> ControlRequests:
-        """Returns the present requests; new missions and events are handed out once."""
+        """Returns the present requests; each new mission and each event is returned only once."""
         if self._requests is self._lasting and not self._holds:
             return self._requests
         paused = None if self._stride is not None else self._holds.get((None, Mode.PAUSED))
@@ -281,7 +280,7 @@ class Control:
         return requests
 
     def note_tick(self, *, changed: bool) -> None:
-        """Notes that the trees were ticked, and ends a step that is done; `changed`: a node changed its status."""
+        """Records a tick of the trees, and ends a step that is complete; with `changed`, a node changed its status."""
         if self._stride is None or (self._stride == 0 and not changed):
             return
         self._stride = self._stride - 1 if self._stride > 1 else None
@@ -289,13 +288,13 @@ class Control:
             self._bump()
 
     def stop_at_breakpoint(self, path_id: str) -> None:
-        """Pauses the run, which has come to a breakpoint."""
+        """Pauses a run that has reached a breakpoint."""
         self._holds[None, Mode.PAUSED] = why = f"at the breakpoint {path_id}"
         self._at, self._stride = path_id, None
         self._note("breakpoint", why)
 
     def note_lease(self, robot_name: str, why: str | None) -> None:
-        """Notes that a robot's lease was lost, and `why`, or that it is back (None)."""
+        """Records that a robot has lost its lease, with the reason `why`, or that it has the lease again (None)."""
         self._holds.pop((robot_name, Mode.LEASE_LOST), None)
         if why is not None:
             self._holds[robot_name, Mode.LEASE_LOST] = why
@@ -317,9 +316,9 @@ class Control:
         return remark
 
     def tell(self, text: str, *, robot: str | None = None) -> bool:
-        """Passes a person's remark to the skills of one robot, or of all, that wait to be ended by one.
+        """Passes a person's remark to the waiting skills of one robot, or of all robots.
 
-        Returns whether a skill waited for it; each skill hears one remark.
+        Returns whether a skill was waiting; each skill hears one remark and then stops waiting.
         """
         heard = [each for each in self._remarks if each.waits and robot in (None, each.robot)]
         for each in heard:
@@ -329,7 +328,7 @@ class Control:
         return bool(heard)
 
     def _take_default(self, pending: PendingAnswer, why: str) -> None:
-        """Answers a question by its default, and notes the reason. May be called from any thread."""
+        """Answers a question by its default, and records the reason. May be called from any thread."""
         with self._changed:
             if pending.answer is None:
                 self._close_question(pending, pending.open.question.default, "question over", why)
@@ -340,23 +339,23 @@ class Control:
         self._note(what, f"{pending.open.id}: {message}")
 
     def extend_questions(self, duration_s: float) -> None:
-        """Extends the time of all questions by the time (s, robot's clock) for which the run was held."""
+        """Extends the time limit of all questions by the time (s, robot's clock) for which the run was held."""
         for pending in self._questions.values():
             pending.open = replace(pending.open, until_s=pending.open.until_s + duration_s)
 
     def rest(self, duration_s: float) -> None:
-        """Waits on the wall clock (s), shorter when something is requested meanwhile."""
+        """Waits on the wall clock for a time (s); returns earlier when somebody makes a request."""
         seen = self._version
         self._changed.wait_for(lambda: self._version > seen, duration_s)
 
     @property
     def slow(self) -> bool:
-        """Returns whether simulated time must not run ahead of the people who watch."""
+        """Returns whether simulated time is limited to `pace`, because the run is held or an operator has to answer."""
         held = self._mode().mode is not Mode.RUNNING or bool(self._holds)
         return held or (self.attended and bool(self._questions))
 
     def end(self) -> tuple[Event, ...]:
-        """Notes that the run is over; returns the events that were not handed out yet."""
+        """Records that the run has ended; returns the events that `poll` has not returned yet."""
         self._ended = True
         self._questions.clear()
         events = self._requests.events
@@ -365,7 +364,7 @@ class Control:
         return events
 
     def _mode(self, robot: str | None = None) -> RobotMode:
-        """Mode of a robot, or of the whole run, by the strongest reason not to move."""
+        """Mode of a robot, or of the whole run, from the strongest reason not to move."""
         if self._ended:
             return RobotMode(Mode.ENDED, self._requests.cancel or "")
         for mode in _REASONS:
@@ -377,7 +376,7 @@ class Control:
         return RobotMode(Mode.READY if ready else Mode.RUNNING)
 
     def _hold(self, robot: str | None, mode: Mode, what: str, reason: str) -> None:
-        """Makes a robot, or all robots, stand still. Raises ValueError when the run has no such robot."""
+        """Makes one robot or all robots stand still. Raises ValueError when the run has no such robot."""
         if robot is not None:
             self._refuse_stranger(robot)
         if self._holds.get((robot, mode)) != reason:
@@ -393,7 +392,7 @@ class Control:
             raise ValueError(f"robot '{robot}' is not in this run; there are: {', '.join(self._missions)}")
 
     def _request(self, request: MissionRequest, what: str, message: str) -> None:
-        """Requests a mission. Raises ValueError like `preempt`; INSTEAD may be the mission under way once more."""
+        """Adds a request for a mission. Raises ValueError like `preempt`, except that INSTEAD may repeat a mission."""
         robot, name = request.tree.robot_name, request.tree.mission_name
         self._refuse_stranger(robot)
         others = [each.tree for each in self._requests.missions if each.turn is not Turn.INSTEAD]
@@ -422,7 +421,7 @@ class Control:
 
 
 class PendingAnswer:
-    """Question that waits for its answer (`skills.api.Asked`); when its time is over, the default is the answer."""
+    """Question that waits for its answer (`skills.api.Asked`); after the time limit, the default becomes the answer."""
 
     def __init__(self, opened: OpenQuestion, clock: Clock, take_default: Callable[[PendingAnswer, str], None]) -> None:
         self.open = opened
@@ -430,7 +429,7 @@ class PendingAnswer:
         self._clock, self._take_default = clock, take_default
 
     def done(self) -> bool:
-        """Returns whether there is an answer; takes the default when the time is over."""
+        """Returns whether there is an answer; takes the default when the time limit has passed."""
         if self._clock.now() >= self.open.until_s - 1e-9:
             self._take_default(self, f"nobody answered in time, so '{self.open.question.default}'")
         return self.answer is not None

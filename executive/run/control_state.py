@@ -9,7 +9,7 @@ from skills.api import Question
 
 
 class Mode(enum.Enum):
-    """State of a run; of several reasons not to move, the strongest counts."""
+    """State of a run; when several reasons stop the robots, the strongest reason determines the state."""
 
     READY = "ready"  # it has not begun
     RUNNING = "running"  # trees are ticked
@@ -48,34 +48,34 @@ class OpenQuestion:
 
 @dataclass
 class PendingRemark:
-    """Remark for which a robot's skill waits (`skills.api.Listen`); `waits` until it is made or withdrawn."""
+    """Remark that a robot's skill waits for (`skills.api.Listen`); `waits` is False once the skill stops waiting."""
 
     robot: str
     waits: bool = True
     text: str | None = None
 
     def done(self) -> bool:
-        """Returns whether a person has spoken."""
+        """Returns whether a person has made the remark."""
         return self.text is not None
 
     def result(self) -> str:
-        """Returns what the person said. Raises RuntimeError before that."""
+        """Returns what the person said. Raises RuntimeError when nobody has spoken yet."""
         if self.text is None:
             raise RuntimeError("nobody has spoken yet")
         return self.text
 
     def withdraw(self) -> None:
-        """Ends the wait."""
+        """Stops waiting for the remark."""
         self.waits = False
 
 
 @dataclass(frozen=True)
 class ControlState:
-    """State of a run's control at one moment.
+    """State of a run at one moment, as the control shows it.
 
     `version` grows with every change. `mode` is the mode of the whole run, `robots` has the mode of each robot.
-    `missions` lists for each robot the missions begun and not ended, the present one last. `at` is the path id of the
-    breakpoint at which the run waits; `buttons` are the buttons that missions wait for or decide by.
+    `missions` lists the missions that each robot has begun and not ended, the present mission last. `at` is the path id
+    of the breakpoint at which the run waits; `buttons` are the buttons that missions wait for or use in conditions.
     """
 
     version: int = 0
@@ -98,7 +98,7 @@ class Event:
 
 
 class Turn(enum.Enum):
-    """Order in which a robot does a requested mission and its present one."""
+    """Order in which a robot executes a requested mission and its present mission."""
 
     FIRST = "first"  # the present mission is suspended, and continues afterwards
     INSTEAD = "instead"  # the present mission, or one that waits, is given up
@@ -107,7 +107,7 @@ class Turn(enum.Enum):
 
 @dataclass(frozen=True)
 class MissionRequest:
-    """Request for one more mission; with INSTEAD, `instead_of` names the mission to give up (None: the present one)."""
+    """Request for another mission; INSTEAD replaces the mission `instead_of` (None: the present mission)."""
 
     tree: CompiledTree
     turn: Turn
@@ -118,8 +118,9 @@ class MissionRequest:
 class ControlRequests:
     """Requests to the run at one moment.
 
-    `insists` is set when a cancelled run was cancelled once more. `hold` is the reason why all robots stand still,
-    `holds` has the reasons for single robots. `cancels` has the robots whose missions end, each with the reason.
+    `insists` is set when a run was cancelled twice, and must end at once. `hold` is the reason why all robots stand
+    still, `holds` has the reasons for single robots. `cancels` has pairs of a robot whose mission must end and the
+    reason.
     """
 
     cancel: str | None = None
@@ -133,9 +134,9 @@ class ControlRequests:
 
     @property
     def of_robots(self) -> bool:
-        """Returns whether there are requests to single robots, or robots that must stand still."""
+        """Returns whether single robots have requests, or any robot must stand still."""
         return bool(self.missions or self.cancels or self.holds) or self.hold is not None
 
     def holds_robot(self, robot_name: str) -> bool:
-        """Returns whether a robot must stand still, alone or with all others."""
+        """Returns whether this robot must stand still, by a request for it alone or for all robots."""
         return self.hold is not None or robot_name in self.holds

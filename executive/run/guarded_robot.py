@@ -50,7 +50,7 @@ class GuardedRobot(RobotWrapper):
     A verb raises `VerbHung` when it takes too long (see `Watchdog`), and `GarbageError` when its answer has the wrong
     type, numbers that are not finite, or a stamp before the clock's beginning.
 
-    After `claim`, skills use `token` as their lease for the whole run; it stands for the robot's present lease.
+    After `claim`, skills use `token` as their lease for the whole run, even if the robot's real lease is renewed.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class GuardedRobot(RobotWrapper):
         self._lease: Lease | None = None
 
     def claim(self, holder: str) -> Lease:
-        """Acquires the lease; returns the token that stands for it. Raises LeaseError."""
+        """Acquires the robot's lease; returns the token that stands for the lease. Raises LeaseError if it is taken."""
         self._holder = holder
         self.token = self._lease = self.acquire_lease(holder)
         return self.token
@@ -84,7 +84,7 @@ class GuardedRobot(RobotWrapper):
         return f"{counts.holder} holds the lease of {self.name}" if counts else "the lease was given back"
 
     def regain_lease(self) -> bool:
-        """Acquires the lease again if it is free; returns whether that worked."""
+        """Acquires the lease again if it is free; returns whether the run has the lease now."""
         if self.lease_holder() is not None:
             return False
         try:
@@ -119,7 +119,7 @@ class GuardedRobot(RobotWrapper):
         return answer
 
     def _elsewhere(self, verb: str, call: Callable[[], AnswerT], limit_s: float) -> AnswerT:
-        """Calls a verb outside the main thread; `image` without a limit, since a renderer is bound to its thread."""
+        """Calls a verb outside the main thread; `image` has no time limit, since a renderer is tied to its thread."""
         if in_lock_step_job():
             if verb in _NEVER_CHANGING:
                 return call()
@@ -133,7 +133,7 @@ def garbage_check(verb: str) -> Check | None:
 
 
 def _typed(kind: type[AnswerT], check: Callable[[AnswerT], str | None] = lambda answer: None) -> Check:
-    """Checks the type, then the contents by `check`; an exception of `check` is a defect of the answer as well."""
+    """Checks the type and then the contents of an answer; an exception of `check` counts as a defect of the answer."""
 
     def whole(answer: Any) -> str | None:
         if not isinstance(answer, kind) or (kind is int and isinstance(answer, bool)):
@@ -151,11 +151,11 @@ def _or_none(check: Check) -> Check:
 
 
 def _reading(kind: type[Any], more: Check = lambda reading: None) -> Check:
-    """Checks the type, the stamp, that all fields annotated as numbers are finite, and what `more` checks."""
+    """Checks the type and stamp of an answer, that its numeric fields are finite, and what `more` checks."""
     numbers = [(each.name, _GOOD[str(each.type)]) for each in fields(kind) if str(each.type) in _GOOD]
 
     def check(reading: Any) -> str | None:
-        """Returns the defect of a reading, or None."""
+        """Returns the defect of a reading, or None if the reading is valid."""
         if not reading.stamp_s >= 0.0:
             return f"a stamp of {reading.stamp_s} s"
         bad = next((name for name, good in numbers if not good(getattr(reading, name))), None)

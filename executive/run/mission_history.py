@@ -1,4 +1,4 @@
-"""History of a mission: the executions of its parts, its findings, its speech, and the text of its claim."""
+"""Records a mission's history: executions of its steps, findings and speech; composes the text of its claim."""
 
 import math
 from collections import Counter
@@ -30,8 +30,8 @@ _ENDED: Final = (Status.SUCCESS, Status.FAILURE)
 class HistoryKeys:
     """Blackboard keys of one mission's history: its findings, its speech, and the time when its robot last drove.
 
-    After a restart, `answered_before` has the nodes that repeat their answer, and `ended_before` those that end a
-    second time because they had ended before the restart.
+    After a restart, `answered_before` has the nodes that will repeat an answer, and `ended_before` has the nodes that
+    will end again because they had already ended before the restart.
     """
 
     findings: str
@@ -54,10 +54,10 @@ def is_speech(node: NodeSpec) -> bool:
 
 
 class Executions:
-    """Record of the executions of a mission's parts and of its speech, on the blackboard, which outlives a restart.
+    """Record of when a mission's steps and speech were executed; it lies on the blackboard and survives a restart.
 
     The run calls `note_visit` with each node that a tick visits, then `after_tick`. A node that only repeats its result
-    from before a restart keeps its first times.
+    from before a restart keeps the times that it had then.
     """
 
     def __init__(self, tree: CompiledTree, nodes: Iterable[Behaviour], board: Board, clock: Clock) -> None:
@@ -79,18 +79,18 @@ class Executions:
 
     @property
     def all(self) -> tuple[Execution, ...]:
-        """Executions so far in the order of their ends; those that are not over come last."""
+        """All executions so far in the order in which they ended; unfinished executions come last."""
         found = [one for path in self._parts for one in self._executions(path)]
         last = float("inf")
         return tuple(sorted(found, key=lambda one: (last if one.ended_s is None else one.ended_s, one.began_s)))
 
     @property
     def moved_s(self) -> float | None:
-        """Time (s) when a skill that may drive last ran; None: never."""
+        """Time (s) at which a skill that may drive last ran; None if none has run."""
         return self._moved_s
 
     def note_visit(self, node: Behaviour, stopped: bool) -> None:
-        """Notes that a tick has visited a node, which was perhaps `stopped` since its last visit."""
+        """Records that a tick has visited a node; with `stopped`, the node was stopped since its last visit."""
         path = self._paths.get(node)
         if path is None:
             return
@@ -102,7 +102,7 @@ class Executions:
             self._end(path, node.status is Status.SUCCESS)
 
     def after_tick(self, changed: Iterable[str]) -> None:
-        """Notes which nodes the tick stopped, and whether the robot may drive; `changed` are nodes that changed."""
+        """Records which nodes the tick stopped and whether the robot may drive; `changed` has changed path ids."""
         for path in [path for path in self._open if self._nodes[path].status is not Status.RUNNING]:
             if path not in self._resumed:
                 self._end(path, done=False)
@@ -126,7 +126,7 @@ class Executions:
         self._put(path, (*before, Execution(path, self._clock.now())))
 
     def _end(self, path: str, done: bool) -> None:
-        """Ends an execution; executions below the node within its time count only if it is done."""
+        """Ends an execution; if it is not `done`, executions below the node during it do not count as done either."""
         self._open.discard(path)
         *before, one = self._executions(path)
         again = frozenset(self._board.get(self._keys.ended_before) if self._keys.ended_before in self._board else ())
@@ -159,7 +159,7 @@ def _executions_key(path_id: str) -> str:
 
 
 def _below(node: NodeSpec, parts: frozenset[str]) -> Mapping[str, frozenset[str]]:
-    """Returns the nodes that are parts or have parts below them, parents first, each with these parts."""
+    """Returns each node that is a step of the mission or has steps below it, parents first, with all these steps."""
     below = [_below(child, parts) for child in node.children]
     own = (parts & {node.path_id}).union(*(next(iter(each.values()), ()) for each in below))
     return {node.path_id: own, **dict(chain.from_iterable(each.items() for each in below))} if own else {}
@@ -168,10 +168,10 @@ def _below(node: NodeSpec, parts: frozenset[str]) -> Mapping[str, frozenset[str]
 class Findings:
     """Collection of the answers and the speech of one mission.
 
-    Any node adds a finding by publishing under `ANSWER_TOPIC`: `node`, `question`, `answer` (a truth value, a text or
-    a number) and `message`, the sentence. Time and robot are added here. The collection stands on the blackboard: a
-    mission that continues after a restart has its earlier findings. A node under the key `answered_before` that repeats
-    its answer adds no second finding.
+    Any node adds a finding by publishing under `ANSWER_TOPIC`: `node`, `question`, `answer` (a truth value, a text or a
+    number) and `message`, the sentence. The collection adds time and robot. It lies on the blackboard, so that a
+    mission that continues after a restart has its earlier findings. A node listed under `answered_before` repeats its
+    answer without a second finding.
     """
 
     def __init__(self, clock: Clock, board: Board, robot_name: str, mission_name: str) -> None:
@@ -179,7 +179,7 @@ class Findings:
         self._keys = history_keys(robot_name, mission_name)
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Notes a message of the mission, and returns it; an answer with its time and the robot's name."""
+        """Records a message of the mission and returns it; adds the time and the robot's name to an answer."""
         if topic == ANSWER_TOPIC:
             message = {**message, "robot": self._robot_name, "t": round(self._clock.now(), 6)}
             finding = _finding(message)
@@ -198,12 +198,12 @@ class Findings:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Findings so far."""
+        """All findings so far."""
         return self._stored(self._keys.findings)
 
     @property
     def said(self) -> tuple[Said, ...]:
-        """Sentences that the robot has said so far."""
+        """All sentences that the robot has said so far."""
         return self._stored(self._keys.said)
 
     def _stored(self, key: str) -> tuple[Any, ...]:
@@ -220,13 +220,13 @@ def _finding(message: Mapping[str, Any]) -> Finding:
 
 
 def claim(message: str, findings: Sequence[Finding], skipped: Sequence[str] = ()) -> str:
-    """Text of a claim: the answers of the mission, then the skipped steps, or else its own `message`."""
+    """Composes a mission's claim from its answers, and from the skipped steps or, if none were skipped, `message`."""
     after = f"skipped: {'; '.join(skipped)}" if skipped else message
     return "; ".join(filter(None, (findings_in_words(findings), after)))
 
 
 def findings_in_words(findings: Sequence[Finding]) -> str:
-    """Text of the answers: one in full, several in short, each sentence once, and "and N more" for the rest."""
+    """Text of the answers: a single one in full, several shortened and without repetition, the rest as "and N more"."""
     counts = Counter(finding.sentence for finding in findings)
     if len(counts) == 1 and len(findings) == 1:
         return findings[0].sentence
@@ -241,6 +241,6 @@ def findings_in_words(findings: Sequence[Finding]) -> str:
 
 
 def _brief(sentence: str) -> str:
-    """Shortens "no: no hammer in the office" by its first word."""
+    """Shortens an answer such as "no: no hammer in the office" by its first word."""
     denied = sentence.removeprefix("no: ")
     return denied if denied.startswith(_DENIALS) else sentence

@@ -17,7 +17,7 @@ from skills.robot import LeaseError, Pose2D, RobotStoppedError
 
 
 class Outcome(enum.Enum):
-    """Outcome of a mission; the worst comes last."""
+    """Outcome of a mission, in order from the best to the worst."""
 
     SUCCESS = "success"  # everything is done, as far as the tree knows
     FAILURE = "failure"  # something could not be done
@@ -27,7 +27,7 @@ class Outcome(enum.Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """Answer that a node of a mission gave or received at `t_s` (robot's clock), as a value and as a sentence."""
+    """Answer that a node gave or received at `t_s` (s on the robot's clock), as a value and as a sentence."""
 
     path_id: str
     t_s: float
@@ -40,7 +40,7 @@ class Finding:
 class Said:
     """Sentence that the robot began to say, or `asked`, at `t_s` (s on the robot's clock).
 
-    In the zone `silent` it was shown and not spoken.
+    In a silent zone, named by `silent`, the sentence was shown instead of spoken.
     """
 
     t_s: float
@@ -51,9 +51,9 @@ class Said:
 
 @dataclass(frozen=True)
 class Execution:
-    """One execution of a part of a mission, from `began_s` to `ended_s` (s on the robot's clock; None: not over).
+    """One execution of a step in a mission, from `began_s` to `ended_s` (s on the robot's clock; None: not ended).
 
-    It is `done` when it succeeded and no node above it failed or was stopped in that time: the work of a failed branch,
+    It is `done` when it succeeded and no node above it failed or was stopped in that time: work in a failed branch,
     attempt or round does not count.
     """
 
@@ -65,7 +65,7 @@ class Execution:
 
 @dataclass(frozen=True)
 class Ending:
-    """End of a mission that its tree did not reach by itself."""
+    """End of a mission that something other than its tree determined."""
 
     outcome: Outcome
     cause: Cause
@@ -74,13 +74,13 @@ class Ending:
 
 @dataclass(frozen=True)
 class RobotResult:
-    """Result of one robot's mission, or of the mission that took its place, with the last states of its nodes.
+    """Result of one robot's mission, or of the mission that replaced it, with the last states of the nodes.
 
-    `answers` has the last answer of each status check by the path id of its node, `findings` has all answers in order,
-    and `said` what the robot said. `preempting` has the results of the missions that came in between, in the order of
-    their ends. `stepped_aside` is set when the robot cleared a reserved path after its mission. `executions` has the
-    times at which the parts of the mission ran; `moved_s` is the time at which a skill that may drive last ran (s on
-    the robot's clock; None: never).
+    `answers` maps the path id of each status check to its last answer, `findings` has all answers in order, and `said`
+    all sentences of the robot. `preempting` has the results of missions that interrupted this one, in the order in
+    which they ended. `stepped_aside` is set when the robot cleared a reserved path after its mission. `executions` has
+    the times at which the mission's steps ran; `moved_s` is the time at which a skill that may drive last ran (s on the
+    robot's clock; None: never).
     """
 
     tree: CompiledTree
@@ -102,7 +102,7 @@ class RobotResult:
         return self.tree.robot_name
 
     def message_of_end(self) -> Mapping[str, object]:
-        """Message of the log about the end of the mission."""
+        """Message for the log at the end of the mission."""
         end = {"robot": self.robot_name, "outcome": self.outcome, "cause": self.cause, "message": self.message}
         return {**end, "answers": self.answers}
 
@@ -121,8 +121,8 @@ class RobotStatus:
 class RunResult:
     """Result of a run. Times in seconds: `sim_time_s` on the robots' clock, `wall_time_s` on the wall clock.
 
-    `overruns` counts the ticks that took longer on the wall clock than the tick period; `work` has the counters of what
-    was computed, by name.
+    `overruns` counts the ticks that took longer on the wall clock than the tick period; `work` has the work counters by
+    name.
     """
 
     robots: tuple[RobotResult, ...]
@@ -134,7 +134,7 @@ class RunResult:
 
     @property
     def every(self) -> tuple[RobotResult, ...]:
-        """Results of all missions, those that came in between before the one that they interrupted."""
+        """Results of all missions; a mission that interrupted another comes before it."""
         return tuple(each for robot in self.robots for each in (*robot.preempting, robot))
 
     @property
@@ -144,13 +144,13 @@ class RunResult:
 
     @property
     def worst(self) -> RobotResult:
-        """Result of the robot with the worst outcome, the first by name among equals."""
+        """Result of the robot with the worst outcome; of several such robots, the first by name."""
         order = list(Outcome)
         return max(self.robots, key=lambda result: order.index(result.outcome))
 
     @property
     def outcome(self) -> Outcome:
-        """Outcome of the whole run: success only when all robots succeeded."""
+        """Outcome of the whole run: success only if all robots succeeded."""
         return self.worst.outcome
 
 

@@ -1,4 +1,4 @@
-"""Robots without work in a run of several: each stands where it is, and clears paths that others reserve."""
+"""Idle robots in a run with several robots: each stands still, and clears paths that other robots reserve."""
 
 import math
 from collections.abc import Callable
@@ -17,7 +17,7 @@ _LOOK_S = 0.5
 
 
 class SteppingAside:
-    """Driver of a robot without work: to a waiting place whenever it stands in a path that another has reserved."""
+    """Drives an idle robot to a waiting place whenever it stands in a path that another robot has reserved."""
 
     def __init__(self, context: SkillContext) -> None:
         self._context, self._skill = context, Navigate(context)
@@ -41,7 +41,7 @@ class SteppingAside:
             self._skill.end()
 
     def _clear_path(self) -> None:
-        """Drives off when a robot with the right of way needs the space, and another place is free."""
+        """Begins to drive away if a robot with the right of way needs the space and another place is free."""
         if self._context.clock.now() < self._due_s or not self._context.localiser.estimate().localised:
             return
         self._due_s = self._context.clock.now() + _LOOK_S
@@ -65,9 +65,9 @@ class _Robot:
 
 @dataclass
 class Resting:
-    """Robots of a run that have no work now: they wait for their turn, are done, or never had a mission.
+    """Robots in a run that have no work now: they wait for their turn, have finished, or never had a mission.
 
-    A robot whose verbs fail is left alone from then on.
+    A robot whose verb fails is not used any more.
     """
 
     table: TrafficTable
@@ -77,16 +77,16 @@ class Resting:
     _robots: dict[str, _Robot] = field(default_factory=dict)
 
     def wait(self, who: RunRobot) -> None:
-        """Adds a robot whose mission waits for others; the run updates its estimators."""
+        """Adds a robot whose mission waits for other missions; the run updates the robot's estimators."""
         if who.name not in self._robots:
             self._begin(who, who.context, own_lease=False)
 
     def rest(self, who: RunRobot) -> None:
-        """Adds a robot without a mission, claims its free lease, and updates its estimators from now on."""
+        """Adds a robot without a mission, claims its lease if it is free, and updates its estimators from now on."""
         who.attempt("resting", lambda: self._begin(who, who.claim(), own_lease=True))
 
     def leave(self, name: str) -> None:
-        """Removes a robot that has work again, or whose run is over. Idempotent; raises nothing."""
+        """Removes a robot that has work again or whose run has ended. Idempotent; raises nothing."""
         robot = self._robots.pop(name, None)
         if robot is None:
             return
@@ -104,7 +104,7 @@ class Resting:
             self.leave(name)
 
     def tick(self, held: Callable[[str], bool]) -> None:
-        """Runs one tick of all robots in the order of their names; robots that are held stand."""
+        """Runs one tick of all robots in the order of their names; robots that are held stand still."""
         for name, robot in sorted(self._robots.items()):
             step = partial(self._step, robot, hold=held(name))
             with self.watchdog.over_tick(name, self.tick_limit_s):

@@ -1,4 +1,4 @@
-"""Log of a robot's pose, state, sensors, navigation and doors while it has a mission."""
+"""Logs a robot's pose, state, sensors, navigation and doors while the robot has a mission."""
 
 import math
 from collections.abc import Mapping
@@ -37,7 +37,7 @@ class RobotLog:
         self._known_doors: tuple[tuple[str, float], ...] = ()
 
     def write(self) -> None:
-        """Writes what is due, after the estimators were updated."""
+        """Writes all messages that are due; call it after the estimators were updated."""
         context, estimate = self._context, self._context.localiser.estimate()
         if estimate.stamp_s != self._matched_s:
             self._matched_s = estimate.stamp_s
@@ -95,7 +95,7 @@ class RobotLog:
             self._context.publish(SCAN, {"robot": self._name, "scan": scan})
 
     def _publish_navigation(self) -> None:
-        """Logs particles of the localiser and obstacles that the map lacks (x, y in m), when either is new."""
+        """Logs the localiser's particles and obstacles that are not on the map (x, y in m), when either changed."""
         localiser, costmap = self._context.localiser, self._context.costmap
         particles = localiser.particles_W(MOST_PARTICLES) if isinstance(localiser, ParticleView) else _NOTHING
         seen = costmap.obstacle_cells() if isinstance(costmap, ObstacleLayerView) else _NOTHING
@@ -107,7 +107,7 @@ class RobotLog:
             self._context.publish(NAVIGATION, {"robot": self._name, **new})
 
     def _watch_doors(self) -> None:
-        """Looks at the doors in view; logs the states of all doors when the memory of one is new."""
+        """Observes the doors in view; logs the states of all doors when a state has changed."""
         self._watch.look()
         doors, memory = self._context.doors, self._context.door_memory
         seen = [memory.last_seen(door) for door in doors]
@@ -118,7 +118,7 @@ class RobotLog:
 
 
 def _door_message(door: Doorway, seen: SeenDoor) -> Mapping[str, object]:
-    """State of a door for the log: its two ends (x, y) in metres, and the time when the robot saw it (s)."""
+    """Message on a door for the log: its two ends (x, y) in metres, its state, and when the robot saw it (s)."""
     ends = [[round(float(value), 3) for value in end] for end in door.ends()]
     seen_s = round(seen.seen_s, 1) if math.isfinite(seen.seen_s) else None
     return {"between": list(door.between), "ends": ends, "state": seen.state.value, "seen_s": seen_s}

@@ -46,17 +46,16 @@ def run(
     control: Control | None = None,
     spare: Sequence[RunEntry] = (),
 ) -> RunResult:
-    """Runs the missions of any number of robots to their end, robots in the order of their names.
+    """Runs the missions of one or more robots to their end; robots act in the order of their names.
 
     Each tick: poll `control`, advance the clock by the tick period, update each robot's estimators, tick each tree,
     call the `visitors`. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree
-    is not ticked, and that time counts against no limit. A robot that fails ends its own mission only, and is then an
+    is not ticked, and no time limit counts this time. A robot that fails ends only its own mission, and is then an
     obstacle to the others. In every case all trees and robots are stopped and all leases returned before this returns.
     Without control, equal seeds give equal logs.
 
-    An assigner gives missions as long as it has any; the result has one entry for each mission. `spare` robots have no
-    mission, or none yet: their trees do not count. Like robots whose missions are over, they clear paths that others
-    reserve.
+    An assigner assigns missions until none is left; the result has one entry for each mission. `spare` robots have no
+    mission, or none yet: their trees are not run. Like robots that have finished, they clear paths that others reserve.
 
     Raises ValueError when there are no missions, two robots have one name, a robot waits for a robot that is not in the
     run, or a breakpoint is at an unknown node. Raises OSError, after all is stopped, when the disk is full.
@@ -77,21 +76,21 @@ def run(
 
 
 class _AllAtOnce(Assigner):
-    """Assigner of all missions at the beginning."""
+    """Assigner that assigns all missions at the beginning."""
 
     def __init__(self, entries: Sequence[RunEntry]) -> None:
         self._entries = sorted(entries, key=lambda entry: entry.robot.name)
 
     def assign(self) -> Sequence[RunEntry]:
-        """Returns all missions once."""
+        """Returns all missions at the first call, and none at later calls."""
         entries, self._entries = self._entries, []
         return entries
 
 
 class _Run:
-    """State of one run. `_sessions` has each robot's last mission, `_ended` all that have ended, in order.
+    """State of one run. `_sessions` has each robot's last mission, `_ended` has all ended missions in order.
 
-    The visitors have heard of the first `_reported` of these.
+    The first `_reported` ended missions have been reported to the visitors.
     """
 
     def __init__(self, assigner: Assigner, shared: RunShared) -> None:
@@ -142,7 +141,7 @@ class _Run:
         return [session for session in self._sessions.values() if session.result is None]
 
     def _has_work(self) -> bool:
-        """Begins the missions that are assigned now, and returns whether one is under way."""
+        """Begins the missions that are assigned now; returns whether any mission is under way."""
         while not self._stopping and (assigned := self._assigner.assign()):  # once more where one cannot begin
             self._assigned = list(assigned)
             while self._assigned:
@@ -152,7 +151,7 @@ class _Run:
         return bool(self._live)
 
     def _rest_apart(self, entry: RunEntry) -> None:
-        """Lets a robot without a mission rest; leaves it alone if its verbs fail."""
+        """Lets a robot without a mission rest; does not use the robot if one of its verbs fails."""
         try:
             self._resting.rest(RunRobot(entry, self._shared))
         except (Exception, VerbHung) as stop:
@@ -161,7 +160,7 @@ class _Run:
             ending_of(stop, self._visitors.publish)
 
     def _begin(self, entry: RunEntry) -> None:
-        """Begins a mission of a robot that may be resting. Raises OSError when the disk is full."""
+        """Begins a robot's mission, even if the robot is resting. Raises OSError when the disk is full."""
         name = entry.robot.name
         self._resting.leave(name)
         try:
@@ -236,7 +235,7 @@ class _Run:
         return requests
 
     def _obey(self, session: Session, requests: ControlRequests) -> None:
-        """Carries out the requests to one robot."""
+        """Carries out the requests that concern one robot."""
         for request in (each for each in requests.missions if each.tree.robot_name == session.name):
             session.take(request)
         for _, reason in (each for each in requests.cancels if each[0] == session.name):
@@ -249,7 +248,7 @@ class _Run:
             session.hold()
 
     def _stop(self, ending: Ending, at_once: bool = False) -> None:
-        """Ends all missions, after their steps under `always` unless `at_once`, and assigns no more."""
+        """Ends all missions and assigns no more; the steps under `always` still run, unless `at_once`."""
         self._stopping = True
         for session in self._live:
             session.cancel(ending, self._settings.endings_limit_s)
@@ -257,7 +256,7 @@ class _Run:
                 session.close(ending)
 
     def _rest(self, live: Sequence[Session], turn: Sequence[Session], held: Callable[[str], bool]) -> None:
-        """Lets robots without a mission, and those that wait for others, clear reserved paths."""
+        """Lets robots without a mission, and robots whose missions wait for others, clear reserved paths."""
         for session in live:
             if session in turn:
                 self._resting.leave(session.name)
@@ -266,7 +265,7 @@ class _Run:
         self._resting.tick(held)
 
     def _tick(self, moving: Sequence[Session], breakpoints: frozenset[str]) -> Mapping[str, TickNote]:
-        """Ticks the trees of robots that may move; returns a note of each tick by the robot's name."""
+        """Ticks the trees of the robots that may move; returns the note of each tick by the robot's name."""
         notes: dict[str, TickNote] = {}
         changes: list[bool] = []
         for session in moving:
@@ -286,7 +285,7 @@ class _Run:
     def _note_ends(self, live: Sequence[Session]) -> None:
         """Closes the missions that have ended.
 
-        Reads the status of all robots twice a second; for an assigner that may recall missions, in each tick.
+        Reads the status of all robots twice a second, or in each tick if the assigner may recall missions.
         """
         due = self._looks_always or self._clock.now() >= self._look_due_s - _EPSILON_S
         self._look_due_s += _LOOK_PERIOD_S if due else 0.0
@@ -316,7 +315,7 @@ class _Run:
         return {end.result.robot_name: end.result for end in self._ended}
 
     def _report_ends(self) -> None:
-        """Reports the missions that have ended to the control and the visitors."""
+        """Reports the newly ended missions to the control and the visitors."""
         ends, self._reported = self._ended[self._reported :], len(self._ended)
         for end in ends:
             self._control.mission_ended(end.result.robot_name)
@@ -325,7 +324,7 @@ class _Run:
                 each.mission_ended(end)
 
     def _recall(self) -> None:
-        """Ends the missions that the assigner recalls."""
+        """Ends the missions that the assigner wants to end."""
         why = self._assigner.recall(self._seen)
         recalled = [session for session in self._live if session.name in why]
         for session in recalled:
@@ -334,7 +333,7 @@ class _Run:
         self._report_ends()
 
     def _keep_pace(self, begun_wall_s: float) -> None:
-        """Waits, so that simulated time does not run ahead of people who have something to decide."""
+        """Waits, so that simulated time does not run ahead of an operator who has to react."""
         people = self._control.attended and any(session.waits_for_people for session in self._sessions.values())
         if self._control.pace is None or not (people or self._control.slow):
             return
@@ -375,5 +374,5 @@ class _Run:
 
 
 def _never_began(entry: RunEntry, ending: Ending) -> RobotResult:
-    """Result of a mission that did not begin."""
+    """Returns the result for a mission that did not begin."""
     return RobotResult(entry.tree, ending.outcome, ending.cause, ending.message)

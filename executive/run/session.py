@@ -1,4 +1,4 @@
-"""One robot of a run, and its missions: their turns, their ticks, and the orderly end."""
+"""Session of one robot in a run: the order of its missions, their ticks, and their orderly end."""
 
 import traceback
 from collections.abc import Callable, Mapping
@@ -35,7 +35,7 @@ ResultT = TypeVar("ResultT")
 
 
 def _with_tags(entry: RunEntry) -> Detector:
-    """Returns the detector of a robot, which recognises objects by their tags, too, where there are any."""
+    """Returns a robot's detector; where the world has tags, it recognises objects by their tags as well."""
     if not entry.tree.tags:
         return entry.detector
     from skills.perception.fiducials import with_tags
@@ -44,14 +44,14 @@ def _with_tags(entry: RunEntry) -> Detector:
 
 
 class RunRobot:
-    """Robot of a run, with or without a mission.
+    """Robot in a run, with or without a mission.
 
-    `context` is what a tree may use of it, under the present lease; `pose` is its estimated pose when it last sensed
-    (None: not localised).
+    `context` is what the robot's tree may use, under the present lease. `pose` is the pose estimated when the robot
+    last sensed (None: not localised).
     """
 
     def __init__(self, entry: RunEntry, shared: RunShared) -> None:
-        """Raises the errors of the robot's verbs."""
+        """Adds the robot to the table of traffic. Raises the errors of the robot's verbs."""
         self.name: Final = entry.robot.name
         limits, self._traffic = shared.settings, shared.traffic
         self.pose: Pose2D | None = None
@@ -62,7 +62,7 @@ class RunRobot:
         self.context = self._context(entry, shared)
 
     def _context(self, entry: RunEntry, shared: RunShared) -> RunContext:
-        """Context of the robot's tree, without a lease."""
+        """Context for the robot's tree, without a lease."""
         name, control, publish = self.name, shared.control, shared.visitors.publish
         return RunContext(
             robot=self._guarded,
@@ -90,15 +90,15 @@ class RunRobot:
         )
 
     def status(self, *, now: bool = False) -> RobotStatus:
-        """Reads the robot's pose (as last sensed, or `now`), its gripper and its battery.
+        """Reads the robot's pose (as last sensed, or with `now` as estimated now), gripper and battery.
 
-        Raises the errors of its verbs.
+        Raises the errors of the robot's verbs.
         """
         robot, pose = self.context.robot, self.context.known_pose() if now else self.pose
         return RobotStatus(pose, robot.gripper().holding, robot.battery().charge)
 
     def sense(self) -> None:
-        """Updates the estimators, and reports the robot's estimated pose to the others."""
+        """Updates the estimators, and reports the estimated pose to the other robots."""
         context = self.context
         if estimators := context.robot_excluders:
             covered_W = self._traffic.covered_W(self.name)
@@ -111,18 +111,18 @@ class RunRobot:
         self._traffic.report(self.name, self.pose)
 
     def claim(self) -> RunContext:
-        """Claims the free lease; returns the context under it. Raises LeaseError."""
+        """Claims the lease; returns the context under this lease. Raises LeaseError if the lease is taken."""
         self.context = replace(self.context, lease=self._guarded.claim(HOLDER))
         return self.context
 
     def stop_and_leave(self) -> None:
-        """Stops the robot and returns its lease. Raises nothing."""
+        """Stops the robot and returns its lease. Never raises."""
         context = self.context
         self.attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
         self.attempt("return the lease", self._guarded.give_lease_back)
 
     def attempt(self, what: str, call: Callable[[], object]) -> bool:
-        """Calls `call` and returns whether it succeeded; logs a defect instead of raising it."""
+        """Calls `call` and returns whether it succeeded; logs an error instead of raising it."""
         try:
             call()
         except (Exception, VerbHung):
@@ -135,12 +135,12 @@ class Session(RunRobot):
     """Robot with a mission. The runner calls `sense`, `may_move` and `tick` or `hold` in turn until `finished`, then
     `close`.
 
-    `gone` is the reason why the robot is left alone after its mission: its lease is lost, or a verb failed. `note`
+    `gone` is the reason why the robot is not used after its mission: it lost its lease, or a verb failed. `note`
     holds the changes that the last tick made in the mission that the robot began with.
     """
 
     def __init__(self, entry: RunEntry, shared: RunShared) -> None:
-        """Begins the mission under the robot's lease. Raises LeaseError, and the errors of the robot's verbs."""
+        """Claims the lease and begins the mission. Raises LeaseError, and the errors of the robot's verbs."""
         super().__init__(entry, shared)
         context = self.claim()
         try:
@@ -182,7 +182,7 @@ class Session(RunRobot):
 
     @property
     def finished(self) -> bool:
-        """Returns whether the mission that the robot began with, and all that come after it, have ended."""
+        """Returns whether the robot's first mission and all later missions have ended."""
         return self.result is not None or (len(self._stack) == 1 and self._top.finished and not self._later)
 
     @property
@@ -191,7 +191,7 @@ class Session(RunRobot):
         return self._top.waiting_at
 
     def call_guarded(self, call: Callable[[], ResultT]) -> ResultT | None:
-        """Returns the call's result, or None where it fails, which ends the mission. Raises OSError for a full disk."""
+        """Returns the call's result; if it fails, ends the mission and returns None. Raises OSError for a full disk."""
         try:
             return call()
         except (Exception, VerbHung) as stop:
@@ -203,7 +203,7 @@ class Session(RunRobot):
             return None
 
     def has_its_turn(self, results: Mapping[str, RobotResult]) -> bool:
-        """Returns whether the robots that the mission waits for are done; ends the mission when one of them failed."""
+        """Returns whether the missions that come first have succeeded; ends this mission if one of them has failed."""
         for name in self._after:
             if name not in results:
                 return False
@@ -220,7 +220,7 @@ class Session(RunRobot):
         self._log.write()
 
     def may_move(self) -> bool:
-        """Returns whether the robot has its lease; a lost lease suspends the mission until the robot has it again.
+        """Returns whether the robot has its lease; without a lease, the mission is suspended until one is acquired.
 
         Raises nothing. After LEASE_PATIENCE_S without the lease, the session is closed with cause EXECUTION. A real
         robot waits as `_paused` says.
@@ -252,15 +252,15 @@ class Session(RunRobot):
         return False
 
     def _silence(self) -> str | None:
-        """Says that a real robot has not answered for a while; None when it has."""
+        """Sentence which says that a real robot no longer answers; None if it answers."""
         silent = self._real and self.context.clock.now() - self.context.robot.odometry().stamp_s > SILENT_S
         return f"{self.name} has not answered for {SILENT_S:g} s" if silent else None
 
     def _paused(self, why: str, resumed: bool, for_s: float) -> bool:
-        """Pauses the run of a real robot that another program may move, or that is silent; returns whether it waits.
+        """Pauses a real robot that another program may move or that does not answer; returns whether the robot waits.
 
-        The lease is acquired when it is free and the operator resumes the run, because nobody else knows whether people
-        are near; the run goes on by itself when a silent robot answers. An unattended session is closed after
+        The lease is acquired when it is free and the operator resumes the run, because only the operator knows whether
+        people are near; the run continues by itself when a silent robot answers. An unattended session is closed after
         LEASE_PATIENCE_S.
         """
         if resumed and self._guarded.regain_lease():
@@ -275,7 +275,7 @@ class Session(RunRobot):
         return True
 
     def _answers_again(self) -> None:
-        """Ends the pause of a robot that was silent, unless the operator has paused it too."""
+        """Resumes a robot that was silent and answers again, unless the operator has paused it too."""
         if self._lost_since_s is not None:
             self._lost_since_s = None
             if self._control.pause_reason == self._paused_because:
@@ -285,7 +285,7 @@ class Session(RunRobot):
         """Ticks the mission under way once; returns whether a node changed its status. After its end, the mission
         below it continues.
 
-        Steps under `always` of missions that were given up or cancelled come first.
+        Steps under `always` come first if they belong to missions that were given up or cancelled.
         """
         self._held = False
         run = self._top
@@ -305,7 +305,7 @@ class Session(RunRobot):
         return changed
 
     def _go_on_after_the_top(self) -> None:
-        """Continues the mission below the one under way after its end, or begins the next."""
+        """When the present mission has ended, continues the mission that it interrupted, or begins the next one."""
         if self._top.finished and len(self._stack) > 1:
             done = self._top
             done.halt(self.attempt)
@@ -319,18 +319,18 @@ class Session(RunRobot):
 
     @property
     def waits_for_people(self) -> bool:
-        """Returns whether the mission under way waits for somebody to press a button."""
+        """Returns whether the present mission waits for a person to press a button."""
         return self.result is None and self._top.waits_for_people
 
     @property
     def ends(self) -> bool:
-        """Returns whether missions that were ended early still run their steps under `always`."""
+        """Returns whether missions that were ended early still have steps under `always` to run."""
         return self.result is None and any(run.ends for run in self._runs)
 
     def cancel(self, ending: Ending, limit_s: float) -> None:
-        """Ends all missions of this robot where they are; idempotent.
+        """Ends all missions of this robot at their present step; idempotent.
 
-        `tick` runs their steps under `always`, for `limit_s` at most.
+        Afterwards `tick` runs only the steps under `always` of these missions, for at most `limit_s`.
         """
         if self._cancelled is None:
             self._cancelled = ending, self.context.clock.now() + limit_s
@@ -345,7 +345,7 @@ class Session(RunRobot):
         return self._cancelled is not None
 
     def hold(self) -> None:
-        """Suspends the missions and stops the robot, once until the next tick."""
+        """Suspends the missions and stops the robot; further calls before the next tick do nothing."""
         if not self._held:
             self._held = True
             for run in self._runs:
@@ -354,7 +354,7 @@ class Session(RunRobot):
                 self.context.robot.stop(lease=self.context.lease)
 
     def take(self, request: MissionRequest) -> None:
-        """Takes one more mission in its turn; a mission that waits, or takes the place of another, has its start."""
+        """Accepts another mission, which begins now, later or in place of a mission, as the request says."""
         tree, old = request.tree, request.instead_of
         if request.turn is Turn.LATER:
             self._later += (tree,)
@@ -367,7 +367,7 @@ class Session(RunRobot):
             self._begin(tree)
 
     def _replace_top(self, tree: CompiledTree) -> None:
-        """Gives up the present mission and begins another in its place."""
+        """Ends the present mission and begins another in its place."""
         self.hold()
         given_up = self._top
         self.attempt("stop the tree", given_up.end_early)
@@ -400,11 +400,11 @@ class Session(RunRobot):
 
     @property
     def _runs(self) -> tuple[TreeRun, ...]:
-        """All trees: those that were given up first, then the one under way and those below it."""
+        """All trees: trees that were given up first, then the present one and the trees that it interrupts."""
         return (*self._given_up, *reversed(self._stack))
 
     def _start_of(self, run: TreeRun) -> Pose2D | None:
-        """Pose at which a mission began: the one that it noted, else the robot's first pose in the run."""
+        """Pose at which a mission began: as stored by the mission, else the robot's first pose in the run."""
         key = start_key(run.tree.robot_name, run.tree.mission_name)
         start: Pose2D | None = run.context.board.get(key) if key in run.context.board else self._asked_at
         return start
@@ -418,7 +418,7 @@ class Session(RunRobot):
         self._control.mission_begun(self.name, tree)
 
     def _note_end(self, result: RobotResult) -> None:
-        """Notes that a mission that came in between is over."""
+        """Records that a mission that interrupted another one has ended."""
         self._control.mission_ended(self.name)
         self._note_result(result)
 

@@ -20,10 +20,9 @@ _LOGGED_EVERY_M = 0.25
 
 @dataclass
 class _Robot:
-    """Row of the table for one robot, which is also its view of the table (`skills.world_model.Traffic`).
+    """Row of the table for one robot, and this robot's view of the table (`skills.world_model.Traffic`).
 
-    `turn` is its place in the order of claims, None without one. A robot is `idle` while it has no work and clears
-    paths that others reserve.
+    `turn` is the robot's place in the order of claims (None: it has no claim). An `idle` robot clears reserved paths.
     """
 
     table: TrafficTable
@@ -40,7 +39,7 @@ class _Robot:
 
     @property
     def pose(self) -> FloatArray | None:
-        """Estimated pose (x, y, yaw in the world frame), the same array until it changes."""
+        """Estimated pose (x, y, yaw in the world frame); the same array is returned until the pose changes."""
         if self.believed is None:
             return None
         if self._pose is None or self._pose[0] is not self.believed:
@@ -48,7 +47,7 @@ class _Robot:
         return self._pose[1]
 
     def covered_W(self) -> FloatArray:
-        """Discs (N, 3) of x, y and radius (m, world frame) that cover the robot at its pose, with a margin."""
+        """Discs (N, 3) of x, y and radius (m, world frame) that cover the robot with a margin at its pose."""
         if self.pose is None:
             return _NOTHING
         if self._covered is None or self._covered[0] is not self.pose or self._covered[1] is not self.discs:
@@ -60,7 +59,7 @@ class _Robot:
 
     @property
     def silent(self) -> bool:
-        """Returns whether it has not reported for more than SILENT_S."""
+        """Returns whether the robot has not reported for more than SILENT_S."""
         return self.table.now() - self.stamp_s > SILENT_S
 
     def claim(self) -> None:
@@ -100,35 +99,35 @@ class _Robot:
             self.turn, other.turn = other.turn, self.turn
 
     def goes_before(self, other: _Robot) -> bool:
-        """Returns whether it has the right of way: it claimed first, and still reports."""
+        """Returns whether the robot has the right of way over another: it claimed first, and still reports."""
         if self.turn is None or self.silent:
             return False
         return other.turn is None or other.silent or self.turn < other.turn
 
 
 class TrafficTable:
-    """Claims of robots in the order in which they come. Each robot holds one claim at most, and no two share a turn.
+    """Table of the robots' claims on paths, in the order of claiming.
 
-    Turns are a strict order, so no two robots wait for each other.
+    Each robot holds at most one claim. Turns are a strict order, so no two robots wait for each other.
     """
 
     def __init__(self, outlines: dict[str, FloatArray], now: Callable[[], float]) -> None:
-        """`outlines` are each robot's discs (x, y, radius in the body frame); `now` is the run's clock (s)."""
+        """`outlines` has each robot's discs (x, y, radius in the body frame); `now` returns the run's clock (s)."""
         self._robots = {name: _Robot(self, name, discs) for name, discs in sorted(outlines.items())}
         self.now, self._turns = now, 0
 
     def join(self, name: str, discs: FloatArray) -> None:
-        """Adds a robot with its discs (x, y, radius in the body frame); a known robot stays as it is."""
+        """Adds a robot with its discs (x, y, radius in the body frame); does nothing for a robot added before."""
         self._robots.setdefault(name, _Robot(self, name, discs))
 
     def report(self, name: str, pose: Pose2D | None) -> None:
-        """Notes that a robot reports, and its estimated pose (world frame; None: not localised)."""
+        """Records that a robot reports, and its estimated pose (world frame; None: not localised)."""
         robot = self._robots[name]
         robot.stamp_s = self.now()
         robot.believed = pose or robot.believed
 
     def rest(self, name: str, *, idle: bool) -> None:
-        """Notes whether a robot has no work, so that it clears paths that others reserve."""
+        """Records whether a robot has no work and thus clears paths that others reserve."""
         self._robots[name].idle = idle
 
     def view_of(self, name: str) -> _Robot:
@@ -145,8 +144,9 @@ class TrafficTable:
         return [robot for other, robot in self._robots.items() if other != name and not robot.silent]
 
     def news(self) -> Iterator[Mapping[str, Any]]:
-        """Iterates over log messages of the robots whose paths have changed since the last call; none for a single
-        robot. Each has the name, the turn (None: no path is reserved) and the path ahead (x, y in m, world frame).
+        """Yields a log message for each robot whose path has changed since the last call; none for a single robot.
+
+        Each message has the robot's name, turn (None: no path is reserved) and path ahead (x, y in m, world frame).
         """
         if len(self._robots) < 2:
             return
@@ -159,15 +159,15 @@ class TrafficTable:
                 yield message
 
     def covered_W(self, name: str) -> FloatArray:
-        """Discs (N, 3) of x, y and radius (m, world frame) that cover the other robots, with a margin."""
+        """Discs (N, 3) of x, y and radius (m, world frame) that cover the other robots with a margin."""
         others = self.others(name)
         return np.vstack([_NOTHING, *(robot.covered_W() for robot in others)]) if others else _NOTHING
 
 
 def _thinned(points: FloatArray) -> FloatArray:
-    """Thins the points (N, 2) of a path to one for each quarter of a metre, counted from the path's end.
+    """Thins the points (N, 2) of a path to one every 0.25 m, counted from the end of the path.
 
-    So a path that becomes shorter keeps its points.
+    Counted from the end, the points stay the same while the path ahead becomes shorter.
     """
     back = points[::-1]
     along_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(back, axis=0), axis=1))])

@@ -1,4 +1,4 @@
-"""Run of one mission's tree: ticks, suspension, stops, the log of its changes, and its result."""
+"""Runs one mission's tree: ticks, suspension, stops, the log of its changes, and its result."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -58,22 +58,22 @@ class TreeRun:
 
     @property
     def finished(self) -> bool:
-        """Returns whether the tree has ended, and all steps under `always` are done."""
+        """Returns whether the tree has ended and all steps under `always` are finished."""
         return self.root.status in (Status.SUCCESS, Status.FAILURE) and self.context.endings.due is None
 
     @property
     def waits_for_people(self) -> bool:
-        """Returns whether a node waits for somebody to press a button."""
+        """Returns whether a node waits for a person to press a button."""
         return any(node.status is Status.RUNNING for node in self._for_buttons)
 
     @property
     def ends(self) -> bool:
-        """Returns whether it was ended early and still runs its steps under `always`."""
+        """Returns whether the tree was ended early and still runs its steps under `always`."""
         return self._ended_early and self.context.endings.due is not None
 
     @property
     def waiting_at(self) -> str | None:
-        """Path id of the breakpoint at which a node waits."""
+        """Path id of the node that waits at a breakpoint; None if no node waits."""
         return next(iter(self.context.hook.waiting), None)
 
     def show(self) -> None:
@@ -97,7 +97,7 @@ class TreeRun:
         return bool(self._changes)
 
     def note(self, *, ticked: bool) -> TickNote:
-        """Returns the note of the last tick; a mission that another one preempts was not `ticked`."""
+        """Returns the note of the last tick; `ticked` is False while another mission preempts this one."""
         context, changes = self.context, self._changes
         now_s, board = context.clock.now(), context.board.values()
         if not ticked:
@@ -110,7 +110,7 @@ class TreeRun:
         return TickNote(self.tree, now_s, changes, board, pose, checkpoints, charge)
 
     def _tick(self) -> None:
-        """Ticks the tree, or suspends it and ticks the steps under `always` of a stopped node."""
+        """Ticks the tree; while steps under `always` of a stopped node are due, suspends it and ticks these instead."""
         endings = self.context.endings
         due = endings.due
         if due is None:
@@ -132,7 +132,7 @@ class TreeRun:
             self._executions.note_visit(node, stopped)
 
     def end_early(self) -> None:
-        """Stops the tree where it is; only its steps under `always` still run."""
+        """Stops the tree at its present step; afterwards only its steps under `always` run."""
         if not self._ended_early and not self.finished:
             self.root.stop(Status.INVALID)
             self._ended_early = True
@@ -160,9 +160,9 @@ class TreeRun:
         return transitions
 
     def halt(self, attempt: Attempt) -> None:
-        """Stops all running nodes, also after an exception in the middle of a tick; results stay visible.
+        """Stops all running nodes, even after an exception during a tick; the nodes keep their results.
 
-        Each part is called through `attempt`, so that a defect in one does not prevent the others.
+        Each stop is called through `attempt`, so that an error in one does not prevent the others.
         """
         for node in self.context.endings.close():
             self._endings.append(f"in the end, broken off: {message_of(node)}")
@@ -174,7 +174,7 @@ class TreeRun:
         self.log_changes(of_all=True)
 
     def judge(self, ending: Ending | None, preempting: tuple[RobotResult, ...] = ()) -> RobotResult:
-        """Returns the result of the mission: the tree's own end, else `ending`."""
+        """Returns the mission's result: from the tree's status if the tree has ended, else from `ending`."""
         root = self.root
         cause = root.cause if isinstance(root, Explained) else None
         message = root.message if isinstance(root, Explained) else root.feedback_message
@@ -215,12 +215,12 @@ class TreeRun:
 class TreeObserver:
     """Reads the states of a built tree after every tick. `states` holds the last state of each node, parents first.
 
-    A node's state changes only when it is ticked, here by `tick`, or stopped: only those nodes are read, so that a tick
+    A node's state changes only when `tick` ticks it or when it is stopped. Only these nodes are read, so that a tick
     costs nothing for the others.
     """
 
     def __init__(self, root: Behaviour, hook: Hook) -> None:
-        """`hook` is that of the tree's nodes."""
+        """Reads the initial states; `hook` is the hook that the nodes of the tree share."""
         self.nodes: tuple[Behaviour, ...] = tuple(_walk(root))
         self._explained = tuple(node for node in self.nodes if isinstance(node, Explained))
         self._last = [_state(node) for node in self._explained]
@@ -230,7 +230,7 @@ class TreeObserver:
         self._touched, self._stopped = hook.touched, hook.stopped
 
     def tick(self, node: Behaviour, visited: Visited = lambda node, stopped: None) -> None:
-        """Ticks the tree, or a part of it, and calls `visited` for each node, after those below it."""
+        """Ticks a node with its subtree, and calls `visited` for each node, children before parents."""
         for each in node.tick():
             self._touched.add(each)
             visited(each, each in self._stopped)
@@ -239,7 +239,7 @@ class TreeObserver:
     def changes(self, *, of_all: bool = False) -> Sequence[Change]:
         """Returns the changes since the last call, in the order of the tree, and updates `states`.
 
-        After an exception in a tick, and where a node was changed by hand, all nodes must be read (`of_all`).
+        With `of_all` all nodes are read, as needed after an exception in a tick or a direct change of a node.
         """
         touched = sorted(self._index[node] for node in self._touched if node in self._index)
         self._touched.clear()
@@ -255,7 +255,7 @@ class TreeObserver:
 
 
 def _walk(root: Behaviour) -> Iterator[Behaviour]:
-    """Iterates over the node and all its descendants, parents first."""
+    """Yields the node and all its descendants, parents first."""
     yield root
     for child in root.children:
         yield from _walk(child)

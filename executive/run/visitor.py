@@ -29,10 +29,10 @@ from skills.stack import RobotStack, default_stack
 class RunEntry:
     """Robot with its tree, estimators, detector and stack.
 
-    The mission begins when the robots `after` have succeeded with theirs, and fails when one of them fails. The person
-    who asked for it stands at `speaker_W` (world frame; None: where the robot begins). `walls` are those of the robot's
-    map (`skills.api.SkillContext`). People stand around a `real` robot: when another program has taken its lease, or it
-    does not answer, the run pauses (`Session.may_move`).
+    The mission begins when the missions of the robots `after` have succeeded, and fails when one of these fails. The
+    person who asked for the mission stands at `speaker_W` (world frame; None: where the robot begins). `walls` are the
+    walls on the robot's map (`skills.api.SkillContext`). People stand around a `real` robot: when another program has
+    taken its lease, or it does not answer, the run pauses (`Session.may_move`).
     """
 
     tree: CompiledTree
@@ -51,9 +51,10 @@ class RunEntry:
 class RunSettings:
     """Seed, tick period and limits of a run.
 
-    `time_limit_s` limits the whole run on the robots' clock, without pauses, and `endings_limit_s` the steps under
-    `always` of cancelled missions. `time_of_day_s` is the time of day (s after midnight) at which the run begins (None:
-    the time of this machine). The watchdog's limits count the wall clock: for one verb, one picture, one robot's tick.
+    `time_limit_s` limits the whole run on the robots' clock, without pauses, and `endings_limit_s` limits the steps
+    under `always` of cancelled missions. `time_of_day_s` is the time of day (s after midnight) at which the run begins
+    (None: the time of this machine). The watchdog has limits on the wall clock for one verb, one picture, and one
+    robot's tick.
     """
 
     seed: int = 0
@@ -68,11 +69,11 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class TickNote:
-    """Note of one tick of the mission that a robot began with, or that took its place; the halt at its end has none.
+    """Changes that one tick made in a robot's first mission or its replacement; the final halt gives no note.
 
-    `changes` are the nodes that changed, `board` has all values on the blackboard, and `checkpoints` those of the
-    running skills by path id. `pose` is X_WB, noted with changes and once a second while the robot is localised, else
-    None; `charge` is the battery's (0 to 1), noted as often as the pose.
+    `changes` are the nodes that changed, `board` has all values on the blackboard, and `checkpoints` has the
+    checkpoints of running skills by path id. `pose` is X_WB, given once a second and with each change while the robot
+    is localised, else None. `charge` is the battery's charge (0 to 1), given as often as the pose.
     """
 
     tree: CompiledTree
@@ -86,10 +87,10 @@ class TickNote:
 
 @dataclass(frozen=True)
 class Progress:
-    """State of a run after a tick: node states, mission and status of each robot (not older than 0.5 s).
+    """State of a run after a tick: node states, mission and status (at most 0.5 s old) of each robot.
 
-    `notes` has the robots whose trees were ticked. The tick took `tick_wall_s` on the wall clock; `overruns` counts the
-    ticks that took too long so far.
+    `notes` has the notes of the robots whose trees were ticked. The tick took `tick_wall_s` on the wall clock;
+    `overruns` counts the ticks that took too long so far.
     """
 
     now_s: float
@@ -106,7 +107,7 @@ class Progress:
 class MissionEnd:
     """End of one robot's mission, with the robot's last status (None: never read).
 
-    `gone` is the reason why the run leaves the robot alone from now on: it does not answer, or its lease is lost.
+    `gone` is the reason why the run no longer uses the robot: the robot does not answer, or its lease is lost.
     """
 
     result: RobotResult
@@ -115,7 +116,7 @@ class MissionEnd:
 
 
 class RunVisitor:
-    """Base class of a run's visitors; the run calls them in the order of their list. Each method does nothing here."""
+    """Base class of visitors, which the run calls in the order of their list. By default each method does nothing."""
 
     def begin(self, settings: RunSettings, worker: Worker) -> None:
         """Handles the beginning of the run, before any robot is used; `run` raises the errors of this method."""
@@ -141,14 +142,14 @@ class Assigner(RunVisitor):
     """Assigner of missions to robots during a run; the run's first visitor."""
 
     def assign(self) -> Sequence[RunEntry]:
-        """Returns the missions that begin now, each for a robot that has none; called before each tick.
+        """Returns the missions that begin now, each for a robot without a mission; called before each tick.
 
         The run ends when it returns no mission, and no mission is under way.
         """
         raise NotImplementedError
 
     def recall(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
-        """Returns the robots whose missions end now, with the reasons; `seen` has the last status of all robots."""
+        """Returns the robots whose missions must end now, with reasons; `seen` has the last status of all robots."""
         return {}
 
 
@@ -175,7 +176,7 @@ class Visitors:
 
 @dataclass
 class RunShared:
-    """Objects that all robots of a run share; `day_began_s` is the time of day (s after midnight) at clock zero."""
+    """Objects that all robots in a run share; `day_began_s` is the time of day (s after midnight) at clock zero."""
 
     clock: Clock
     worker: Worker

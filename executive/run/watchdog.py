@@ -1,4 +1,4 @@
-"""Watchdog on the wall clock over a robot's verbs and over ticks: one that hangs ends the run."""
+"""Watchdog on the wall clock over a robot's verbs and ticks; a call that hangs ends the run."""
 
 from __future__ import annotations
 
@@ -31,15 +31,14 @@ class VerbHung(BaseException):
 class Watchdog:
     """Context manager that raises `VerbHung` in the main thread when a verb or a tick takes too long there.
 
-    A call costs two assignments: `verb` and `tick` hold the calls under way as (due time, sentence). A thread compares
-    them with the wall clock and interrupts the main thread by SIGALRM; other alarms go to the handler from before.
+    Guarding a call costs two assignments: `verb` and `tick` hold the calls under way as (due time, sentence). A thread
+    compares due times with the wall clock and interrupts the main thread by SIGALRM; the previous handler gets others.
 
-    Compiled code is interrupted only when it returns to Python, and only the main thread is interrupted; see
-    `call_aside` for others.
+    Only the main thread is interrupted (see `call_aside` for others), and compiled code only at its return to Python.
     """
 
     def __init__(self, shortest_limit_s: float = VERB_LIMIT_S) -> None:
-        """`shortest_limit_s` of all limits determines the period of the checks."""
+        """Takes the shortest of all limits, from which the period of the checks follows."""
         self.verb: tuple[float, str] | None = None
         self.tick: tuple[float, str] | None = None
         self._period_s = min(shortest_limit_s / _LOOKS_PER_LIMIT, _LONGEST_PERIOD_S)
@@ -79,7 +78,7 @@ class Watchdog:
                 signal.pthread_kill(main, signal.SIGALRM)
 
     def _overdue(self) -> str | None:
-        """Sentence of the overdue tick, else of the overdue verb, else None."""
+        """Sentence on the overdue tick, else on the overdue verb; None if no call is overdue."""
         now_s = time.monotonic()
         return next((what for due_s, what in filter(None, (self.tick, self.verb)) if now_s >= due_s), None)
 
@@ -93,7 +92,7 @@ class Watchdog:
 
 
 def hung_message(verb: str, limit_s: float) -> str:
-    """Sentence for a verb that did not return in time."""
+    """Sentence that reports a verb that did not return in time."""
     return f"the robot did not answer '{verb}' within {limit_s:g} s"
 
 

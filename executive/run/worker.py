@@ -1,4 +1,4 @@
-"""Workers for simulation (lock-step) and for real time. Both run jobs in order, in one thread beside the ticks."""
+"""Workers for simulation (lock-step) and for real time. Both run jobs one after another in a background thread."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _Work = tuple[Callable[[], Any], "Future[Any]"]
 
 
 def in_lock_step_job() -> bool:
-    """Returns whether the caller is a job in lock-step, which may use nothing that the ticks change."""
+    """Returns whether the caller is a lock-step job, which must not use anything that ticks change."""
     return threading.current_thread().name == _LOCK_STEP_THREAD
 
 
@@ -62,8 +62,8 @@ class WorkThread:
 class _NoCollection:
     """Context that disables the process's garbage collector while any worker is busy.
 
-    The collector runs in the thread that allocates, and may free an earlier run's renderer, whose graphics context
-    belongs to the main thread: freed by a worker, it aborts the process.
+    The collector runs in the thread that allocates, and may free an earlier run's renderer. A renderer's graphics
+    context belongs to the main thread; if a worker frees it, the process aborts.
     """
 
     def __init__(self) -> None:
@@ -95,7 +95,7 @@ def _run_jobs(given: SimpleQueue[_Work | None]) -> None:
 
 
 def fulfil(future: Future[ResultT], work: Callable[[], ResultT]) -> None:
-    """Runs the work and sets the future to its result, or to its exception."""
+    """Runs the work and sets the future to the result, or to the exception that the work raised."""
     try:
         future.set_result(work())
     except BaseException as defect:
@@ -119,13 +119,13 @@ class _ThreadJob(Generic[ResultT]):
         return self.future.result()
 
     def withdraw(self) -> None:
-        """Withdraws the job: one that has not begun is dropped."""
+        """Withdraws the job; a job that has not begun is dropped."""
         self.future.cancel()
 
 
 @dataclass(frozen=True)
 class _LockStepJob(_ThreadJob[ResultT]):
-    """Job whose result appears at `ready_s` of the robot's clock; reading it waits for a job that takes longer."""
+    """Job with a result from `ready_s` on (robot's clock); reading the result waits for a job that takes longer."""
 
     clock: Clock
     ready_s: float
@@ -135,7 +135,7 @@ class _LockStepJob(_ThreadJob[ResultT]):
         return self.clock.now() >= self.ready_s - 1e-9
 
     def withdraw(self) -> None:
-        """Withdraws the job; returns when it is done, so that nothing uses its inputs any more."""
+        """Waits until the job has finished, so that nothing uses its inputs any more."""
         wait((self.future,))
 
 
@@ -150,7 +150,7 @@ class LockStepWorker:
         self._clock, self._thread = clock, WorkThread(_LOCK_STEP_THREAD)
 
     def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
-        """Starts `work`, whose exception `result` raises. Raises ValueError for a negative latency."""
+        """Starts `work`; the job's `result` raises an exception of `work`. Raises ValueError for a negative latency."""
         if latency_s < 0.0:
             raise ValueError(f"{name}: a latency of {latency_s} s")
         return _LockStepJob(self._thread.do(work), self._clock, self._clock.now() + latency_s)
@@ -191,27 +191,27 @@ class ThreadWorker:
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
     ) -> Job[ResultT]:
-        """Reads the robot's sensors in the thread, since that may block, and works on the readings there."""
+        """Reads the sensors in the background thread, because reading may block, and works on the readings there."""
         return self.submit(lambda: work(read()), latency_s=latency_s, name=name)
 
     def close(self) -> None:
-        """Drops jobs that have not begun; the running one ends by itself."""
+        """Drops jobs that have not begun; the running job ends by itself."""
         self._thread.close(0.0)
 
 
 @dataclass(frozen=True)
 class TimedWorker:
-    """Worker that submits each job to another one as `timed` wraps it."""
+    """Worker that passes each job, wrapped by `timed`, to another worker."""
 
     worker: Worker
     timed: Callable[[Callable[..., Any]], Callable[..., Any]]
 
     def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
-        """Submits a job."""
+        """Submits the wrapped job to the other worker."""
         return self.worker.submit(self.timed(work), latency_s=latency_s, name=name)
 
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
     ) -> Job[ResultT]:
-        """Submits a job on the value of `read`."""
+        """Submits a wrapped job that works on the value of `read`."""
         return self.worker.sense(read, self.timed(work), latency_s=latency_s, name=name)

@@ -1,1 +1,1 @@
-"""Speech: from sound to words."""
+"""Recognises and understands speech, and speaks."""

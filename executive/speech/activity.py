@@ -27,8 +27,8 @@ class PauseRules:
     """Thresholds for the begin and the end of an utterance; all times in seconds.
 
     An utterance begins with a frame whose probability of speech is at least `begin_at`, and ends once all frames for
-    `pause_s` stay below `end_at`. Pauses inside are cut down to `inner_pause_s`, `margin_s` stays at both ends, sounds
-    shorter than `least_s` are no speech, and an utterance is cut off at `most_s`.
+    `pause_s` are below `end_at`. Pauses inside are shortened to `inner_pause_s`, and `margin_s` of sound is kept at
+    both ends. A sound shorter than `least_s` is no speech, and an utterance is cut off at `most_s`.
     """
 
     begin_at: float = 0.5
@@ -42,7 +42,7 @@ class PauseRules:
 
 @dataclass(frozen=True)
 class Utterance:
-    """Speech without a long pause: its samples at RATE_HZ, and its begin and end in the sound (s)."""
+    """Speech without a long pause: samples at RATE_HZ, and the times (s) in the sound when it begins and ends."""
 
     samples: Samples
     start_s: float
@@ -50,7 +50,7 @@ class Utterance:
 
     @property
     def length_s(self) -> float:
-        """Length of the samples (s), with the pauses inside cut down."""
+        """Length of the samples (s), in which inner pauses are shortened."""
         return len(self.samples) / RATE_HZ
 
 
@@ -70,11 +70,11 @@ class Endpointer:
         return bool(self._stored)
 
     def current_sound(self) -> Samples:
-        """Samples of the utterance that has begun."""
+        """Samples so far of the utterance under way."""
         return concatenate(self._stored)
 
     def push(self, block: Samples) -> Iterator[Utterance]:
-        """Adds the next block; yields the utterances that end in it."""
+        """Adds the next block of sound; yields the utterances that end in this block."""
         sound = np.concatenate([self._rest, block])
         whole = len(sound) - len(sound) % FRAME
         self._rest = sound[whole:]
@@ -105,7 +105,7 @@ class Endpointer:
             yield from self._end()
 
     def _wait(self, frame: Samples, probability: float) -> None:
-        """Stores frames before speech, which may hold the soft beginning of a word."""
+        """Buffers frames before speech, because they may contain the soft beginning of a word."""
         self._before.append(frame)
         if probability >= self._rules.begin_at:
             self._stored = list(self._before)

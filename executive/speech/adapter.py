@@ -6,8 +6,8 @@ which it belongs; `errand_train` makes it.
 
 The weights are in CTranslate2's `model.bin`, and are changed in place. Its layout is that of `ModelSpec._serialize` in
 CTranslate2's converter, binary version 6: version, name of the specification, revision, the variables (name, shape,
-type, bytes), and at last other names for some of them. All numbers are little-endian; texts have their length before
-them and a zero behind.
+type, bytes), and finally aliases of variables. All numbers are little-endian; a text is preceded by its length and ends
+with a zero byte.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ _HINT: Final = f"make a new one: python -m errand_train.speech --out executive/s
 
 @dataclass(frozen=True)
 class LowRank:
-    """Change of a matrix: `up` (outputs, rank) times `down` (rank, inputs)."""
+    """Low-rank change of a matrix: `up` (outputs, rank) times `down` (rank, inputs)."""
 
     up: Matrix
     down: Matrix
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Outputs and inputs of the matrix; (0, 0) when the two parts do not fit together."""
+        """Outputs and inputs of the matrix; (0, 0) if the shapes of `up` and `down` do not fit together."""
         fits = self.up.ndim == self.down.ndim == 2 and self.up.shape[1] == self.down.shape[0]
         return (self.up.shape[0], self.down.shape[1]) if fits else (0, 0)
 
@@ -56,7 +56,7 @@ class LowRank:
 
 @dataclass(frozen=True)
 class Adapter:
-    """Changes by the names of the matrices in the model's file; a convolution is one, (outputs, inputs x width)."""
+    """Low-rank changes by the matrix's name in the model file; a convolution is one, (outputs, inputs x width)."""
 
     changes: Mapping[str, LowRank]
 
@@ -124,7 +124,7 @@ _TYPES: Final = {0: "<f4", 1: "<i1", 2: "<i2", 3: "<i4", 4: "<f2"}
 
 @dataclass(frozen=True)
 class Variable:
-    """Variable of a model file: the position of its numbers (bytes), their shape, and their numpy type."""
+    """Variable in a model file: the position (bytes) of its numbers, their shape, and their numpy type."""
 
     start: int
     shape: tuple[int, ...]
@@ -132,7 +132,7 @@ class Variable:
 
 
 class ModelFile:
-    """Content of a `model.bin`. Nothing is copied: where the content is writable, so are the weights."""
+    """Content of a `model.bin`. The weights are views of the content, not copies, and writable if the content is."""
 
     def __init__(self, content: Content, variables: Mapping[str, Variable]) -> None:
         self._content, self._variables = content, variables
@@ -163,7 +163,7 @@ def read_model_file(content: Content) -> ModelFile:
 
 
 class _Reader:
-    """Reader of successive numbers and texts."""
+    """Reads numbers and texts one after another."""
 
     def __init__(self, content: Content) -> None:
         self.content, self.at = content, 0

@@ -1,4 +1,4 @@
-"""Understanding of recognised speech: the robot that is called, the commands, and misheard words."""
+"""Understands recognised speech: which robot is called, the commands, and misheard words."""
 
 import re
 from collections.abc import Collection, Iterator, Sequence
@@ -28,10 +28,10 @@ _UNRESOLVED: Final = frozenset({"her", "him"})
 
 @dataclass(frozen=True)
 class Reader:
-    """Reader of heard sentences for one robot, or for several, of which the speaker may call one, some or all.
+    """Reader of heard sentences for one robot, or for several robots, any of which the speaker may call.
 
-    With `knowledge` None, for one robot, names stay as spoken; then only names of the vocabulary, where there is one,
-    fit. `other_robots` may be called as well, and do not listen.
+    For one robot `knowledge` may be None: names stay as spoken, and must be in the vocabulary unless it is empty.
+    `other_robots` may be called as well, but do not listen.
     """
 
     parser: DependencyParser
@@ -42,10 +42,9 @@ class Reader:
     other_robots: tuple[str, ...] = ()
 
     def read(self, text: str) -> Reading[Understanding]:
-        """Understands `text`; the reading fits when it becomes commands with known names.
+        """Understands `text`; the hypothesis fits if it gives commands in which all names are known.
 
-        The text of the meaning has the name of the called robot in its right spelling, so that a user can type it
-        instead.
+        The text in the meaning spells the called robot's name correctly, so that a user could type the text instead.
         """
         called, alone = self._called(text), len(self.robots) == 1
         typed = called.text if called.name is None else f"Hey {called.name}, {called.text}"
@@ -70,11 +69,11 @@ class Reader:
         return Reading(meant, fits=not strange, suspects=strange)
 
     def calls(self, text: str) -> bool:
-        """Returns whether `text` calls a robot."""
+        """Returns whether `text` calls one of the robots."""
         return self.read(text).meaning.addressed
 
     def _called(self, text: str) -> Address:
-        """Finds the robot that `text` calls, its name perhaps misspelled, and the rest of the text."""
+        """Finds the robot that `text` calls, even by a misspelled name, and the rest of the text."""
         for name in self.robots:
             text = _with_pause(text, name)
         others = {name: {*self.robots, *self.other_robots} - {name} for name in self.robots}
@@ -95,7 +94,7 @@ def refuse_similar_names(robots: Sequence[str]) -> None:
 
 
 def spoken_phrases(vocabulary: Vocabulary) -> SoundAlikes:
-    """Phrases that a misheard word may stand for: the names, also in the plural, and the words of requests."""
+    """Phrases that a misheard word may stand for: the names, their plurals, and the words that requests use."""
     words = lexicon()
     verbs = [" ".join(verb) for verb in words.verbs]
     prepositions = [" ".join(preposition) for preposition in words.prepositions]
@@ -119,23 +118,23 @@ def spoken_phrases(vocabulary: Vocabulary) -> SoundAlikes:
 
 
 def _with_pause(text: str, name: str) -> str:
-    """Adds a comma between the name at the beginning and a verb, since pauses are not always heard."""
+    """Adds a comma between a name at the beginning and a verb, because the recogniser may miss a pause."""
     call = re.match(rf"({re.escape(name)})\s+(\w+)", text, re.IGNORECASE)
     asks = call is not None and any(verb[0] == call.group(2).lower() for verb in lexicon().verbs)
     return f"{name}, {text[len(name) :].lstrip()}" if asks else text
 
 
 def _names(command: Command) -> Iterator[str]:
-    """Names in a command, with their adjectives."""
+    """Names in a command, each with its adjectives."""
     objects = (" ".join((*one.attributes, one.name)) for one in (command.item, command.object) if one)
     goals = (goal for goal in (command.goal, command.goal_at) if goal is not None and goal != HERE.name)
     yield from (*objects, *goals)
 
 
 def _knows(known: Collection[str], name: str) -> bool:
-    """Returns whether a name is known, with or without its adjectives, or is a word for a person.
+    """Returns whether a name is known, with or without its adjectives, or is a common word for people.
 
-    Pronouns that stand for nobody are no names.
+    Pronouns that refer to nobody do not count.
     """
     words = _plain(name).split()
     while words and " ".join(words) not in known and is_attribute(words[0]):
@@ -145,5 +144,5 @@ def _knows(known: Collection[str], name: str) -> bool:
 
 
 def _plain(name: str) -> str:
-    """Name in a form without case and signs, equal for singular and plural."""
+    """Normal form of a name, without case and punctuation, equal for singular and plural."""
     return re.sub(r"(?:(?<=[sxz])es|(?<=ch)es|(?<=sh)es|(?<!s)s)$", "", re.sub(r"[^\w ]", "", name.lower()))

@@ -1,4 +1,4 @@
-"""Choice among the readings of a sound: the likeliest that makes sense, otherwise a reading corrected by sound.
+"""Chooses among hypotheses for a sound: the likeliest that makes sense, otherwise a hypothesis corrected by sound.
 
 Words that fit nowhere become known words of similar sound ("ranch" -> wrench). The search begins at the transcripts,
 tries the least audible change first, and changes only words that the sentence reader rejects, or their neighbours. The
@@ -44,9 +44,9 @@ class Interpretation(Generic[Meaning]):
 def interpret(
     recognition: Recognition, read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes
 ) -> Interpretation[Meaning] | None:
-    """Chooses the likeliest reading that fits, otherwise the likeliest; None when nothing was said.
+    """Chooses the likeliest hypothesis that fits, or the likeliest of all if none fits; None if nothing was said.
 
-    When the likeliest reading is better left as it is (the robot was not called), no other is tried.
+    If the likeliest hypothesis must not be corrected (the robot was not called), no other hypothesis is tried.
     """
     transcripts = recognition.transcripts
     if not transcripts:
@@ -66,7 +66,7 @@ def _fitting(
     read: Callable[[str], Reading[Meaning]],
     alikes: SoundAlikes,
 ) -> list[Candidate[Meaning]]:
-    """Readings that fit: those of the first search, otherwise of further ones, otherwise those corrected by sound."""
+    """Hypotheses that fit: from the first search, else from wider searches, else from corrections by sound."""
     likeliest = recognition.transcripts[0].likelihood
     heard = _read(recognition.transcripts, likeliest, heard, read)
     searches = recognition.more()
@@ -79,9 +79,9 @@ def _fitting(
 def _likeliest(
     recognition: Recognition, first: Candidate[Meaning], fitting: list[Candidate[Meaning]]
 ) -> Candidate[Meaning] | None:
-    """Likeliest candidate given the sound, unless it is much less likely than the first reading.
+    """Likeliest candidate given the sound; None if it is much less likely than the first hypothesis.
 
-    The recogniser's own readings keep their order.
+    The recogniser's own hypotheses keep their order.
     """
     if not fitting or not fitting[0].changes:
         return fitting[0] if fitting else None
@@ -97,7 +97,7 @@ def _read(
     heard: list[Candidate[Meaning]],
     read: Callable[[str], Reading[Meaning]],
 ) -> list[Candidate[Meaning]]:
-    """Reads the transcripts that are not much less likely than the best, in order."""
+    """Reads in order the transcripts that are not much less likely than the best one."""
     heard = [*heard]
     for transcript in transcripts:
         text, behind = remove_repetitions(transcript.text), max(best - transcript.likelihood, 0.0)
@@ -111,8 +111,8 @@ def _read(
 def remove_repetitions(text: str) -> str:
     """Removes repetitions from a text.
 
-    Words that the speaker repeats after a restart stand once ("grab the, grab the cup"), and no pronoun repeats a
-    relative one ("Robin, which he is in the hall").
+    Keeps words once that the speaker repeats after a restart ("grab the, grab the cup"), and removes a pronoun that
+    repeats a relative pronoun ("Robin, which he is in the hall").
     """
     once = re.sub(r"\b(\w+(?:[ ']\w+){1,9})[ ,.;]+(?=\1\b)", "", text, flags=re.IGNORECASE)
     return re.sub(r",?\s+(?:which|who|that)\s+(?:he|she|they)\s+(is|are)\b", r" who \1", once, flags=re.IGNORECASE)
@@ -120,9 +120,9 @@ def remove_repetitions(text: str) -> str:
 
 @dataclass(frozen=True)
 class Reading(Generic[Meaning]):
-    """Meaning of a sentence, whether it fits, and otherwise the suspect words (none: any word).
+    """Meaning of a sentence, and whether it fits; if not, the suspect words (empty: any word is suspect).
 
-    A reading that is not `correctable` is better left as it is.
+    A hypothesis that is not `correctable` must not be changed.
     """
 
     meaning: Meaning
@@ -133,9 +133,9 @@ class Reading(Generic[Meaning]):
 
 @dataclass(frozen=True)
 class Candidate(Generic[Meaning]):
-    """Sentence with its meaning and its distance in sound from the transcript (0 the same, about 1 a changed sound).
+    """Sentence with its meaning and its distance in sound from the transcript (0: equal, 1: about one changed sound).
 
-    `changes` counts the changed groups of words.
+    `changes` is the number of changed groups of words.
     """
 
     text: str
@@ -147,7 +147,7 @@ class Candidate(Generic[Meaning]):
 def corrections(
     heard: Sequence[Candidate[Meaning]], read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes, *, most: int = 3
 ) -> list[Candidate[Meaning]]:
-    """Searches for at most `most` sentences that fit and sound like one of those heard, the most similar first."""
+    """Searches for up to `most` sentences that fit and sound like a heard sentence, the most similar first."""
     order = count()
     known = {candidate.text: candidate.reading for candidate in heard}
     queue = [(candidate.cost, next(order), 0, tuple(candidate.text.split())) for candidate in heard]
@@ -182,7 +182,7 @@ def _changed(
 def _replaced(
     words: tuple[str, ...], start: int, end: int, alikes: SoundAlikes
 ) -> Iterator[tuple[Alike, tuple[str, ...]]]:
-    """Sentences with a known phrase of similar sound in place of some words."""
+    """Sentences in which a known phrase of similar sound replaces a group of words."""
     tail = re.sub(r".*[\w']", "", words[end - 1])
     for alike in alikes.nearest(" ".join(map(_bare, words[start:end]))):
         before = words[:start]
@@ -194,9 +194,9 @@ def _replaced(
 
 
 def _blamed(words: Sequence[str], suspects: Sequence[str]) -> set[int]:
-    """Positions of the suspect words, articles between them included; all positions when there is no suspect.
+    """Positions of the suspect words and of articles between them; all positions if no word is suspect.
 
-    When the words of a suspect do not stand together, each is suspect by itself.
+    If the words of a suspect name are not adjacent, each word is suspect by itself.
     """
     bare = [(at, _bare(word).lower()) for at, word in enumerate(words)]
     plain = [(at, word) for at, word in bare if word not in _ARTICLES]
@@ -209,7 +209,7 @@ def _blamed(words: Sequence[str], suspects: Sequence[str]) -> set[int]:
 
 
 def _together(plain: Sequence[tuple[int, str]], parts: Sequence[str]) -> set[int]:
-    """Positions from the first to the last part, wherever the parts stand one after another."""
+    """Positions from the first to the last word of a name, wherever its words are adjacent."""
     places = set[int]()
     for first in range(len(plain) - len(parts) + 1):
         found = plain[first : first + len(parts)]
@@ -219,7 +219,7 @@ def _together(plain: Sequence[tuple[int, str]], parts: Sequence[str]) -> set[int
 
 
 def _spans(count: int, blamed: set[int]) -> Iterator[tuple[int, int]]:
-    """Groups of one to three successive words, at least one of them suspect."""
+    """Groups of one to three successive words that contain a suspect word."""
     for length in range(1, _MOST_WORDS + 1):
         for start in range(count - length + 1):
             if blamed & set(range(start, start + length)):
@@ -249,10 +249,10 @@ _OPENING_WORDS: Final = 4
 
 
 def choose_opening(recognition: Recognition, text: str, names: Collection[str], calls: Callable[[str], bool]) -> str:
-    """Replaces the robot's name when the opening is much likelier without expected names and then calls nobody.
+    """Replaces the robot's name if the opening is much likelier without expected names and then calls no robot.
 
-    `calls` returns whether a text calls one of the robots `names`. The opening is replaced first, since the names
-    behind it are recognised better when they are expected. A text without a name among its first words stays as it is.
+    `calls` returns whether a text calls one of the robots `names`. Only the opening is replaced, because the names
+    after it are recognised better when they are expected. A text without a name among its first words stays the same.
     """
     words = text.split()
     bare = [re.sub(r"\W", "", word).lower() for word in words[:_OPENING_WORDS]]

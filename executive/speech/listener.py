@@ -1,4 +1,4 @@
-"""Listener to a recording or a microphone: recognises and understands one utterance after another."""
+"""Listens to a recording or a microphone: recognises and understands one utterance after another."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CLIPPED: Final = "the recording is clipped (too loud for its scale): words may b
 
 @dataclass(frozen=True)
 class HeardUtterance:
-    """Speech between two pauses (s from the beginning of the sound), and its meaning."""
+    """Utterance (s from the beginning of the sound) with its meaning."""
 
     start_s: float
     end_s: float
@@ -38,7 +38,7 @@ class HeardUtterance:
 
 @dataclass(frozen=True)
 class Listener:
-    """Converter of sound to commands. `new_detector` makes a speech detector in its initial state."""
+    """Converts sound to commands. `new_detector` returns a speech detector in its initial state."""
 
     recogniser: Recogniser
     new_detector: Callable[[], SpeechDetector]
@@ -47,7 +47,7 @@ class Listener:
     rules: PauseRules = field(default_factory=PauseRules)
 
     def hear_file(self, wav: Path) -> Recording:
-        """Listens to a recording of any length, of which only seconds are in memory.
+        """Listens to a recording of any length, and holds only seconds of it in memory.
 
         Raises:
             InputError: see `read_wav`.
@@ -87,7 +87,7 @@ class Listener:
 
 @dataclass(frozen=True)
 class Recording:
-    """Content of a recording."""
+    """Utterances in a recording, with their meanings."""
 
     file: str
     heard: tuple[HeardUtterance, ...]
@@ -105,26 +105,26 @@ class Recording:
 
     @property
     def decisive(self) -> tuple[HeardUtterance, ...]:
-        """Utterances that count: those for the robot, or the first when there is none."""
+        """Utterances that count: those addressed to the robot, or the first one if none is."""
         addressed = tuple(one for one in self.heard if one.meant.status is not Status.NOT_ADDRESSED)
         return addressed or self.heard[:1]
 
     @property
     def status(self) -> Status:
-        """Status OK when all utterances for the robot are OK, otherwise that of the first that is not."""
+        """Status OK if all decisive utterances are OK, else the status of the first that is not."""
         states = [one.meant.status for one in self.decisive]
         return next((state for state in states if state is not Status.OK), Status.OK if states else Status.REFUSED)
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """Commands of all utterances; empty when any of them was not understood."""
+        """Commands from all utterances; empty if any utterance was not understood."""
         if self.status is not Status.OK:
             return ()
         return tuple(command for one in self.decisive for command in one.meant.commands)
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Part of each of several robots; empty when any utterance was not understood."""
+        """Part of the mission for each of several robots; empty if any utterance was not understood."""
         return tuple(part for one in self.decisive for part in one.meant.parts) if self.status is Status.OK else ()
 
     @property
@@ -136,7 +136,7 @@ class Recording:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on the quality of the sound, and on names that were taken for known ones."""
+        """Notes on the quality of the sound, and on words that were taken for known names."""
         clipped = (CLIPPED,) if self.loudness.much_clipped else ()
         return (*clipped, *(note for one in self.decisive for note in one.meant.notes))
 
@@ -160,7 +160,7 @@ class Recording:
 def join_utterances(utterances: Iterable[Utterance], most_s: float) -> Iterator[Utterance]:
     """Joins utterances that together last no longer than `most_s`: a request with pauses for thought.
 
-    In a longer recording each stays an utterance of its own.
+    If they last longer, each stays an utterance of its own.
     """
     held = list[Utterance]()
     length_s = 0.0
@@ -182,9 +182,9 @@ _HINT: Final = "install alsa-utils, or record to a wav file and give that"
 
 @dataclass(frozen=True)
 class Hearing:
-    """State after one block of sound: the time (s), its level (dB below full scale), and whether somebody speaks.
+    """State after one block of sound: time (s), level (dB below full scale), and whether somebody speaks.
 
-    `partial` is a first reading of the sentence under way, `finished` a sentence that has just ended.
+    `partial` is a first transcript of the sentence under way, `finished` is a sentence that has just ended.
     """
 
     time_s: float
@@ -195,7 +195,7 @@ class Hearing:
 
 
 def follow(blocks: Iterable[Samples], listener: Listener, *, partial_every_s: float = 1.0) -> Iterator[Hearing]:
-    """Listens block by block; all times are those of the sound, so that any source will do."""
+    """Listens block by block; all times are counted in the sound, so that the blocks may come at any speed."""
     endpointer = Endpointer(listener.new_detector(), listener.rules)
     time_s, read_s, partial = 0.0, 0.0, ""
     for block in blocks:
@@ -214,7 +214,7 @@ def follow(blocks: Iterable[Samples], listener: Listener, *, partial_every_s: fl
 
 
 def microphone_blocks(*, which: Callable[[str], str | None] = shutil.which) -> Generator[Samples, None, None]:
-    """Records the default microphone in blocks of 0.1 s until it is closed, with ALSA's `arecord`.
+    """Records the default microphone in blocks of 0.1 s with ALSA's `arecord`, until the iterator is closed.
 
     Raises InputError when `arecord` is not installed, or there is no microphone.
     """

@@ -1,4 +1,4 @@
-"""Interface of a speech recogniser: from sound and expected names to transcripts."""
+"""Interface of a speech recogniser, which turns sound and expected names into transcripts."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from skills.inputs.outside import read_text
 
 @dataclass(frozen=True)
 class Transcript:
-    """Possible text of a sound, and its log likelihood given the sound (natural logarithm, of the whole text)."""
+    """Possible text of a sound, with the log likelihood of the whole text (natural logarithm)."""
 
     text: str
     likelihood: float
 
 
 class Recognition(Protocol):
-    """Recognition of one sound."""
+    """Result of recognising one sound."""
 
     @property
     def transcripts(self) -> Sequence[Transcript]:
-        """Readings, likeliest first; none when nothing was said."""
+        """Hypotheses, the likeliest first; empty if nothing was said."""
 
     def more(self) -> Iterator[Sequence[Transcript]]:
-        """Yields the readings of further searches, each slower than the one before, with its likeliest first."""
+        """Yields the hypotheses of wider and slower searches, one list for each search, the likeliest first."""
 
     def unprompted_text(self) -> str:
         """Text of a quick search that expects no names; empty for no speech."""
@@ -40,7 +40,7 @@ class Recognition(Protocol):
     def likelihoods(self, texts: Sequence[str]) -> Sequence[float]:
         """Log likelihood of each text given the sound, when no names are expected.
 
-        They can be compared with each other, not with those of `transcripts`.
+        These values can be compared with each other, but not with those of `transcripts`.
         """
 
 
@@ -51,7 +51,7 @@ class Recogniser(Protocol):
         """Recognises at most 30 s of sound at RATE_HZ."""
 
     def partial_transcript(self, sound: Samples, vocabulary: Vocabulary) -> str:
-        """Recognises a sentence under way, quickly."""
+        """Recognises the sentence under way, quickly."""
 
 
 _MOST_NAMES = 5_000
@@ -60,9 +60,9 @@ _MOST_LETTERS = 80
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """Names of objects, places and people as they are spoken, the most usual last, and the robot's own name.
+    """Names of objects, places and people as they are spoken, the most frequent last, and the robot's name.
 
-    Without `robot_name` nobody need call the robot; `other_robots` may be called as well.
+    If `robot_name` is empty, nobody needs to call the robot; `other_robots` may be called as well.
     """
 
     names: tuple[str, ...] = ()
@@ -76,7 +76,7 @@ class Vocabulary:
 
     @property
     def prompt(self) -> str:
-        """Prompt of the recogniser: the names, and usual forms of requests."""
+        """Prompt for the recogniser: the names, and usual forms of requests."""
         call: tuple[str, ...] = _UNCALLED
         if self.robots:
             call = tuple(form.format(name) for form, name in zip(_CALLED, cycle(self.robots), strict=False))
@@ -90,7 +90,7 @@ class Vocabulary:
 
 
 def vocabulary_of_world(knowledge: Knowledge, *, called: bool) -> Vocabulary:
-    """Collects all names of a world; `called` says whether the speaker calls the robot by its name."""
+    """Collects all names in a world; with `called`, the speaker calls the robot by its name."""
     groups = (knowledge.surfaces, knowledge.places, knowledge.things, knowledge.people)
     aliases = [alias for group in groups for facts in group.values() for alias in facts.aliases]
     names = [name for group in groups for name in group]
@@ -122,7 +122,7 @@ _HINT: Final = "install the extra that listens: pip install 'spot-errand[speech]
 
 
 def speech_module(name: str) -> ModuleType:
-    """Imports the module of that name. Raises InputError when the extra `speech` is not installed."""
+    """Imports a module of the extra `speech`. Raises InputError when the extra is not installed."""
     try:
         return import_module(name)
     except ImportError as error:

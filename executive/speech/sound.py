@@ -1,4 +1,4 @@
-"""Sound as samples, its loudness, and wav files of any rate, width and channels."""
+"""Reads sound as samples from wav files of any rate, width and channels, and measures its loudness."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _SILENT_LEVEL: Final = 1e-3
 
 @dataclass(frozen=True)
 class Loudness:
-    """Loudness of a sound: its length in samples, its greatest sample (1 is full scale), and the clipped samples.
+    """Loudness of a sound: number of samples, greatest sample (1 is full scale), and number of clipped samples.
 
-    A sample counts as clipped when at least three neighbours are at full scale.
+    A sample counts as clipped if it belongs to a run of at least `_CLIP_RUN` samples at full scale.
     """
 
     count: int = 0
@@ -40,7 +40,7 @@ class Loudness:
     clipped: int = 0
 
     def with_block(self, block: Samples) -> Loudness:
-        """Loudness of the sound and one more block, of any rate."""
+        """Loudness of the sound so far and one more block, of any rate."""
         if not block.size:
             return self
         height = np.abs(block)
@@ -60,7 +60,7 @@ class Loudness:
 
 
 def level_db(block: Samples) -> float:
-    """Mean power of a block in decibels below full scale (0 is a full square wave), -100 at the least."""
+    """Mean power of a block in decibels below full scale (0 is a square wave at full scale), at least -100."""
     power = float(np.mean(np.square(block))) if block.size else 0.0
     return max(10.0 * float(np.log10(max(power, 1e-10))), -100.0)
 
@@ -89,7 +89,7 @@ _HINT: Final = "save the recording as a plain wav file (PCM or float)"
 
 
 def read_wav(file: Path) -> Iterator[Samples]:
-    """Reads a wav file at RATE_HZ, its channels averaged, in blocks of one second; the last one is shorter.
+    """Reads a wav file in blocks of one second at RATE_HZ, with averaged channels; the last block may be shorter.
 
     Only a few blocks are in memory at a time.
 

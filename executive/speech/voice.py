@@ -1,4 +1,4 @@
-"""Voice of the robot: speaks its answers where a synthesiser is installed."""
+"""Speaks the robot's answers where a synthesiser is installed."""
 
 import queue
 import shutil
@@ -18,24 +18,24 @@ class Voice(Protocol):
 
 
 class Silence:
-    """Voice that stays silent."""
+    """Voice that says nothing."""
 
     def say(self, text: str) -> None:
         """Does nothing."""
 
 
 class EspeakVoice:
-    """Voice of the program `espeak-ng`. While it speaks, it drops further texts."""
+    """Voice of the program `espeak-ng`, which drops texts that arrive while it speaks."""
 
     _LONGEST: Final = 300
 
     def __init__(self, program: str, *, longest: int = _LONGEST) -> None:
-        """Makes a voice that speaks at most `longest` letters of a text."""
+        """Takes the greatest number of letters that the voice speaks of a text."""
         self._program, self._longest = program, longest
         self._speaking: subprocess.Popen[bytes] | None = None
 
     def say(self, text: str) -> None:
-        """Begins to speak `text`, cut off at the longest length."""
+        """Begins to speak `text`, cut off at the greatest length."""
         if self._speaking is not None and self._speaking.poll() is None:
             return
         quiet = subprocess.DEVNULL
@@ -53,7 +53,7 @@ class EspeakVoice:
 
 
 class QueuedVoice:
-    """Voice that speaks all texts in order; `say` returns at once, since a thread waits."""
+    """Voice that speaks all texts in order; `say` returns at once, because a thread waits for the end of each."""
 
     _LONGEST: Final = 500
     _PATIENCE_S: Final = 60.0
@@ -69,7 +69,7 @@ class QueuedVoice:
         self._texts.put(text)
 
     def close(self) -> None:
-        """Waits until all texts have ended, a minute at most; further texts are dropped. Idempotent."""
+        """Waits until all texts have been spoken, at most a minute; drops further texts. Idempotent."""
         self._texts.put(None)
         self._thread.join(self._PATIENCE_S)
 
@@ -80,7 +80,7 @@ class QueuedVoice:
 
 
 def installed_voice(*, which: Callable[[str], str | None] = shutil.which) -> Voice:
-    """Voice of this machine; silent when `espeak-ng` is not installed."""
+    """Voice that this machine has; silent if `espeak-ng` is not installed."""
     program = which("espeak-ng")
     return Silence() if program is None else EspeakVoice(program)
 

@@ -75,7 +75,7 @@ def base_weights() -> tuple[io.BytesIO, dict[str, bytes]]:
 
 
 def start_tokens(tokens: Any, prompt: str) -> list[int]:
-    """Tokens before a text: the end of the prompt, the language, the task, and no times."""
+    """Tokens before a text: end of the prompt, language, task, and the token for no timestamps."""
     encoded = tokens.encode(f" {prompt}")[-_MOST_PROMPT_TOKENS:] if prompt else []
     before = [tokens.sot_prev, *encoded] if encoded else []
     return [*before, *tokens.sot_sequence, tokens.no_timestamps]
@@ -97,7 +97,7 @@ class WhisperRecogniser:
         return next((t.text for t in self.search(self.encode(sound), vocabulary.prompt, beam=1)), "")
 
     def search(self, encoded: Any, prompt: str, *, beam: int) -> tuple[Transcript, ...]:
-        """Searches for the likeliest texts of an encoded sound, with a beam of that width."""
+        """Searches for the likeliest texts of an encoded sound, by a beam search of that width."""
         (result,) = self._whisper.model.generate(
             encoded,
             [start_tokens(self._tokens, prompt)],
@@ -117,7 +117,7 @@ class WhisperRecogniser:
         return tuple(transcript for transcript in found if transcript.text)
 
     def likelihoods(self, encoded: Any, length_s: float, texts: Sequence[str]) -> list[float]:
-        """Log likelihood of each text, without any prompt, corrected for its length."""
+        """Log likelihood of each text without any prompt, corrected for the text's length."""
         few = [texts[first : first + _AT_A_TIME] for first in range(0, len(texts), _AT_A_TIME)]
         return [each for some in few for each in self._aligned(encoded, length_s, some)]
 
@@ -133,7 +133,7 @@ class WhisperRecogniser:
         return [sum(math.log(max(p, 1e-9)) + _PER_TOKEN for p in one.text_token_probs) for one in aligned]
 
     def encode(self, sound: Samples) -> Any:
-        """Encodes a sound with some silence behind it."""
+        """Encodes a sound, padded with silence at its end."""
         heard = self._whisper.feature_extractor(sound)
         frames = int(min(len(sound) / RATE_HZ + _PADDING_S, _WINDOW_S) * _FRAMES_PER_S)
         fitted = np.pad(heard[:, :frames], ((0, 0), (0, max(frames - heard.shape[1], 0))))
@@ -149,11 +149,11 @@ class WhisperRecognition:
 
     @cached_property
     def transcripts(self) -> tuple[Transcript, ...]:
-        """Readings, likeliest first; none when nothing was said."""
+        """Hypotheses, the likeliest first; empty if nothing was said."""
         return self._owner.search(self._encoded, self._prompt, beam=_BEAM)
 
     def more(self) -> Iterator[tuple[Transcript, ...]]:
-        """Yields the readings of a wider search."""
+        """Yields the hypotheses of one wider search."""
         yield self._owner.search(self._encoded, self._prompt, beam=_WIDE_BEAM)
 
     def unprompted_text(self) -> str:

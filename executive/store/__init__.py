@@ -1,1 +1,1 @@
-"""Durable store of missions, queued and under way, with the progress of each."""
+"""Durable store for missions that are queued or under way, and for the progress of each mission."""

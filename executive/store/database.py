@@ -1,4 +1,4 @@
-"""SQLite files of Errand; each failure to use one becomes one error with a hint."""
+"""Opens SQLite files of Errand; each failure to use a file becomes one error with a hint."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ BUSY_S: Final = 2.0
 class FileKind:
     """Kind of a database file: its tables, its identity among databases, and the texts of its errors.
 
-    `name` is its name in messages, `option` the option for another file. The others are parts of messages: `absent`
-    names the command that writes the file, `lost` the data in it, `older` the action for a file of another version,
-    `claimed` the work of the process that has claimed it. `go_on` says how to continue after the disk was full;
-    "{path}" in it stands for the file.
+    `name` is the kind's name in messages, `option` the option to name another file. The other fields are parts of
+    messages: `absent` names the command that writes the file, `lost` the data in it, `older` the action for a file of
+    another version, `claimed` the work of the process that has claimed it. `go_on` says how to continue after the disk
+    was full; "{path}" in it stands for the file.
     """
 
     name: str
@@ -42,18 +42,18 @@ class FileKind:
     go_on: str
 
     def full_disk_error(self, path: Path) -> StoreError:
-        """Error for a disk that became full while the file was written."""
+        """Returns the error for a disk that became full while the file was written."""
         go_on = self.go_on.format(path=path)
         return StoreError("the disk is full", hint=f"what was written is kept: free space, then {go_on}")
 
     def damage_error(self, path: Path, why: object) -> StoreError:
-        """Error for a file that cannot be read."""
+        """Returns the error for a file that cannot be read."""
         hint = f"move it away ({self.lost} are lost), or name another by {self.option}"
         return StoreError(f"the {self.name} is damaged ({why})", hint=hint, file=path)
 
     @contextmanager
     def failures(self, path: Path) -> Iterator[None]:
-        """Turns failures of the database and of the disk into a StoreError."""
+        """Turns errors of the database or of the disk into StoreError."""
         what, hint = f"cannot use the {self.name}", f"name another by {self.option}"
         try:
             yield
@@ -73,7 +73,7 @@ class FileKind:
 
 
 class StoreError(InputError):
-    """Error of a file that cannot be read or written at all."""
+    """Raised for a file that cannot be read or written at all."""
 
 
 class Database:
@@ -82,10 +82,10 @@ class Database:
     kind: FileKind
 
     def __init__(self, path: Path, *, create: bool = False) -> None:
-        """Opens the file, or creates it where `create` allows it.
+        """Opens the file; with `create`, creates a missing file.
 
-        A killed process loses no committed data: the file is in write-ahead mode. Raises InputError when there is no
-        file, it cannot be opened, it is damaged, or another version wrote it.
+        A killed process loses no committed data: the file is in write-ahead mode. Raises InputError when the file is
+        missing, cannot be opened, is damaged, or was written by another version.
         """
         self.path = path
         if not create and not path.is_file():
@@ -146,7 +146,7 @@ class Database:
             return cursor.execute(query, values).fetchall()
 
     def _prepare(self) -> None:
-        """Sets the modes, checks kind and version of the file, and creates the tables of a new one."""
+        """Sets the modes, checks the file's kind and version, and creates the tables in a new file."""
         kind, connection = self.kind, self._connection
         (application,) = connection.execute("PRAGMA application_id").fetchone()
         (version,) = connection.execute("PRAGMA user_version").fetchone()

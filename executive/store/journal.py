@@ -1,4 +1,4 @@
-"""Journal of a mission in the store, with one transaction for each tick that changed something."""
+"""Journals a mission into the store, with one transaction for each tick that changed something."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ last_charge = coalesce(:last, last_charge), ended = NULL WHERE id = :id
 
 
 class StoreJournal(RunVisitor):
-    """Journal of one robot's mission, from tick to tick.
+    """Journal that stores the progress of one robot's mission after each tick.
 
-    While another program locks the store, notes wait for a later tick, and the robot works on. `troubles` lists the
-    notes that could not be written. The journal calls `keep_world` before each write, since the stored state of a
+    While another program locks the store, notes wait for a later tick, and the robot continues. `troubles` lists the
+    notes that could not be written. The journal calls `keep_world` before each write, because the stored state of a
     simulated world must not be older than the journal.
     """
 
     def __init__(self, connection: sqlite3.Connection, mission: int, robot: str | None, *, main: str) -> None:
-        """`robot` names the robot to store among several (None: all); the journal notes the battery of `main`."""
+        """`robot` names the robot to store among several (None: all); the battery of the robot `main` is stored."""
         self._connection, self._mission, self._robot, self._main = connection, mission, robot, main
         self._board: Mapping[str, Any] = {}
         self._written: dict[str, Any] = {}
@@ -57,12 +57,12 @@ class StoreJournal(RunVisitor):
         self.troubles: list[str] = []
 
     def allow_replacement(self, tree: CompiledTree, request_of: Callable[[CompiledTree], Request]) -> StoreJournal:
-        """Allows a correction to replace the mission; `request_of` returns the new mission's request."""
+        """Allows a correction to replace the mission; `request_of` returns the request to store for the new tree."""
         self._tree, self._request_of = tree, request_of
         return self
 
     def _replace(self, tree: CompiledTree) -> None:
-        """Stores the mission that has taken the place of another, without any steps."""
+        """Stores the mission that replaced another, and deletes the steps stored before."""
         self._board, self._written, self._steps, self._values, self._checkpoints = {}, {}, {}, {}, {}
         self._pose = self._charges = self._recollection = None
         if self._request_of is None:
@@ -82,12 +82,12 @@ class StoreJournal(RunVisitor):
             self._trouble(f"the mission that took this one's place could not be kept ({error})")
 
     def use_recollection(self, recollection: Recollection, tree: CompiledTree | None = None) -> StoreJournal:
-        """Sets the recollection of an interrupted run: its results stay in the store until they have been used."""
+        """Sets the recollection of an interrupted run; its results stay in the store until they have been used."""
         self._recollection, self._tree = recollection, tree
         return self
 
     def tick(self, progress: Progress) -> None:
-        """Writes the notes of a tick."""
+        """Writes the notes from a tick."""
         for name, note in progress.notes.items():
             if self._robot in (None, name):
                 self.note(note)
@@ -160,12 +160,12 @@ class StoreJournal(RunVisitor):
 
 
 def robot_condition(column: str) -> str:
-    """SQL condition that a column belongs to a robot; its two values are the `robot_prefix`."""
+    """Returns the SQL condition that a column belongs to a robot; `robot_prefix` returns the condition's two values."""
     return f"substr({column}, 1, length(?)) = ?"
 
 
 def robot_prefix(robot: str | None) -> tuple[str, str]:
-    """Prefix of a robot's path ids and blackboard keys, twice; empty for the only robot (None)."""
+    """Returns the prefix of a robot's path ids and blackboard keys, twice; empty for the only robot (None)."""
     prefix = "" if robot is None else f"{slug(robot)}/"
     return prefix, prefix
 

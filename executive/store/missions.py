@@ -1,4 +1,4 @@
-"""Missions in the store: their requests, states and progress, and their assignments to the robots of a fleet."""
+"""Stores missions: requests, states and progress, and the assignment of missions to the robots of a fleet."""
 
 import enum
 import sqlite3
@@ -24,7 +24,7 @@ STORE: Final = Path(".errand") / "missions.sqlite"
 
 
 def store_in(folder: Path) -> Path:
-    """Returns the store's file in a folder for logs; an earlier version kept it beside the logs."""
+    """Returns the path of the store in a folder; a store that an earlier version kept beside the logs is found too."""
     former = folder / STORE.name
     return former if former.is_file() else folder / STORE
 
@@ -35,7 +35,7 @@ def utc_now() -> datetime:
 
 
 class MissionState(enum.Enum):
-    """State of a mission. A RUNNING mission without a process was interrupted.
+    """State of a mission. A mission that is RUNNING although no process runs it was interrupted.
 
     A STANDING mission never runs itself: each time its trigger fires, a queued copy is added.
     """
@@ -51,10 +51,10 @@ class MissionState(enum.Enum):
 
 @dataclass(frozen=True)
 class StoredMission:
-    """Mission in the store. `starts` counts its starts; `clock_s` is the time (robot's clock) of the last note.
+    """Mission in the store. `starts` counts how often it was started; `clock_s` is the robot's clock at the last note.
 
-    `poses` has each robot's last pose (world frame), `instead` the corrected requests, both by the robot's name. A copy
-    of a standing mission has its number in `standing`, and the occurrence of the trigger in `why`.
+    `poses` has each robot's last pose (world frame), `instead` has the corrected requests, both by the robot's name. In
+    a copy of a standing mission, `standing` is the standing mission's number, and `why` is what triggered the copy.
     """
 
     id: int
@@ -71,17 +71,17 @@ class StoredMission:
 
 
 class MissionStore(Database):
-    """Open store of missions."""
+    """Open store that holds the missions."""
 
     kind = STORE_FILE
 
     def __init__(self, path: Path, *, create: bool = True, now: Callable[[], datetime] = utc_now) -> None:
-        """Opens the file; `now` reads the wall clock. Raises InputError when there is none, or it cannot be used."""
+        """Opens the file; `now` reads the wall clock. Raises InputError when the file is missing or cannot be used."""
         super().__init__(path, create=create)
         self.now = now
 
     def add(self, request: Request, *, queued: bool) -> StoredMission:
-        """Adds a mission with an understood request, to be run later; returns it."""
+        """Adds a mission that will be run later; returns the mission. The request must be understood already."""
         with self.writing() as connection:
             number = insert(connection, request, state=MissionState.QUEUED, queued=queued)
         return self.mission(number)
@@ -96,7 +96,7 @@ class MissionStore(Database):
         return self._mission(rows[0])
 
     def missions(self, *states: MissionState) -> tuple[StoredMission, ...]:
-        """Returns all missions in the order in which they came, or those in the given states."""
+        """Returns all missions, or the missions in the given states, in the order in which they were added."""
         found = map(self._mission, self.rows("SELECT * FROM mission ORDER BY id"))
         return tuple(mission for mission in found if not states or mission.state in states)
 
@@ -107,16 +107,16 @@ class MissionStore(Database):
             connection.execute("DELETE FROM mission WHERE id = ?", (number,))
 
     def begin(self, number: int) -> None:
-        """Notes a start of the mission."""
+        """Stores that the mission was started."""
         self._change("state = 'running', starts = starts + 1", number)
 
     def undo_begin(self, before: StoredMission) -> None:
-        """Restores the state of a mission that could not begin."""
+        """Restores the earlier state of a mission that could not begin."""
         values = (before.state.value, before.message, before.starts)
         self._change("state = ?, message = ?, starts = ?", before.id, *values)
 
     def finish(self, number: int, state: MissionState, message: str) -> None:
-        """Notes the end of the mission."""
+        """Stores how the mission ended."""
         values = (state.value, message, self.now().isoformat())
         self._change("state = ?, message = ?, ended = ?", number, *values)
 
@@ -129,7 +129,7 @@ class MissionStore(Database):
         return bool(self.rows("SELECT 1 FROM step WHERE mission = ? LIMIT 1", number))
 
     def memory(self, number: int, robot: str | None = None) -> Memory:
-        """Reads the state in which a mission was interrupted; the skills that it uses must be loaded.
+        """Reads the state in which a mission was interrupted; the mission's skills must be loaded.
 
         `robot` names one of several robots. Raises InputError when the state cannot be read.
         """
@@ -145,14 +145,14 @@ class MissionStore(Database):
             raise InputError(f"mission {number} cannot be taken up: {error}", hint=hint, file=self.path) from error
 
     def journal(self, number: int, robot: str | None = None) -> StoreJournal:
-        """Opens the journal of a mission's run, or of the part of one of several robots.
+        """Opens the journal for a run of a mission, or for the part that one of several robots has.
 
-        Of several batteries, only the battery of the request's main robot is noted.
+        Among several robots, the journal stores only the battery of the request's main robot.
         """
         return StoreJournal(self._connection, number, robot, main=self.mission(number).request.robot)
 
     def place(self, number: int, poses: Mapping[str, Pose2D]) -> None:
-        """Notes the poses of robots at the start of a mission (world frame); an earlier note of a robot stays."""
+        """Stores the poses of robots at the start of a mission (world frame); does not replace poses stored before."""
         known = {**poses, **self.mission(number).poses}
         self._change("poses = ?", number, form(dict[str, Pose2D]).dump_json(known).decode())
 
@@ -165,7 +165,7 @@ class MissionStore(Database):
 
 
 def insert(connection: sqlite3.Connection, request: Request, *, state: MissionState, **more: object) -> int:
-    """Inserts a mission with values for more columns; returns its number."""
+    """Inserts a mission, with values for additional columns; returns the mission's number."""
     values = {"state": state.value, "request": request.to_json(), **more}
     names, marks = ", ".join(values), ", ".join(f":{name}" for name in values)
     return connection.execute(f"INSERT INTO mission ({names}) VALUES ({marks})", values).lastrowid or 0
@@ -178,13 +178,13 @@ _FAILED: Final = (MissionState.FAILURE, MissionState.ERROR, MissionState.CANCELL
 class GivenMission:
     """Assignment of a mission to a robot of a fleet.
 
-    `robot` is the present or last robot; the mission was passed to another `reassigned` times. The first `done` of its
-    commands are done and are not repeated; `blocked` is the reason why the mission cannot restart from its present
-    command. `last_known` is the place at which its robot last knew the object. `referee` is the final verdict, as JSON
+    `robot` is the present or last robot; the mission was passed to another robot `reassigned` times. The first `done`
+    commands are finished and are not repeated; `blocked` is the reason why the mission cannot restart from the present
+    command. `last_known` is where the robot last knew the mission's object. `referee` is the final verdict, as JSON
     values.
 
-    A mission that no robot could do alone is split into parts, which are `part_of` it; a part begins when the part that
-    it `follows` is done.
+    A mission that no robot could do alone is split into parts. In a part, `part_of` is the number of the whole mission,
+    and `follows` is the number of the part that must be done first.
     """
 
     robot: str | None = None
@@ -198,7 +198,7 @@ class GivenMission:
 
 
 class GivenMissions:
-    """Table of the assignments in a store."""
+    """Table of the missions' assignments in a store."""
 
     def __init__(self, store: MissionStore) -> None:
         self._store = store
@@ -215,23 +215,23 @@ class GivenMissions:
         self._put(mission, replace(known, robot=robot, reassigned=known.reassigned + again, blocked=None))
 
     def progress(self, mission: int, done: int, blocked: str | None) -> None:
-        """Notes the number of finished commands, and why the present one cannot be restarted (None: it can)."""
+        """Stores the number of finished commands, and why the present command cannot restart (None: it can restart)."""
         self._put(mission, replace(self._of(mission), done=done, blocked=blocked))
 
     def hand_back(self, mission: int, last_known: LastKnown | None = None) -> None:
-        """Returns the mission to the queue for another robot, with the latest known place of its object."""
+        """Returns the mission to the queue for another robot, with the last known place of the mission's object."""
         known = self._of(mission)
         self._put(mission, replace(known, blocked=None, last_known=last_known or known.last_known))
 
     def split(self, mission: int, parts: Sequence[int]) -> None:
-        """Notes that the mission is split into parts, which run one after the other."""
+        """Stores that the mission is split into parts, which run one after another."""
         for part, before in zip(parts, (None, *parts), strict=False):
             self._put(part, replace(self._of(part), part_of=mission, follows=before))
 
     def settle(self) -> None:
-        """Ends split missions, and parts that can never begin.
+        """Ends split missions whose parts have ended, and parts that can never begin.
 
-        A part fails when the part before it failed; a mission in parts ends like its last part.
+        A part fails when the part before it failed; a split mission ends as its last part ends.
         """
         given, states = self.all(), {mission.id: mission for mission in self._store.missions()}
         for number, one in given.items():
@@ -247,7 +247,7 @@ class GivenMissions:
                 self._store.finish(one.part_of, before.state, f"mission {before.id}: {before.message}")
 
     def judge(self, mission: int, referee: Mapping[str, Any] | None) -> None:
-        """Notes the referee's verdict."""
+        """Stores the referee's verdict."""
         self._put(mission, replace(self._of(mission), referee=referee))
 
     def _of(self, mission: int) -> GivenMission:

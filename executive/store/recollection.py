@@ -1,4 +1,4 @@
-"""Memory of an interrupted run, and the results of it that a resumed run still uses."""
+"""State of an interrupted run, and the results from it that a resumed run still uses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PATIENCE_S = 10.0
 
 @dataclass(frozen=True)
 class StepRecord:
-    """Last state of a node: its status, since `clock_s` (robot's clock), and the checkpoint of a running skill."""
+    """Last state of a node: status since `clock_s` (robot's clock), cause, and the checkpoint of a running skill."""
 
     status: Status
     cause: Cause | None
@@ -33,7 +33,7 @@ class StepRecord:
 
 @dataclass(frozen=True)
 class Memory:
-    """State of a robot's interrupted mission: its nodes by path id, its blackboard, its last pose."""
+    """Stored state of a robot's interrupted mission: nodes by path id, blackboard, last pose."""
 
     steps: Mapping[str, StepRecord]
     board: Mapping[str, Any]
@@ -41,14 +41,14 @@ class Memory:
 
 
 class Recollection:
-    """Results of skills before the restart, each to be used once.
+    """Results that skills had before the restart, each of which is used once.
 
     A skill with a stored result returns it instead of working. Once a skill works, the results of later skills in the
-    tree are dropped, since the new run may differ from there on.
+    tree are dropped, because the new run may differ from there on.
     """
 
     def __init__(self, order: Sequence[str], steps: Mapping[str, StepRecord]) -> None:
-        """`order` are the path ids of all nodes, parents first; `steps` the stored states."""
+        """`order` has the path ids of all nodes, parents first; `steps` has the stored states."""
         self._place = {path_id: number for number, path_id in enumerate(order)}
         self._ended = {path: step for path, step in steps.items() if step.ended and path in self._place}
         self._checkpoints = {path: step.checkpoint for path, step in steps.items() if step.checkpoint}
@@ -59,7 +59,7 @@ class Recollection:
         self.log: list[str] = []
 
     def restrict(self, path_ids: Sequence[str]) -> Recollection:
-        """Drops the results of all other nodes; returns itself."""
+        """Drops the results of all nodes but these; returns the recollection itself."""
         self._ended = {path: step for path, step in self._ended.items() if path in path_ids}
         successes = [path for path, step in self._ended.items() if step.status is Status.SUCCESS]
         self._last = max(successes, key=lambda path: (self._ended[path].clock_s, self._place[path]), default=None)
@@ -70,11 +70,11 @@ class Recollection:
         return self._ended.get(path_id)
 
     def is_last(self, path_id: str) -> bool:
-        """Returns whether this was the last success before the restart, whose effect may be gone."""
+        """Returns whether a node was the last to succeed before the restart; the effect of its work may be lost."""
         return path_id == self._last
 
     def note_use(self, path_id: str, sentence: str) -> None:
-        """Notes that a result was returned instead of work."""
+        """Records that a result was returned instead of working."""
         self._ended.pop(path_id, None)
         self.repeated.add(path_id)
         self.log.append(f"{path_id}: {sentence}")
@@ -84,7 +84,7 @@ class Recollection:
         return self._checkpoints.get(path_id, {})
 
     def note_work(self, path_id: str, sentence: str) -> None:
-        """Notes that a skill works itself, and drops the results of later skills."""
+        """Records that a skill works instead of repeating a result, and drops the results of later skills."""
         later = {path for path in self._ended if self._place[path] > self._place[path_id]}
         for path in {path_id, *later}:
             self._ended.pop(path, None)
@@ -97,7 +97,7 @@ class Recollection:
     def must_check_first(self, changes_world: bool) -> bool:
         """Returns whether a skill must check at its start for work done before the restart.
 
-        That holds until a skill that changes the world has begun, since the journal may miss the last actions.
+        It must until a skill that changes the world has begun, because the journal may lack the last actions.
         """
         looks, self._world_untouched = self._world_untouched, self._world_untouched and not changes_world
         return looks
@@ -105,7 +105,7 @@ class Recollection:
     def is_awake(self, now_s: float, localised: bool) -> bool:
         """Returns whether the sensors can be trusted: the robot is localised, and 0.5 s have passed since the restart.
 
-        After PATIENCE_S it no longer waits for the localisation.
+        After PATIENCE_S the localisation is not waited for any longer.
         """
         self._begun_s = now_s if self._begun_s is None else self._begun_s
         since_s = now_s - self._begun_s

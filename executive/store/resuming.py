@@ -1,8 +1,8 @@
 """Resumes an interrupted mission: the same tree, in which finished skills repeat their results.
 
-Ticks alone lead the tree to the node where it was: a finished skill returns its result in its first tick, so that the
-composites see the same results as before. Guards read the robot's present state. The interrupted skill gets `resume`
-instead of `begin`, so that it checks the world before it changes it. Counts of attempts begin at one.
+Ticks lead the tree back to the node where it was interrupted: a finished skill returns its result in its first tick, so
+that the composites see the same results as before. Guards read the robot's present state. The interrupted skill gets
+`resume` instead of `begin`, so that it checks the world before it changes it. Counts of attempts begin at one.
 """
 
 import dataclasses
@@ -29,7 +29,7 @@ _DECLARED: Final = tuple(name for name, hint in Skill.__annotations__.items() if
 
 @dataclass(frozen=True)
 class ResumedTree(CompiledTree):
-    """Tree that begins with the stored blackboard, and whose nodes are restored by `restore` once they are built."""
+    """Tree that starts with the stored blackboard; `restore` restores each node after the nodes are built."""
 
     board: Mapping[str, Any] = field(default_factory=dict)
     restore: Callable[[ExplainedNode], object] = field(default=lambda node: None)
@@ -48,7 +48,7 @@ class ResumedTree(CompiledTree):
 
 
 def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recollection]:
-    """Returns the tree of a mission that continues, and its recollection; path ids stay the same.
+    """Returns the tree that continues a mission, and the recollection for it; path ids stay the same.
 
     Interrupts are not restored; their conditions call them again. A decision keeps its result without its looks.
     """
@@ -77,17 +77,17 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
 
 
 def ended_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recollection] | None:
-    """Returns the tree of a mission that had ended while other robots worked on; None where it had not.
+    """Returns the tree of a mission that had ended while other robots still worked; None if it had not ended.
 
-    Its nodes have their last states, the root from its first tick on, and no skill runs: the effects of the mission may
-    be gone by now, since another robot may have moved the objects. A mission that ended with a defect had not ended.
+    The nodes have their last states, the root from its first tick on, and no skill runs, because another robot may have
+    changed the result since. A mission that ended with an internal error counts as not ended.
     """
     ended = memory.steps.get(tree.root.path_id)
     if ended is None or not ended.ended or ended.cause is Cause.ERROR:
         return None
 
     def restore(node: ExplainedNode) -> None:
-        """Restores a node's last state; the root's in its first tick."""
+        """Restores a node's last state; the root restores its state in its first tick."""
         step = memory.steps.get(node.path_id)
         if node.path_id == tree.root.path_id:
             _repeat(node, ended)
@@ -118,7 +118,7 @@ def _is_settled(node: NodeSpec, memory: Memory) -> bool:
 def _with_resumed_skills(
     spec: NodeSpec, restored: Container[str], memory: Memory, recollection: Recollection
 ) -> NodeSpec:
-    """Returns the spec with skills that repeat their results from before the restart, or do their work."""
+    """Replaces the skills to restore by skills that repeat their results from before the restart, or else work."""
     if spec.skill is None or spec.path_id not in restored:
         children = (_with_resumed_skills(child, restored, memory, recollection) for child in spec.children)
         return dataclasses.replace(spec, children=tuple(children))
@@ -131,17 +131,17 @@ def _with_resumed_skills(
 
 @dataclass(frozen=True)
 class _Past:
-    """Stored states of a mission's nodes; `specs` are the nodes to restore."""
+    """Stored states of a mission's nodes; `specs` are the nodes to be restored."""
 
     memory: Memory
     specs: Mapping[str, NodeSpec]
 
     def restore(self, node: ExplainedNode) -> None:
-        """Restores a node of any kind; skills restore themselves.
+        """Restores any node but a skill, because skills restore themselves.
 
-        A branch that was passed over is passed over once more. A running composite keeps its blackboard keys. A
-        decorator ticks its child once more whatever would hold it back, since its condition may have changed after the
-        child's result. A decorator that failed by itself, and a leaf, repeat their state.
+        A branch that was skipped before is skipped again. A running composite keeps its blackboard keys. A decorator
+        ticks its child again even if its condition would prevent this, because the condition may have changed after the
+        child's result. A leaf repeats its state, and so does a decorator that failed although its child did not.
         """
         spec, step = self.specs.get(node.path_id), self.memory.steps.get(node.path_id)
         if spec is None or isinstance(node, SkillLeaf):
@@ -176,7 +176,7 @@ class _Past:
 
 
 def _repeat(node: ExplainedNode, step: StepRecord) -> None:
-    """Makes the first tick of a node only restore its state from before the restart."""
+    """Makes a node repeat its stored state in its first tick instead of working."""
     node.hook.restored[node.path_id] = (step.status, step.cause, _before(step.message))
 
 
@@ -187,7 +187,7 @@ def _before(message: str) -> str:
 def resumed_skill(
     skill: type[Skill[Any]], path: str, ports: Mapping[str, Any], recollection: Recollection
 ) -> type[Skill[Any]]:
-    """Returns a stand-in for a skill at one node of a resumed tree: it repeats the result from before, or works."""
+    """Returns a stand-in for a skill at one node of a resumed tree, which repeats the stored result or works."""
 
     class Resumed(_Resumed):
         def __init__(self, context: SkillContext) -> None:
@@ -211,7 +211,7 @@ class _Resumed(Skill[Any]):
         self._working = False
 
     def begin(self, inputs: Any) -> None:
-        """Notes the inputs; the first step decides whether there is a result already."""
+        """Stores the inputs; the first step decides whether a stored result can be repeated."""
         self._inputs, self._working = inputs, False
         self.checkpoint = self._recollection.checkpoint(self._path)
 

@@ -1,4 +1,4 @@
-"""Standing missions: each waits in the store with its trigger; when the trigger fires, a queued copy is added."""
+"""Standing missions: each is stored with a trigger; whenever the trigger fires, a queued copy is added."""
 
 import sqlite3
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ _ENDED: Final = "SELECT request, lowest_charge, last_charge, ended FROM mission 
 class StandingMission:
     """Mission that is queued each time its trigger fires.
 
-    `anchor` is the time at which it was given, `since` the time up to which its occurrences were handled, both aware.
+    `anchor` is when the mission was given, `since` until when its occurrences are handled; both have a time zone.
     """
 
     id: int
@@ -37,21 +37,21 @@ class StandingMission:
     since: datetime
 
     def due_next(self, now: datetime, zone: tzinfo | None) -> datetime | None:
-        """Time of its next occurrence after `now` (`zone` None: the system's); None for a trigger without times."""
+        """Time of the next occurrence after `now` (`zone` None: the system's); None for a trigger without set times."""
         if not isinstance(self.trigger, Timed):
             return None
         return self.trigger.after(max(now, self.since), self.anchor, zone)
 
 
 class StandingMissions:
-    """Table of the standing missions in a store."""
+    """Table with the standing missions in a store."""
 
     def __init__(self, store: MissionStore, zone: tzinfo | None = None) -> None:
-        """`zone` is the time zone of local times; None is the system's."""
+        """`zone` is the time zone of local times (None: the system's)."""
         self._store, self._zone = store, zone
 
     def add(self, request: Request, trigger: Trigger, missed: Missed = Missed.SKIP) -> StandingMission:
-        """Stores a standing mission with an understood request. Raises InputError when its only time has passed."""
+        """Stores a standing mission with an understood request. Raises InputError when its single time has passed."""
         now = self._store.now()
         if isinstance(trigger, Once) and trigger.latest(now, now, self._zone) is not None:
             raise InputError(f"{trigger} has passed", hint="give a time to come, or queue the mission without --at")
@@ -61,14 +61,14 @@ class StandingMissions:
         return StandingMission(number, request, trigger, missed, now, now)
 
     def missions(self) -> tuple[StandingMission, ...]:
-        """Returns all standing missions in the order in which they came."""
+        """Returns all standing missions in the order in which they were added."""
         rows = self._store.rows("SELECT * FROM mission WHERE trigger IS NOT NULL ORDER BY id")
         return tuple(form(StandingMission).validate_python(dict(row)) for row in rows)
 
     def fire(self, chosen: Sequence[tuple[StandingMission, Request]], why: str) -> tuple[StoredMission, ...]:
         """Queues these requests, each as a copy of its standing mission: all of them or none.
 
-        Raises InputError when too many copies of one wait already, or it was removed meanwhile.
+        Raises InputError when too many copies of a standing mission wait already, or when it was removed meanwhile.
         """
         with self._store.writing() as connection:
             for each, _ in chosen:
@@ -99,7 +99,7 @@ class StandingMissions:
         return tuple(map(self._store.mission, numbers))
 
     def due_next(self) -> datetime | None:
-        """Time of the next occurrence of any standing mission; None when no trigger has times."""
+        """Time of the next occurrence of any standing mission; None when no trigger has set times."""
         now = self._store.now()
         times = (each.due_next(now, self._zone) for each in self.missions())
         return min((at for at in times if at is not None), default=None)
@@ -135,7 +135,7 @@ class StandingMissions:
 
 
 class TooManyError(InputError):
-    """Error of a standing mission with too many waiting copies."""
+    """Raised for a standing mission that has too many waiting copies."""
 
 
 def _queue(connection: sqlite3.Connection, standing: int, request: Request, why: str) -> int:

@@ -83,19 +83,19 @@ class Once:
         return f"{self.date.isoformat()} {self.time.strftime('%H:%M')}"
 
     def after(self, moment: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
-        """Returns the occurrence if it is later than a moment."""
+        """Returns the single occurrence if it is later than a moment, else None."""
         at = _moment(self.date, self.time, zone)
         return at if at > moment else None
 
     def latest(self, now: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
-        """Returns the occurrence if it is not later than now."""
+        """Returns the single occurrence if it is not later than now, else None."""
         at = _moment(self.date, self.time, zone)
         return at if at <= now else None
 
 
 @dataclass(frozen=True)
 class Every:
-    """Periodic trigger, in whole seconds from the anchor: the time at which the standing mission was given."""
+    """Periodic trigger, in whole seconds from the anchor, which is the time when the user gave the standing mission."""
 
     period: timedelta
 
@@ -127,7 +127,7 @@ class Every:
 
 @dataclass(frozen=True)
 class OnBatteryFull:
-    """Trigger at the end of a mission whose charge (0 to 1) rose to this level from below it by more than NOISE."""
+    """Trigger at the end of a mission during which the charge (0 to 1) rose to this level, from below by over NOISE."""
 
     level: float = FULL
 
@@ -135,7 +135,7 @@ class OnBatteryFull:
         return "battery full" if self.level == FULL else f"battery {100 * self.level:g}%"
 
     def rises(self, lowest: float, last: float) -> bool:
-        """Returns whether a mission with this lowest and this last charge is an occurrence."""
+        """Returns whether the charge rose enough in a mission with this lowest and this last charge."""
         return lowest < self.level - NOISE and self.level <= last
 
 
@@ -151,7 +151,7 @@ class OnCall:
 
 @dataclass(frozen=True)
 class OnTopic:
-    """Trigger by a message of a topic, received by the trigger source of a kind."""
+    """Trigger by a message on a topic; the trigger source of this kind receives the message."""
 
     kind: str
     topic: str
@@ -219,7 +219,7 @@ _HINTS: Final = {
 
 
 def _moment(day: date, at: time, zone: tzinfo | None) -> datetime:
-    """Converts a local date and time to UTC."""
+    """Converts a local date and time of day to UTC."""
     wall = datetime.combine(day, at)
     if zone is not None:
         return wall.replace(tzinfo=zone).astimezone(UTC)

@@ -1,7 +1,7 @@
-"""Named pipe beside the store that wakes the process that waits for work; any process may write to it.
+"""Named pipe beside the store that wakes the process that waits for work; any process may write to the pipe.
 
 A wake-up says only that the store or the state of the waiting process has changed. Threads, signal handlers and other
-processes write in the same way. A wake-up while no process waits ends the next wait; several count as one.
+processes write in the same way. A wake-up while no process waits ends the next wait; several wake-ups count as one.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class WakeupPipe:
     """Waiting side of the pipe; use it as a context manager, or close it."""
 
     def __init__(self, store: MissionStore) -> None:
-        """Opens the pipe beside a store. Raises InputError when that is not possible."""
+        """Opens the pipe beside a store. Raises InputError when the pipe cannot be created."""
         self._store, self._path = store, _path(store.path)
         with store.kind.failures(store.path):
             with suppress(FileExistsError):

@@ -1,4 +1,4 @@
-"""Test bench for one skill: its leaf, a robot, estimators and a clock, ticked as the runner does; the small room."""
+"""Test bench for one skill: leaf, robot, estimators and clock, ticked as the runner does; also the small room."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _RESOLUTION_M = 0.025
 
 
 def write_small_room(folder: Path, *, can: bool = True) -> Path:
-    """Writes the world into `folder` and returns it. Its only object is a can on the table, placed by the seed."""
+    """Writes the small room into `folder` and returns it. The seed places its only object, a can, on the table."""
     (folder / "map").mkdir(parents=True, exist_ok=True)
     (folder / "room.sdf").write_text(_sdf([_FLOOR, *ROOM]), encoding="utf-8")
     model = {"add_model": {"name": "room", "file": (folder / "room.sdf").resolve().as_uri()}}
@@ -62,7 +62,7 @@ def _write_yaml(path: Path, data: Mapping[str, Any]) -> None:
 
 @cache
 def _facts() -> dict[str, Any]:
-    """Reads the knowledge and the objects of the room."""
+    """Reads knowledge and objects of the small room."""
     facts: dict[str, Any] = read_yaml(Path(__file__).with_name("small_room.yaml")).data
     return facts
 
@@ -85,7 +85,7 @@ def _write_map(folder: Path, name: str, band_m: tuple[float, float]) -> None:
 
 
 def _sdf(blocks: list[Block]) -> str:
-    """Returns an SDF file with one fixed model of all blocks."""
+    """Returns an SDF file with one fixed model that consists of all blocks."""
     shapes = "\n".join(_shapes(number, block) for number, block in enumerate(blocks))
     model = f'<model name="room"><link name="room">\n{shapes}\n</link></model>'
     return f'<?xml version="1.0"?>\n<sdf version="1.9">{model}</sdf>\n'
@@ -126,7 +126,7 @@ class SkillRun:
 
 
 class SkillBench:
-    """Robot with its lease, estimators and log, which runs one skill after another."""
+    """Robot with lease, estimators and log, which runs one skill after another."""
 
     def __init__(
         self,
@@ -139,7 +139,7 @@ class SkillBench:
         doors: tuple[Doorway, ...] = (),
         seed: int = 0,
     ) -> None:
-        """Takes the robot's lease. Ideal estimators replace those that are not given."""
+        """Acquires the robot's lease. Ideal estimators replace those that are not given."""
         self.robot, self.clock = robot, clock
         self._capabilities = robot.capabilities()
         self.sensing = False
@@ -164,7 +164,7 @@ class SkillBench:
         return self._context.for_skill(f"{_PREFIX}/skill")
 
     def inject(self, *words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS) -> None:
-        """Injects faults in words. Raises ValueError for words that are no fault of this robot."""
+        """Injects faults that words describe. Raises ValueError for words that describe no fault of this robot."""
         cameras = [camera.source for camera in self._capabilities.cameras]
         self.add_faults(*(parse_fault(each, kinds, cameras=cameras) for each in words))
 
@@ -219,7 +219,7 @@ class SkillBench:
             self.robot.return_lease(self._context.lease)
 
     def _sense(self, robot: Robot) -> None:
-        """Updates the estimators. They keep their estimates if the robot's sensors raise."""
+        """Updates the estimators, which keep their estimates if the robot's sensors raise an error."""
         context, self.sensing = self._context, True
         try:
             context.localiser.update(robot)

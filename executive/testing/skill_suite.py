@@ -6,8 +6,8 @@ Write a class in a test file and pytest runs all of it:
         skill = Wave
         inputs = WaveInputs(times=2)
 
-`bench` may be overridden to put the robot elsewhere. The case must end in success when nothing goes wrong. Files
-`*.skilltest.yaml` are collected for pytest, and may ask for the suite.
+Override `bench` to put the robot elsewhere. Without faults the skill must succeed. Pytest also collects files
+`*.skilltest.yaml`, which may ask for the suite.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _OWN_VERBS = ("acquire_lease", "take_lease", "return_lease", "lease_holder")
 
 @dataclass(frozen=True)
 class SuiteCase:
-    """Case of the suite: a skill, inputs with which it succeeds, and a factory of benches with a scripted robot."""
+    """Case for the suite: a skill, inputs with which it succeeds, and a factory of benches with a scripted robot."""
 
     skill: type[Skill[Any]]
     inputs: Any
@@ -54,12 +54,12 @@ class SuiteCase:
 
     @property
     def limit_s(self) -> float:
-        """Time limit of a run with a fault (s): 1.5 times the nominal run plus 5 s."""
+        """Time limit (s) for a run with a fault: 1.5 times the duration of the nominal run, plus 5 s."""
         return 1.5 * self.nominal[0].time_s + 5.0
 
     @cached_property
     def nominal(self) -> tuple[SkillRun, Counter[str]]:
-        """Run without faults, and the number of the skill's calls of each verb in it."""
+        """Run without faults, and how often the skill calls each verb in it."""
         bench, _ = self.bench()
         calls: Counter[str] = Counter()
 
@@ -71,7 +71,7 @@ class SuiteCase:
         return bench.run(self.skill, self.inputs), calls
 
     def sampled(self, ticks: int) -> list[int]:
-        """Returns tick numbers spread over a run, with the first and the last; all ticks of a short run."""
+        """Returns tick numbers spread over a run, including the first and the last; all ticks if the run is short."""
         if ticks <= self.samples:
             return list(range(1, ticks))
         step = (ticks - 2) / (self.samples - 1)
@@ -164,7 +164,7 @@ def stale_sensors(case: SuiteCase) -> Iterator[str]:
 
 
 def _recorded(skill: type[Skill[Any]], made: list[Skill[Any]]) -> type[Skill[Any]]:
-    """Returns a subclass of the skill that appends its instances to `made`."""
+    """Returns a subclass of the skill that appends each of its instances to `made`."""
 
     def init(self: Any, *arguments: Any, **options: Any) -> None:
         skill.__init__(self, *arguments, **options)
@@ -181,14 +181,14 @@ PARTS: dict[str, Callable[[SuiteCase], Iterator[str]]] = {
 
 
 class SkillSuite:
-    """Base class of tests: set `skill` and `inputs`, and perhaps override `bench`."""
+    """Base class for tests of a skill: set `skill` and `inputs`, and override `bench` if necessary."""
 
     skill: ClassVar[type[Skill[Any]]]
     inputs: ClassVar[Any]
     samples: ClassVar[int] = 8
 
     def bench(self, capabilities: Capabilities) -> tuple[SkillBench, ScriptedRobot]:
-        """Returns a new bench; by default the scripted Spot stands at the origin of the room, before the table."""
+        """Returns a new bench; by default the scripted Spot stands at the origin of the room, facing the table."""
         return scripted_bench(capabilities)
 
     def test_it_can_be_cancelled_at_every_tick(self, robot_capabilities: Capabilities) -> None:
@@ -215,14 +215,14 @@ def _raise_findings(found: Iterable[str]) -> None:
 
 
 class SkillTestSettings:
-    """Settings of all skill tests of a session; a conftest may extend `fault_kinds` or replace benches in `makers`."""
+    """Settings for all skill tests in a session; a conftest may extend `fault_kinds` or replace benches in `makers`."""
 
     def __init__(self, skills: Mapping[str, type[Skill[Any]]], makers: BenchMakers, capabilities: Capabilities) -> None:
         self.skills, self.makers, self.capabilities = dict(skills), dict(makers), capabilities
         self.fault_kinds: list[FaultKind] = [*STANDARD_FAULTS]
 
     def use_robot(self, capabilities: Capabilities) -> None:
-        """Lets the scripted robot of all tests, and of the suite, have these capabilities."""
+        """Gives these capabilities to the scripted robot in all tests and in the suite."""
         self.capabilities, self.makers["scripted"] = capabilities, scripted_maker(capabilities)
 
 
@@ -249,21 +249,21 @@ class SkillTestModule(pytest.File):
         return item
 
     def _carried_out(self, tests: SkillTestFile, index: int) -> Iterator[str]:
-        """Runs a test; yields a report if it did not meet its expectation."""
+        """Runs a test; yields a report if the result differs from the test's expectation."""
         settings = self.settings
         trial = carry_out(tests, index, settings.skills[tests.skill], settings.makers, settings.fault_kinds)
         if trial.differences:
             yield trial.report()
 
     def _case(self, tests: SkillTestFile, index: int) -> SuiteCase:
-        """Returns the case of a test for all parts of the suite, with a scripted robot."""
+        """Returns the case that all checks of the suite use, built from a test, with a scripted robot."""
         test, skill = tests.tests[index], self.settings.skills[tests.skill]
         make = partial(bench_of_setup, self.settings.capabilities, test.robot or tests.robot, test.world or tests.world)
         return SuiteCase(skill, tests.inputs(index, skill), make)
 
 
 class SkillTestItem(pytest.Item):
-    """Test, or part of the suite, at a line of a file; it fails if `findings` yields a sentence."""
+    """Test, or check of the suite, at a line of a file; it fails if `findings` yields a sentence."""
 
     def __init__(
         self, *, tests: SkillTestFile, index: int, findings: Callable[[], Iterable[str]], **options: Any
@@ -282,7 +282,7 @@ class SkillTestItem(pytest.Item):
         return self.path, self.tests.line(self.index) - 1, self.name
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """Returns a plain report for a failed test, and a traceback for a defect."""
+        """Returns a plain report for a failed test, and a traceback for any other error."""
         if isinstance(excinfo.value, pytest.fail.Exception | InputError):
             return f"{self.path}:{self.tests.line(self.index)}: skill '{self.tests.skill}'\n{excinfo.value}"
         return super().repr_failure(excinfo, style)

@@ -57,7 +57,7 @@ class PoseSetup(_Strict):
 
 
 class RobotSetup(_Strict):
-    """Robot and its initial state."""
+    """Robot and its state at the beginning."""
 
     kind: Literal["scripted", "plant"] = Field(
         default="scripted",
@@ -106,13 +106,13 @@ class DoorSetup(_Strict):
 
     @property
     def doorway(self) -> Doorway:
-        """Doorway of the skills."""
+        """Doorway as the skills' own data type."""
         opener = None if self.opens is None else door_opener(self.opens)
         return Doorway(self.at, self.width, self.through, opener=opener)
 
 
 class WorldSetup(_Strict):
-    """World of a test."""
+    """World in which a test takes place."""
 
     room: bool = Field(default=True, description="a room of 6 m by 5 m, with a table before the origin")
     can: bool = Field(default=True, description="a red can near the edge of the table")
@@ -121,7 +121,7 @@ class WorldSetup(_Strict):
 
 
 class Expectation(_Strict):
-    """Expected end of the skill."""
+    """Expected result of the skill."""
 
     outcome: Literal["success", "failure", "cancelled"] = Field(description="outcome")
     cause: Cause | None = Field(default=None, description="the cause of a failure")
@@ -145,7 +145,7 @@ class Expectation(_Strict):
 
 
 class SkillTest(_Strict):
-    """Test of a skill."""
+    """Test for a skill."""
 
     name: Annotated[str, Field(min_length=1, description="name of the test")]
     with_: dict[str, Any] = Field(
@@ -159,7 +159,7 @@ class SkillTest(_Strict):
 
 
 class SkillTestFile(_Strict):
-    """File with the tests of one skill."""
+    """File with tests for one skill."""
 
     skill: Annotated[str, Field(min_length=1, description="registered name of the skill")]
     with_: dict[str, Any] = Field(default_factory=dict, alias="with", description="input ports of all tests")
@@ -181,11 +181,11 @@ class SkillTestFile(_Strict):
         return self
 
     def line(self, index: int) -> int:
-        """Line of a test in the file, from 1."""
+        """Line of a test in the file, counted from 1."""
         return self._source.line(("tests", index))
 
     def inputs(self, index: int, skill: type[Skill[Any]]) -> Any:
-        """Returns the skill's Inputs for one test, grounded in the room. Raises InputError with file and line."""
+        """Returns a test's inputs for the skill, grounded in the room. Raises InputError with file and line."""
         hints, knowledge = field_types(skill.Inputs), room_knowledge()
         values = {**self.with_, **self.tests[index].with_}
         try:
@@ -243,7 +243,7 @@ class Trial:
     differences: tuple[str, ...]
 
     def report(self) -> str:
-        """Formats differences, end, faults and the last messages as text."""
+        """Formats differences, result, faults and the last messages as text."""
         run = self.run
         lines = [*self.differences, ""]
         lines.append(f"it ended with {_end(run.outcome, run.cause)} after {run.time_s:g} s: {run.message}")
@@ -254,7 +254,7 @@ class Trial:
 
 
 def scripted_maker(capabilities: Capabilities) -> BenchMaker:
-    """Returns a factory of benches with a scripted robot of these capabilities."""
+    """Returns a factory of benches with a scripted robot that has these capabilities."""
 
     return lambda setup, world: bench_of_setup(capabilities, setup, world)[0]
 
@@ -270,7 +270,7 @@ def bench_of_setup(
 
 
 def blocks_of(world: WorldSetup) -> tuple[Block, ...]:
-    """Returns the blocks of a world."""
+    """Returns the blocks that a world contains."""
     blocks = [*(ROOM if world.room else ()), *((TABLE_CAN,) if world.can else ())]
     for each in world.blocks:
         (x, y, z), (dx, dy, dz) = each.at, each.size

@@ -1,1 +1,1 @@
-"""Behaviour trees of missions: the compiler, the nodes, and the checks and estimates before a run."""
+"""Compiles missions to behaviour trees, defines the nodes, and checks and estimates missions before a run."""

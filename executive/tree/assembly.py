@@ -1,4 +1,4 @@
-"""Assembles a mission's steps to nodes, with the data flow of all their plans."""
+"""Assembles a mission's steps to nodes, and tracks which values and objects each step can use."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class Named:
     quantity: Any = None
 
     def is_alike(self, kind: Any) -> bool:
-        """Returns whether expressions may compare its values with values of type `kind`."""
+        """Returns whether an expression may compare this value with a value of type `kind`."""
         return self.type is kind or (kind_of(self.type) is kind_of(kind) and kind_of(kind) is not Kind.OTHER)
 
     def is_same(self, other: Named | None) -> bool:
-        """Returns whether two values stand under one blackboard key and are of one type."""
+        """Returns whether two values have the same blackboard key and the same type."""
         return other is not None and other.key == self.key and other.is_alike(self.type)
 
 
@@ -45,10 +45,9 @@ class Named:
 class Flow:
     """Data flow at one point of a mission, if no step fails before it.
 
-    `names` has the values that certainly exist, `kinds` the types of all values that a step may have given, by their
-    blackboard keys; `declared` are the names that always have a value. `held` is the object in the gripper; `opening`
-    is set while it is the object from the mission's beginning. An earlier step has met the people in `met` at their
-    places.
+    `names` has the values that certainly exist. `kinds` has the type of each value that a step may give, by blackboard
+    key; `declared` are the names that always have a value. `held` is the object in the gripper; `opening` is True while
+    the gripper holds what it held when the mission began. An earlier step has met the people in `met`.
     """
 
     names: dict[str, Named] = field(default_factory=dict)
@@ -59,11 +58,11 @@ class Flow:
     met: frozenset[str] = frozenset()
 
     def copy(self) -> Flow:
-        """Returns a copy, for a branch."""
+        """Returns a copy, in which a branch can be assembled."""
         return replace(self, names=dict(self.names))
 
     def join(self, branches: Sequence[Flow]) -> None:
-        """Merges the flows of several branches, of which one runs."""
+        """Keeps what holds after each of several branches, only one of which runs."""
         first, *others = branches
         shared = {n: named for n, named in first.names.items() if all(named.is_same(b.names.get(n)) for b in others)}
         for name, named in shared.items():
@@ -77,7 +76,7 @@ class Flow:
         self.met = frozenset.intersection(*(branch.met for branch in branches))
 
     def may_lack(self, before: Flow) -> None:
-        """Merges with the flow before the last step, because that step may be skipped and its values missing."""
+        """Keeps what held before the last step as well, because the step may be skipped and give no values."""
         after = {name: named for name, named in self.names.items() if named.is_same(before.names.get(name))}
         changed = {name for name, named in after.items() if before.names[name] != named}
         self.met &= before.met
@@ -102,13 +101,13 @@ class Flow:
 
     @property
     def ranges(self) -> Mapping[str, Any]:
-        """Quantities of all names that have one."""
+        """Quantities of the names that have a quantity."""
         return {**RANGES, **{name: each.quantity for name, each in self.names.items() if each.quantity is not None}}
 
 
 @dataclass(frozen=True)
 class _Item:
-    """Command or other step: its number on its level, and its step with the step's place, both from 1."""
+    """Command or other step: its number on its level, and its step with the step's place, both counted from 1."""
 
     number: int
     place: int
@@ -120,9 +119,8 @@ class _Item:
 class Assembler:
     """Assembler of one mission's subtrees by the `plans` of its steps.
 
-    `pick_ups` and `move_aside` are the defaults of steps; `flow` is the data flow at the present point. The values of
-    steps have blackboard keys below `values_base`. `last_known` is the place of the mission's object, as another robot
-    last knew it.
+    `pick_ups` and `move_aside` are defaults for steps; `flow` is the present data flow. Values that steps give have
+    blackboard keys below `values_base`. `last_known` is where another robot last knew the mission's object.
     """
 
     knowledge: Knowledge
@@ -136,14 +134,14 @@ class Assembler:
     flow: Flow = field(default_factory=Flow)
 
     def builder(self, path_id: str, source: SourceLine | None) -> PlanBuilder:
-        """Returns the builder of nodes that belong to no single command."""
+        """Returns a builder for nodes that belong to no single command."""
         here = Command(goal=START)
         return PlanBuilder(
             self.knowledge, self.registry, path_id, self.start_key, here, source, last_known=self.last_known
         )
 
     def level(self, steps: Sequence[Step], base: str) -> Assembled:
-        """Assembles steps in a row; a step under a policy becomes one subtree, other steps keep theirs."""
+        """Assembles steps in sequence; a step with a policy becomes one subtree, other steps stay separate nodes."""
         made, problems = Assembled(), Problems()
         for items, policy in _groups(steps):
             with problems:
@@ -161,7 +159,7 @@ class Assembler:
         return made
 
     def _group(self, items: Sequence[_Item], base: str) -> Assembled:
-        """Assembles items in a row; some plans use two items."""
+        """Assembles items in sequence; some plans combine two items."""
         made, problems, done = Assembled(), Problems(), 0
         for item, after in zip(items, (*items[1:], None), strict=True):
             if item.number <= done:
@@ -179,12 +177,12 @@ class Assembler:
         return made
 
     def row(self, steps: Sequence[Step], builder: PlanBuilder, name: str) -> Assembled:
-        """Assembles steps in a row as one node at the builder's path id; the flow is then that after them."""
+        """Assembles steps in sequence as one node at the builder's path id; the flow is then that after the steps."""
         made = self.level(steps, builder.path_id)
         return replace(made, nodes=(builder.sequence(name, *made.nodes, part="steps"),))
 
     def branch(self, steps: Sequence[Step], builder: PlanBuilder, name: str, before: Flow) -> tuple[Assembled, Flow]:
-        """Assembles a branch from the flow `before`; returns it with the flow after it, and keeps its own flow."""
+        """Assembles a branch that begins with the flow `before`; returns the node and the flow after it."""
         here, self.flow = self.flow, before.copy()
         made = self.row(steps, builder, name) if steps else Assembled()
         self.flow, after = here, self.flow
@@ -193,11 +191,11 @@ class Assembler:
     def give(self, name: str | None, key: str, kind: type, builder: PlanBuilder, quantity: Any = None) -> str:
         """Lets later steps read a value under `name` (None: not at all); returns the value's blackboard key.
 
-        It is the name's earlier key, so that in a loop earlier steps read the values of later ones; else `key`, or the
-        name's own key if `key` is empty.
+        The key is the earlier key of the name, so that in a loop earlier steps read the values that later steps gave;
+        else it is `key`, or the name's own key if `key` is empty.
 
-        Raises InputError when the name is no word, is that of a reading, or has another type elsewhere, since steps may
-        be repeated.
+        Raises InputError when the name is no identifier, names a reading, or has another type elsewhere, because steps
+        may be repeated.
         """
         if name is None:
             return key
@@ -216,7 +214,7 @@ class Assembler:
         return key
 
     def check_template(self, text: Template, builder: PlanBuilder) -> None:
-        """Raises InputError when an expression of the text does not fit the known values."""
+        """Raises InputError when an expression in the text reads an unknown value or a value of a wrong type."""
         for expression in text.expressions:
             self.flow.kind_of(expression, builder.source)
 
@@ -227,12 +225,12 @@ StepPlans = Mapping[type[Step], StepPlan]
 
 
 def step_name(command: Command) -> str:
-    """Name of a command's step in path ids: the goal, else the object."""
+    """Name of a command's step as used in path ids: the goal, or else the object."""
     return slug(command.goal or str(command.object or command.item or "anywhere"))
 
 
 def _part(item: _Item) -> str:
-    """Name of an item in path ids."""
+    """Name of an item as used in path ids."""
     match item.step:
         case UseMission():
             return slug(item.step.words)
@@ -244,7 +242,7 @@ def _part(item: _Item) -> str:
 
 
 def _groups(steps: Sequence[Step]) -> Iterator[tuple[tuple[_Item, ...], Policy | None]]:
-    """Iterates over groups of items: one step with its policy, or adjacent steps without any."""
+    """Yields groups of items: one step that has a policy, or adjacent steps that have none."""
     number, free = 1, []
     for place, step in enumerate(steps, start=1):
         commands: Sequence[Command | None] = step.commands or (None,)
@@ -262,7 +260,7 @@ def _groups(steps: Sequence[Step]) -> Iterator[tuple[tuple[_Item, ...], Policy |
 
 
 def _words(items: Sequence[_Item]) -> str:
-    """Text of a step in messages."""
+    """Text that stands for a step in messages."""
     commands = [item.command for item in items if item.command is not None]
     return ", then ".join(map(_command_words, commands)) or items[0].step.words
 

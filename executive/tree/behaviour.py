@@ -1,7 +1,7 @@
-"""Base classes of nodes, with a stable path id, a cause and a message: leaves, decorators and composites.
+"""Base classes of nodes, which have a stable path id, a cause and a message: leaves, decorators and composites.
 
-A page of `executive.tree.nodes` defines a kind of node as a class with a `kind`, which registers it. Its fields are the
-options of its specs, and objects of the run: `child` or `children`, `context`, and any field of the context.
+A page of `executive.tree.nodes` defines a kind of node as a class with a `kind`, which registers it. The class's fields
+are the options of the node's spec, and objects of the run: `child` or `children`, `context`, any field of the context.
 
 Suspending a tree changes no status and no memory: a composite stays at its child, a retry at its attempt. Only running
 nodes that are `Suspendable` stop; each continues when it is ticked the next time. Time that passes while a node is
@@ -47,7 +47,7 @@ class Explained:
 
 
 class Hook:
-    """Hook of a run on its nodes, by path id: they ask it when they are ticked, and report to it when they stop.
+    """Hook by which a run controls its nodes: a node asks it at each tick, and reports to it when the node stops.
 
     A node at one of the `breakpoints` waits in the tick that would begin it, once; the next tick lets it pass. After a
     restart, `restored` has the states that nodes take in their first tick, `applied` the first answers of conditions
@@ -67,11 +67,11 @@ class Hook:
 
     @property
     def active(self) -> bool:
-        """Returns whether it may change the tick of a node."""
+        """Returns whether the hook may change the tick of any node."""
         return bool(self.breakpoints or self.waiting or self.restored)
 
     def tick(self, node: Any) -> Iterator[Behaviour]:
-        """Makes a node wait or take its restored state; else lets it tick."""
+        """Makes a node wait, or take the state restored for it; otherwise lets the node tick."""
         if self.waiting.pop(node.path_id, None) is not None and node.status == Status.RUNNING:
             node.status = Status.INVALID
         elif node.status != Status.RUNNING and node.path_id in self.breakpoints:
@@ -89,7 +89,7 @@ class Hook:
         yield node
 
     def note_stop(self, node: Any, new_status: Status) -> None:
-        """Notes that a node stops, by itself or from outside (INVALID)."""
+        """Records that a node has stopped, by itself or from outside (INVALID)."""
         self.touched.add(node)
         if new_status == Status.INVALID:
             self.stopped.add(node)
@@ -99,14 +99,14 @@ class Hook:
 
 @dataclass_transform(kw_only_default=True, eq_default=False, field_specifiers=(field,))
 class _TakesKeywords:
-    """Base class whose subclasses become dataclasses of keywords."""
+    """Base class that turns each subclass into a dataclass with keyword arguments only."""
 
     def __init_subclass__(cls) -> None:
         dataclass(kw_only=True, eq=False, repr=False)(cls)
 
 
 class ExplainedNode(_TakesKeywords, Explained):
-    """Node with an explanation; `kind` is the kind of its specs."""
+    """Node that explains its status; `kind` names the kind of node in its spec."""
 
     kind: ClassVar[str] = ""
     output_types: ClassVar[Mapping[str, Any]] = MappingProxyType({})
@@ -154,21 +154,21 @@ class ExplainedNode(_TakesKeywords, Explained):
 
     @classmethod
     def signs(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Returns the blackboard keys that show where an object is, and the `executive.tree.board.Sign` of each."""
+        """Returns the keys under which the node writes an object's place, each with its `executive.tree.board.Sign`."""
         return {}
 
     @classmethod
     def usual_children(cls, node: Any) -> Any:
-        """Returns the children of a node's spec that run one after the other without failures."""
+        """Returns those children in a node's spec that run one after another if nothing fails."""
         return node.children[cls.usual]
 
     @classmethod
     def estimate(cls, node: Any, walk: Any, first: bool) -> Any:
-        """Estimates a node's spec on a walk (`executive.tree.estimate`); with `first`, raises its first error."""
+        """Estimates a node from its spec on a `walk` (`executive.tree.estimate`); with `first`, raises its error."""
         return walk.all_of(node, first)
 
     def restore(self, status: Status, cause: Cause | None, message: str) -> None:
-        """Restores the status, cause and message from before a restart."""
+        """Restores the status, cause and message that the node had before a restart."""
         self.status, self.cause, self.message = status, cause, message
 
     @property
@@ -192,7 +192,7 @@ class ExplainedNode(_TakesKeywords, Explained):
         return False
 
     def fail(self, failure: Failed) -> Status:
-        """Explains a failure of the node itself; returns FAILURE."""
+        """Explains a failure that the node itself caused; returns FAILURE."""
         self.cause, self.message = failure.cause, failure.message
         return Status.FAILURE
 
@@ -225,7 +225,7 @@ class ExplainedLeaf(ExplainedNode, Behaviour):
 
 
 class ExplainedDecorator(ExplainedNode, Decorator):
-    """Decorator that takes its child's explanation unless it has its own."""
+    """Decorator that repeats its child's cause and message unless it has its own."""
 
     child: Behaviour
     before: Status | None = field(default=None, init=False)
@@ -235,7 +235,7 @@ class ExplainedDecorator(ExplainedNode, Decorator):
         Decorator.__init__(self, self.name, self.child)
 
     def _tick(self) -> Iterator[Behaviour]:
-        """Ticks the child unless it is held back, then updates; like py_trees, but without its type checks."""
+        """Ticks the child unless the decorator prevents it, then updates; like py_trees, but without type checks."""
         if self.status != Status.RUNNING:
             self.initialise()
         status = None if self.path_id in self.hook.unheld else self._held_back()
@@ -248,11 +248,11 @@ class ExplainedDecorator(ExplainedNode, Decorator):
         yield self
 
     def _held_back(self) -> Status | None:
-        """Returns the status of a tick without the child; None if the child is ticked."""
+        """Returns the status for a tick without the child; None if the child must be ticked."""
         return None
 
     def stop(self, new_status: Status) -> None:
-        """Stops the child; explains an interruption while running, and clears the explanation in a reset."""
+        """Stops the child; explains a stop while running, and clears the explanation at a reset."""
         self.hook.note_stop(self, new_status)
         interrupted = new_status == Status.INVALID and self.status == Status.RUNNING
         super().stop(new_status)
@@ -262,14 +262,14 @@ class ExplainedDecorator(ExplainedNode, Decorator):
             self.clear_explanation()
 
     def pass_on(self) -> Status:
-        """Takes the child's explanation; returns the child's status."""
+        """Copies the child's cause and message; returns the child's status."""
         failed = self.decorated.status == Status.FAILURE
         self.cause, self.message = (cause_of(self.decorated) if failed else None), message_of(self.decorated)
         return self.decorated.status
 
 
 class MemoryComposite(ExplainedNode, Composite):
-    """Composite that ticks its children one after the other, by `_following`, and keeps their results."""
+    """Composite that ticks its children one after another, in the order of `_following`, and keeps their results."""
 
     goes_on_after: ClassVar[tuple[Status, ...]] = (Status.SUCCESS,)
     least: ClassVar[int] = 1
@@ -284,7 +284,7 @@ class MemoryComposite(ExplainedNode, Composite):
         Composite.__init__(self, self.name, list(self.children))
 
     def _tick(self) -> Iterator[Behaviour]:
-        """Ticks the present child, and the children that follow it in the same tick."""
+        """Ticks the present child, and in the same tick the children that follow it."""
         if self.status != Status.RUNNING:
             self._restart()
         while True:
@@ -299,7 +299,7 @@ class MemoryComposite(ExplainedNode, Composite):
         yield self
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
-        """Stops the running children when it is interrupted, and keeps the results of others; else resets all."""
+        """Stops the running children when the node is interrupted, and keeps the results of others; else resets all."""
         self.hook.note_stop(self, new_status)
         if new_status == Status.INVALID:
             interrupted = self.status == Status.RUNNING
@@ -317,7 +317,7 @@ class MemoryComposite(ExplainedNode, Composite):
         return False
 
     def _following(self, child: Behaviour) -> int | None:
-        """Returns the index of the child to tick next in the same tick after the present one ended; None for none."""
+        """Returns the index of the child to tick next, in the same tick, after the present child ended, or None."""
         goes_on = child.status in self.goes_on_after and self._index + 1 < len(self.children)
         return self._index + 1 if goes_on else None
 
@@ -329,14 +329,14 @@ class MemoryComposite(ExplainedNode, Composite):
             self._forget()
 
     def _forget(self) -> None:
-        """Clears the blackboard keys of an earlier run of the node."""
+        """Clears the blackboard keys that an earlier run of the node has written."""
 
     def _reset_children(self) -> None:
         for child in self.children:
             child.stop(Status.INVALID)
 
     def _take_over(self, child: Behaviour) -> None:
-        """Takes the child's status and explanation."""
+        """Copies the child's status, cause and message."""
         status = child.status if child.status != Status.INVALID else Status.FAILURE
         self.cause, self.message = self._explanation(child) if status == Status.FAILURE else (None, message_of(child))
         if status == Status.RUNNING:
@@ -348,11 +348,11 @@ class MemoryComposite(ExplainedNode, Composite):
         return cause_of(child), message_of(child)
 
     def _go_on(self, message: str) -> None:
-        """Sets RUNNING with this message."""
+        """Stays RUNNING, with this message."""
         self.status, self.cause, self.message = Status.RUNNING, None, message
 
     def _end(self, cause: Cause | None, message: str) -> None:
-        """Ends with SUCCESS, or with FAILURE if there is a cause."""
+        """Ends with FAILURE if there is a cause, else with SUCCESS."""
         self.cause, self.message = cause, message
         self.stop(Status.SUCCESS if cause is None else Status.FAILURE)
 
@@ -376,14 +376,14 @@ def message_of(node: Behaviour) -> str:
 
 @runtime_checkable
 class Conditional(Protocol):
-    """Child of a selector that is skipped, without a failure, when it does not apply."""
+    """Node that a selector skips, without a failure, when the node's condition does not hold."""
 
     def applies(self) -> bool:
-        """Returns whether it may be ticked now."""
+        """Returns whether the node's condition holds, so that it may be ticked."""
 
 
 def applies(node: Behaviour) -> bool:
-    """Returns whether a node may be ticked now: by its answer from before a restart, or by its condition."""
+    """Returns whether a node may be ticked now: as answered before a restart, else by its condition."""
     if not isinstance(node, Conditional):
         return True
     before = node.hook.applied.pop(node.path_id, None) if isinstance(node, ExplainedNode) else None
@@ -392,17 +392,17 @@ def applies(node: Behaviour) -> bool:
 
 @runtime_checkable
 class Suspendable(Protocol):
-    """Node that must be suspended before a pause of its ticks."""
+    """Node that must be suspended before its ticks pause."""
 
     def suspend(self) -> None:
-        """Stops the robot and its own time until the next tick. Idempotent; never raises."""
+        """Stops the robot and the node's own stopwatch until the next tick. Idempotent; never raises."""
 
 
 def suspend(root: Behaviour, *, sparing: Behaviour | None = None) -> None:
     """Suspends all running nodes of a tree: their motion stops, and they keep their state. Idempotent.
 
     The node `sparing` and its descendants continue. The next tick continues the tree: each suspended skill gets
-    `resume`, which by default begins it again. Stop the tree to give it up.
+    `resume`, which by default begins it again. To end the work for good, stop the tree instead.
     """
     spared = set() if sparing is None else set(sparing.iterate())
     for node in root.iterate():
@@ -411,7 +411,7 @@ def suspend(root: Behaviour, *, sparing: Behaviour | None = None) -> None:
 
 
 class StoppableTime:
-    """Stopwatch on the robot's clock, in seconds since its creation, without the time of its stops."""
+    """Stopwatch on the robot's clock that counts seconds since its creation, except while it is stopped."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -420,7 +420,7 @@ class StoppableTime:
 
     @property
     def stopped(self) -> bool:
-        """Returns whether it is between `stop` and `go_on`."""
+        """Returns whether the stopwatch has been stopped and not continued."""
         return self._stopped_s is not None
 
     def elapsed_s(self) -> float:

@@ -1,4 +1,4 @@
-"""Blackboard of one run, whose keys begin with the robot's name, and the last known places of objects on it."""
+"""Blackboard of one run, in which each key begins with the robot's name; tracks the last known places of objects."""
 
 import enum
 from collections.abc import Iterable, Mapping
@@ -34,7 +34,7 @@ class Board:
         return self._values[key]
 
     def forget(self, keys: Iterable[str]) -> None:
-        """Removes values, so that another attempt begins without them; ignores unknown keys."""
+        """Removes values, so that another attempt begins without them; ignores keys without a value."""
         for key in keys:
             self._values.pop(key, None)
         self._copy = None
@@ -43,17 +43,17 @@ class Board:
         return key in self._values
 
     def values(self) -> Mapping[str, Any]:
-        """Returns a copy of all values, the same copy until they change."""
+        """Returns a copy of all values; returns the same copy again until a value changes."""
         if self._copy is None:
             self._copy = dict(self._values)
         return self._copy
 
 
 class Binding(Protocol):
-    """Source of an input port's value."""
+    """Source from which an input port reads its value."""
 
     def read(self, board: Board) -> Any:
-        """Returns the present value. Raises KeyError when there is none yet."""
+        """Returns the present value. Raises KeyError when nothing was written yet."""
 
 
 @dataclass(frozen=True)
@@ -69,55 +69,55 @@ class Constant:
 
 @dataclass(frozen=True)
 class FromBoard:
-    """Binding of a port to a blackboard key. `gives` is the type of the result; None: the type of the stored value."""
+    """Binding of a port to a blackboard key. `gives` is the type of the value that the port gets (None: as stored)."""
 
     gives: ClassVar[Any] = None
     key: str
 
     def read(self, board: Board) -> Any:
-        """Returns the value under the key. Raises KeyError when there is none yet."""
+        """Returns the value under the key. Raises KeyError when nothing was written there yet."""
         return board.get(self.key)
 
 
 @dataclass(frozen=True)
 class FromBoardOr(FromBoard):
-    """Binding of a port to a blackboard key, with a default while there is no value."""
+    """Binding of a port to a blackboard key, with a default for as long as nothing is written there."""
 
     default: Any
 
     def read(self, board: Board) -> Any:
-        """Returns the value under the key, else the default."""
+        """Returns the value under the key, or the default when nothing was written there."""
         return board.get(self.key) if self.key in board else self.default
 
 
 @dataclass(frozen=True)
 class BesideBoard(FromBoard):
-    """Binding of a port to a pose beside the one under a blackboard key, shifted along that pose's axes (m)."""
+    """Binding of a port to a pose beside the pose under a blackboard key, shifted along that pose's axes (m)."""
 
     gives: ClassVar[Any] = Pose2D
     forward_m: float
     left_m: float
 
     def read(self, board: Board) -> Pose2D:
-        """Returns the shifted pose. Raises KeyError when there is none yet."""
+        """Returns the shifted pose. Raises KeyError when no pose was written yet."""
         return pose_beside(board.get(self.key), self.forward_m, self.left_m)
 
 
 @dataclass(frozen=True)
 class PlaceOf(FromBoard):
-    """Binding of a port to the place (x, y) of the person seen under a blackboard key."""
+    """Binding of a port to the position (x, y) of the person whose observation is under a blackboard key."""
 
     gives: ClassVar[Any] = tuple[Coordinate, Coordinate]
 
     def read(self, board: Board) -> tuple[float, float]:
-        """Returns the place. Raises KeyError when nobody was seen yet."""
+        """Returns the position. Raises KeyError when no person was observed yet."""
         seen: ObjectObservation = board.get(self.key)
         return seen.position_W[0], seen.position_W[1]
 
 
 @dataclass(frozen=True)
 class SurfaceOfDetection(FromBoard):
-    """Binding of a port to the surface under the detected object of a blackboard key, or to all if it is unknown."""
+    """Binding of a port to the surface below a detected object; to all surfaces if that surface is unknown."""
 
     gives: ClassVar[Any] = tuple[Surface, ...]
     surfaces: tuple[Surface, ...]
@@ -129,12 +129,12 @@ class SurfaceOfDetection(FromBoard):
 
 
 def pose_beside(pose: Pose2D, forward_m: float, left_m: float) -> Pose2D:
-    """Shifts a pose along its own axes (m); the yaw stays."""
+    """Shifts a pose along its own axes (m); the yaw stays the same."""
     return compose(pose, Pose2D(forward_m, left_m, 0.0))
 
 
 class Sign(enum.Enum):
-    """Event after which an object is known to be somewhere."""
+    """Event from which the place of an object is known."""
 
     SEEN = "was seen"
     RELEASED = "was let go"
@@ -162,7 +162,7 @@ class LastKnown:
 
 
 class LastKnownTracker:
-    """Follows the blackboard of a mission; `last` is the object that was seen, let go or dropped last."""
+    """Tracks on a mission's blackboard which object was seen, released or dropped last, and where (`last`)."""
 
     def __init__(self, root: NodeSpec) -> None:
         self._keys: Mapping[str, Sign] = {
@@ -173,7 +173,7 @@ class LastKnownTracker:
         self.last: LastKnown | None = None
 
     def note(self, board: Mapping[str, Any], pose: Pose2D | None) -> None:
-        """Takes the values of the blackboard; those of the first call are of earlier missions."""
+        """Reads the changed values on the blackboard; the values at the first call belong to earlier missions."""
         now = {key: board[key] for key in self._keys if key in board}
         before, self._values = self._values, now
         changed = {} if before is None else {key: each for key, each in now.items() if each is not before.get(key)}

@@ -1,4 +1,4 @@
-"""Check of a mission before it runs: errors, warnings, and its estimate."""
+"""Checks a mission before it runs: errors, warnings, and an estimate."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ Fault = tuple[str, str]
 
 @dataclass(frozen=True)
 class Abilities:
-    """Abilities of the robot and properties of the objects, as far as they are known before a run.
+    """Abilities of the robot and properties of the objects that are known before a run.
 
-    `masses_kg` has the masses of all classes with a model, `lift_kg` is the payload of the arm. The robot recognises
-    `classes` and `attributes`; an unknown one makes a search for several objects fail. `reaches_m` are the heights of
-    the lowest and the highest reachable surface; `widths_m` has the least width of each class, `opens_m` is the
-    gripper's largest; `gripper` is False without one. `takers` are the people who take objects from the robot (None:
-    unknown). `taken_m2` is the covered area of each surface, `apart_m` the free distance around an object.
+    `masses_kg` has the mass of each class with a model, `lift_kg` is the arm's payload. The detector recognises
+    `classes` and `attributes`; a search for several objects fails for any others. `reaches_m` are the heights of the
+    lowest and the highest reachable surface. `widths_m` has the least width of each class, `opens_m` is the gripper's
+    maximum opening; `gripper` is False without a gripper. `takers` are the people who take objects from the robot
+    (None: unknown). `taken_m2` is the covered area of each surface, `apart_m` the clearance around an object.
     """
 
     masses_kg: Mapping[str, float]
@@ -58,7 +58,7 @@ class Abilities:
 
 @dataclass(frozen=True)
 class Checked:
-    """Result of a check: the errors, the warnings, and the estimate of a mission without failures."""
+    """Result of a check: errors, warnings, and the estimate for a mission in which nothing fails."""
 
     errors: tuple[InputError, ...]
     estimate: Estimate
@@ -68,7 +68,7 @@ class Checked:
 class PlannedRoutes(RoutePlanner):
     """Planner of routes on the map with the global planner of `navigate`; each route is planned once.
 
-    `full_m_s` returns the robot's full speed, for zones with a share of it.
+    `full_m_s` returns the robot's full speed, for zones that limit the speed to a fraction of it.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class PlannedRoutes(RoutePlanner):
     def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
         """Plans the route from start to goal within the zones.
 
-        Raises ValueError with one sentence if none exists, InputError for an unreadable mask.
+        Raises ValueError with one sentence if there is no route, InputError for an unreadable mask.
         """
         if (start, goal, zones) not in self._routes:
             try:
@@ -125,7 +125,7 @@ class PlannedRoutes(RoutePlanner):
         return KeepOut(zone_map(zones, self._full_m_s())).space(self._costmap, self._footprint, start)
 
     def _between(self, zones: tuple[Zone, ...], start: Pose2D, goal: Pose2D) -> tuple[str, ...]:
-        """Names of the keep-out zones that cut the goal off: one that suffices, else all; none if walls do."""
+        """Names of the keep-out zones that cut the goal off: one that suffices, else all; empty if walls do."""
         keep_out = tuple(zone for zone in zones if zone.kind is ZoneKind.KEEP_OUT)
 
         def leads(without: Sequence[Zone]) -> bool:
@@ -140,7 +140,7 @@ class PlannedRoutes(RoutePlanner):
         return next(((zone.name,) for zone in keep_out if leads([zone])), tuple(zone.name for zone in keep_out))
 
     def _limited(self, ground: ZoneMap, path: Path) -> tuple[tuple[float, float], ...]:
-        """Parts of a path under a speed limit: the progress of each (m), and the limit (m/s)."""
+        """Stretches of a path with a speed limit: the progress (m) along each stretch, and the limit (m/s)."""
         parts, now = dict[float, float](), np.zeros(1)
         steps = zip(path.poses[1:], np.diff(path.progress_m()).tolist(), strict=True)
         for pose, step_m in steps:
@@ -168,7 +168,7 @@ def check_tree(
     lines = {node.path_id: node.source for node in tree.root.walk()}
 
     def errors(found: Iterable[tuple[StepPart, Fault]]) -> tuple[InputError, ...]:
-        """Returns errors at the lines of their parts."""
+        """Returns errors, each at the line of the step that it concerns."""
         return tuple(InputError.at(lines.get(part.path_id), what, hint=hint) for part, (what, hint) in found)
 
     commands = ((part, part.command) for part in tree.parts if part.command is not None)
@@ -184,7 +184,7 @@ def check_tree(
 
 
 def _objection(part: StepPart, held: InGripper | None, knowledge: Knowledge, abilities: Abilities) -> Fault | None:
-    """Returns the error of a part that cannot run with the object in the gripper, or without a gripper; or None."""
+    """Returns the error of a step that cannot run with this object in the gripper, or without a gripper; else None."""
     skill = part.skill
     if part.command is not None or skill is None:
         return None if part.command is None else objection(part.command, held, knowledge)
@@ -198,8 +198,10 @@ def _objection(part: StepPart, held: InGripper | None, knowledge: Knowledge, abi
 
 
 def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:
-    """Iterates over the errors of an impossible command: an object that the robot does not recognise or cannot take, a
-    person who takes nothing, or a surface out of the arm's reach."""
+    """Yields the errors of an impossible command.
+
+    The robot may not recognise or be able to take an object, a person may take nothing, or a surface be out of reach.
+    """
     handles = command.item is not None or command.task in (Task.GRASP, Task.PLACE)
     if handles and not abilities.gripper:
         what = command.item or command.object
@@ -231,7 +233,7 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
 
 
 def _nobody_takes(command: Command, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:
-    """Iterates over the errors of a hand-over to nobody, or to a person who takes nothing."""
+    """Yields the errors for a hand-over to nobody, or to a person who takes nothing."""
     if command.item is None or command.task is Task.PLACE or abilities.takers is None:
         return
     person = None if command.goal is None else knowledge.person(command.goal)
@@ -247,7 +249,7 @@ def _nobody_takes(command: Command, knowledge: Knowledge, abilities: Abilities) 
 
 
 def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[tuple[StepPart, Fault]]:
-    """Iterates over the parts that put too many objects on a surface, by the known sizes."""
+    """Yields the steps that put more objects on a surface than fit there, judged by the known sizes."""
     brought_m2: dict[str, float] = {}
     for part in tree.parts:
         command = part.command
@@ -273,7 +275,7 @@ def _narrowest_m(classes: Collection[str], abilities: Abilities) -> float:
 
 
 def _out_of_reach(goal: str, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:
-    """Iterates over the errors of a surface that is too high or too low for the arm."""
+    """Yields the errors for a surface that is too high or too low for the arm."""
     surface = knowledge.surfaces.get(knowledge.place(goal) or goal)
     low_m, high_m = abilities.reaches_m
     if surface is not None and not low_m <= surface.height <= high_m:

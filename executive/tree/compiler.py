@@ -1,4 +1,4 @@
-"""Compiler from missions to trees: a pure function; the same mission gives the same tree, including path ids."""
+"""Compiles missions to trees by a pure function: the same mission gives the same tree, including path ids."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ from skills.inputs.errors import InputError, suggestion, with_article
 class CompiledTree:
     """Tree of a mission for one robot, as data.
 
-    `parts` are its parts with goal conditions in order, `steps` the compiled steps, `doors`, `tags` (AprilTags),
-    `surfaces` and `zones` those of the knowledge file. Its root has monitors and interrupts above the mission: see
+    `parts` are the steps with goal conditions, in order, `steps` all compiled steps. `doors`, `tags` (AprilTags),
+    `surfaces` and `zones` come from the knowledge file. The root has monitors and interrupts above the mission: see
     `executive.tree.nodes.interrupts`.
     """
 
@@ -50,7 +50,7 @@ class CompiledTree:
 
     @property
     def mission(self) -> NodeSpec:
-        """Node of the mission below its monitors and interrupts."""
+        """Node of the mission itself, below the monitors and interrupts."""
         return self.root.children[-1] if self.root.behaviour.watches else self.root
 
     def build(self, context: RunContext) -> Behaviour:
@@ -59,12 +59,12 @@ class CompiledTree:
 
     @property
     def buttons(self) -> tuple[str, ...]:
-        """Operator's buttons in the mission's waits and decisions."""
+        """Buttons that the mission waits for or uses in decisions."""
         return tuple(dict.fromkeys(button for node in self.root.walk() for button in buttons_of(node)))
 
     @property
     def all_zones(self) -> tuple[Zone, ...]:
-        """Zones of the whole mission, and of its groups."""
+        """Zones of the whole mission, and of groups of steps in it."""
         groups = (node.options["zones"] for node in self.root.walk() if "zones" in node.options)
         return tuple(dict.fromkeys((*self.zones, *(zone for zones in groups for zone in zones))))
 
@@ -77,13 +77,13 @@ class CompiledTree:
 def compile_mission(
     mission: Mission, *, knowledge: Knowledge, registry: Registry, last_known: LastKnown | None = None
 ) -> CompiledTree:
-    """Compiles a mission to a tree and checks its wiring; each node has the line of the mission file behind it.
+    """Compiles a mission to a tree and checks its wiring; each node has the line of the mission file that it is from.
 
     Args:
         mission: the mission; its robot and name become the first parts of the path ids.
         knowledge: the world's places, surfaces, objects and people.
         registry: the skills by name.
-        last_known: the place of the mission's object, as another robot last knew it; the search begins there.
+        last_known: where another robot last knew the mission's object; the search begins there.
 
     Raises InputError when there are no steps, a place, object or skill is unknown, ports are wired wrongly, or a
     command cannot be carried out; with the file and line where known, and all further errors in `others`.
@@ -122,7 +122,7 @@ def check_wiring(root: NodeSpec) -> None:
 
 
 def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Iterates over the errors of one skill's ports, with hints."""
+    """Yields the errors in one skill's ports, with hints."""
     skill, inputs, outputs = (node.options[key] for key in ("skill", "inputs", "outputs"))
     types = field_types(skill.Inputs)
     for name in required_fields(skill.Inputs):
@@ -139,7 +139,7 @@ def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, s
 
 
 def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Iterates over the errors of one bound input, with hints."""
+    """Yields the errors in one bound input, with hints."""
     wanted = f"give it {with_article(describe_type(kind))}"
     if isinstance(binding, Constant) and not conforms(binding.value, kind):
         yield f"input port '{port}' got {binding.value!r}", wanted
@@ -163,7 +163,7 @@ PLANS: Final[StepPlans] = {model: plan for page in node_pages() for model, plan 
 
 
 def build(spec: NodeSpec, context: RunContext) -> Behaviour:
-    """Builds the py_trees node of a spec for one run, with all nodes below it."""
+    """Builds the py_trees node for a spec in one run, with all nodes below it."""
     if "zones" in spec.options:
         context = replace(context, zones=tuple(dict.fromkeys((*context.zones, *spec.options["zones"]))))
     children = [build(child, context) for child in spec.children]

@@ -1,4 +1,4 @@
-"""Shared context of the running nodes of one robot's tree."""
+"""Context that the running nodes of one robot's tree share."""
 
 import hashlib
 from collections.abc import Callable, Mapping
@@ -21,9 +21,9 @@ def leaf_seed(run_seed: int, path_id: str) -> int:
 
 
 class Endings:
-    """Queue of steps under `always` whose nodes were stopped from outside.
+    """Queue of steps under `always` that the run must still execute after their nodes were stopped from outside.
 
-    The run takes these steps over, and ticks them first.
+    The run takes these steps over, and ticks them before anything else.
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class Endings:
         return self._due[0] if self._due else None
 
     def take(self, node: Behaviour) -> bool:
-        """Takes a node over, perhaps in the middle of its work; returns False after `close`."""
+        """Accepts a node, which may be in the middle of its work; returns False after `close`."""
         if not self._closed:
             self._due.append(node)
         return not self._closed
@@ -57,12 +57,12 @@ class Endings:
 
 @dataclass
 class ArmOrder:
-    """State of the arm between skills: `anywhere` after a skill that failed, stopped, or leaves the arm out."""
+    """State of the arm between skills: `anywhere` after a skill that failed, was stopped, or leaves it extended."""
 
     anywhere: bool = False
 
     def note_end(self, skill: type[Skill[Any]], *, succeeded: bool) -> None:
-        """Notes the end of a skill: only a success of a skill for the arm alone leaves the arm in a known pose."""
+        """Records the end of a skill: only the success of a skill for the arm alone leaves the arm in a known pose."""
         if Part.ARM in skill.uses:
             self.anywhere = not succeeded or Part.BASE in skill.uses
 
@@ -71,9 +71,8 @@ class ArmOrder:
 class RunContext(SkillContext):
     """Context of all nodes of a robot's tree: the context of skills, the blackboard, the stop button.
 
-    `seed` is the run's. `stop_pressed` returns why nothing may move while a stop button is pressed, else None.
-    `presses` counts the presses of each of the operator's buttons. `day_began_s` is the time of day (s after midnight)
-    at zero of the robot's clock.
+    `seed` is the seed of the run. `stop_pressed` returns why nothing may move while a stop button is pressed, else
+    None. `presses` counts how often each button was pressed. `day_began_s` is the time of day (s) at clock 0.
     """
 
     board: Board
@@ -86,7 +85,7 @@ class RunContext(SkillContext):
 
     @cached_property
     def robot_excluders(self) -> tuple[ExcludesRobots, ...]:
-        """Estimators that ignore readings of other robots, whose poses are known."""
+        """Estimators that can exclude readings of other robots, whose poses are known."""
         return tuple(each for each in (self.localiser, self.costmap) if isinstance(each, ExcludesRobots))
 
     def known_pose(self) -> Pose2D | None:
@@ -94,6 +93,6 @@ class RunContext(SkillContext):
         return self.pose() if self.localiser.estimate().localised else None
 
     def for_skill(self, path_id: str) -> SkillContext:
-        """Returns the part of the context that a skill may use, with a seed of its own."""
+        """Returns those parts of the context that a skill may use, with a seed of the skill's own."""
         lent = {each.name: getattr(self, each.name) for each in fields(SkillContext) if each.init}
         return SkillContext(**{**lent, "seed": leaf_seed(self.seed, path_id)})

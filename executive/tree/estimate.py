@@ -1,4 +1,4 @@
-"""Estimate of a mission without failures: time, distance and charge, with errors for parts that are impossible.
+"""Estimates a mission in which nothing fails: time, distance and charge, with errors for impossible steps.
 
 A walk follows the tree's nodes in the order in which they run; of alternatives it takes the first possible one.
 """
@@ -37,7 +37,7 @@ class DriveTimes(_Data):
 
 
 class BatteryUse(_Data):
-    """Charge per second that is drawn or restored, as a share of a full battery."""
+    """Charge per second that is drawn or restored, as a fraction of a full battery."""
 
     driving_per_s: Positive
     standing_per_s: Positive
@@ -57,7 +57,7 @@ class Estimates(_Data):
 class Route:
     """Route between two poses: its length (m), and its progress (m), in which turns count as well.
 
-    `limited` are its parts under a speed limit: the progress of each (m), and the limit (m/s).
+    `limited` are its stretches with a speed limit: the progress (m) along each, and the limit (m/s).
     """
 
     length_m: float
@@ -69,14 +69,14 @@ class RoutePlanner(Protocol):
     """Planner of routes on the map."""
 
     def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
-        """Plans the route from start to goal that minds the zones. Raises ValueError with one sentence if none does."""
+        """Plans the route from start to goal that obeys the zones. Raises ValueError with one sentence without one."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Least duration on the robot's clock (s), distance driven (m), and charge used (share of a full battery).
+    """Least duration on the robot's clock (s), distance driven (m), and charge used (fraction of a full battery).
 
-    It may take `spare_s` longer (infinite: unknown) for the `reasons`: "1 to 3 rounds", "until 18:00".
+    The mission may take `spare_s` longer (infinite: unknown) for the `reasons`, such as "1 to 3 rounds".
     """
 
     duration_s: float = 0.0
@@ -100,13 +100,13 @@ class Estimate:
         )
 
     def up_to(self, most_s: float, *reasons: str) -> Estimate:
-        """Returns the estimate with `most_s` as its longest duration, for these reasons before its own."""
+        """Returns the estimate with `most_s` as the longest duration, and puts these reasons before the others."""
         all_reasons = tuple(dict.fromkeys((*reasons, *self.reasons)))
         return replace(self, spare_s=max(0.0, most_s - self.duration_s), reasons=all_reasons)
 
 
 class CannotError(Exception):
-    """Node that cannot succeed; `error` is None where the user need not know."""
+    """Raised for a node that cannot succeed; `error` is None if the user need not know."""
 
     def __init__(self, error: InputError | None) -> None:
         super().__init__(str(error))
@@ -115,7 +115,7 @@ class CannotError(Exception):
 
 @dataclass
 class Walk:
-    """State of the walk: the robot's pose, the poses it has noted, the charge drawn since the battery was full."""
+    """State of a walk: the robot's pose, the poses stored by nodes, and the charge drawn since the battery was full."""
 
     planner: RoutePlanner
     estimates: Estimates
@@ -128,11 +128,11 @@ class Walk:
     drawn: float = 0.0
 
     def mark(self) -> _Mark:
-        """Returns the present pose, noted poses and drawn charge."""
+        """Returns the present pose, the stored poses and the drawn charge, as a state to return to."""
         return self.pose, dict(self.noted), self.drawn
 
     def go_to(self, mark: _Mark) -> None:
-        """Sets pose, noted poses and drawn charge."""
+        """Returns to an earlier state of the walk."""
         self.pose, noted, self.drawn = mark
         self.noted = dict(noted)
 
@@ -145,7 +145,7 @@ class Walk:
         return taken
 
     def follow(self, node: NodeSpec, *, first: bool) -> Estimate:
-        """Estimates a node. An impossible part is noted and omitted; with `first` its error is raised instead."""
+        """Estimates a node. Records and omits an impossible step; with `first`, raises the step's error instead."""
         try:
             taken: Estimate = node.behaviour.estimate(node, self, first)
             return taken
@@ -157,11 +157,11 @@ class Walk:
             return Estimate()
 
     def all_of(self, node: NodeSpec, first: bool) -> Estimate:
-        """Estimates the children one after the other."""
+        """Estimates the children, which run one after another."""
         return sum((self.follow(child, first=first) for child in node.behaviour.usual_children(node)), Estimate())
 
     def first_of(self, node: NodeSpec) -> Estimate:
-        """Estimates the first possible branch. Raises the first branch's error if there is none."""
+        """Estimates the first possible branch. Raises the first branch's error if no branch is possible."""
         reasons: list[InputError] = []
         for child in node.behaviour.usual_children(node):
             tried = self._try(child, reasons)
@@ -170,7 +170,7 @@ class Walk:
         raise CannotError(reasons[0] if reasons else None)
 
     def all_that_can(self, node: NodeSpec) -> Estimate:
-        """Estimates all possible branches. Raises the first branch's error if there is none."""
+        """Estimates all possible branches. Raises the first branch's error if no branch is possible."""
         reasons: list[InputError] = []
         tried = [self._try(child, reasons) for child in node.behaviour.usual_children(node)]
         done = [each for each in tried if each is not None]
@@ -179,7 +179,7 @@ class Walk:
         return sum(done, Estimate())
 
     def _try(self, branch: NodeSpec, reasons: list[InputError]) -> Estimate | None:
-        """Estimates a branch. An impossible one gives None, changes nothing and adds its error to `reasons`."""
+        """Estimates a branch; if it is impossible, returns None, changes nothing and adds the error to `reasons`."""
         here = self.mark()
         try:
             return self.follow(branch, first=True)
@@ -189,7 +189,7 @@ class Walk:
             return None
 
     def each_from_here(self, branches: Sequence[NodeSpec], first: bool) -> list[tuple[Estimate, _Mark]]:
-        """Estimates each branch from the present state of the walk; returns each with the state at its end."""
+        """Estimates each branch from the present state; returns each estimate with the state at the branch's end."""
         here, found = self.mark(), []
         for branch in branches:
             self.go_to(here)
@@ -200,9 +200,9 @@ class Walk:
 def estimate_tree(
     root: NodeSpec, *, start: Pose2D, planner: RoutePlanner, estimates: Estimates, zones: tuple[Zone, ...] = ()
 ) -> tuple[Estimate, tuple[InputError, ...], tuple[InputError, ...]]:
-    """Estimates a tree from `start` on, in which the robot minds `zones`.
+    """Estimates a tree that begins at `start`, for a robot that obeys `zones`.
 
-    Returns also errors for unreachable places, and warnings, with their lines.
+    Also returns errors for unreachable places, and warnings, each with its line.
     """
     walk = Walk(planner, estimates, start, zones)
     return walk.follow(root, first=False), tuple(walk.errors), tuple(walk.warnings)

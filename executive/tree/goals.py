@@ -1,4 +1,4 @@
-"""Goal conditions of commands and skills in the known world."""
+"""Derives goal conditions from commands and skills in the known world."""
 
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
@@ -19,15 +19,15 @@ _Goal = Callable[[Command, Knowledge, tuple[str, ...]], GoalCondition | None]
 
 
 def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition | None:
-    """Goal condition of a command; `elsewhere` are more surfaces from which its object may be taken.
+    """Goal condition of a command; the object may also be taken from the surfaces `elsewhere`.
 
-    Waiting at the present pose has none.
+    None for waiting at the present pose.
     """
     return _GOALS[command.task](command, knowledge, tuple(elsewhere))
 
 
 def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[GoalCondition, GoalCondition]:
-    """Goal conditions of two commands that clear a place: it is empty, and all objects are at the goal."""
+    """Goal conditions of two commands that clear a place: the place is empty, and all its objects are at the goal."""
     source = _regions(get, knowledge, ())
     place = None if bring.goal is None else knowledge.place(bring.goal)
     assert place is not None
@@ -36,7 +36,7 @@ def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[
 
 
 def door_goal(knowledge: Knowledge, between: tuple[str, str], kind: GoalKind = GoalKind.DOOR_OPEN) -> GoalCondition:
-    """Goal condition of a door: a right answer whether it is open, or an open door after a step (DOOR_OPENED).
+    """Goal condition for a door: a right answer whether it is open, or an open door after a step (DOOR_OPENED).
 
     Raises StopIteration if the world has no such door.
     """
@@ -47,7 +47,7 @@ def door_goal(knowledge: Knowledge, between: tuple[str, str], kind: GoalKind = G
 
 
 def surfaces_to_search(knowledge: Knowledge, item: str, place: str | None) -> tuple[str, ...]:
-    """Returns the surfaces to search, the usual places of the object first; without a place, all surfaces.
+    """Returns the surfaces to search, those where the object usually is first; without a place, all surfaces.
 
     The surfaces of a room that is a usual place count as usual.
     """
@@ -57,7 +57,7 @@ def surfaces_to_search(knowledge: Knowledge, item: str, place: str | None) -> tu
 
 
 def surface_region(knowledge: Knowledge, surface: str) -> Region:
-    """Region above a surface that holds the origin of any object resting on it."""
+    """Region above a surface that contains the origin of each object at rest on the surface."""
     facts = knowledge.surfaces[surface]
     return Region(surface, facts.polygon, facts.height - BELOW_TOP_M, facts.height + ABOVE_TOP_M)
 
@@ -121,7 +121,7 @@ def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) ->
 
 
 def _with_person(kind: GoalKind) -> _Goal:
-    """Makes the goal of a command about a person: a known one, or anybody, in the room of its goal."""
+    """Returns a function from a command to its goal about a person: known or any, in the room that it names."""
 
     def goal(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> GoalCondition | None:
         name = "" if command.object is None else command.object.name
@@ -142,7 +142,7 @@ def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondi
 
 
 def _place_region(knowledge: Knowledge, goal: str) -> Region:
-    """Outline of a room; for a surface or the start, a square around the robot's pose there."""
+    """Outline of a room; for a surface or the start, a square around the pose that a robot has there."""
     place = knowledge.place(goal)
     if place in knowledge.places:
         return Region(place, knowledge.places[place].polygon)

@@ -1,4 +1,4 @@
-"""Nodes as plain data: the spec of each, and its state while it runs.
+"""Nodes as plain data: the spec of each node, and the state of a running node.
 
 Specs are compared, shown and checked without a robot; `executive.tree.compiler.build` makes their py_trees nodes.
 """
@@ -30,16 +30,16 @@ def node_pages() -> tuple[ModuleType, ...]:
 
 @cache
 def node_classes() -> Mapping[str, type[ExplainedNode]]:
-    """Returns the classes of nodes by kind, as the pages define them."""
+    """Returns the classes of nodes by the kind that each class defines."""
     found = (node for page in node_pages() for node in vars(page).values() if isinstance(node, type))
     return {node.kind: node for node in found if issubclass(node, ExplainedNode) and "kind" in vars(node)}
 
 
 @dataclass(frozen=True)
 class NodeSpec:
-    """A node's kind, path id, displayed name, options, children, and the line of the mission file behind it.
+    """A node's kind, path id, displayed name, options, children, and the line of the mission file that it comes from.
 
-    `step` is set for the nodes that the author of the mission knows: the mission and its steps.
+    `step` is True for nodes that the mission file contains: the mission itself and its steps.
     """
 
     kind: str
@@ -52,7 +52,7 @@ class NodeSpec:
 
     @property
     def behaviour(self) -> type[ExplainedNode]:
-        """Class of the node, which answers what holds for its kind."""
+        """Class of the node, which has the properties of its kind."""
         return node_classes()[self.kind]
 
     @property
@@ -74,7 +74,7 @@ class NodeSpec:
 
 
 class NodeState(NamedTuple):
-    """Status, cause, message and, for a skill, progress from 0 to 1 where known.
+    """Status, cause, message and, for a skill that reports it, progress from 0 to 1.
 
     `expected` marks a failure that is normal (`executive.tree.node_view.node_view`).
     """
@@ -87,7 +87,7 @@ class NodeState(NamedTuple):
 
     @property
     def cause_text(self) -> str:
-        """Cause to show: none for an expected failure."""
+        """Cause to display: empty for an expected failure."""
         return "" if self.cause is None or self.expected else self.cause.value
 
 
@@ -105,7 +105,7 @@ class Change(NamedTuple):
 
     @property
     def is_activity(self) -> bool:
-        """Returns whether a running node reports a new action; a message with new numbers alone does not count."""
+        """Returns whether a running node reports a new action; a message with merely new numbers does not count."""
         if self.is_transition or self.after.status is not Status.RUNNING:
             return False
         return _NUMBER.sub("", self.before.message) != _NUMBER.sub("", self.after.message)

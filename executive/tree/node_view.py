@@ -1,4 +1,4 @@
-"""Views of nodes: the tree's nodes with their ports and states, as plain data for all displays."""
+"""Views of nodes: the nodes in a tree with their ports and states, as plain data for every display."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from skills.inputs.errors import SourceLine
 
 @dataclass(frozen=True)
 class Port:
-    """Input or output of a node with its value as text, which is a blackboard key if `on_board` is set."""
+    """Input or output of a node, with its value as text; with `on_board`, the text is a blackboard key."""
 
     name: str
     value: str
@@ -37,7 +37,7 @@ _LOOKS: Final = frozenset({"detect", "find_people"})
 
 
 def _ports_of(spec: NodeSpec) -> Iterator[Port]:
-    """Iterates over the ports of a skill, or the options of any other node."""
+    """Yields the ports of a skill, or the options of any other node."""
     options = spec.options
     if spec.skill is None:
         parts = spec.path_id.split("/")
@@ -99,7 +99,7 @@ def _record(value: Any) -> str:
 
 
 def _fact(name: str, value: Any) -> str:
-    """Formats a field with its unit: "x 5.5 m"; empty for an unset one."""
+    """Formats a field with its unit: "x 5.5 m"; empty for a field without a value."""
     if value is None or value is False or (text := plain(value)) == "":
         return ""
     unit = next((unit for unit in _UNITS if name.endswith(f"_{unit}")), "")
@@ -113,8 +113,8 @@ def _fact(name: str, value: Any) -> str:
 class NodeView:
     """View of one node. INVALID without a cause means that it has not run yet; `hidden` counts omitted descendants.
 
-    `step` is that of the node's spec. A row of an outline has the `policy` of its step in words, and `hidden` counts
-    all omitted nodes.
+    `step` is taken from the node's spec. In an outline, a view is one row: `policy` describes the policy of the row's
+    step, and `hidden` counts all omitted nodes.
     """
 
     path_id: str
@@ -130,12 +130,12 @@ class NodeView:
 
     @property
     def behaviour(self) -> type[ExplainedNode]:
-        """Class of the node; the base class for a row, and for a kind of another version's log."""
+        """Class of the node; the base class for a row, and for a kind that only another version's log knows."""
         return node_classes().get(self.kind, ExplainedNode)
 
     @property
     def label(self) -> str:
-        """Kind and name; the name alone for a skill and a row of steps; a row's policy stands behind them."""
+        """Kind and name; only the name for a skill or a row of steps. A row's policy is appended in brackets."""
         policy = f" ({self.policy})" if self.policy else ""
         alone = self.behaviour.runs_skill or self.kind in _ROWS
         return f"{'' if alone else f'{self.kind} '}{self.name}{policy}"
@@ -154,7 +154,7 @@ class NodeView:
     def title(self, above: NodeView | None = None) -> str:
         """Title of the node: its name, with a skill's texts and surfaces, or with the goal of a drive.
 
-        `above` is its parent, whose name has the goal of a drive.
+        `above` is the parent, whose name contains the goal of a drive.
         """
         if not self.behaviour.runs_skill:
             return self.name
@@ -167,7 +167,7 @@ class NodeView:
     def structure(self) -> dict[str, Any]:
         """Returns the tree without states, as it is logged.
 
-        The first node of each row of the outline has the `row`; the nodes that share it have none.
+        In the first node of each row of the outline, `row` is the row's text; other nodes of the row have none.
         """
         return _structure(self, None, {row.path_id: row for _, row in outline(self).walk()})
 
@@ -195,7 +195,7 @@ def outline(root: NodeView) -> NodeView:
 
 
 def _authored(node: NodeView) -> set[str]:
-    """Path ids of the steps, and of the nodes with steps below them."""
+    """Path ids of the steps, and of the nodes above steps."""
     below = set[str]().union(*map(_authored, node.children))
     return below | {node.path_id} if below or node.step else below
 
@@ -226,7 +226,7 @@ def _is_sequence(node: NodeView) -> bool:
 
 
 def _same_row(chain: Sequence[NodeView], authored: set[str]) -> NodeView | None:
-    """Returns the child that shares the row of a chain of nodes, if there is one: each row has one step at most."""
+    """Returns the child that shares the row of a chain of nodes, or None; a row has at most one step."""
     inner = chain[-1]
     below = [child for child in inner.children if child.path_id in authored]
     if not below:
@@ -238,27 +238,27 @@ def _same_row(chain: Sequence[NodeView], authored: set[str]) -> NodeView | None:
 
 
 def _leads_to_step(node: NodeView, authored: set[str]) -> bool:
-    """Returns whether a node is a step, or its only child with steps below it."""
+    """Returns whether a node is a step, or a step lies below it through nodes with one such child each."""
     below = [child for child in node.children if child.path_id in authored]
     return node.step or (len(below) == 1 and _leads_to_step(below[0], authored))
 
 
 def _is_telling(port: Port) -> bool:
-    """Returns whether a port holds texts, or the name of one surface; older logs have "str" as the type of a text."""
+    """Returns whether a port holds texts or the name of one surface; in older logs the type of a text is "str"."""
     return "text" in port.type or "str" in port.type or ("Surface" in port.type and "," not in port.value)
 
 
 def node_view(spec: NodeSpec, states: Mapping[str, NodeState] | None = None) -> NodeView:
     """Returns the view of a spec, with states by path id.
 
-    A look without a find is an expected failure in a success, and in a selector with further children, unless it made a
-    step fail; so is a node that failed only by these looks.
+    A look that finds nothing is an expected failure if the node above succeeded or a selector continues, unless it made
+    a step fail. So is the failure of a node below which only such looks failed.
     """
     return _with_expected(_view_of(spec, states or {}), False)
 
 
 def _with_expected(node: NodeView, inside: bool) -> NodeView:
-    """Marks the expected failures; `inside` allows expected failures below the nearest node above."""
+    """Marks the expected failures; with `inside`, the nearest node above allows expected failures."""
     state, failed = node.state, node.state.status is Status.FAILURE
     goes_on = state.status is Status.RUNNING and node.behaviour.control == "Fallback"
     inside = state.status is Status.SUCCESS or goes_on or (inside and failed and not node.step)
@@ -285,7 +285,7 @@ def _view_of(spec: NodeSpec, known: Mapping[str, NodeState]) -> NodeView:
 def logged_view(structure: Mapping[str, Any], states: Mapping[str, NodeState]) -> NodeView:
     """Returns the view of a logged structure, marked as in `node_view`.
 
-    Raises KeyError or TypeError for values of another form.
+    Raises KeyError or TypeError if the logged values are malformed.
     """
     return _with_expected(_logged_view(structure, states), False)
 

@@ -1,4 +1,4 @@
-"""Builder of the node specs of one step's subtree, with the goal conditions of its parts."""
+"""Builds the node specs in one step's subtree, with the goal conditions that belong to them."""
 
 from __future__ import annotations
 
@@ -33,27 +33,27 @@ PICK_UPS: Final = 2
 
 
 def start_key(robot_name: str, mission_name: str) -> str:
-    """Blackboard key of the pose at which a mission began."""
+    """Blackboard key for the pose at which a mission began."""
     return f"{slug(robot_name)}/{slug(mission_name)}/start-pose"
 
 
 def pose_2d(pose: Pose) -> Pose2D:
-    """Converts a pose of the knowledge file to the pose of the skills."""
+    """Converts a pose from the knowledge file to the pose type of the skills."""
     return Pose2D(pose.x, pose.y, pose.yaw)
 
 
 def failure_trigger(*causes: Cause, of: NodeSpec | None = None, own: bool = False) -> Trigger:
-    """Trigger of a recovery: a failure with one of the causes, of a node (None: of the whole attempt)."""
+    """Trigger for a recovery: a failure of one node (None: of the whole attempt) with one of the causes."""
     return Trigger(frozenset(causes), None if of is None else of.path_id, own)
 
 
 @dataclass(frozen=True)
 class StepPart:
-    """Part of a mission with a goal condition of its own: a command, or a single skill.
+    """Step of a mission that may have a goal condition: a command, or a single skill.
 
-    `path_id` is the path id of its subtree, `node` that of its outermost node if it differs; `skill` is the single
-    skill, `goal` the goal condition (None: none that a referee can judge). `held` is the object that the gripper holds
-    before it; with `opening`, it is the object that the gripper held when the mission began.
+    `path_id` is the path id of the subtree, `node` that of the outermost node if it differs; `skill` is the single
+    skill, `goal` the goal condition (None: a referee cannot judge the step). `held` is the object in the gripper before
+    the step; with `opening`, it is the object that the gripper held when the mission began.
     """
 
     path_id: str
@@ -67,7 +67,7 @@ class StepPart:
 
 @dataclass(frozen=True)
 class Assembled:
-    """Nodes in a row and their parts with goal conditions, in order, made of `used` commands."""
+    """Nodes in sequence and their steps with goal conditions, built from the first `used` commands."""
 
     nodes: tuple[NodeSpec, ...] = ()
     parts: tuple[StepPart, ...] = ()
@@ -78,20 +78,20 @@ class Assembled:
 
     @property
     def node(self) -> NodeSpec:
-        """Node of an assembly that has exactly one."""
+        """Node of an assembly that has exactly one node."""
         (node,) = self.nodes
         return node
 
 
 @dataclass(frozen=True)
 class PlanBuilder:
-    """Builder of the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start.
+    """Builder of one step's nodes: `path_id` is the step's path id, `start_key` the key for the mission's start pose.
 
-    With `anywhere`, the robot searches for an object outside its place too, but never on the surfaces in `avoided`:
-    objects there are at their goal. With `in_gripper`, an earlier step has grasped the object; `carried` is any object
-    from an earlier step's grasp. The robot picks a dropped object up at most `pick_ups` times, and moves at most
-    `move_aside` blocking objects aside. `following` is the next command. `last_known` is the place of the mission's
-    object, as another robot last knew it. An earlier step has met the people in `met`.
+    With `anywhere`, the robot also searches outside the named place, but never on the surfaces in `avoided`, where
+    objects are at their goal. With `in_gripper`, an earlier step has grasped the command's object; `carried` is any
+    object that an earlier step has grasped. The robot picks up a dropped object at most `pick_ups` times, and moves at
+    most `move_aside` blocking objects aside. `following` is the next command. `last_known` is where another robot last
+    knew the mission's object. An earlier step has met the people in `met`.
     """
 
     knowledge: Knowledge
@@ -111,7 +111,7 @@ class PlanBuilder:
     met: frozenset[str] = frozenset()
 
     def at(self, *parts: str) -> PlanBuilder:
-        """Returns the builder of a subtree below."""
+        """Returns a builder for a subtree below this one."""
         return replace(self, path_id="/".join((self.path_id, *map(slug, parts))))
 
     def key(self, name: str) -> str:
@@ -119,7 +119,7 @@ class PlanBuilder:
         return f"{self.path_id}/{name}"
 
     def met_key(self, person: str, of: str = "") -> str:
-        """Returns the blackboard key of a person as they were met last, the same in all steps of a mission."""
+        """Returns the blackboard key for the last observation of a person; all steps of a mission use the same key."""
         return f"{self.start_key.rpartition('/')[0]}/met-{slug(person)}{of}"
 
     def node(self, kind: str, name: str, *children: NodeSpec, part: str = "", **options: Any) -> NodeSpec:
@@ -216,7 +216,7 @@ class PlanBuilder:
         return below.recover(f"go to {to}", drive, *recoveries, attempts=3)
 
     def has_ports(self, skill: str, inputs: tuple[str, ...] = (), outputs: tuple[str, ...] = ()) -> bool:
-        """Returns whether a registered skill has these ports; a user's skill may lack ports that are not essential."""
+        """Returns whether a registered skill has these ports; a user's skill may lack inessential ports."""
         kind = self.registry.get(skill)
         if kind is None:
             return False
@@ -224,49 +224,50 @@ class PlanBuilder:
         return known.issuperset(inputs) and set(kind.outputs).issuperset(outputs)
 
     def optional_ports(self, skill: str, inputs: Mapping[str, object]) -> dict[str, object]:
-        """Returns the inputs with a port of the registered skill; see `has_ports`."""
+        """Returns those inputs for which the registered skill has a port; see `has_ports`."""
         return {port: value for port, value in inputs.items() if self.has_ports(skill, (port,))}
 
     def surface(self, name: str) -> Surface:
-        """Converts a surface of the knowledge file to the surface of the skills."""
+        """Converts a surface from the knowledge file to the surface type of the skills."""
         facts = self.knowledge.surfaces[name]
         return Surface(name=name, polygon_W=facts.polygon, height_m=facts.height)
 
     def place(self, name: str) -> str:
-        """Returns the known place that `name` means. Raises InputError when there is none."""
+        """Returns the known place that `name` means. Raises InputError when there is no such place."""
         known = self.knowledge.place(name)
         if known is None:
             raise self.error(f"the place '{name}' is not known", suggestion(name, self.knowledge.place_names()))
         return known
 
     def classes(self, name: str) -> tuple[str, ...]:
-        """Returns the classes that an object's name stands for. Raises InputError for an unknown name."""
+        """Returns the classes that an object's name includes. Raises InputError for an unknown name."""
         classes = self.knowledge.classes(self.knowledge.object_name(name) or name)
         if not classes:
             raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.object_names()))
         return classes
 
     def last_known_of(self, item: ObjectKind) -> LastKnown | None:
-        """Returns where an object was last known to be; None when nobody knows."""
+        """Returns where an object was last known to be; None if no robot knows."""
         known = self.last_known
         return known if known is not None and known.kind.name in self.classes(item.name) else None
 
     def required_object(self, item: ObjectKind | None) -> ObjectKind:
-        """Returns an object of the command. Raises InputError when the command names none, or an unknown one."""
+        """Returns the object that the command must name. Raises InputError when the name is missing or unknown."""
         if item is None:
             raise self.error("the command names no object", "say what it is about")
         self.classes(item.name)
         return item
 
     def search_classes(self, name: str) -> tuple[str, ...]:
-        """Returns the classes to search for an object of that name: its own, or `ANY_OBJECT` for any object.
+        """Returns the classes to search for an object by its name; `ANY_OBJECT` if the name stands for any object.
 
-        A question names the found objects, so it searches for known classes. Raises InputError for an unknown name.
+        A question searches for known classes, because its answer names the found objects. Raises InputError for an
+        unknown name.
         """
         classes = self.classes(name)
         unnamed = self.knowledge.object_name(name) in (ANYTHING, EVERYTHING)
         return (ANY_OBJECT,) if unnamed and self.command.task is not Task.FIND else classes
 
     def error(self, message: str, hint: str) -> InputError:
-        """Builds an error at the step's line."""
+        """Builds an error that names the step's line."""
         return InputError.at(self.source, f"{message} (in '{self.command}')", hint=hint)

@@ -1,8 +1,8 @@
 """Values of a skill's ports: checks against their type hints, and conversion of YAML values to the types of inputs.
 
-Numbers, texts and truth values stay; a tuple takes a list, an enum one of its values, a dataclass a mapping of its
-fields, whose units may be omitted ("yaw" for "yaw_rad"). A pose may also be the name of a place, a `Surface` the name
-of a surface, several surfaces the name of a room, an `ObjectKind` its words ("red wrench").
+Numbers, texts and truth values stay the same; a tuple is given as a list, an enum as one of its values, a dataclass as
+a mapping of its fields, whose units may be omitted ("yaw" for "yaw_rad"). A pose may also be the name of a place, a
+`Surface` the name of a surface, several surfaces the name of a room, an `ObjectKind` its words ("red wrench").
 """
 
 import dataclasses
@@ -24,7 +24,7 @@ from skills.robot import Pose2D
 
 
 def conforms(value: Any, hint: Any) -> bool:
-    """Returns whether `value` is of the type `hint` and in its range; an int passes as a float."""
+    """Returns whether `value` is of the type `hint` and in the hint's range; an int counts as a float."""
     if bounds(hint):
         return conforms(value, base_type(hint)) and in_range(value, hint)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
@@ -42,7 +42,7 @@ def conforms(value: Any, hint: Any) -> bool:
 
 
 def assignable(source: Any, target: Any) -> bool:
-    """Returns whether a port of type `target` takes every value of type `source`; ranges are not compared."""
+    """Returns whether a port of type `target` accepts every value of type `source`; ranges are not compared."""
     source, target = base_type(source), base_type(target)
     if target is Any or source == target or (source is int and target is float):
         return True
@@ -92,7 +92,7 @@ Path = tuple[str | int, ...]
 
 
 class PortValueError(ValueError):
-    """Error of a value that does not fit its port; `path` leads to the wrong part, `hint` says how to correct it."""
+    """Raised for a value that does not fit its port; `path` leads to the wrong value, `hint` says how to correct it."""
 
     def __init__(self, path: Path, message: str, hint: str) -> None:
         super().__init__(message)
@@ -102,9 +102,9 @@ class PortValueError(ValueError):
 def assign_ports(values: Mapping[str, Any], inputs: type) -> dict[str, tuple[Path, Any]]:
     """Assigns values to the input ports of the dataclass `inputs`, each with its path in `values`.
 
-    A unit may be omitted from a port's name. Keys that are fields of the only port with such a dataclass go to that
-    port: `{x: 1, y: 2, yaw: 0}` is the `goal` of navigate. Raises PortValueError for a key that is neither a port nor
-    such a field.
+    A unit may be omitted from a port's name. If only one port's dataclass has fields of these names, their keys set
+    this port: `{x: 1, y: 2, yaw: 0}` is the `goal` of navigate. Raises PortValueError for a key that is neither a port
+    nor such a field.
     """
     hints = field_types(inputs)
     found: dict[str, tuple[Path, Any]] = {}
@@ -124,7 +124,7 @@ def assign_ports(values: Mapping[str, Any], inputs: type) -> dict[str, tuple[Pat
 
 
 def port_value(value: Any, hint: Any, knowledge: Knowledge, path: Path = ()) -> Any:
-    """Converts `value` to the type `hint`, in its range. Raises PortValueError."""
+    """Converts `value` to the type `hint`. Raises PortValueError when it does not fit the type or its range."""
     if bounds(hint):
         try:
             return number_of(value, hint)
@@ -154,13 +154,13 @@ def port_value(value: Any, hint: Any, knowledge: Knowledge, path: Path = ()) -> 
 
 
 def _named(key: str, names: Iterable[str]) -> str | None:
-    """Returns the name that a key means, with or without its unit, or None."""
+    """Returns the name that a key means, with or without a unit; None if no name fits."""
     known = list(names)
     return key if key in known else next((name for name in known if unitless_name(name) == key), None)
 
 
 def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable[str]) -> str:
-    """Returns the only port whose type has all these fields. Raises PortValueError."""
+    """Returns the only port whose type has all these fields. Raises PortValueError if there is not exactly one."""
     records = {port: field_types(hint) for port, hint in hints.items() if _is_record(hint)}
     fitting = [
         port for port, fields in records.items() if port not in taken and all(_named(key, fields) for key in loose)
@@ -269,7 +269,7 @@ def _surface(value: Any, knowledge: Knowledge, path: Path) -> Surface:
 
 
 def _surfaces(name: str, knowledge: Knowledge, path: Path) -> tuple[Surface, ...]:
-    """Converts the name of a room to its surfaces, or of a surface to the surface alone."""
+    """Converts the name of a room to the surfaces in it, or the name of a surface to that surface alone."""
     place = knowledge.place(name)
     surfaces = () if place is None else knowledge.surfaces_in(place)
     if not surfaces:
@@ -279,7 +279,7 @@ def _surfaces(name: str, knowledge: Knowledge, path: Path) -> tuple[Surface, ...
 
 
 def _object_kind(value: Any, knowledge: Knowledge, path: Path) -> ObjectKind:
-    """Converts an object in words to the object by its own name."""
+    """Converts the words for an object to the object with its own name."""
     said = parse_object(_name(value, "an object in words", path))
     known = knowledge.object_name(said.name)
     if known is None:

@@ -1,8 +1,8 @@
 """Registry of the skills that a tree may use, by name: installed distributions register them as entry points.
 
 A distribution registers a skill in the group `errand.skills`, name = skill's name, value = "module:Class". The shipped
-skills stand in `pyproject.toml` in the same way. This is the only mechanism: users' packages have the same abilities as
-the shipped skills, and a folder on the path never becomes a skill by accident.
+skills stand in `pyproject.toml` in the same way. There is no other mechanism: users' skills can do all that the shipped
+skills can, and a folder on the path never becomes a skill by accident.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class SkillRegistry(Mapping[str, SkillClass]):
         return {name: error for name, error in found.items() if error is not None}
 
     def why_broken(self, name: str) -> InputError | None:
-        """Returns the error of a broken skill of another distribution; None if it works, or does not exist."""
+        """Returns the error of a broken skill from another distribution; None if the skill works or does not exist."""
         found = self._of_others(name)
         return found if isinstance(found, InputError) else None
 
@@ -69,7 +69,7 @@ class SkillRegistry(Mapping[str, SkillClass]):
         return sum(1 for _ in self)
 
     def _of_others(self, name: str) -> SkillClass | InputError | None:
-        """Returns the skill of another distribution, loaded once, or its error."""
+        """Returns the skill from another distribution, loaded once, or the error that loading it raised."""
         if name not in self._loaded and name in self._others:
             try:
                 self._loaded[name] = _only(self._others[name], self._ours)
@@ -79,7 +79,7 @@ class SkillRegistry(Mapping[str, SkillClass]):
 
 
 def missing_skill(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, str]:
-    """Message and hint for a name that is no skill of the registry."""
+    """Message and hint for a name that the registry does not know."""
     broken = registry.why_broken(name) if isinstance(registry, SkillRegistry) else None
     if broken is not None:
         return broken.message, broken.hint
@@ -105,7 +105,7 @@ def built_in_skills() -> dict[str, SkillClass]:
 
 
 def skills_of(entries: Iterable[EntryPoint], *, limit_s: float = LIMIT_S) -> dict[str, SkillClass]:
-    """Loads and checks the skills of entry points within a time limit; returns them by name. Raises InputError."""
+    """Loads and checks the skills behind entry points within a time limit; returns them by name. Raises InputError."""
     named: dict[str, tuple[EntryPoint, ...]] = {}
     for entry in sorted(entries, key=lambda entry: (entry.name, distribution_of(entry))):
         named[entry.name] = (*named.get(entry.name, ()), entry)
@@ -142,7 +142,7 @@ def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:
 
 
 def faults_of(skill: Any, *, registered_as: str) -> Iterator[tuple[str, str]]:
-    """Iterates over the rules for skills that a class breaks, as messages with hints."""
+    """Yields a message with a hint for each rule for skills that a class breaks."""
     if not (inspect.isclass(skill) and issubclass(skill, Skill)):
         yield "it is no subclass of skills.api.Skill", "register the skill's class"
         return
@@ -165,7 +165,7 @@ def faults_of(skill: Any, *, registered_as: str) -> Iterator[tuple[str, str]]:
 
 
 def _port_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
-    """Iterates over the errors in the declarations of the ports, with hints."""
+    """Yields the errors in the declarations of a skill's ports, with hints."""
     inputs = getattr(skill, "Inputs", None)
     frozen = dataclasses.is_dataclass(inputs) and inputs.__dataclass_params__.frozen  # type: ignore[union-attr]
     if not (inspect.isclass(inputs) and frozen):
@@ -187,7 +187,7 @@ def _port_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
 
 
 def _cause_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
-    """Iterates over the errors in the documentation of the causes, with hints."""
+    """Yields the errors in the documentation of a skill's causes, with hints."""
     if not (isinstance(skill.causes, Mapping) and skill.causes):
         yield "it documents no causes of failure", "set causes = {Cause.PRECONDITION: 'when ...', ...}"
         return

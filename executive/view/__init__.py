@@ -1,1 +1,1 @@
-"""Views of a run: trees as text, SVG and JSON, the live page, the map, and report pages."""
+"""Shows runs: trees as text, SVG and JSON, the live page, the map, and report pages."""

@@ -1,4 +1,4 @@
-"""Feed of the page: logged messages in order, and the latest progress and control state."""
+"""Feed for the page: logged messages in order, and the latest progress and control state."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_PICTURES: Final = 500
 
 @dataclass(frozen=True)
 class _Message:
-    """Message with its number from 1, its topic, robot and node, and the number of its picture."""
+    """Message with its number (from 1), topic, robot and node, and the number of its picture."""
 
     number: int
     about: Hashable
@@ -31,14 +31,14 @@ class _Message:
 
 
 class Feed:
-    """Ordered list of messages as JSON text. The run's thread writes it, and the server's thread reads it.
+    """Ordered list of messages as JSON text. The run's thread writes the feed, and the server's thread reads it.
 
     Pictures are stored separately, so that a page fetches only the pictures that it shows. A full feed drops its older
     half, except the newest message of each topic, robot and node.
     """
 
     def __init__(self, *, most: int | None = MOST_MESSAGES, most_pictures: int = MOST_PICTURES) -> None:
-        """Keeps about `most` messages and `most_pictures` pictures, or all of them if `most` is None."""
+        """Stores about `most` messages and `most_pictures` pictures at most, or all of them if `most` is None."""
         self._lock = threading.Condition()
         self._most, self._most_pictures = most, most_pictures
         self._full, self._full_pictures = most or 0, most_pictures
@@ -72,7 +72,7 @@ class Feed:
         self._call_listeners()
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Calls `listener` after each change, in the thread that made it."""
+        """Calls `listener` after each change, in the thread that made the change."""
         with self._lock:
             self._listeners = (*self._listeners, listener)
 
@@ -116,10 +116,10 @@ class Feed:
             self._lock.notify_all()
 
     def wait_sent(self, timeout_s: float) -> bool:
-        """Waits until a page has all messages, at most `timeout_s` of wall time; returns whether it has.
+        """Waits until a page has received all messages, at most `timeout_s` (wall time); returns whether it has.
 
-        The run calls it after each tick, so that a busy run lets the server's thread work. Returns at once without a
-        page.
+        The run calls it after each tick, so that a busy run lets the server's thread work. Returns at once if no page
+        reads the feed.
         """
         with self._lock:
             return self._lock.wait_for(lambda: self._readers == 0 or self._read >= self._added, timeout_s)

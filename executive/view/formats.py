@@ -1,4 +1,4 @@
-"""The tree in formats of other programs: SVG, Mermaid, and the XML of BehaviorTree.CPP."""
+"""Writes the tree in formats of other programs: SVG, Mermaid, and the XML of BehaviorTree.CPP."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _width_em(text: str) -> float:
 
 @dataclass(frozen=True)
 class _Box:
-    """Box of a node: its upper left corner, height, note, and the boxes of its children."""
+    """Box for a node: upper left corner, height, note, and the boxes of its children."""
 
     node: NodeView
     x: float
@@ -95,7 +95,7 @@ class _Box:
 
 
 def to_svg(root: NodeView, *, title: str = "") -> str:
-    """Draws the tree as an SVG document with a legend; notes have three lines, and tooltips have the whole note."""
+    """Draws the tree as an SVG document with a legend; notes have at most three lines, tooltips have the whole note."""
     box, bottom = _laid_out(root, MARGIN, MARGIN + TITLE_H)
     boxes = list(box.walk())
     width = max(MARGIN + len(Styles) * LEGEND_W, *(each.x + BOX_W + MARGIN for each in boxes))
@@ -111,7 +111,7 @@ def to_svg(root: NodeView, *, title: str = "") -> str:
 
 
 def _laid_out(node: NodeView, x: float, y: float) -> tuple[_Box, float]:
-    """Lays out a node, and the nodes below it indented under it; returns its box, and the height for the next box."""
+    """Lays out a node and, indented below it, its descendants; returns its box, and the height for the next box."""
     told = ". ".join(filter(None, (node.policy, note_of(node))))
     note = fit_text(told, NOTE_EM, NOTE_LINES) if told else ()
     height = BOX_H + NOTE_LINE_H * len(note)
@@ -194,9 +194,9 @@ def to_btcpp(root: NodeView) -> str:
 
 
 def _parts(root: NodeView) -> list[tuple[NodeView, str]]:
-    """Returns the steps of the mission and its guards, each with a unique name.
+    """Returns the mission's guards and steps, each with a unique name.
 
-    The path id of a mission has two parts. The mission is the root, or below its guards.
+    The mission is the root or the node below the guards; its path id has two parts.
     """
     missions = [node for _, node in root.walk() if node.path_id.count("/") == 1]
     parents = {id(node): node for node in (root, *missions)}
@@ -231,7 +231,7 @@ def _element(node: NodeView, steps: Mapping[int, str]) -> Element:
 
 
 def _category(node: NodeView) -> str:
-    """Name of a node's element: a built-in control node, or the category for its number of children."""
+    """Name of the XML element for a node: a built-in control node, or the category for its number of children."""
     if node.behaviour.control and node.children:
         return node.behaviour.control
     return ("Action", "Decorator", "Control")[min(len(node.children), 2)]
@@ -242,14 +242,14 @@ def _model_id(node: NodeView) -> str:
 
 
 def _identifier(text: str, prefix: str = "Errand") -> str:
-    """Returns a name that the format allows: letters and digits, a letter first, and no built-in name."""
+    """Returns a name that the format allows: letters and digits, first a letter, and no built-in name."""
     words = re.findall(r"[A-Za-z0-9]+", text)
     name = "".join(word[0].upper() + word[1:] for word in words) or "Unnamed"
     return name if name[0].isalpha() and name not in _TAKEN else f"{prefix}{name}"
 
 
 def _named(ports: Iterable[Port]) -> Iterator[tuple[str, Port]]:
-    """Yields the ports with their names in the file; an output with the name of an input gets another name."""
+    """Yields the ports with their names in the file; an output that shares an input's name gets another name."""
     inputs = {port.name for port in ports if not port.output}
     for port in ports:
         yield f"{_port_name(port)}_out" if port.output and port.name in inputs else _port_name(port), port
@@ -261,7 +261,7 @@ def _port_name(port: Port) -> str:
 
 
 def _value(port: Port) -> str:
-    """Returns a blackboard key in braces, or a text, quoted if it looks like a key."""
+    """Returns the value as the file writes it: a blackboard key in braces; a text, quoted if it looks like a key."""
     text = printable(port.value)
     if port.on_board:
         return f"{{{text}}}"
@@ -276,7 +276,7 @@ def _description(node: NodeView) -> str:
 
 
 def _models(root: NodeView, trees: Sequence[str]) -> Element:
-    """Returns a model for each kind of node that is not built in, with all ports of its nodes."""
+    """Returns a model for each kind of node that is not built in, with all ports that its nodes have."""
     models: dict[tuple[str, str], dict[str, Port]] = {}
     for _, node in root.walk():
         if not node.behaviour.control or not node.children:

@@ -1,4 +1,4 @@
-"""Logged messages live over Foxglove's WebSocket (`--foxglove`); needs the extra `foxglove`."""
+"""Sends logged messages live over Foxglove's WebSocket (`--foxglove`); needs the extra `foxglove`."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _MOST_PORT: Final = 65535
 
 
 class LiveServer:
-    """Server of the channels of event logs, one log after another; `close` it at the end.
+    """Server for the channels in event logs, one log after another; `close` it at the end.
 
-    A client that subscribes late first gets the newest message of each robot and node. A slow client misses messages;
-    no run waits for one.
+    A client that subscribes late first gets the newest message of each robot and node. A slow client misses messages,
+    because no run waits for a client.
     """
 
     def __init__(self, address: str) -> None:
-        """Starts serving at HOST:PORT; port 0 takes a free one. Raises InputError."""
+        """Starts serving at HOST:PORT; port 0 takes any free port. Raises InputError if the address cannot be used."""
         found = _ADDRESS.fullmatch(address)
         if found is None or int(found["port"]) > _MOST_PORT:
             hint = "write HOST:PORT, as in 127.0.0.1:8765"
@@ -53,7 +53,7 @@ class LiveServer:
         self.url = f"ws://{found['host']}:{self._server.port}"
 
     def follow(self, log: EventLog) -> None:
-        """Sends the messages of a log from now on, and forgets those of the log before it."""
+        """Sends the messages of a log from now on, and forgets the messages of the previous log."""
         with self._lock:
             self._newest.clear()
         self._time_s = 0.0
@@ -94,7 +94,7 @@ class LiveServer:
 
 @contextmanager
 def serve_live(address: str | None, tell: Callable[[str], None]) -> Iterator[LiveServer | None]:
-    """Serves during the block, and shows the address; serves nothing without one. Raises InputError."""
+    """Serves while the block runs, and shows the address; serves nothing without an address. Raises InputError."""
     if address is None:
         yield None
         return

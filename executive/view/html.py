@@ -1,4 +1,4 @@
-"""HTML and SVG files that need no other file: reports from `templates`, and the replay page of a log."""
+"""Builds HTML files that need no other file: reports from `templates`, and the replay page of a log."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def clock_text(t_s: float) -> str:
 
 
 def feed_of(events: Sequence[Event]) -> Feed:
-    """Returns a feed of a whole log."""
+    """Returns a feed with all messages of a log."""
     feed = Feed(most=None)
     for event in events:
         feed(event.topic, event.stamp_s, event.data)

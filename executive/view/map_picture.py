@@ -1,4 +1,4 @@
-"""Draws the robots of a log on their map at one time."""
+"""Draws the robots in a log on their map at one time."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ _DOORS: Final[Mapping[str, tuple[Colour, str]]] = {
 
 @dataclass(frozen=True)
 class _Frame:
-    """Frame of the picture: `height_px` rows, and its lower left corner at `origin_m` in the world."""
+    """Geometry of the picture: `height_px` rows, and the lower left corner at `origin_m` in the world frame."""
 
     origin_m: tuple[float, float]
     height_px: int
     pixels_per_m: float
 
     def pixels(self, points_W: Sequence[Sequence[float]]) -> NDArray[np.int32]:
-        """Returns pixels (N, 2), column and row, of points (x, y) in metres."""
+        """Returns the pixels (N, 2), as column and row, of points (x, y) in metres."""
         xy = np.asarray(points_W, dtype=np.float64).reshape(-1, 2) - self.origin_m
         return np.column_stack(
             [np.round(xy[:, 0] * self.pixels_per_m), np.round(self.height_px - xy[:, 1] * self.pixels_per_m)]
@@ -63,9 +63,8 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
     """Draws the map (height, width, 3; blue, green, red) at a time on the robot's clock.
 
     It shows the trajectory, the planned and the reserved path, the particles of the localiser, the cells of the
-    obstacle layer, the footprint, the dock, and the zones, with a legend and a scale below. Several robots have a
-    colour each.
-    Raises InputError if the log has no map.
+    obstacle layer, the footprint, the dock, and the zones, with a legend and a scale below. Each of several robots has
+    its own colour. Raises InputError if the log has no map.
     """
     known = [event for event in events if event.stamp_s <= at_s]
     maps = [event.data for event in events if event.topic == MAP]
@@ -91,7 +90,7 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
 
 
 def newest_zones(trees: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Zones of the newest of the logged trees of each robot, each once."""
+    """Zones in the newest logged tree of each robot; each zone once."""
     last = {tree["robot"]: tree.get("zones", ()) for tree in trees}
     return list({zone["rule"]: zone for zones in last.values() for zone in zones}.values())
 
@@ -108,7 +107,7 @@ def _write_names(
     poses: Sequence[Mapping[str, Any]],
     zones: Sequence[Mapping[str, Any]],
 ) -> None:
-    """Draws the dock, and the names of robots, dock, places and other zones above all else."""
+    """Draws the dock and, above all else, the names of robots, dock, places and other zones."""
     driven: dict[str, list[tuple[float, float]]] = {}
     for pose in poses:
         driven.setdefault(pose["robot"], []).append(_position(pose))
@@ -137,7 +136,7 @@ def _position(pose: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def _ground(data: Mapping[str, Any]) -> tuple[NDArray[np.uint8], _Frame]:
-    """Draws the enlarged grid; returns it with its frame."""
+    """Draws the enlarged grid; returns the picture with its geometry."""
     grey = cv2.imdecode(np.frombuffer(base64.b64decode(data["data"]), np.uint8), cv2.IMREAD_GRAYSCALE)
     if grey is None:
         raise InputError("the log's map is no picture")
@@ -150,7 +149,7 @@ def _ground(data: Mapping[str, Any]) -> tuple[NDArray[np.uint8], _Frame]:
 
 
 def _draw_doors(picture: NDArray[np.uint8], frame: _Frame, seen: Sequence[Sequence[Mapping[str, Any]]]) -> set[str]:
-    """Draws each door as a robot saw it last; returns the states that there are. A closed door is the thickest."""
+    """Draws each door as a robot saw it last, a closed door thickest; returns the states that occur."""
     doors = sorted((door for each in seen for door in each), key=lambda door: door["seen_s"] or -1.0)
     latest = {str(door["ends"]): door for door in doors}.values()
     for door in latest:
@@ -189,7 +188,7 @@ def _draw_robot(picture: NDArray[np.uint8], frame: _Frame, events: Sequence[Even
 
 
 def _draw_reserved(picture: NDArray[np.uint8], pixels: NDArray[np.int32], colour: Colour) -> None:
-    """Draws the reserved path as a broad pale band with a ring at its end."""
+    """Draws the reserved path as a broad pale band with a ring at the end."""
     pale = tuple(round(0.35 * part + 0.65 * 255) for part in colour)
     cv2.polylines(picture, [pixels], False, pale, 15, cv2.LINE_AA)
     cv2.circle(picture, pixels[-1].tolist(), 9, colour, 3, cv2.LINE_AA)

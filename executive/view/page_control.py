@@ -1,4 +1,4 @@
-"""Progress and control state of a run for the page, and the actions of its buttons."""
+"""Sends progress and control state of a run to the page, and defines the actions of its buttons."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ Action = Callable[[Mapping[str, Any]], str]
 
 
 class RefusedError(Exception):
-    """Error of an action that cannot be done; its text says why and what to do."""
+    """Raised by an action that cannot be carried out; the text says why and what to do."""
 
 
 def control_actions(control: Control) -> Mapping[str, Action]:
-    """Returns the actions of a run by name. Each takes the page's values and returns a sentence, or RefusedError."""
+    """Returns the actions of a run by name, functions that return a sentence for the page or raise RefusedError."""
 
     def bound(call: Callable[[Control, Mapping[str, Any]], None], said: str) -> Action:
-        """Returns an action that calls the control and returns the sentence `said`."""
+        """Returns an action that calls the control and then returns the sentence `said`."""
 
         def action(values: Mapping[str, Any]) -> str:
             try:
@@ -47,7 +47,7 @@ def control_actions(control: Control) -> Mapping[str, Action]:
 
 
 def text_of(values: Mapping[str, Any], key: str) -> str:
-    """Returns a text of an action's values. Raises RefusedError if it is missing, empty, too long or no plain text."""
+    """Returns a text from an action's values. Raises RefusedError if it is missing, empty, too long or not plain."""
     text = values.get(key)
     if not isinstance(text, str) or not text.strip():
         raise RefusedError(f"the action needs a text under '{key}'")
@@ -74,7 +74,7 @@ def control_json(state: ControlState) -> dict[str, Any]:
 
 
 def asked_json(waiting: Waiting | None, robot: str = "") -> dict[str, Any]:
-    """Returns the question that a robot asks back as JSON values for the page; null without one."""
+    """Returns the question that a robot asks back as JSON values for the page; null if it asks none."""
     if waiting is None:
         return {"question": None}
     question = waiting.question
@@ -108,14 +108,14 @@ _LOOK_AGAIN_S: Final = 0.5
 
 
 class ProgressWatch(RunVisitor):
-    """Sender of the progress to the page, a few times a second."""
+    """Visitor that sends the progress to the page, a few times a second."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
         self._sent_s = 0.0
 
     def tick(self, progress: Progress) -> None:
-        """Sends the progress if it is time; waits at most SEND_LIMIT_S until the page has all messages."""
+        """Sends the progress if enough time has passed; waits at most SEND_LIMIT_S until the page has all messages."""
         now = time.perf_counter()
         if now - self._sent_s >= PROGRESS_PERIOD_S:
             self._sent_s = now
@@ -124,7 +124,7 @@ class ProgressWatch(RunVisitor):
 
 
 def progress_json(progress: Progress) -> Mapping[str, Any]:
-    """Returns for each robot its deepest running node, with message and progress (0 to 1), as JSON values."""
+    """Returns each robot's deepest running node, with message and progress (0 to 1), as JSON values."""
     robots = dict[str, Mapping[str, Any]]()
     for name, states in progress.states.items():
         running = [(path_id, state) for path_id, state in states.items() if state.status is Status.RUNNING]
@@ -135,7 +135,7 @@ def progress_json(progress: Progress) -> Mapping[str, Any]:
 
 
 class ControlWatch:
-    """Sender of each new state of a control, in a thread of its own, until the run ends or `close`."""
+    """Thread that sends each new state of a control to the page, until the run ends or `close`."""
 
     def __init__(self, control: Control, feed: Feed) -> None:
         self._control, self._feed = control, feed

@@ -1,7 +1,7 @@
 """HTTP server of the page on 127.0.0.1, in a thread of its own.
 
-Each server draws a new token, which all requests for data, actions and the websocket need. The server refuses requests
-from another origin or for another host, so that no other web page can control the robot.
+Each server draws a new token, which every request for data, actions or the websocket must contain. The server refuses
+requests from another origin or for another host, so that no other web page can control the robot.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _NOT_ALLOWED: Final = 4403
 
 @dataclass(frozen=True)
 class PageContent:
-    """Content of the page: feed, actions of the buttons, and the address or recording of the 3D scene."""
+    """Content of the page: feed, actions for the buttons, and the address or recording of the 3D scene."""
 
     feed: Feed
     actions: Mapping[str, Action] = field(default_factory=dict)
@@ -49,10 +49,10 @@ class PageContent:
 
 
 class PageServer(Server):
-    """Running server of the page."""
+    """Running server for the page."""
 
     def __init__(self, content: PageContent, *, port: int = 0) -> None:
-        """Starts serving; `port` 0 takes a free one. Raises OSError if the port is taken."""
+        """Starts serving; `port` 0 takes any free port. Raises OSError if the port is taken."""
         self._content = content
         self._token = secrets.token_urlsafe(24)
         opened = socket.create_server((HOST, port))
@@ -63,7 +63,7 @@ class PageServer(Server):
         content.feed.listen(self._wake)
 
     def offer_recording(self, recording: Path) -> None:
-        """Shows the recording of the scene, which follows the page's slider."""
+        """Adds the recording of the scene, which follows the page's slider."""
         self._content = replace(self._content, recording=recording)
         self._content.feed.tell("recording", {"address": RECORDING_ADDRESS})
 
@@ -99,7 +99,7 @@ class PageServer(Server):
         ]
 
     def _allowed(self, connection: HTTPConnection) -> bool:
-        """Returns whether host, origin and token are right; browsers always send the origin of actions."""
+        """Returns whether host, origin and token are right; browsers always send an origin with an action."""
         here = {f"{HOST}:{self.port}", f"localhost:{self.port}"}
         headers = connection.headers
         origin = headers.get("origin")
@@ -194,7 +194,7 @@ class PageServer(Server):
 
 
 def _values(body: bytes | None) -> Mapping[str, Any]:
-    """Reads the values of an action. Raises RefusedError unless the body is a JSON object."""
+    """Reads the values for an action. Raises RefusedError unless the body is a JSON object."""
     if body is None:
         raise RefusedError(f"the action's values are larger than {MAX_BODY} bytes")
     try:

@@ -1,4 +1,4 @@
-"""HTTP servers in a thread of their own, and the server of calls that start missions."""
+"""HTTP servers in separate threads, and the server for calls that start missions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Server:
     """Running server of routes in a thread of its own. Use it as a context manager, or call `close`."""
 
     def __init__(self, routes: Sequence[BaseRoute], opened: socket.socket, **settings: Any) -> None:
-        """Starts serving on an open socket; `settings` are uvicorn's."""
+        """Starts serving on an open socket; `settings` are settings of uvicorn."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ready = threading.Event()
         app = Starlette(routes=routes)
@@ -58,7 +58,7 @@ class Server:
 
 
 async def body_of(request: Request) -> bytes | None:
-    """Reads the body of a request; returns None if it is larger than MAX_BODY, or the client disconnects."""
+    """Reads the body of a request; returns None if the body is larger than MAX_BODY, or the client disconnects."""
     body = b""
     try:
         async for part in request.stream():
@@ -71,7 +71,7 @@ async def body_of(request: Request) -> bytes | None:
 
 
 class CallError(Exception):
-    """Error of a refused call, with a reason and an HTTP status."""
+    """Raised to refuse a call, with a reason and an HTTP status."""
 
     def __init__(self, status: HTTPStatus, reason: str) -> None:
         super().__init__(reason)
@@ -85,11 +85,11 @@ CallHandler = Callable[[str, bytes], Mapping[str, Any]]
 class CallServer(Server):
     """Running server of calls: `POST /missions/NAME` with `Authorization: Bearer TOKEN` starts a mission.
 
-    It checks the token first, and stores only the values in the JSON body of a request.
+    The server checks the token first; from a request, only the values in the JSON body are stored.
     """
 
     def __init__(self, handler: CallHandler, *, token: str, host: str, port: int) -> None:
-        """Starts serving; `port` 0 takes a free one. Raises OSError if the address is taken, or not of this machine."""
+        """Starts serving; `port` 0 takes any free port. Raises OSError if this machine cannot use the address."""
         self._handler, self._token = handler, token
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         opened = socket.create_server((host, port), family=family)
@@ -98,7 +98,7 @@ class CallServer(Server):
 
     @property
     def url(self) -> str:
-        """Address of calls, up to the name of the mission."""
+        """Address for calls, without the name of the mission at the end."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"http://{host}:{self.port}/missions/"
 

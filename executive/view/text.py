@@ -1,4 +1,4 @@
-"""The tree as lines of text, plain or coloured, folded if it is large; styles of its nodes' states.
+"""Formats the tree as lines of text, plain or coloured, folded if it is large; defines the styles of node states.
 
 Lines have the colours of Okabe and Ito, which differ for all common kinds of colour vision. Each state also has its own
 symbol and line pattern. Text has a darker ink of the same hue, readable on white and on the fill.
@@ -93,7 +93,7 @@ def to_rich(root: NodeView, *, collapsed: bool = True, ascii_only: bool = False)
 def _lines(
     node: NodeView, own: str, below: str, pieces: Sequence[str], collapsed: bool
 ) -> Iterator[tuple[str, NodeStyle, str, str]]:
-    """Yields a line for each node, parents first: branches, style, label, and a note on the state."""
+    """Yields a line for each node, parents first: branches, style, label, and note."""
     branch, last_branch, bar, blank = pieces
     hidden = collapsed and is_closed(node)
     unseen = node.below if hidden else node.hidden
@@ -108,7 +108,7 @@ def _lines(
 
 
 def note_of(node: NodeView) -> str:
-    """Returns cause and message of a node; the message only if no child has the same."""
+    """Returns cause and message of a node; omits a message that a child has too."""
     state = node.state
     is_own = state.message and all(state.message != child.state.message for child in node.children)
     counts = state.cause is not None or not node.children or node.behaviour.counts
@@ -141,8 +141,8 @@ def fold_below(root: NodeView, depth: int) -> NodeView:
 def fold_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
     """Folds the tree to at most about `most` visible nodes.
 
-    Subtrees that have not begun are folded first, then those that succeeded, the deepest first. The root, its
-    children, and the path to each running, failed or cancelled node stay visible.
+    Subtrees that have not begun are folded first, then those that succeeded, in both cases the deepest first. The root,
+    its children, and the path to each running, failed or cancelled node stay visible.
     """
     deepest = max(depth for depth, _ in root.walk())
     shown = root
@@ -157,8 +157,8 @@ def fold_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
 def readable(root: NodeView, most: int = MANY_NODES) -> NodeView:
     """Returns the outline of a tree with at most about `most` rows.
 
-    The guards of the mission are folded. What runs a step is folded, the deepest nodes first, before any step is.
-    Running, failed and cancelled nodes stay visible.
+    The mission's guards are folded. Then nodes inside steps are folded, the deepest first, before whole steps. Running,
+    failed and cancelled nodes stay visible.
     """
     shown = outline(root)
     deepest = max(depth for depth, _ in shown.walk())
@@ -170,7 +170,7 @@ def readable(root: NodeView, most: int = MANY_NODES) -> NodeView:
 
 
 def _fold_below_steps(row: NodeView, level: int, left: int) -> NodeView:
-    """Folds guards, and other closed rows more than `level` levels below their step; `left` of them are left here."""
+    """Folds guards, and closed rows over `level` levels below their step; `left` counts the levels left here."""
     shown, hidden = [], row.hidden
     for child in row.children:
         guard = child.behaviour.watches or child.behaviour.plumbing
@@ -182,9 +182,9 @@ def _fold_below_steps(row: NodeView, level: int, left: int) -> NodeView:
 
 
 def executed_tree(node: NodeView, above: NodeView | None = None) -> NodeView:
-    """Returns the executed nodes, named by their actions, without nodes that only pass on one child's result.
+    """Returns the executed nodes under their actions' names, without nodes that only pass on one child's result.
 
-    It also leaves out conditions that held and stored poses, but no failed or cancelled node. `above` is the parent.
+    Conditions that held and stored poses are omitted too, but no failed or cancelled node. `above` is the parent.
     """
     below = tuple(executed_tree(child, node) for child in node.children if not _is_plumbing(child))
     if len(below) == 1 and not node.step and (node.state.cause is None or node.state.message == below[0].state.message):

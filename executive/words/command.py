@@ -1,6 +1,6 @@
 """Commands of the form *Take [item] to [goal] and do [task] to [object]*, and their text form.
 
-A name of several words stands as it is ("[orange juice]"). Where its words could be read as attributes, a number or
+A name with several words needs no quotes ("[orange juice]"). If its words could be read as attributes, a number or
 Nothing, the text form puts the name in quotes ('["red wine"]'), so that every command parses back to itself.
 """
 
@@ -36,7 +36,7 @@ _COUNTED: Final = re.compile(r'(?:(\d+|some) )?(?:([^"]*) )?(?:"([^"]+)"|([^"]+)
 
 
 class Task(enum.Enum):
-    """Task of a command at its goal. WAIT takes a time as its object, CHARGE none; FOLLOW, GUIDE and GREET a person."""
+    """Task of a command at its goal. WAIT has a time as its object, FOLLOW, GUIDE and GREET a person, CHARGE none."""
 
     GRASP = "grasp"
     FIND = "find"
@@ -57,10 +57,10 @@ class Command:
     """Command to one robot. None stands for Nothing; a count of 0 is a plural without a number, 1 a singular.
 
     `goal` is a place or a person ("start": the pose where the robot stood when the speaker addressed it), `goal_at` the
-    place of a person, `verb` the spoken verb.
+    place where that person is, `verb` the spoken verb.
 
-    Raises ValueError when a name holds brackets, quotes or stray blanks, a count is negative, Nothing is counted, or
-    `goal_at` stands without a goal.
+    Raises ValueError when a name contains brackets, quotes or stray blanks, a count is negative, Nothing is counted, or
+    `goal_at` is given without a goal.
     """
 
     item: ObjectKind | None = None
@@ -92,7 +92,7 @@ class Command:
         return f"Take [{item}] to [{_goal_text(self.goal, self.goal_at)}] and do [{task}] to [{target}]"
 
     def to_json(self) -> dict[str, Any]:
-        """Returns the command as JSON values: names as text, null for Nothing, whose count is 0."""
+        """Returns the command as JSON values: names as text, and null for Nothing, with count 0."""
         return {
             "item": None if self.item is None else str(self.item),
             "goal": self.goal,
@@ -106,12 +106,12 @@ class Command:
 
 
 def is_attribute(word: str) -> bool:
-    """Returns whether a leading `word` is an attribute of the words behind it ("red", "biggest")."""
+    """Returns whether `word` is an attribute of the words that follow it ("red", "biggest")."""
     return _ATTRIBUTE.fullmatch(word) is not None
 
 
 def may_be_attribute(word: str) -> bool:
-    """Returns whether `word` can be an attribute in a command: one word, and no number."""
+    """Returns whether a command may use `word` as an attribute: one word that is no number."""
     return _NO_ATTRIBUTE.fullmatch(word) is None
 
 
@@ -138,7 +138,7 @@ def parse_command(text: str) -> Command:
 
 
 def parts_of_command(command: Command) -> dict[str, str]:
-    """Parts of a command's text form by the keys of mission files; parts that are Nothing are left out."""
+    """Splits a command's text form into its parts by the keys of mission files; omits parts that are Nothing."""
     parts = {
         "take": _counted_text(command.item, command.item_count),
         "to": _goal_text(command.goal, command.goal_at),
@@ -149,7 +149,7 @@ def parts_of_command(command: Command) -> dict[str, str]:
 
 
 def command_of_parts(parts: Mapping[str, str | None]) -> Command:
-    """Builds a command from its parts. Raises ValueError when a part is no name."""
+    """Builds a command from its parts. Raises ValueError when a part cannot be parsed."""
     take, to, do, target = (parts.get(key) or _NOTHING for key in ("take", "to", "do", "object"))
     return parse_command(f"Take [{take}] to [{to}] and do [{do}] to [{target}]")
 
@@ -159,7 +159,7 @@ def _words(kind: ObjectKind | None) -> tuple[str, ...]:
 
 
 def _counted_text(of: ObjectKind | None, count: int) -> str:
-    """Text between the brackets; in quotes where it would not parse back."""
+    """Text between the brackets; in quotes if it would not parse back to the same object."""
     if of is None:
         return _NOTHING
     number = {0: f"{_PLURAL} ", 1: ""}.get(count, f"{count} ")

@@ -1,4 +1,4 @@
-"""Conditions by which a mission decides, waits and watches, as a mission file writes them."""
+"""Conditions on which a mission decides, waits and interrupts its steps, as a mission file writes them."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ if not TYPE_CHECKING:
 
 
 class ValueIs(Strict):
-    """Condition that an expression of variables and readings is true."""
+    """Condition that an expression over variables and readings is true."""
 
     text: Annotated[Text, Field(alias="expression", description='As in "battery < 0.3 and not holding".')]
 
@@ -76,13 +76,13 @@ class _Looking(Strict):
 
 
 class Question(_Looking):
-    """Question in English that the robot answers by looking."""
+    """Question in English, which the robot answers by looking."""
 
     look: Text = Field(description='The question, as in "is there a hammer in the workshop".')
 
 
 class Look(_Looking):
-    """Condition that an object is seen; the robot goes there and looks each time that the condition is checked."""
+    """Condition that an object is seen; the robot goes there and looks each time the condition is checked."""
 
     object: Text = Field(description="The object to look for; `at` says where.")
     at: Text | None = Field(default=None, description="The place of the object; by default anywhere.")
@@ -95,7 +95,7 @@ class Look(_Looking):
 
     @cached_property
     def command(self) -> Command:
-        """Command to find the object. Raises ValueError when a name is none."""
+        """Command to find the object. Raises ValueError when a name cannot be parsed."""
         return command_of_parts({"do": Task.FIND.value, "object": self.object, "to": self.at})
 
     def __str__(self) -> str:
@@ -104,14 +104,14 @@ class Look(_Looking):
 
 
 class LookFor(_Looking):
-    """Condition that a person, or anybody, is seen."""
+    """Condition that a certain person, or any person, is seen."""
 
     person: Text = Field(description='The person to look for, or "anybody"; `at` says where.')
     at: Text | None = Field(default=None, description="The place of the person; by default anywhere.")
 
 
 class DoorOpen(_Looking):
-    """Condition that a door is open; the robot goes there and looks."""
+    """Condition that a door is open; the robot goes there and looks each time the condition is checked."""
 
     door: Annotated[
         tuple[Name, ...],
@@ -121,13 +121,13 @@ class DoorOpen(_Looking):
 
     @property
     def between(self) -> tuple[str, str]:
-        """Both rooms of the door, once they are known."""
+        """Both rooms that the door joins, once they are known."""
         one, other = self.door
         return one, other
 
     @property
     def name(self) -> str:
-        """The door by its rooms."""
+        """Name of the door, formed from its rooms."""
         return f"door between {' and '.join(self.door)}" if len(self.door) > 1 else f"door of {self.door[0]}"
 
     def __str__(self) -> str:
@@ -144,7 +144,7 @@ class ButtonPressed(Strict):
 
 
 class AllOf(Strict):
-    """Conjunction of conditions, decided as soon as one does not hold."""
+    """Conjunction of conditions; it is false as soon as one condition is false."""
 
     parts: Annotated[tuple[Condition, ...], Field(alias="all", min_length=1, description="All of these hold.")]
 
@@ -153,7 +153,7 @@ class AllOf(Strict):
 
 
 class AnyOf(Strict):
-    """Disjunction of conditions, decided as soon as one holds."""
+    """Disjunction of conditions; it is true as soon as one condition is true."""
 
     parts: Annotated[tuple[Condition, ...], Field(alias="any", min_length=1, description="One of these holds.")]
 
@@ -209,14 +209,14 @@ else:
 
 
 def _bracketed(part: Condition) -> str:
-    """Text of a condition within another one, in brackets where it could be misread."""
+    """Text of a condition inside another one, in brackets if it could be misread."""
     text = str(part)
     plain = isinstance(part, Look | DoorOpen | ButtonPressed | Not) or not {"and", "or", "if"} & set(text.split())
     return text if plain else f"({text})"
 
 
 def parts_of(condition: Condition) -> Iterator[Condition]:
-    """Conditions within a condition, in order, without `all`, `any` and `not` themselves."""
+    """Yields the conditions inside a condition in order, but not `all`, `any` and `not` themselves."""
     match condition:
         case AllOf(parts=parts) | AnyOf(parts=parts):
             for part in parts:

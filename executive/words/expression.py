@@ -1,8 +1,8 @@
 """Expression language of mission files: `count + 1`, `battery < 0.3 and not holding`, `"{count} beers"`.
 
 An expression has numbers, texts, true and false, names; + - * / // %; comparisons; and, or, not; `A if C else B`;
-brackets; and the functions of `FUNCTIONS`. The grammar is a closed part of Python's, parsed by `ast`; no code is
-executed. The types of its names are checked before a mission runs, and its value is computed while the mission runs.
+brackets; and the functions of `FUNCTIONS`. The grammar is a subset of Python's, parsed by `ast`; no code is executed.
+The types of names are checked before a mission runs, and values are computed while the mission runs.
 """
 
 import ast
@@ -26,7 +26,7 @@ LARGEST: Final = 1e15
 
 
 class ExpressionError(ValueError):
-    """Error in an expression: its syntax, the types of its names, or its value; `hint` says how to correct it."""
+    """Error in an expression: syntax, types of names, or value; `hint` says how to correct it."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
@@ -56,7 +56,7 @@ def kind_of(type_or_value: Any) -> Kind:
 
 @dataclass(frozen=True)
 class _Function:
-    """Function by name: the kinds of its arguments (None: one or more numbers), of its result, and its body."""
+    """Named function: the kinds of its arguments (None: one or more numbers), the kind of its result, and its body."""
 
     takes: tuple[Kind, ...] | None
     returns: Kind
@@ -107,13 +107,13 @@ class Expression:
         return kind
 
     def value(self, values: Mapping[str, Value]) -> Value:
-        """Computes the value. Raises ExpressionError for a division by zero, a huge or missing value."""
+        """Computes the value. Raises ExpressionError for a division by zero, a huge value or a missing one."""
         return _checked(_value(_parsed(self.text).body, values))
 
 
 @dataclass(frozen=True)
 class Template:
-    """Text with expressions in braces: "I saw {count} beers"; `{{` is a brace. Raises ExpressionError."""
+    """Text with expressions in braces: "I saw {count} beers"; `{{` is a brace. Raises ExpressionError if invalid."""
 
     text: str
 
@@ -131,7 +131,7 @@ class Template:
         return frozenset(name for each in self.expressions for name in each.names)
 
     def fill(self, values: Mapping[str, Value]) -> str:
-        """Replaces the expressions by their values. Raises ExpressionError."""
+        """Replaces each expression by its value. Raises ExpressionError when a value cannot be computed."""
         texts = []
         for piece in _pieces(self.text):
             value = piece if isinstance(piece, str) else piece.value(values)
@@ -140,7 +140,7 @@ class Template:
         return "".join(texts)
 
     def matches(self, text: str) -> bool:
-        """Returns whether some values of the expressions give this text; spaces do not count."""
+        """Returns whether this text could result from any values of the expressions; ignores repeated spaces."""
         pieces = [
             re.escape(piece) if isinstance(piece, str) else ".*" for piece in _pieces(" ".join(self.text.split()))
         ]
@@ -148,7 +148,7 @@ class Template:
 
 
 def literal(value: Value) -> Expression:
-    """Expression of a plain value. Raises ExpressionError when the value is too long or too large."""
+    """Expression for a plain value. Raises ExpressionError when the value is too long or too large."""
     _checked(value)
     return Expression(repr(value) if not isinstance(value, bool) else str(value).lower())
 
@@ -168,7 +168,7 @@ def _pieces(text: str) -> tuple[str | Expression, ...]:
 
 @functools.lru_cache(maxsize=4096)
 def _parsed(text: str) -> ast.Expression:
-    """Parses an expression of the closed grammar."""
+    """Parses an expression. Raises ExpressionError for syntax outside the grammar."""
     if len(text) > MOST_LETTERS:
         raise ExpressionError(f"the expression has {len(text)} letters", f"write {MOST_LETTERS} at most")
     try:
@@ -183,7 +183,7 @@ def _parsed(text: str) -> ast.Expression:
 
 
 def slip_hint(text: str) -> str:
-    """Hint for a number that people write in another form (12:30, 1,5, 30 %); empty for other texts."""
+    """Hint for a number in a form that expressions lack (12:30, 1,5, 30 %); empty for other texts."""
     for pattern, meant in _SLIPS:
         match = re.search(pattern, text)
         if match is not None and (hint := meant(match)):
@@ -208,7 +208,7 @@ _SLIPS: Final[tuple[tuple[str, Callable[[re.Match[str]], str]], ...]] = (
 
 
 def _refuse_others(node: ast.expr, depth: int) -> None:
-    """Refuses syntax outside the grammar."""
+    """Raises ExpressionError for syntax outside the grammar."""
     if depth > MOST_DEPTH:
         raise ExpressionError("the expression is nested too deeply", "use 'set' to name a part of it")
     if isinstance(node, ast.Constant):
@@ -243,7 +243,7 @@ def _parts(node: ast.expr) -> tuple[ast.expr, ...]:
 
 
 def _kind(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
-    """Type of a node's value. Raises ExpressionError."""
+    """Type of a node's value. Raises ExpressionError for an unknown name or types that do not fit."""
     match node:
         case ast.Constant(value):
             return kind_of(value)
@@ -311,7 +311,7 @@ def _nearest_clock(value: object) -> str:
 
 
 def _text_hint(node: ast.Compare) -> str:
-    """Hint for a comparison of a number, or a time of day, with a text."""
+    """Hint for comparing a number, or a time of day, with a text."""
     sides = (node.left, *node.comparators)
     if any(isinstance(each, ast.Name) and each.id == CLOCK for each in sides):
         return 'a time of day is written as "08:30"'
@@ -357,7 +357,7 @@ def _value(node: ast.expr, values: Mapping[str, Value]) -> Any:
 
 
 def _shown(node: ast.AST, letters: int) -> str:
-    """Text of a part of an expression for messages, cut off after so many letters."""
+    """Text of a subexpression for messages, cut off after this number of letters."""
     try:
         return ast.unparse(node)[:letters]
     except RecursionError:

@@ -1,4 +1,4 @@
-"""Declarations with models: mappings in a file, unions of models by key, and options of the command line."""
+"""Declarations for models: mappings in a file, unions of models by key, and options of the command line."""
 
 import enum
 from collections.abc import Callable, Mapping, Sequence
@@ -12,7 +12,7 @@ from skills.inputs.errors import listing
 
 
 class Strict(BaseModel):
-    """Model of a mapping without unknown keys; immutable. Code uses the names of its fields, files their aliases."""
+    """Immutable model of a mapping; unknown keys are errors. Code uses field names, files use their aliases."""
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True, defer_build=True
@@ -20,22 +20,22 @@ class Strict(BaseModel):
 
 
 def aliases(model: type[BaseModel]) -> dict[str, str]:
-    """Keys of a model in a file, with the names of their fields."""
+    """Returns a model's keys as a file writes them, each with the name of its field."""
     return {field.alias or name: name for name, field in model.model_fields.items()}
 
 
 @dataclass(frozen=True)
 class Forms:
-    """Union of models, each distinguished by one or several keys.
+    """Union of models; the key that a mapping has selects the model.
 
-    `refused` returns the message for a mapping whose keys select no model or several.
+    `refused` returns the message for a mapping whose keys select no model or several models.
     """
 
     models: Mapping[str, type[Strict]]
     refused: Callable[[Sequence[str]], str]
 
     def read(self, data: Any) -> Any:
-        """Reads a mapping as the model of its keys. Raises ValueError when they select none, or do not fit together."""
+        """Reads a mapping as the model that its keys select. Raises ValueError unless they select exactly one."""
         kinds = tuple(dict.fromkeys(self.models.values()))
         if isinstance(data, kinds):
             return data
@@ -58,7 +58,7 @@ class Forms:
             raise ValidationError.from_exception_data("mapping", faults)
 
     def _fitting(self, data: Mapping[Any, Any], form: str, model: type[Strict]) -> dict[Any, Any]:
-        """Drops empty keys of other models. Raises ValueError for keys that do not fit together."""
+        """Drops empty keys of other models. Raises ValueError for keys that cannot be used together."""
         own, fitting = aliases(model), dict(data)
         for key in data:
             users = [name for name, other in self.models.items() if key in aliases(other)]
@@ -74,7 +74,7 @@ class Forms:
 
 
 class OptionGroup(enum.StrEnum):
-    """Headings of options in the help of a command."""
+    """Headings above options in the help of a command."""
 
     REQUEST = "Request"
     WORLD = "World"
@@ -86,10 +86,10 @@ class OptionGroup(enum.StrEnum):
 
 @dataclass(frozen=True)
 class Option:
-    """Command-line option of a field; a number has the range of the field's quantity.
+    """Command-line option that sets a field; a number must be in the range of the field's quantity.
 
-    `name` is the option, by default the field's name; an `argument` has none. `read` converts the typed value, of type
-    `typed`, to the field's value; it raises InputError. `group` is its heading in the help.
+    `name` is the option's name, by default the field's; an `argument` has no name. `read` converts the typed value, of
+    type `typed`, to the field's value or raises InputError. `group` is the option's heading in the help.
     """
 
     help: str

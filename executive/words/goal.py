@@ -37,8 +37,8 @@ class When(enum.Enum):
 class Region:
     """Part of the world: an outline seen from above, (x, y) corners in order, and a range of heights (m).
 
-    An object lies in a region when its body origin does, a robot when the origin of its body does: a table of 0.75 m
-    whose objects have their origin between base and 0.25 m above it is the range 0.70 to 1.00.
+    An object or a robot is in a region when the origin of its body frame is: for a table 0.75 m high, on which origins
+    are up to 0.25 m above an object's base, the range is 0.70 to 1.00.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Region:
             raise ValueError(f"region {self.name!r} needs three corners or more and z_min_m below z_max_m")
 
     def contains(self, p_W: Iterable[float]) -> bool:
-        """Returns whether a point (x, y, z) in the world lies inside."""
+        """Returns whether a point (x, y, z) in the world frame lies in the region."""
         x, y, z = p_W
         return self.z_min_m <= z <= self.z_max_m and inside(self.polygon_W, (x, y))
 
@@ -60,17 +60,17 @@ class Region:
 class GoalCondition:
     """One goal condition.
 
-    `classes` are the object classes that fulfil it (none: any), `wanted` their common name (empty: the classes) and
-    `count` the number of objects (0 counts as 1). The robot takes the objects from `source` (empty: anywhere) or, for
-    an answer, looks there; an answer may count or miss objects in `maybe`. `goal` is the destination of the objects or
-    of the robot (any of the regions). `person` receives the object or, where the class is "person", is asked for (None:
-    anyone). To follow, guide, meet or greet a person, `person` (None: anyone) must stand in `goal` (empty: anywhere).
-    `answer` is the answer that the robot gave at `answered_s` (None: now), `spoken_s` has the times at which it spoke.
-    `robot` must act (None: any).
+    `classes` are the object classes that fulfil the condition (none: any), `wanted` is their common name (empty: the
+    classes), and `count` the number of objects (0 counts as 1). The robot takes the objects from `source` (empty:
+    anywhere) or, for an answer, looks there; an answer may count or miss objects in `maybe`. `goal` is the destination
+    of the objects or of the robot (any of the regions). `person` receives the object or, if the class is "person", is
+    searched for (None: anyone). To follow, guide, meet or greet a person, `person` (None: anyone) must stand in `goal`
+    (empty: anywhere). `answer` is the answer that the robot gave at `answered_s` (None: now), `spoken_s` has the times
+    at which it spoke. `robot` must act (None: any).
 
-    `when` says at which times it must hold. The step ran from `began_s` (None: since `since_s`) to `ended_s` (None: it
-    ends now). A later step of the same mission may lift the objects again within the intervals `taken_s`. Events before
-    `since_s` (simulated time) belong to another mission and do not count.
+    `when` says at which times the condition must hold. The step ran from `began_s` (None: since `since_s`) to `ended_s`
+    (None: it ends now). A later step of the same mission may lift the objects again within the intervals `taken_s`.
+    Events before `since_s` (simulated time) belong to another mission and do not count.
     """
 
     kind: GoalKind
@@ -93,7 +93,7 @@ class GoalCondition:
 
     @property
     def from_s(self) -> float:
-        """Time when the step of the condition began."""
+        """Time when the step that the condition belongs to began."""
         return self.since_s if self.began_s is None else max(self.began_s, self.since_s)
 
     @property
@@ -104,11 +104,11 @@ class GoalCondition:
 
 @dataclass(frozen=True)
 class RefereeReport:
-    """Verdict of the referee on all goal conditions, with its counts and a sentence for each lift, drop and bump.
+    """Verdict of the referee on all goal conditions, with counts and a sentence for each lift, drop and collision.
 
-    `success` is None when the referee has not judged everything that was asked for; `why` has a sentence for each
-    condition. `collisions` are the robots' own: `people_hit` of them are with people, `robots_hit` between two robots.
-    `hit_by_people` counts the people who walked into a standing robot. `holds` tells of a failed run whether its goal
+    `success` is None when the referee could not judge every condition; `why` has a sentence for each condition.
+    `collisions` counts those that robots caused: `people_hit` of them are with people, `robots_hit` between two robots.
+    `hit_by_people` counts the people who walked into a standing robot. For a failed run, `holds` says whether the goal
     conditions hold nevertheless.
     """
 

@@ -1,7 +1,7 @@
-"""Conversion of values to JSON and back: plain values, tuples, enums, arrays, transforms and frozen dataclasses.
+"""Converts values to JSON and back: plain values, tuples, enums, arrays, transforms and frozen dataclasses.
 
-A value without a form in JSON carries its kind, so that it is read back equal and with its type. A class is looked up
-among the loaded modules; nothing is imported, and only constructors of dataclasses are called.
+A value without a form in JSON is stored with its kind, so that it is read back equal and with its type. A class is
+looked up among the loaded modules; nothing is imported, and only constructors of dataclasses are called.
 """
 
 import dataclasses
@@ -25,7 +25,7 @@ def to_text(value: Any) -> str:
 
 
 def from_text(text: str) -> Any:
-    """Converts a text of `to_text` back. Raises ValueError for a damaged text, and for an unknown class."""
+    """Converts a text written by `to_text` back. Raises ValueError for a damaged text, and for an unknown class."""
     try:
         return unpack(json.loads(text))
     except (KeyError, TypeError, AttributeError) as error:
@@ -33,7 +33,7 @@ def from_text(text: str) -> Any:
 
 
 def pack(value: Any) -> Any:
-    """Converts a value to plain JSON data. Raises TypeError as `to_text`."""
+    """Converts a value to plain JSON data. Raises TypeError like `to_text`."""
     of: Any = type(value)
     kind = _kind_of(of)
     return value if kind is None else {_KIND: kind, **_KINDS[kind][1](value)}
@@ -41,7 +41,7 @@ def pack(value: Any) -> Any:
 
 @cache
 def _kind_of(of: Any) -> str | None:
-    """Kind of the values of a type; None for plain ones. Raises TypeError for a type without a stored form."""
+    """Kind stored with values of a type; None for plain values. Raises TypeError for a type that cannot be stored."""
     if issubclass(of, bool | int | float | str | NoneType) and not issubclass(of, enum.Enum):
         return None
     for kind, (fits, _, _) in _KINDS.items():
@@ -51,7 +51,7 @@ def _kind_of(of: Any) -> str | None:
 
 
 def unpack(value: Any) -> Any:
-    """Converts data of `pack` back. Raises ValueError, KeyError, TypeError or AttributeError for any other data."""
+    """Converts data from `pack` back. Raises ValueError, KeyError, TypeError or AttributeError for any other data."""
     if not isinstance(value, dict):
         if isinstance(value, list):
             raise ValueError("a bare list is no stored value")

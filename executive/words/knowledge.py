@@ -113,7 +113,7 @@ class Person(Strict):
 class TagFacts(Strict):
     """AprilTag of family 36h11 with the side of its black square (m), on an object, at the dock, or on a wall or door.
 
-    A tag on an object stands `on` its class; any other one has a place and a heading in the world frame.
+    For a tag on an object, `on` is the object's class; any other tag has a position and a heading in the world frame.
     """
 
     id: TagNumber = Field(description="its number in the family")
@@ -153,42 +153,42 @@ class Knowledge(Strict):
     )
 
     def known_tags(self) -> tuple[Tag, ...]:
-        """Tags as the skills know them."""
+        """Tags as the skills' own data type."""
         return tuple(Tag(tag.id, tag.size, tag.on, tag.at, tag.yaw) for tag in self.tags)
 
     def known_zones(self) -> tuple[Zone, ...]:
-        """Zones as the skills know them, in the file's order."""
+        """Zones as the skills' own data type, in the file's order."""
         rooms = {name: place.polygon for name, place in self.places.items()}
         return tuple(facts.zone(name, rooms) for name, facts in self.zones.items())
 
     def with_zones(self, zones: Mapping[str, ZoneFacts]) -> Knowledge:
-        """Adds the zones of a mission; one whose name is taken gets another."""
+        """Adds the zones that a mission declares; a zone whose name is taken gets another name."""
         more = {f"{name} (mission)" if name in self.zones else name: facts for name, facts in zones.items()}
         return self.model_copy(update={"zones": {**self.zones, **more}}) if more else self
 
     def place(self, name: str) -> str | None:
-        """Own name of the room or surface that `name` means; None when it is unknown."""
+        """Name in the file of the room or surface that `name` means; None when `name` is unknown."""
         return _resolve(name, self.places) or _resolve(name, self.surfaces)
 
     def room(self, place: str) -> str:
-        """Room of a known place; a room is its own."""
+        """Room that contains a known place; a room contains itself."""
         return self.surfaces[place].place if place in self.surfaces else place
 
     def surfaces_in(self, place: str) -> tuple[str, ...]:
-        """Surfaces of a room, in the file's order; a surface is its own only one."""
+        """Surfaces in a room, in the file's order; for a surface, only the surface itself."""
         return tuple(name for name, surface in self.surfaces.items() if place in (name, surface.place))
 
     def place_pose(self, place: str) -> Pose:
-        """Pose of a robot at a known room (its pose) or surface (its first viewpoint)."""
+        """Pose of a robot at a known room (the room's pose) or surface (its first viewpoint)."""
         return self.surfaces[place].viewpoints[0] if place in self.surfaces else self.places[place].pose
 
     def object_name(self, name: str) -> str | None:
-        """Own name of the class or category that `name` means; None when it is unknown."""
+        """Name in the file of the class or category that `name` means; None when `name` is unknown."""
         own = _resolve(name, self.things) or next((c for c in self.categories() if c.lower() == name.lower()), None)
         return own or _UNNAMED.get(name.lower())
 
     def classes(self, name: str) -> tuple[str, ...]:
-        """Classes that a class, alias or category includes, in the file's order; empty when it is unknown."""
+        """Classes that a class, alias or category includes, in the file's order; empty when the name is unknown."""
         known = _resolve(name, self.things)
         if known is None and self.object_name(name) in _UNNAMED:
             return tuple(self.things)
@@ -199,19 +199,19 @@ class Knowledge(Strict):
         return tuple(dict.fromkeys(category for facts in self.things.values() for category in facts.categories))
 
     def usual_surfaces(self, name: str) -> tuple[str, ...]:
-        """Usual surfaces of objects of a class or category, the likeliest first."""
+        """Surfaces where objects of a class or category usually are, the likeliest first."""
         return tuple(dict.fromkeys(place for c in self.classes(name) for place in self.things[c].usual))
 
     def person(self, name: str) -> str | None:
-        """Own name of the person that `name` means; None when it is unknown."""
+        """Name in the file of the person that `name` means; None when `name` is unknown."""
         return _resolve(name, self.people)
 
     def somebody(self, name: str) -> str | None:
-        """Own name of the person that `name` means, `ANYBODY` for any person; None for any other name."""
+        """Name in the file of the person that `name` means; `ANYBODY` for any person, None for an unknown name."""
         return self.person(name) or (ANYBODY if name.lower() == ANYBODY else None)
 
     def rooms_to_search(self, person: str, place: str | None) -> tuple[str, ...]:
-        """Rooms in which to look for a person: the room of the place, or all rooms, the person's usual room first."""
+        """Rooms in which to look for a person: the place's room, or all rooms, the person's usual room first."""
         if place is not None:
             return (self.room(place),)
         usual = (self.room(self.people[person].at),) if person in self.people else ()
@@ -221,7 +221,7 @@ class Knowledge(Strict):
         """Place for `task` on an object of a class or category when the speaker names no place.
 
         The table of defaults decides first, by the task or else by grasp, and by the class or else by its categories;
-        then the usual room of the objects.
+        if it has no entry, the room where the objects usually are is taken.
         """
         words = [name, *(category for c in self.classes(name) for category in self.things[c].categories)]
         tables = [self.defaults.get(t.value, {}) for t in (task, Task.GRASP) if t is not None]
@@ -237,7 +237,7 @@ class Knowledge(Strict):
         return (*self.places, *self.surfaces)
 
     def spellings(self, names: Iterable[str]) -> tuple[str, ...]:
-        """Names with all their aliases, to guess the meaning of a misspelled name."""
+        """Names with all their aliases, from which to guess the meaning of a misspelled name."""
         groups: tuple[Mapping[str, Place | SurfaceFacts | ObjectFacts | Person], ...]
         groups = (self.places, self.surfaces, self.things, self.people)
         aliases = {name: facts.aliases for group in groups for name, facts in group.items()}
@@ -255,7 +255,7 @@ def _resolve(
 
 
 def load_knowledge(path: Path | str, own: Collection[str] = ()) -> Knowledge:
-    """Reads a world's `knowledge.yaml`; `own` are the names of imported objects, which it need not mention.
+    """Reads a world's `knowledge.yaml`; `own` are the names of imported objects, which the file may omit.
 
     Raises:
         InputError: with file, line and hint, for broken YAML, unknown or missing keys, wrong values, and for names
@@ -265,9 +265,9 @@ def load_knowledge(path: Path | str, own: Collection[str] = ()) -> Knowledge:
 
 
 def knowledge_of_source(source: YamlSource, own: Collection[str] = (), below: Knowledge | None = None) -> Knowledge:
-    """Reads the knowledge of a parsed document, which may repeat zones of the knowledge `below`.
+    """Reads the knowledge in a parsed document, which may repeat zones from the knowledge `below`.
 
-    Raises InputError as `load_knowledge`.
+    Raises InputError like `load_knowledge`.
     """
     knowledge = validate(Knowledge, source)
     for error in _cross_errors(knowledge, source, own):
@@ -278,7 +278,7 @@ def knowledge_of_source(source: YamlSource, own: Collection[str] = (), below: Kn
 
 
 def with_own_objects(knowledge: Knowledge, own: Iterable[str]) -> Knowledge:
-    """Adds the names of imported objects that are not known yet. Raises InputError if one means another object."""
+    """Adds imported objects by name. Raises InputError if a new name already means another object."""
     new = [name for name in own if name not in knowledge.things]
     for name in new:
         for word in (name, name.replace("_", " ")):
@@ -290,7 +290,7 @@ def with_own_objects(knowledge: Knowledge, own: Iterable[str]) -> Knowledge:
 
 
 def _cross_errors(knowledge: Knowledge, source: YamlSource, own: Collection[str]) -> Iterator[InputError]:
-    """Errors in references from one part of the file to another."""
+    """Yields errors in references between sections of the file."""
     tasks = [task.value for task in Task]
     for index, door in enumerate(knowledge.doors):
         for side, room in enumerate(door.between):
@@ -331,7 +331,7 @@ def _unless_known(
 
 
 def _doubles(knowledge: Knowledge, source: YamlSource) -> Iterator[InputError]:
-    """Errors for names that mean two things of the same kind."""
+    """Yields errors for names that mean two things of the same kind."""
     for kinds in (("places", "surfaces"), ("things",), ("people",)):
         seen: dict[str, str] = {}
         for kind in kinds:

@@ -1,4 +1,4 @@
-"""Steps without steps inside: commands, skills, used missions; waits, checks, charging, speech, and values."""
+"""Steps that contain no steps: commands, skills, used missions; waits, checks, charging, speech, and values."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ COMMAND_KEYS: Final = ("take", "to", "do", "object")
 
 
 def _named_goal(value: object) -> object:
-    """Accepts the name of a goal; a pose belongs to a skill that takes one. Raises QuantityError."""
+    """Accepts the name of a goal. Raises QuantityError for a pose, with the skill that takes one as a hint."""
     if isinstance(value, list | dict):
         hint = "for a pose write 'skill: navigate' with 'with: {x: 1.0, y: 2.0, yaw: 1.57}', in metres and radians"
         raise QuantityError("should be the name of a place or person", hint)
@@ -43,7 +43,7 @@ _GIVES: Final = (
 
 
 class Say(Step):
-    """Step in English."""
+    """Step written as a sentence in English."""
 
     say: Text = Field(description="The request, in English.")
     elsewhere: StrictBool | None = Field(default=None, description=_ELSEWHERE)
@@ -52,18 +52,18 @@ class Say(Step):
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """Commands of the sentence, once it is understood."""
+        """Commands that the sentence means, once it is understood."""
         return self._meaning
 
     def with_commands(self, commands: tuple[Command, ...]) -> Say:
-        """Copies the step, with the commands that its sentence means."""
+        """Copies the step with the commands that its sentence means."""
         copy = self.model_copy()
         copy._meaning = commands
         return copy
 
 
 class Do(Step):
-    """Step of one command, given by its parts."""
+    """Step with one command, written as its parts."""
 
     take: Text | None = Field(default=None, description="The object to carry; a number may stand before it.")
     to: Goal | None = Field(default=None, description='The place or person, or "start", or "Robin at hall".')
@@ -84,13 +84,13 @@ class Do(Step):
 
     @classmethod
     def from_command(cls, command: Command) -> Do:
-        """Builds the step of a command, and keeps its verb."""
+        """Builds the step for a command, and keeps the command's verb."""
         step = cls.model_validate(parts_of_command(command))
         step.__dict__["command"] = command
         return step
 
     def with_command(self, command: Command) -> Do:
-        """Copies the step, with another command."""
+        """Copies the step with another command."""
         parts: Mapping[str, Any] = {**dict.fromkeys(COMMAND_KEYS), **parts_of_command(command), "do": command.task}
         copy = self.model_copy(update=parts)
         copy.__dict__["command"] = command
@@ -98,7 +98,7 @@ class Do(Step):
 
     @functools.cached_property
     def command(self) -> Command:
-        """Command of the step. Raises ValueError when a part is no name."""
+        """Command of the step. Raises ValueError when a part cannot be parsed."""
         do = None if self.do is None else self.do.value
         return command_of_parts({"take": self.take, "to": self.to, "do": do, "object": self.object})
 
@@ -109,7 +109,7 @@ class Do(Step):
 
 
 def steps_of_commands(commands: Sequence[Command]) -> tuple[Do, ...]:
-    """One step for each command."""
+    """Returns one step for each command."""
     return tuple(map(Do.from_command, commands))
 
 
@@ -120,7 +120,7 @@ _With = Annotated[
 
 
 class CallSkill(Step):
-    """Step that calls a skill with its ports."""
+    """Step that calls a skill with values for its ports."""
 
     skill: Name = Field(description="The name of a registered skill.")
     values: _With = None
@@ -141,23 +141,23 @@ class UseMission(Step):
 
     @property
     def mission(self) -> Any:
-        """`Mission` of the file, once the file is read."""
+        """`Mission` in the file, once the file is read."""
         return self._mission
 
     def with_mission(self, mission: Any) -> UseMission:
-        """Copies the step, with its mission."""
+        """Copies the step with the mission that its file contains."""
         copy = self.model_copy()
         copy._mission = mission
         return copy
 
     @property
     def inner_steps(self) -> tuple[Step, ...]:
-        """Steps of the mission."""
+        """Steps of the used mission."""
         return () if self._mission is None else (*self._mission.steps, *self._mission.framing_steps)
 
     @property
     def words(self) -> str:
-        """Name of the mission."""
+        """Name of the used mission."""
         return self.use if self._mission is None else str(self._mission.name)
 
 
@@ -166,7 +166,7 @@ Clock = Annotated[str, BeforeValidator(clock_text)]
 
 
 class Awaited(Strict):
-    """End of a wait: a condition, a time, or a time of day."""
+    """Event that ends a wait: a condition, a duration, or a time of day."""
 
     condition: Annotated[Condition | None, Field(alias="for", description="Wait until this holds.")] = None
     seconds: Duration | None = Field(default=None, description='Length of the wait: seconds, or "10 min".')
@@ -183,13 +183,13 @@ class Awaited(Strict):
 
     @property
     def until_clock_s(self) -> float:
-        """Time of day in seconds after midnight; 0 where there is none."""
+        """Time of day in seconds after midnight; 0 if the wait has no time of day."""
         hours, minutes = map(int, (self.until_clock or "00:00").split(":"))
         return 3600.0 * hours + 60.0 * minutes
 
 
 class Wait(Step):
-    """`wait`: waits for a condition, some time, or until a time of day."""
+    """`wait`: waits for a condition, for a duration, or until a time of day."""
 
     key: ClassVar[str] = "wait"
     awaited: Annotated[
@@ -198,13 +198,13 @@ class Wait(Step):
 
     @property
     def words(self) -> str:
-        """Name of the step, with its condition where it has one."""
+        """Name of the step, with its condition if it has one."""
         condition = self.awaited.condition
         return self.key if condition is None else f"wait until {condition}"
 
 
 class Answering(Step):
-    """Step whose answer later steps may read under a name."""
+    """Step with an answer that later steps may read under a name."""
 
     gives: dict[str, Name] | None = Field(default=None, description=_GIVES)
 
@@ -215,7 +215,7 @@ class Answering(Step):
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """Faults for outputs that the step does not have."""
+        """Yields a fault for each named output that the step does not have."""
         for wrong in (port for port in self.gives or () if port != "answer"):
             yield ("gives", wrong), f"it gives no '{wrong}'", "write {answer: NAME}"
 
@@ -258,7 +258,7 @@ class Dock(Step):
 
     @property
     def level(self) -> float | None:
-        """Level of charge from 0 to 1; None: the level of the knowledge file."""
+        """Charge from 0 to 1; None stands for the charge that the knowledge file states."""
         return self.charging.level
 
 
@@ -270,7 +270,7 @@ class Speak(Step):
 
     @property
     def text(self) -> Template:
-        """Text with its expressions. Raises ExpressionError."""
+        """Text with its expressions parsed. Raises ExpressionError."""
         return Template(self.speak)
 
     @property
@@ -280,12 +280,12 @@ class Speak(Step):
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """Faults of a text that cannot be parsed."""
+        """Yields a fault if the text cannot be parsed."""
         yield from unreadable(("speak",), lambda: self.text)
 
 
 class DoorToOpen(DoorOpen):
-    """Door that is to be open, and the time until then."""
+    """Door that must be opened, and the time limit for it."""
 
     within_s: Annotated[
         Duration, Field(alias="within", description='Time until the door is open: seconds, or a text such as "2 min".')
@@ -293,12 +293,12 @@ class DoorToOpen(DoorOpen):
 
     @property
     def words(self) -> str:
-        """What is to happen to the door."""
+        """Words for what must happen to the door."""
         return f"have the {self.name} opened"
 
 
 class OpenDoor(Step):
-    """`open`: has a door opened, and waits until it is open; does nothing when it is open already."""
+    """`open`: has a door opened, and waits until it is open; does nothing if the door is open already."""
 
     key: ClassVar[str] = "open"
     door: Annotated[DoorToOpen, Field(alias="open", description="Have a door opened, and wait until it is open.")]
@@ -310,19 +310,19 @@ class OpenDoor(Step):
 
 
 class Set(Step):
-    """`set`: computes values by name, in order."""
+    """`set`: computes named values in order."""
 
     key: ClassVar[str] = "set"
     set: dict[Name, Scalar] = Field(description="Values by name: numbers, truths or expressions.")
 
     @property
     def values(self) -> Mapping[str, Expression]:
-        """Expression of each value. Raises ExpressionError."""
+        """Parsed expression for each value. Raises ExpressionError."""
         return {name: _expression(value) for name, value in self.set.items()}
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """Faults for names without a value, and for values that cannot be parsed."""
+        """Yields the faults of values with bad names, and of values that cannot be parsed."""
         for name, value in self.set.items():
             if value is None:
                 yield ("set", name), f"'{name}' gets no value", "give a number, a truth or an expression"
@@ -330,5 +330,5 @@ class Set(Step):
 
 
 def _expression(value: Scalar) -> Expression:
-    """Expression of a value. Raises ExpressionError."""
+    """Parses the expression for a value. Raises ExpressionError."""
     return Expression(value) if isinstance(value, str) else literal(0 if value is None else value)

@@ -45,7 +45,7 @@ class Stop(Strict):
 
 
 class Distraction(Strict):
-    """Lapse of a walking person's attention: a stop, perhaps after some steps back."""
+    """Lapse in a walking person's attention: the person stops, and may first step back."""
 
     after: Walked = Field(description="Path that the person has walked by then, in metres.")
     stop: Delay = Field(default=3.0, description="Time for which the person stands, in seconds.")
@@ -112,7 +112,7 @@ class LooseObject(Strict):
 
 
 class Parameter(Strict):
-    """Parameter of a mission file."""
+    """Parameter that a mission file declares."""
 
     type: Literal["text", "number", "truth", "place", "object", "person"] | None = Field(
         default=None, description="Its type; a place, object or person is checked against the world."
@@ -133,7 +133,7 @@ else:
 
 
 class _Whole(Placed):
-    """Policy of a mission, or of a robot's part of it."""
+    """Policy for a whole mission, or for the part of one robot."""
 
     @field_validator("on_failure")
     @classmethod
@@ -151,7 +151,7 @@ class _Whole(Placed):
 
 
 class MissionPart(_Whole):
-    """Part of one of several robots. Its policy, `always`, `while` and `when` replace those at the file's top."""
+    """Part for one of several robots. Its policy, `always`, `while` and `when` replace those at the file's top."""
 
     after: Name | Annotated[tuple[Name, ...], Field(min_length=1)] | None = Field(
         default=None, description="The robot, or the robots, whose parts must be done before this one begins."
@@ -175,7 +175,7 @@ class MissionPart(_Whole):
 class Mission(_Whole):
     """Mission in one world, for one robot or with a part for each of several.
 
-    The policy at the top is for the whole mission, or for each part.
+    The policy at the top of the file applies to the whole mission, or to each part.
     """
 
     model_config = ConfigDict(title="Errand mission")
@@ -235,7 +235,7 @@ class Mission(_Whole):
     @model_validator(mode="before")
     @classmethod
     def _steps_or_parts(cls, data: Any) -> Any:
-        """Accepts `parts` in place of `steps`."""
+        """Accepts `parts` instead of `steps`."""
         if not isinstance(data, dict) or not data.keys() & {"steps", "parts"}:
             return data
         if (data.get("steps") is None) == (data.get("parts") is None):
@@ -244,7 +244,7 @@ class Mission(_Whole):
 
     @classmethod
     def from_steps(cls, steps: Sequence[Step], *, world: str, robot: str) -> Self:
-        """Builds a mission without a file, named after its first command, or else after its first block."""
+        """Builds a mission without a file; names it after its first command, or else after its first block."""
         first = next((command for step in steps for each in step.walk() for command in each.commands), None)
         if first is None:
             name = type(steps[0]).__name__.lower() if steps else "do"
@@ -254,12 +254,12 @@ class Mission(_Whole):
 
     @property
     def document(self) -> YamlSource | None:
-        """Data and lines of the file; None for a mission without a file."""
+        """Data and line numbers of the file; None for a mission without a file."""
         return None if self._place is None else self._place.document
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on names in a sentence that were taken for known ones."""
+        """Notes on words in a sentence that were taken for known names."""
         return self._notes
 
     @property
@@ -274,32 +274,32 @@ class Mission(_Whole):
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """Commands of all steps, used missions included, in order."""
+        """Commands in all steps, in order, including those of used missions."""
         return tuple(command for step in self.walk() for command in step.commands)
 
     @property
     def framing_steps(self) -> tuple[Step, ...]:
-        """Steps that interrupt the mission's own steps, and steps at its end."""
+        """Steps that interrupt the mission's own steps, and steps that run at the end."""
         return (*(step for each in self.when or () for step in each.steps), *self.always)
 
     @property
     def is_framed(self) -> bool:
-        """Returns whether the mission watches a condition, or has steps at its end, or zones."""
+        """Returns whether the mission has `always`, `while` or `when`, or zones."""
         return bool(self.always) or self.while_ is not None or self.when is not None or bool(self.zones)
 
     @property
     def whole_zones(self) -> Mapping[str, ZoneFacts]:
-        """Zones that hold for the whole mission: its own, and those of a group that is its only step."""
+        """Zones that hold for the whole mission: its own zones, and those of a group that is the only step."""
         lone = self.steps[0] if len(self.steps) == 1 else None
         return {**((isinstance(lone, Group) and lone.zones) or {}), **(self.zones or {})}
 
     def walk(self) -> Iterator[Step]:
-        """Yields all steps in order; a step with steps inside comes before them."""
+        """Yields all steps in order; a step comes before the steps that it contains."""
         for step in (*self.steps, *self.framing_steps):
             yield from step.walk()
 
     def with_notes(self, notes: tuple[str, ...]) -> Self:
-        """Copies the mission, with other notes."""
+        """Copies the mission with other notes."""
         copy = self.model_copy()
         copy._notes = notes
         return copy

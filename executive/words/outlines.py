@@ -24,14 +24,14 @@ Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
 
 @dataclass(frozen=True)
 class Side:
-    """Side of an outline, and its distance (m) from a given line."""
+    """Side of an outline, with its distance (m) from a given line."""
 
     ends: tuple[Point, Point]
     off_m: float
 
 
 def inside(polygon: Sequence[Point], point: Point) -> bool:
-    """Returns whether (x, y) lies within the outline."""
+    """Returns whether (x, y) lies inside the outline."""
     import shapely
 
     return bool(shapely.contains_xy(_outline(tuple(polygon)), *point))
@@ -50,7 +50,7 @@ def distance_m(polygon: Sequence[Point], point: Point) -> float:
 
 
 def fits(outline: Sequence[Point], polygon: Sequence[Point], taken: Iterable[Sequence[Point]]) -> bool:
-    """Returns whether an outline lies within a polygon and meets none of the `taken` outlines."""
+    """Returns whether an outline lies in a polygon and overlaps none of the `taken` outlines."""
     import shapely
 
     body = shapely.Polygon(outline)
@@ -58,13 +58,13 @@ def fits(outline: Sequence[Point], polygon: Sequence[Point], taken: Iterable[Seq
 
 
 def nearest_side(polygon: Sequence[Point], middle: Point, length_m: float) -> Side:
-    """Side of an outline that is nearest to both ends of a parallel line, given by its middle and length."""
+    """Side of an outline that is nearest to both ends of a parallel line with this centre and length."""
     ends = zip(polygon, (*polygon[1:], polygon[0]), strict=True)
     return min((Side(pair, _ends_off_m(pair, middle, length_m)) for pair in ends), key=lambda side: side.off_m)
 
 
 def _ends_off_m(side: tuple[Point, Point], middle: Point, length_m: float) -> float:
-    """Sum of the distances of both ends of a line from a side parallel to it."""
+    """Sum of the distances between a side and both ends of a line parallel to it."""
     import shapely
 
     (x0, y0), (x1, y1) = side
@@ -76,7 +76,7 @@ def _ends_off_m(side: tuple[Point, Point], middle: Point, length_m: float) -> fl
 
 @functools.lru_cache(maxsize=256)
 def _outline(polygon: tuple[Point, ...]) -> shapely.Polygon:
-    """Outline as a shapely polygon, cached since the compiler asks for rooms again and again."""
+    """Outline as a shapely polygon; cached, because the compiler asks for the same rooms repeatedly."""
     import shapely
 
     return shapely.Polygon(polygon)

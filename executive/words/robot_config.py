@@ -1,4 +1,4 @@
-"""Robots of a run: their names, kinds, starts, docks and stacks."""
+"""Robots in a run: their names, kinds, starts, docks and stacks."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -27,9 +27,9 @@ _NUMBER: Final = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?\s*", re.
 class RobotConfig:
     """Robot of a run.
 
-    `kind` is a name of the entry-point group `errand.robots`; the robot begins at `start` (world frame), charges at the
-    place `dock` and uses the components of the file `stack`. None stands for the world's value, or the kind's. `source`
-    is the line of a file that names the robot.
+    `kind` is a name in the entry-point group `errand.robots`; the robot begins at `start` (world frame), charges at the
+    place `dock` and uses the components in the file `stack`. None stands for the world's value, or else the kind's.
+    `source` is the line of the file that names the robot.
     """
 
     name: str
@@ -70,22 +70,22 @@ RobotsFile = Annotated[dict[Name, Annotated[NamedRobot, _SHORT]], Field(min_leng
 
 
 def name_key(name: str) -> str:
-    """Normal form of a robot's name, without case and without signs between words."""
+    """Normal form of a robot's name, without case and without separators between words."""
     return re.sub(r"[\W_]+", " ", name.casefold()).strip()
 
 
 def display_name(name: str) -> str:
-    """Robot's name as people read it: "alice" is Alice; capitals stay."""
+    """Robot's name as shown to users: "alice" becomes Alice; capitals stay."""
     return name[:1].upper() + name[1:]
 
 
 def find_robot(said: str, names: Iterable[str]) -> str | None:
-    """Finds the robot of that name among `names`, without regard to case and signs; None when there is none."""
+    """Finds the robot of that name among `names`, ignoring case and separators; None if there is no such robot."""
     return next((name for name in names if name_key(name) == name_key(said)), None)
 
 
 def name_clash(name: str, names: Iterable[str]) -> InputError | None:
-    """Error when `name` is one of `names`, or differs from it only in case or signs; None otherwise."""
+    """Error if `name` is one of `names`, or differs only in case or separators; else None."""
     other = find_robot(name, names)
     if other is None:
         return None
@@ -94,7 +94,7 @@ def name_clash(name: str, names: Iterable[str]) -> InputError | None:
 
 
 def check_name(name: str) -> str:
-    """Returns the name if a robot can have it. Raises InputError."""
+    """Returns the name if it is valid for a robot. Raises InputError if it is not."""
     if not name:
         raise InputError("a robot without a name", hint=_FORM)
     if not _NAME.fullmatch(name) or not name_key(name).strip():
@@ -139,7 +139,7 @@ def parse_robots(text: str, kinds: Collection[str]) -> tuple[RobotConfig, ...]:
 def robots_of_file(
     robots: Mapping[str, NamedRobot], kinds: Collection[str], source: YamlSource | None
 ) -> tuple[RobotConfig, ...]:
-    """Reads the robots under `robots` in a file, in its order; stack paths start from the file's folder.
+    """Reads the robots under `robots` in a file, in the file's order; stack paths are relative to the file's folder.
 
     Raises:
         InputError: with file and line: two have one name, a name is invalid, or a kind is not among `kinds`.
@@ -182,7 +182,7 @@ def parse_pose(words: Sequence[str]) -> Pose2D:
 
 
 def _entries(text: str) -> Iterator[str]:
-    """Yields the part of the option for each robot; commas within a start separate none. Raises InputError."""
+    """Yields the text for each robot in the option; commas in a start do not separate robots. Raises InputError."""
     if not text.strip(" ,"):
         raise InputError("no robots are named", hint=_FORM)
     entry = ""

@@ -8,9 +8,9 @@ LONGEST_SLUG: Final = 80
 
 
 def slug(text: str) -> str:
-    """Makes a text one part of a path id or file name: lower case, words joined by hyphens, no dots or slashes.
+    """Converts a text to one part of a path id or file name: lower case, hyphens between words, no dots or slashes.
 
-    A long text is cut off and ends with its checksum, so that texts with the same beginning stay different.
+    A long text is cut off and ends with a checksum, so that texts with the same beginning stay different.
     """
     words = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "unnamed"
     if len(words) <= LONGEST_SLUG:

@@ -1,4 +1,4 @@
-"""Base of all steps of a mission: policy (limits, guards, retries, failures), place in the file, common properties."""
+"""Base of all steps in a mission: policy (limits, guards, retries, failures), location in the file, properties."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Objects = Annotated[int, Quantity(ge=0, le=10)]
 
 
 class StaleData(enum.Enum):
-    """Policy for a reading that is older than it may be."""
+    """Policy for a reading that is too old."""
 
     WAIT = "wait"  # stand still until there is a new one, and fail when the patience is over
     FAIL = "fail"  # count it as violated at once
@@ -34,7 +34,7 @@ class StaleData(enum.Enum):
 
 
 class OnFailure(enum.Enum):
-    """Reaction to a failed step without retries left."""
+    """Reaction to a failed step that has no retries left."""
 
     STOP = "stop"  # the mission fails
     RETRY = "retry"  # try again, once unless `retries` says otherwise, then stop
@@ -44,7 +44,7 @@ class OnFailure(enum.Enum):
 
 
 class Guards(Strict):
-    """Guards of a running step, which fails when one does not hold."""
+    """Conditions that must hold while a step runs; the step fails when one does not hold."""
 
     battery: Share | None = Field(default=None, description="The least charge of the battery, from 0 to 1.")
     localised: StrictBool | None = Field(default=None, description="Whether the robot must know where it is.")
@@ -119,7 +119,7 @@ class Policy(Strict):
         return stops and not guarded and not self.further_attempts and numbers == (None, None, None)
 
     def with_policy(self, below: Policy | None) -> Self:
-        """Copies the policy, with its open values taken from `below`."""
+        """Copies the policy; values that it leaves open are taken from `below`."""
         values: dict[str, Any] = {} if below is None else {key: getattr(below, key) for key in Policy.model_fields}
         return self.model_copy(
             update={key: value for key, value in values.items() if value is not None and getattr(self, key) is None}
@@ -128,9 +128,9 @@ class Policy(Strict):
 
 @dataclass(frozen=True)
 class Place:
-    """Place of a step or a mission in a file: the document, and the path in it.
+    """Location of a step or a mission in a file: the document, and the path of keys in it.
 
-    Keys that the `part` of one of several robots does not have are looked up at the file's top.
+    A key that is missing in the `part` of one of several robots is looked up at the top of the file.
     """
 
     document: YamlSource
@@ -138,11 +138,11 @@ class Place:
     part: bool = False
 
     def line(self, below: KeyPath = ()) -> SourceLine:
-        """Line of the value at a path below."""
+        """Line of the value at a path below this location."""
         return SourceLine(self.document.path, self.document.line(self._whole(below)))
 
     def error(self, below: KeyPath, message: str, hint: str) -> InputError:
-        """Error in the value at a path below."""
+        """Error in the value at a path below this location."""
         return self.document.error(self._whole(below), message, hint)
 
     def _whole(self, below: KeyPath) -> KeyPath:
@@ -151,13 +151,13 @@ class Place:
 
 
 class Placed(Policy):
-    """Policy of a step or a mission, with its place in a file."""
+    """Policy for a step or a mission, with its location in a file."""
 
     _place: Place | None = PrivateAttr(default=None)
 
     @property
     def place(self) -> Place | None:
-        """Place in a file; None without a file."""
+        """Location in a file; None if there is no file."""
         return self._place
 
     def error(self, below: KeyPath, message: str, hint: str) -> InputError:
@@ -165,31 +165,31 @@ class Placed(Policy):
         return InputError(message, hint=hint) if self._place is None else self._place.error(below, message, hint)
 
     def with_place(self, place: Place | None) -> Self:
-        """Copies the step or mission, with another place."""
+        """Copies the step or mission with another location."""
         copy = self.model_copy()
         copy._place = place
         return copy
 
 
 class Step(Placed):
-    """Step of a mission, with its policy."""
+    """Step of a mission, with the step's policy."""
 
     key: ClassVar[str] = ""
     """First key of its form, which names the step in path ids."""
 
     @property
     def source(self) -> SourceLine | None:
-        """Line of the step; None without a file."""
+        """Line of the step in its file; None if there is no file."""
         return None if self._place is None else self._place.line()
 
     @property
     def is_block(self) -> bool:
-        """Returns whether the step decides, repeats, waits or the like, and is no command, skill or mission."""
+        """Returns whether the step is a block (decision, loop, wait and so on), no command, skill or used mission."""
         return bool(self.key)
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """Commands of the step itself."""
+        """Commands of the step itself, without those of inner steps."""
         return ()
 
     @property
@@ -199,16 +199,16 @@ class Step(Placed):
 
     @property
     def words(self) -> str:
-        """Name of the step in sentences."""
+        """Name of the step for use in sentences."""
         return self.key
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """Faults in the step's own values."""
+        """Yields the faults in the step's own values."""
         yield from ()
 
     def walk(self) -> Iterator[Step]:
-        """Yields the step and all steps inside it, those of a used mission included."""
+        """Yields the step and all steps inside it, including those of a used mission."""
         yield self
         for step in self.inner_steps:
             yield from step.walk()
@@ -223,7 +223,7 @@ def _steps_in(value: Any) -> Iterator[Step]:
 
 
 def unreadable(path: KeyPath, read: Callable[[], object]) -> Iterator[Fault]:
-    """Yields the fault of an expression, or of a text with expressions, that cannot be parsed."""
+    """Yields the fault if an expression, or a text with expressions, cannot be parsed."""
     try:
         read()
     except ExpressionError as error:

@@ -1,7 +1,7 @@
-"""Steps with steps inside, and the union of all kinds of steps, as a mission file writes them.
+"""Steps that contain steps, and the union of all kinds of steps, as a mission file writes them.
 
-The first key of a step selects its model. A resolved step is of the same model, with its sentences understood and its
-names replaced by those of the world. As lines of text, commands have their text form and other steps are YAML.
+The first key of a step selects its model. A resolved step has the same model, with understood sentences and with the
+world's own names. As lines of text, commands have their text form and other steps are YAML.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -76,7 +76,7 @@ class Choose(Step):
 
 
 class Loop(Strict):
-    """Rounds of a `repeat`: their number, interval and end."""
+    """Number, interval and end condition of the rounds in a `repeat`."""
 
     times: Count | None = Field(default=None, description="How many rounds; with a condition, how many at most.")
     until: Condition | None = Field(default=None, description="Rounds are made until this holds after one.")
@@ -108,7 +108,7 @@ class Loop(Strict):
 
     @property
     def is_endless(self) -> bool:
-        """Returns whether nothing ends the rounds."""
+        """Returns whether the rounds have no end condition and no number."""
         return self.times is None and self.until is None and self.while_ is None
 
 
@@ -124,7 +124,7 @@ class Repeat(Step):
 
 
 class ForEach(Step):
-    """`repeat` with `for_each`: reads its steps once for each value, which they name."""
+    """`repeat` with `for_each`: its steps are read once for each value, which they name."""
 
     key: ClassVar[str] = "repeat"
     loop: Annotated[Loop, Field(alias="repeat", description=_ROUNDS)]
@@ -132,13 +132,13 @@ class ForEach(Step):
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """Fault of missing steps."""
+        """Yields a fault if the steps are missing."""
         if not self.steps:
             yield (), "'repeat' needs 'steps' beside it", "add what is to be done in each round"
 
 
 class Try(Step):
-    """`try`: runs the steps in order, and those of `else` as soon as one fails."""
+    """`try`: runs the steps in order, and the steps of `else` as soon as one step fails."""
 
     key: ClassVar[str] = "try"
     steps: Annotated[Steps, Field(alias="try", description="Steps; as soon as one fails, those of `else` are done.")]
@@ -152,7 +152,7 @@ class Try(Step):
 
 
 class Together(Step):
-    """`together`: runs all steps in parallel until enough of them are done, and stops the others."""
+    """`together`: runs all steps in parallel until enough steps are done, and stops the others."""
 
     key: ClassVar[str] = "together"
     if TYPE_CHECKING:
@@ -172,27 +172,27 @@ class Together(Step):
 
     @property
     def needed(self) -> int:
-        """Number of steps that must be done."""
+        """Number of steps that must succeed."""
         if isinstance(self.done_when, int):
             return self.done_when
         return 1 if self.done_when == "any" else len(self.steps)
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """Fault of a `done_when` greater than the number of steps."""
+        """Yields a fault if `done_when` exceeds the number of steps."""
         if self.needed > len(self.steps):
             what = f"{self.needed} of {len(self.steps)} steps cannot be done"
             yield ("done_when",), what, f"give {len(self.steps)} at most"
 
 
 class While(Strict):
-    """Condition that must hold while steps run."""
+    """Condition that must hold while a group or a mission runs."""
 
     holds: Condition = Field(description="When it does not hold, the steps are stopped and have failed.")
 
 
 class Handler(Strict):
-    """Condition that interrupts a group or a mission, with the steps to run then."""
+    """Condition that interrupts a group or a mission, with the steps that run then."""
 
     condition: Annotated[
         Condition, Field(alias="if", description="When this begins to hold, the steps are interrupted.")
@@ -202,7 +202,7 @@ class Handler(Strict):
 
 
 class Group(Step):
-    """`group`: steps in order with a common policy, watched conditions, and steps at the end."""
+    """`group`: runs steps in order with a common policy, watched conditions, and steps at the end."""
 
     key: ClassVar[str] = "group"
     steps: Annotated[Steps, Field(alias="group", description="Steps in a row that share a policy.")]
@@ -219,7 +219,7 @@ class Group(Step):
 
     @property
     def inner_steps(self) -> Steps:
-        """Steps that interrupt the group, the group's own steps, and those at the end."""
+        """Steps that interrupt the group, the group's own steps, and steps at the end."""
         return (*(step for each in self.when or () for step in each.steps), *self.steps, *self.always)
 
     @property
@@ -229,7 +229,7 @@ class Group(Step):
 
 
 def _choices(data: Any) -> Any:
-    """Expands a list of choices to a mapping. Raises ValueError when one is true or false."""
+    """Expands a list of choices to a mapping. Raises ValueError when a choice is true or false."""
     names = list(data) if isinstance(data, list | dict) else []
     if any(isinstance(name, bool) for name in names):
         raise ValueError("yes, no, on and off mean true and false in YAML: put them in quotes")
@@ -250,7 +250,7 @@ class Ask(Answering):
     """`ask`: asks the people around, or the operator.
 
     The answer is one of `choices`, whose steps then run; or, with `match`, a name of the world, a number or any text.
-    When nobody answers in time the answer is `default`; without one the step fails.
+    When nobody answers in time, the answer is `default`; without `default` the step fails.
     """
 
     key: ClassVar[str] = "ask"
@@ -276,7 +276,7 @@ class Ask(Answering):
 
     @property
     def text(self) -> Template:
-        """Question with its expressions. Raises ExpressionError."""
+        """Question with its expressions parsed. Raises ExpressionError."""
         return Template(self.ask)
 
     @property
@@ -286,7 +286,7 @@ class Ask(Answering):
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """Faults of a default that is no choice, and of choices that sound the same."""
+        """Yields faults for a default that is no choice, and for choices that sound the same."""
         choices = self.choices or {}
         if choices and self.default is not None and self.default not in choices:
             yield ("default",), f"'{self.default}' is none of the choices", f"they are {listing(choices)}"
@@ -318,7 +318,7 @@ _FORMS: Final = Forms(_KEYS, _refused)
 
 
 def _read(data: Any) -> Any:
-    """Reads a step of a file; `dock` may stand alone, and the steps of a `for_each` are read later, for each value."""
+    """Reads a step from a file; accepts `dock` without a value, and keeps the steps of a `for_each` as data."""
     if data == "dock" or (isinstance(data, Mapping) and "dock" in data and data["dock"] is None):
         data = {**({} if data == "dock" else data), "dock": {}}
     if isinstance(data, ForEach):
@@ -333,7 +333,7 @@ if not TYPE_CHECKING:
 
 
 class _Document(Strict):
-    """Document of steps alone."""
+    """Document that contains only steps."""
 
     steps: Steps
 
@@ -344,7 +344,7 @@ def steps_to_data(steps: Iterable[Step]) -> list[Any]:
 
 
 def steps_to_yaml(steps: Iterable[Step]) -> tuple[str, ...]:
-    """Lines of a mission file's `steps`; none for no steps."""
+    """Converts steps to the lines of a mission file's `steps`; no lines for no steps."""
     data = steps_to_data(steps)
     if not data:
         return ()
@@ -353,9 +353,9 @@ def steps_to_yaml(steps: Iterable[Step]) -> tuple[str, ...]:
 
 
 def lines_of_steps(steps: Sequence[Step]) -> tuple[str, ...]:
-    """Lines that `steps_from_lines` reads: commands in their text form where all steps are commands, otherwise YAML.
+    """Lines that `steps_from_lines` reads: text forms if all steps are commands, otherwise YAML.
 
-    For the steps of a mission file, only the commands.
+    Steps from a mission file are given by their commands alone.
     """
     walked = [step for one in steps for step in one.walk()]
     if all(isinstance(step, Do) for step in walked) or any(step.source is not None for step in walked):
@@ -381,7 +381,7 @@ def steps_from_yaml(lines: Sequence[str]) -> Steps:
 
 
 def _short(value: Any) -> Any:
-    """Drops empty keys; an expression stands for itself, and a whole number of seconds has no point."""
+    """Shortens data: drops empty keys, writes a condition as its expression, and whole seconds without a point."""
     if isinstance(value, list):
         return [_short(each) for each in value]
     if isinstance(value, float) and value.is_integer():

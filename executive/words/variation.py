@@ -1,4 +1,4 @@
-"""Variations of a world from run to run: light, clutter, walking people, friction."""
+"""Variations of a world between runs: light, clutter, walking people, friction."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ Friction = Annotated[float, Quantity(ge=0.05, le=5.0)]
 
 @dataclass(frozen=True)
 class Light:
-    """Light of a world, as a change of the normal day light.
+    """Light of a world, relative to normal daylight.
 
-    `brightness` multiplies all beams, `colour` (red, green, blue; 0 to 1) tints them. A `sun` (direction of its beam,
-    world frame, and intensity) is added.
+    `brightness` multiplies all beams, `colour` (red, green, blue; 0 to 1) tints them. A `sun` (direction of its beam in
+    the world frame, and intensity) is added.
     """
 
     brightness: float = 1.0
@@ -58,11 +58,11 @@ def parse_light(words: str) -> Light:
 
 @dataclass(frozen=True)
 class Variation:
-    """Change of a world from its files.
+    """Changes to a world as its files describe it.
 
-    `light` is one of `LIGHTS` by name, or a brightness (1.0 is day light). `clutter` adds objects of classes that the
-    mission does not ask for; `people` adds walking people; `friction` multiplies the friction of all loose objects and
-    of the robots.
+    `light` is a name in `LIGHTS`, or a brightness (1.0 is daylight). `clutter` adds this number of objects of classes
+    that the mission does not mention; `people` adds walking people; `friction` multiplies the friction of all loose
+    objects and of the robots.
 
     Raises InputError when a value is out of range, or the light is unknown.
     """
@@ -97,7 +97,7 @@ class Variation:
         return self != NO_VARIATION
 
     def lines(self) -> tuple[str, ...]:
-        """One line for each variation."""
+        """One line for each value that differs from the world's files."""
         people = "1 person more walks about" if self.people == 1 else f"{self.people} people more walk about"
         lines = {
             f"light: {self.light}": self.light != NORMAL_LIGHT,

@@ -1,4 +1,4 @@
-"""Zones of a knowledge file, and the filter masks of Nav2 that they name."""
+"""Zones in a knowledge file, and the Nav2 filter masks that they name."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class FilterInfo(Strict):
 class ZoneFacts(Strict):
     """Zone of the map. Its ground is a room (`place`), a `polygon`, or a `mask` of Nav2.
 
-    A mask of kind `keep_out` or `speed_limit` is read with its filter info, or without one as Nav2's examples write it:
+    A mask of kind `keep_out` or `speed_limit` is read with its filter info; without filter info, as in Nav2's examples:
     a keep-out cell has the value 100 and smaller values are costs; a speed limit is 100 % less the value.
     """
 
@@ -64,7 +64,7 @@ class ZoneFacts(Strict):
         return self
 
     def zone(self, name: str, rooms: Mapping[str, Polygon]) -> Zone:
-        """Zone as the skills know it; `rooms` are the outlines of the rooms by name."""
+        """Zone as the skills' own data type; `rooms` are the outlines of the rooms by name."""
         corners = rooms[self.place] if self.place is not None else self.polygon or ()
         info = self.info if isinstance(self.info, FilterInfo) else _PLAIN_INFO.get(self.kind)
         mask = ZoneMask(self.mask, info.type, info.base, info.multiplier) if self.mask and info else None
@@ -72,7 +72,7 @@ class ZoneFacts(Strict):
 
 
 def _by_name(value: Any) -> Any:
-    """Names the zones of a list, each written as its kind with a room: `keep_out: bathroom`. Raises ValueError."""
+    """Gives names to zones in a list, each written as kind and room: `keep_out: bathroom`. Raises ValueError."""
     if not isinstance(value, list):
         return value
     zones: dict[str, Any] = {}
@@ -127,7 +127,7 @@ def with_files(source: YamlSource, name: str, facts: ZoneFacts) -> ZoneFacts:
 
 
 def _file(source: YamlSource, path: KeyPath, name: str) -> Path:
-    """File that the value at `path` names. Raises InputError in its line when there is none."""
+    """Path of the file that the value at `path` names. Raises InputError with the line when there is no such file."""
     try:
         found = file_beside(source.path, name)
     except InputError as error:
@@ -138,7 +138,7 @@ def _file(source: YamlSource, path: KeyPath, name: str) -> Path:
 
 
 def _filter_info(path: Path, kind: ZoneKind) -> FilterInfo:
-    """Reads the filter info of a Nav2 parameter file, of the server whose type fits the kind. Raises InputError."""
+    """Reads the filter info for this kind of zone from a Nav2 parameter file. Raises InputError if it has none."""
     source = read_yaml(path)
     servers = source.data if isinstance(source.data, dict) else {}
     found = {

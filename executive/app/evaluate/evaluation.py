@@ -65,7 +65,7 @@ def evaluate_runs(
         out: the folder for files of runs.
         tell: shows a line.
         progress: shows the progress.
-        before: called with the missing runs before the first begins; may refuse them by InputError.
+        before: called once with the runs that have no result yet; it may raise InputError to refuse them.
         checked: whether a run with errors of `errand check` counts as refused.
 
     Raises:
@@ -88,7 +88,7 @@ def evaluate_runs(
 def _execute(
     missing: Sequence[RunSpec], stored: ResultsFile, pool: Pool, out: Path, progress: Progress, *, checked: bool
 ) -> None:
-    """Stores the result of each run as it ends; leaves a cancelled run to the next time."""
+    """Executes the runs and stores each result at the run's end; a cancelled run gets no result and is repeated."""
     with pool.opened() as workers, progress(len(missing)) as advance:
         count, began = workers.count, time.monotonic()
         for finished in workers.map_items(partial(run_one, checked=checked), missing):
@@ -113,7 +113,7 @@ def _write_files(case: Case, folder: Path) -> Case:
 
 
 def refuse_impossible_runs(runs: Sequence[RunSpec]) -> None:
-    """Checks each run once for all seeds and variations. Raises InputError with all errors."""
+    """Checks each run once for all its seeds, as `errand check` does. Raises InputError with all errors found."""
     problems, seen = Problems(), set[str]()
     for run in runs:
         request = run.request
@@ -161,7 +161,7 @@ def _run_in(folder: Path, spec: RunSpec, checked: bool) -> Case:
 
 
 def _request(spec: RunSpec, folder: Path) -> Request:
-    """Returns the request with its files as the evaluation began; copies the files if they have changed since."""
+    """Returns the request with its files as they were when the evaluation began; copies files changed since then."""
     request = spec.request
     if all(_has_text(Path(path), text) for path, text in spec.files.items()):
         return request
@@ -193,7 +193,7 @@ def _has_text(path: Path, text: str) -> bool:
 
 
 def _report(spec: RunSpec, outcome: str, cause: str, message: str) -> RunReport:
-    """Returns the report of a run that ended without one."""
+    """Builds the report of a run that ended before it could report."""
     return RunReport(
         outcome=outcome,
         cause=cause,
@@ -211,7 +211,7 @@ def _report(spec: RunSpec, outcome: str, cause: str, message: str) -> RunReport:
 
 
 def steps_of(events: Sequence[Event]) -> dict[str, float]:
-    """Run time of each skill by name (s, on the robot's clock); skills in parallel count each."""
+    """Returns the run time of each skill by its name (s, on the robot's clock); skills in parallel count separately."""
     skills, since, spent = dict[str, str](), dict[str, float](), defaultdict[str, float](float)
     for event in events:
         if event.topic == TREE:

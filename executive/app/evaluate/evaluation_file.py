@@ -34,7 +34,7 @@ FileFinder = Callable[[Path], Path]
 
 
 def is_evaluation(path: Path) -> bool:
-    """Returns whether a file is an evaluation file, and no mission. Raises InputError if it cannot be read."""
+    """Returns whether a file is an evaluation file, not a mission file. Raises InputError if it cannot be read."""
     if path.suffix not in (".yaml", ".yml") or not is_file(path):
         return False
     data = read_yaml(path).data
@@ -58,9 +58,9 @@ def load_evaluation(path: Path) -> Evaluation:
 
 
 def evaluation_at_seeds(asked: Request, seeds: Sequence[int], *, each_fault: bool) -> Evaluation:
-    """Builds the runs of a request at many seeds; `each_fault` tries it without faults, then with each one alone.
+    """Builds the runs of a request at many seeds; with `each_fault` once without faults, then with each fault alone.
 
-    Raises InputError if there is no fault to try.
+    Raises InputError if `each_fault` is set and the request has no fault.
     """
     asked = asked.from_anywhere()
     name = asked.sentence or (asked.file.stem if asked.file is not None else "")
@@ -75,9 +75,9 @@ def evaluation_at_seeds(asked: Request, seeds: Sequence[int], *, each_fault: boo
 
 
 def _conditions(asked: Request, *, each_fault: bool) -> Sequence[tuple[str, Request]]:
-    """Returns the request under each condition by name: unchanged, or without faults and then with each alone.
+    """Returns the request for each condition by name: as it is, or first without faults and then with each fault alone.
 
-    Raises InputError if there is no fault to try.
+    Raises InputError if `each_fault` is set and the request has no fault.
     """
     if not each_fault:
         return [("", asked)]
@@ -181,7 +181,7 @@ class _Reader:
         return found.resolve()
 
     def _light(self, light: str | float, path: KeyPath) -> str:
-        """Returns a light's name or brightness. Raises InputError with the line if it is neither."""
+        """Returns the light level as text. Raises InputError with the line if it is no name and no brightness."""
         words = light if isinstance(light, str) else f"{light:g}"
         try:
             parse_light(words)
@@ -190,7 +190,7 @@ class _Reader:
         return words
 
     def _variations(self, lists: VariationsFile) -> Iterator[tuple[Mapping[str, Any], Mapping[str, str]]]:
-        """Yields for each combination the changed fields of a request, and the varied values in words."""
+        """Yields, for each combination of values, the request fields to change and the varied values as text."""
         several = [name for name in type(lists).model_fields if len(getattr(lists, name)) > 1]
         lights = [self._light(light, ("variations", "light", index)) for index, light in enumerate(lists.light)]
         scenarios, stacks = self._files("scenario", lists.scenario), self._files("stack", lists.stack, stack_file)
@@ -211,7 +211,7 @@ class _Reader:
     def _files(
         self, key: str, names: Sequence[str], finder: FileFinder | None = None
     ) -> Sequence[tuple[str, Path | None]]:
-        """Returns each file of a list with its name; None for `none` and `default`. Raises InputError with the line."""
+        """Returns each name in a list with its file; `none` and `default` have no file. Raises InputError with line."""
         return [
             (name, None if name in _NOTHING else self._find(name, ("variations", key, index), finder))
             for index, name in enumerate(names)
@@ -219,7 +219,7 @@ class _Reader:
 
 
 def _faults(entry: str | FaultsFile) -> tuple[str, Scenario]:
-    """Returns the name of an entry and its faults."""
+    """Returns the name and the faults of an entry in the list of faults."""
     if isinstance(entry, str):
         return entry, Scenario(() if entry in _NOTHING else (entry,))
     drawn = (f"{entry.random} random",) if entry.random else ()
@@ -228,14 +228,14 @@ def _faults(entry: str | FaultsFile) -> tuple[str, Scenario]:
 
 
 def _files_of(request: Request) -> Mapping[str, str]:
-    """Returns the texts of a request's files and of the files that they use, by path."""
+    """Returns the text by path of the files that a request names, and of the files that these include."""
     others = (path for path in (request.stack, *request.scenario_files) if path is not None)
     used = {} if request.file is None else dict(_with_used(request.file))
     return {**used, **{str(path): read_text(path) for path in others}}
 
 
 def _with_used(file: Path) -> Iterator[tuple[str, str]]:
-    """Yields path and text of a mission file and of the files that it uses."""
+    """Yields path and text of a mission file and of the files that it includes, directly or not."""
     todo, known = [file], set[Path]()
     while todo:
         path = todo.pop()

@@ -32,7 +32,7 @@ _ORDINARY: Final = ("a", "the")
 
 @dataclass(frozen=True)
 class KnownWorld:
-    """World of random missions, by its name or folder; `carried` are the classes that the robot can carry."""
+    """World in which random missions take place; `carried` are the object classes that the robot can carry."""
 
     name: str
     knowledge: Knowledge
@@ -106,7 +106,7 @@ def random_sentence(world: KnownWorld, seed: int) -> tuple[str, str]:
 
 
 class _Slots(dict[str, str]):
-    """Words for the slots of one sentence; equal slots get equal words. Raises LookupError if the world has none."""
+    """Words for the slots of one sentence; a repeated slot gets the same words. Raises LookupError if none fit."""
 
     def __init__(self, world: KnownWorld, rng: random.Random) -> None:
         super().__init__()
@@ -144,7 +144,7 @@ class _Slots(dict[str, str]):
         return _with_article(article or self._rng.choice(_ORDINARY), self.called(name, known.things[name].aliases))
 
     def usual_surfaces(self, names: Iterable[str]) -> list[str]:
-        """Returns the usual surfaces of objects of these classes."""
+        """Returns the surfaces where objects of these classes usually stand."""
         usual = (spot for name in names for spot in self._known.things[name].usual)
         return list(dict.fromkeys(surface for spot in usual for surface in self._known.surfaces_in(spot)))
 
@@ -156,13 +156,13 @@ class _Slots(dict[str, str]):
         return self.placed(rooms.pop())
 
     def chosen(self) -> list[str]:
-        """Returns the class of the sentence's object."""
+        """Returns a list with the class of the object in the sentence."""
         if "object" not in self._meant:
             self.object()
         return [self._meant["object"]]
 
     def members(self) -> list[str]:
-        """Returns the classes of the sentence's category that the robot can carry."""
+        """Returns the object classes in the sentence's category that the robot can carry."""
         known, found = self._known, dict[str, list[str]]()
         for category in known.categories():
             found[category] = [name for name in known.classes(category) if name in self._carried]
@@ -174,7 +174,7 @@ class _Slots(dict[str, str]):
         return self._meant["category"]
 
     def some(self) -> str:
-        """Returns a number of objects of the category."""
+        """Returns a number and the plural of the category, such as "two drinks"."""
         most = len(self.members())
         return f"{_NUMBERS[self._rng.choice([count for count in _NUMBERS if count <= most])]} {plural(self.category())}"
 
@@ -184,30 +184,30 @@ class _Slots(dict[str, str]):
         return self.placed(self.choice(what, [name for name in self._known.places if name not in taken]))
 
     def surface(self, names: Iterable[str] = ()) -> str:
-        """Returns a surface that is not usual for these classes."""
+        """Returns a surface where objects of these classes do not usually stand."""
         usual = self.usual_surfaces(names)
         return self.placed(self.choice("surface", [name for name in self._known.surfaces if name not in usual]))
 
     def furnished(self, names: Iterable[str] = ()) -> str:
-        """Returns a room with surfaces that is not usual for these classes."""
+        """Returns a room that has surfaces, and where objects of these classes are not usually found."""
         known = self._known
         homes = {known.room(surface) for surface in self.usual_surfaces(names)}
         rooms = (name for name in known.places if known.surfaces_in(name) and name not in homes)
         return self.placed(self.choice("furnished room", rooms))
 
     def person(self, *, only: bool = False) -> str:
-        """Returns a person; with `only` the world must have exactly one."""
+        """Returns a person's name; with `only`, raises LookupError unless the world has exactly one person."""
         people = self._known.people
         if only and len(people) != 1:
             raise LookupError
         return self.choice("person", people)
 
     def room_of_person(self) -> str:
-        """Returns the usual room of the sentence's person."""
+        """Returns the room where the person in the sentence usually is."""
         return self.placed(self._known.room(self._known.people[self.person()].at))
 
     def to_clear(self) -> str:
-        """Returns a surface whose usual objects the robot can all carry."""
+        """Returns a surface such that the robot can carry every object that usually stands there."""
         usual = {
             surface: [name for name in self._known.things if surface in self.usual_surfaces([name])]
             for surface in self._known.surfaces
@@ -216,7 +216,7 @@ class _Slots(dict[str, str]):
         return self.choice("cleared", clearable)
 
     def cleared_onto(self) -> str:
-        """Returns a surface other than the one to clear."""
+        """Returns a surface to which the objects go, other than the surface to clear."""
         return self.placed(self.choice("onto", [name for name in self._known.surfaces if name != self.to_clear()]))
 
 

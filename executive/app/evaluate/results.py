@@ -24,10 +24,10 @@ _COUNTERS_OF_THE_MACHINE: Final = ("bytes_logged",)
 
 @dataclass(frozen=True)
 class RunSpec:
-    """Specification of a run: its request, the name of its `mission`, and the varied values by dimension.
+    """Specification of a run: request, name of the `mission`, and the varied values by dimension, such as "light".
 
     `files` maps the path of each file of the request to its text, used files included, so that any machine can run it.
-    A run with a `folder` writes all its files there; without one only a failed run writes files.
+    A run with a `folder` writes all its files there; a run without a `folder` writes files only if it fails.
     """
 
     request: Request
@@ -38,7 +38,7 @@ class RunSpec:
 
     @cached_property
     def id(self) -> str:
-        """Hash of its content: equal for equal runs, wherever the files lie."""
+        """Hash of the run's content: equal for equal runs, wherever their files lie."""
         content = json.loads(replace(self.request, out=Path()).to_json())
         for name in {"file", "stack"} & content.keys():
             content[name] = self.files.get(content[name], content[name])
@@ -48,13 +48,13 @@ class RunSpec:
 
     @property
     def variation_words(self) -> str:
-        """Variation on one line."""
+        """Varied values on one line."""
         return ", ".join(f"{name} {value}" for name, value in self.varied.items())
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Runs of an evaluation; `name` is its file, or the options of its random missions."""
+    """Runs to evaluate; `name` is the evaluation file, or the options from which random missions were drawn."""
 
     name: str
     runs: Sequence[RunSpec]
@@ -66,7 +66,7 @@ class Evaluation:
 
 
 class Standing(enum.Enum):
-    """Claim of a run against the referee's verdict, in words and as a column; after the first, the gravest first."""
+    """Claim of a run compared with the referee's verdict, as a phrase and as a column; failures follow by gravity."""
 
     FULFILLED = "claimed and fulfilled", "fulfilled"
     FALSE_CLAIM = "claimed, not fulfilled: FALSE CLAIM", "false claims"
@@ -86,7 +86,7 @@ _NO_CLAIM: Final = {"refused": Standing.REFUSED, "error": Standing.BROKEN}
 
 @dataclass(frozen=True)
 class Evidence:
-    """Evidence of a failure: timeline as (s, subject, text), pictures with captions as JPEG, other files."""
+    """Evidence of a failure: timeline as (s, subject, text), pictures as JPEG with captions, and other files."""
 
     timeline: tuple[tuple[float, str, str], ...] = ()
     pictures: tuple[tuple[str, bytes], ...] = ()
@@ -110,7 +110,7 @@ class Case:
 
     @cached_property
     def standing(self) -> Standing:
-        """Claim against verdict."""
+        """Claim of the run compared with the referee's verdict."""
         if self.report.claimed:
             return _CLAIMED[self.report.seen.success]
         if self.report.outcome in _NO_CLAIM:
@@ -132,12 +132,12 @@ class Case:
 
     @property
     def label(self) -> str:
-        """Claim against verdict in words, with the cause of a failure."""
+        """Claim compared with the verdict, in words, with the cause of a failure."""
         return self.standing.words + (f" ({self.failure_cause})" if self.failure_cause else "")
 
     @property
     def why(self) -> str:
-        """Sentence on the cause, or on why the run was not judged."""
+        """Sentence on why the run failed or why it was not judged."""
         return self.report.seen.why if self.report.claimed else self.report.message
 
     @property
@@ -200,7 +200,7 @@ CREATE TABLE picture (
 
 @dataclass(frozen=True)
 class Results:
-    """Runs that have a result, and facts about the evaluation."""
+    """Runs that have a result, with the facts stored about their evaluation."""
 
     cases: Sequence[Case]
     about: Mapping[str, str]
@@ -212,7 +212,7 @@ class Results:
 
 
 class ResultsFile(Database):
-    """File of results."""
+    """SQLite file that stores the results of an evaluation."""
 
     kind = RESULTS_FILE
 
@@ -301,7 +301,7 @@ class ResultsFile(Database):
 
 
 def _spec_text(run: RunSpec) -> str:
-    """Encodes a run as JSON, its files by path only."""
+    """Encodes a run as JSON, with the paths of its files but without their texts."""
     text: bytes = form(RunSpec).dump_json(replace(run, files=dict.fromkeys(run.files, "")), exclude_defaults=True)
     return text.decode()
 

@@ -19,14 +19,14 @@ _PLAIN: Final = "as it is"
 
 
 class Rate(NamedTuple):
-    """Rate of successes in a number of runs."""
+    """Success rate: successes in a number of runs."""
 
     successes: int
     total: int
 
     @property
     def value(self) -> float:
-        """Share of successes; 0 without runs."""
+        """Success rate as a fraction (0 to 1); 0 without runs."""
         return self.successes / self.total if self.total else 0.0
 
     def interval(self) -> tuple[float, float]:
@@ -38,14 +38,14 @@ class Rate(NamedTuple):
 
     @property
     def interval_text(self) -> str:
-        """Interval in per cent."""
+        """95 % interval in per cent, as text."""
         low, high = self.interval()
         return f"{low:.1%} to {high:.1%}"
 
 
 @dataclass(frozen=True)
 class Group:
-    """Cases with the same mission, world, robots or varied value."""
+    """Cases that share a mission, a world, the robots or a varied value."""
 
     dimension: str
     name: str
@@ -53,12 +53,12 @@ class Group:
 
     @property
     def label(self) -> str:
-        """Dimension and name in words."""
+        """Dimension and value in words."""
         return label_of(self.dimension, self.name)
 
     @cached_property
     def rate(self) -> Rate:
-        """Rate of success."""
+        """Success rate of the cases."""
         return Rate(sum(case.report.achieved for case in self.cases), len(self.cases))
 
     @cached_property
@@ -67,7 +67,7 @@ class Group:
         return Counter(case.standing for case in self.cases)
 
     def to_json(self) -> dict[str, Any]:
-        """Returns its counts as JSON values."""
+        """Returns the group's counts as JSON values."""
         rate = {"runs": self.rate.total, "achieved": self.rate.successes, "interval": self.rate.interval()}
         return {"dimension": self.dimension, "name": self.name, **rate, **totals_of(self.cases)}
 
@@ -78,7 +78,7 @@ def label_of(dimension: str, name: str) -> str:
 
 
 def totals_of(cases: Sequence[Case]) -> Mapping[str, int]:
-    """Returns the counts of claims and verdicts by their JSON keys."""
+    """Returns the number of claimed successes, of confirmed successes and of false claims, by JSON key."""
     return {
         "successes": sum(case.report.claimed for case in cases),
         "referee_successes": sum(case.report.seen.success is True for case in cases),
@@ -96,7 +96,7 @@ def groups_of(cases: Sequence[Case]) -> Sequence[Group]:
 
 
 def _keyed(cases: Sequence[Case]) -> dict[tuple[str, str], list[Case]]:
-    """Groups the cases by dimension and name."""
+    """Groups the cases by dimension and value."""
     keyed: dict[tuple[str, str], list[Case]] = {(_ALL, "all runs"): list(cases)}
     for case in cases:
         run, world = case.run, case.report.world or case.run.request.world or ""
@@ -109,7 +109,7 @@ def _keyed(cases: Sequence[Case]) -> dict[tuple[str, str], list[Case]]:
 
 @dataclass(frozen=True)
 class StandingRow:
-    """Row of the table of claims against verdicts: the rate of runs, and the counts of their causes."""
+    """Row of the table of claims against verdicts: fraction of all runs, and how often each failure cause occurred."""
 
     standing: Standing
     rate: Rate
@@ -117,7 +117,7 @@ class StandingRow:
 
 
 def standing_rows(cases: Sequence[Case]) -> Sequence[StandingRow]:
-    """Returns the table of claims against verdicts."""
+    """Returns the table of claims against verdicts, with a row for each standing."""
     found: dict[Standing, list[Case]] = {standing: [] for standing in Standing}
     for case in cases:
         found[case.standing].append(case)
@@ -132,7 +132,7 @@ def standing_rows(cases: Sequence[Case]) -> Sequence[StandingRow]:
 
 
 def cases_to_inspect(cases: Iterable[Case]) -> Sequence[Case]:
-    """Returns the cases that are not claimed and fulfilled, the gravest first."""
+    """Returns the cases that need inspection, the gravest first: all but successes that the referee confirms."""
     order = list(Standing)
     found = [case for case in cases if case.standing is not Standing.FULFILLED]
     return sorted(found, key=lambda case: order.index(case.standing))
@@ -140,7 +140,7 @@ def cases_to_inspect(cases: Iterable[Case]) -> Sequence[Case]:
 
 @dataclass(frozen=True)
 class CauseRow:
-    """Cause of failures, with its number of runs and the counts of its most frequent messages."""
+    """Cause of failures: number of runs that failed for it, and how often each of its commonest messages occurred."""
 
     cause: str
     runs: int
@@ -159,7 +159,7 @@ def causes_of(cases: Iterable[Case], *, most: int = 5) -> Sequence[CauseRow]:
 
 @dataclass(frozen=True)
 class TimeRow:
-    """Run time of a skill: number of runs, total time (s, on the robot's clock), and share of the time of all runs."""
+    """Run time of a skill: number of runs, total (s, on the robot's clock), and fraction of the time of all runs."""
 
     skill: str
     runs: int
@@ -231,7 +231,7 @@ CommandOf = Callable[[RunSpec], str]
 
 
 def standings_json(found: Results, command_of: CommandOf) -> dict[str, Any]:
-    """Returns claims against verdicts as JSON values: the counts, and each run that failed or claimed falsely."""
+    """Returns claims against verdicts as JSON values: the counts, and each run that failed or made a false claim."""
     return {
         "standings": {
             row.standing.words: {"runs": row.rate.successes, "interval": row.rate.interval(), "causes": row.causes}
@@ -281,8 +281,7 @@ def to_page(
 ) -> str:
     """Renders the results as one HTML file that needs no other file.
 
-    `evidence` returns the evidence of a run by its id; `against` are the cases of another results file, `other` its
-    name.
+    `evidence` returns a run's evidence by the run's id; `against` are the cases of another results file, named `other`.
     """
     cases, about, work = found.cases, found.about, Counter[str]()
     for case in cases:
@@ -313,7 +312,7 @@ def to_page(
 
 
 def _with_evidence(cases: Sequence[Case], find: Callable[[str], Evidence]) -> Iterator[tuple[Case, Evidence, bool]]:
-    """Yields each case to inspect, its evidence, and whether its pictures fit into the page's size limit."""
+    """Yields each case to inspect with its evidence, and whether its pictures still fit into the page's size limit."""
     left_bytes = MOST_PICTURE_BYTES
     for case in cases_to_inspect(cases):
         evidence = find(case.run.id)

@@ -45,7 +45,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class WorkResult(Generic[Item, Result]):
-    """Item and its result; if each worker with the item died, `result` is None and `lost` is the reason."""
+    """Item with its result; if every worker that tried the item died, `result` is None and `lost` is the reason."""
 
     item: Item
     result: Result | None
@@ -95,7 +95,7 @@ class LocalWorkers:
 
 
 class _Process:
-    """One worker process, which starts with its first item."""
+    """Worker process, which starts when it gets its first item."""
 
     def __init__(self) -> None:
         self._pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), initializer=_begin)
@@ -130,7 +130,7 @@ def _begin() -> None:
 
 
 class _OtherVersionError(Exception):
-    """Error of a worker whose version of Errand differs from this process."""
+    """Raised by a worker whose version of Errand differs from the version of the evaluating process."""
 
 
 class ClusterWorkers:
@@ -182,9 +182,9 @@ class ClusterWorkers:
                 self._client.cancel(futures, force=True)
 
     def _patiently(self, get: Callable[..., Any]) -> Any:
-        """Repeats `get` until it returns. Raises InputError if no worker is connected for `GONE_S`.
+        """Repeats `get` until it returns. Raises InputError when no worker has been connected for `GONE_S`.
 
-        A result is lost with the last worker that holds it; another worker then computes it again.
+        If the last worker that holds a result disappears, another worker computes the result again.
         """
         seen_s = time.monotonic()
         while True:
@@ -197,7 +197,7 @@ class ClusterWorkers:
                     raise InputError(f"no worker has been connected for {GONE_S:g} s", hint=_START_ONE) from error
 
     def _check(self) -> None:
-        """Refuses workers that would give other results. Raises InputError."""
+        """Raises InputError without workers, or for a worker that has another version or several threads."""
         with _errors_as_input():
             try:
                 self._client.wait_for_workers(1, timeout=ANSWER_S)
@@ -230,7 +230,7 @@ def _code_here() -> str:
 
 
 def _checked(expected: str, function: Callable[[Item], Result], item: Item) -> Result:
-    """Applies a function to an item if the worker has the expected version."""
+    """Applies a function to an item; raises an error if the worker's version is not `expected`."""
     if installed_code() != expected:
         raise _OtherVersionError(f"a worker has another version of Errand ({installed_code()}; here it is {expected})")
     return function(item)
@@ -238,7 +238,7 @@ def _checked(expected: str, function: Callable[[Item], Result], item: Item) -> R
 
 @contextmanager
 def _errors_as_input() -> Iterator[None]:
-    """Raises InputError for a lost scheduler and for a worker of another version."""
+    """Turns the errors for a lost scheduler and for a worker of another version into InputError."""
     try:
         yield
     except _OtherVersionError as error:
@@ -301,10 +301,10 @@ Workers = LocalWorkers | ClusterWorkers
 
 @dataclass(frozen=True)
 class Pool:
-    """Choice of workers: `jobs` local processes, a local cluster of `workers`, or the workers of a `scheduler`.
+    """Settings of the workers: `jobs` local processes, a local cluster of `workers`, or a running `scheduler`.
 
     Raises:
-        InputError: both a cluster and a scheduler are given.
+        InputError: both `workers` and `scheduler` are given.
     """
 
     jobs: int = 2
@@ -318,7 +318,7 @@ class Pool:
 
     @contextmanager
     def opened(self) -> Iterator[Workers]:
-        """Opens the workers for the length of the context. Raises InputError if they are not available."""
+        """Starts or connects the workers while the context is open. Raises InputError if they are not available."""
         if self.scheduler is not None:
             with scheduler_at(self.scheduler) as workers:
                 yield workers
@@ -331,7 +331,7 @@ class Pool:
 
 @cache
 def installed_code() -> str:
-    """Returns the version with a hash of code, models, worlds and the versions of libraries."""
+    """Returns the version of Errand with a hash over code, models, worlds and library versions."""
     made, known = hashlib.sha256(), versions((*_LIBRARIES, "spot-errand"))
     for package in _PACKAGES:
         for path in sorted((_ROOT / package).rglob("*")):

@@ -61,7 +61,7 @@ PlacesOf = Callable[[int], frozenset[str]]
 
 @dataclass(frozen=True)
 class Round:
-    """Result of one round: missions that begin now, reasons why no robot can do others, robots that charge first."""
+    """Result of one auction round: missions that begin now, refused missions with reasons, robots that charge first."""
 
     begun: Sequence[Award]
     refused: Mapping[int, str]
@@ -71,14 +71,14 @@ class Round:
 class Auction:
     """Assignment of missions to robots, one mission for each robot at a time.
 
-    `waiting` are the missions that no robot has, `robots` the robots that can work, and `under_way` maps a robot to its
-    mission. Robots that are `resting` charge: they bid, but begin nothing.
+    `waiting` are the missions that are not assigned, `robots` the robots that can work, and `under_way` maps a robot to
+    its mission. A robot in `resting` is charging: it bids, but begins no mission.
     """
 
     def __init__(
         self, missions: Iterable[int], robots: Iterable[str], places: PlacesOf = lambda mission: frozenset()
     ) -> None:
-        """Takes the missions in the order of the queue; `places` returns the places that a mission needs for itself."""
+        """Takes the missions in the order of the queue; `places` returns the places that a mission needs alone."""
         self._places = places
         self.waiting: list[int] = list(dict.fromkeys(missions))
         self.robots: list[str] = list(dict.fromkeys(robots))
@@ -119,7 +119,7 @@ class Auction:
 
     @property
     def _taken(self) -> frozenset[str]:
-        """Places where robots work now."""
+        """Places that are reserved by the missions under way."""
         return frozenset[str]().union(*map(self._places, self.under_way.values()))
 
     def add(self, mission: int, *, after: int | None = None) -> None:
@@ -129,11 +129,11 @@ class Auction:
             self._after[mission] = after
 
     def done(self, mission: int) -> None:
-        """Releases the missions that wait for this one, which is done."""
+        """Marks a mission as done, so that the missions that wait for it can be assigned."""
         self._after = {each: before for each, before in self._after.items() if before != mission}
 
     def drop(self, mission: int) -> Sequence[int]:
-        """Removes the missions that wait for this one, which has failed; returns their numbers."""
+        """Removes the missions that wait for a failed mission; returns their numbers."""
         dropped = [each for each, before in self._after.items() if before == mission]
         self.waiting = [each for each in self.waiting if each not in dropped]
         return [*dropped, *(later for each in dropped for later in self.drop(each))]
@@ -145,6 +145,6 @@ class Auction:
         return mission
 
     def lose(self, robot: str) -> None:
-        """Removes the robot, which can work no more."""
+        """Removes a robot that can no longer work."""
         self.resting.discard(robot)
         self.robots = [each for each in self.robots if each != robot]

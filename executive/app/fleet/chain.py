@@ -14,9 +14,9 @@ from skills.inputs.errors import InputError
 
 @dataclass(frozen=True)
 class Split:
-    """Commands of a mission in two parts.
+    """Commands of a mission, split into two parts.
 
-    The first part puts the held object on the `table`, and the second takes it from there. Without a `table` the
+    The first part puts the held object on the `table`, and the second part takes it from there. Without a `table` the
     gripper is empty between the parts.
     """
 
@@ -27,7 +27,7 @@ class Split:
 
 @dataclass(frozen=True)
 class Chain:
-    """Split of a mission with the bids of two robots for its parts."""
+    """Split mission with the bid of one robot for each part."""
 
     split: Split
     first: Bid
@@ -56,7 +56,7 @@ def splits(commands: Sequence[Command], tables: Iterable[str]) -> Iterator[Split
 
 
 def soonest(split: Split, first: Iterable[Bid], second: Sequence[Bid]) -> Chain | None:
-    """Returns the chain of two different robots that ends first; None if no two robots can do it."""
+    """Returns the two different robots that finish a split mission first; None if no two robots can do its parts."""
     able = [(a, b) for a in first for b in second if not a.problems and not b.problems and a.robot != b.robot]
     chains = [Chain(split, a, b) for a, b in able]
     return min(chains, key=lambda chain: (chain.ends_s, chain.first.robot, chain.second.robot), default=None)
@@ -67,10 +67,10 @@ TakesFrom = Callable[[str, SurfaceFacts], bool]
 
 
 def best_split(mission: FleetMission, bid: BidOn, takes_from: TakesFrom) -> Split | None:
-    """Returns the split of a mission that two robots finish first.
+    """Returns the split with which two robots finish a mission first.
 
-    None if no two robots can do it, or the mission has more than commands. `bid` returns a robot's bid for a part;
-    `takes_from` returns whether a robot reaches an object that another robot puts on a table.
+    None if no two robots can do it, or if the mission contains more than plain commands. `bid` returns a robot's bid
+    for a part; `takes_from` returns whether a robot reaches an object that another robot puts on a table.
     """
     prepared = next(iter(mission.options.values()))
     if len(mission.options) < 2 or not is_plain(prepared.tree):
@@ -98,7 +98,7 @@ def best_split(mission: FleetMission, bid: BidOn, takes_from: TakesFrom) -> Spli
 
 
 def options_for(mission: FleetMission, commands: tuple[Command, ...]) -> Mapping[str, Prepared]:
-    """Returns the commands prepared for each robot; leaves out robots for which they cannot be compiled."""
+    """Compiles the commands for each robot; leaves out robots for which they cannot be compiled."""
     options: dict[str, Prepared] = {}
     for name, prepared in mission.options.items():
         with suppress(InputError):

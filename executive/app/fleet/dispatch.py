@@ -43,12 +43,12 @@ LEFT_M: Final = 1.5
 
 
 def silence(line: str) -> None:
-    """Drops a line that a caller would show."""
+    """Discards a line instead of showing it."""
 
 
 @dataclass
 class Dispatch(Assigner):
-    """Assigner of a store's missions to robots of a backend.
+    """Dispatcher of a fleet: assigns the missions in a store to the robots of a backend.
 
     A robot whose battery is low returns its mission once its gripper is empty, and charges by its mission `dock`.
     `tell` shows a line; `offers` builds the bids of the robots.
@@ -128,7 +128,7 @@ class Dispatch(Assigner):
         return True
 
     def recall(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
-        """Returns the robots that must stop, with the reason: low battery and empty gripper, or nothing left to do."""
+        """Returns the robots that must stop, each with the reason: its battery is low, or no mission is left."""
         self._release_following(seen)
         for name, robot in self.robots.items():
             robot.recalled = self._why_recalled(robot, seen.get(name))
@@ -155,7 +155,7 @@ class Dispatch(Assigner):
                 self._auction.done(part)
 
     def tick(self, progress: Progress) -> None:
-        """Takes the changes of each robot's tree."""
+        """Updates the progress of each robot's mission with the changes of its tree."""
         for name, note in progress.notes.items():
             journal = self.robots[name].journal
             if journal is not None:
@@ -227,7 +227,7 @@ class Dispatch(Assigner):
         robot.to_dock = True
 
     def _update_robot(self, robot: FleetRobot, end: MissionEnd) -> str | None:
-        """Updates a robot's state at the end of a mission; returns why it must stop working (None: it need not)."""
+        """Updates a robot's state at the end of a mission; returns why the robot must stop working, or None."""
         robot.free_at_s = self._now_s
         if end.seen is None:
             return end.gone
@@ -243,7 +243,7 @@ class Dispatch(Assigner):
         return "it does not know where it is" if lost or end.seen.pose is None else None
 
     def close(self) -> None:
-        """Fails the returned missions that no other robot took; the others stay in the queue."""
+        """Fails the missions that a robot returned and no other robot took; all others stay in the queue."""
         assigned = self._given.all()
         lost = {robot.name: robot.lost for robot in self.robots.values() if robot.lost is not None}
         for number in () if self._stopped else self._auction.waiting:
@@ -282,7 +282,7 @@ class Dispatch(Assigner):
         return replace(entry, tree=prepared.tree, speaker_W=speaker_W)
 
     def spare(self) -> Sequence[RunEntry]:
-        """Returns the robots as they stand before their first mission."""
+        """Returns the robots at their starts, before any of them has a mission."""
         options = next((mission.options for mission in self.missions.values()), {})
         return [self._robot_entry(robot, options[name]) for name, robot in self.robots.items() if name in options]
 
@@ -343,7 +343,7 @@ class Dispatch(Assigner):
     def _end_part(self, robot: FleetRobot, mission: FleetMission, share: Share, seen: Mapping[str, Any] | None) -> None:
         """Ends a part of a mission: the robot leaves the table to the next one; the last part judges the whole.
 
-        Does nothing for a mission that is no part.
+        A robot that has a dock then leaves the table free for the next robot. Does nothing for an unsplit mission.
         """
         given = self._given.all()
         whole = given[mission.number].part_of
@@ -369,6 +369,6 @@ class Dispatch(Assigner):
         self._log_missions()
 
     def _log_missions(self) -> None:
-        """Logs the assignments."""
+        """Writes the assignments of the missions into the log."""
         if self.log is not None:
             self.log(MISSIONS, missions_message(self.store, missions_json(self.store, list(self.missions))))

@@ -77,9 +77,9 @@ def fleet_mission(
     robots: Mapping[str, PlacedRobot],
     given: GivenMission = NOT_GIVEN,
 ) -> FleetMission:
-    """Prepares the unfinished part of a stored mission for the robots; its earlier assignment says what is done.
+    """Prepares the unfinished part of a stored mission for the robots; `given` says which commands are done.
 
-    Raises InputError with the mission's number if none of them can do it.
+    Raises InputError with the mission's number if none of the robots can do it.
     """
     try:
         options = _options(stored, world, knowledge, robots)
@@ -117,14 +117,14 @@ def _options(
 
 
 def rest_of(prepared: Prepared, done: int, last_known: LastKnown | None) -> Prepared:
-    """Returns a mission of plain commands without the first `done`; its search begins at the object's known place."""
+    """Returns a mission of plain commands without its first `done` ones; a search begins at the last known place."""
     if not done and (last_known is None or not is_plain(prepared.tree)):
         return prepared
     return with_commands(replace(prepared, last_known=last_known), prepared.tree.commands[done:])
 
 
 def surfaces_of(prepared: Prepared) -> frozenset[str]:
-    """Surfaces that a mission's commands name; one robot at a time works at each."""
+    """Returns the surfaces that a mission's commands name; only one robot at a time works at each surface."""
     goals = {command.goal for command in prepared.tree.commands if command.goal is not None}
     return frozenset(filter(None, map(prepared.knowledge.place, goals))) & prepared.knowledge.surfaces.keys()
 
@@ -142,7 +142,7 @@ def with_commands(prepared: Prepared, commands: Sequence[Command]) -> Prepared:
 
 
 def _patient(knowledge: Knowledge) -> Knowledge:
-    """Lowers the charge at which a robot interrupts its own mission, because another robot takes it over earlier."""
+    """Lowers the charge at which a robot interrupts its own mission, because the fleet recalls the robot earlier."""
     battery = knowledge.battery.model_copy(update={"low": URGENT * knowledge.battery.low})
     return knowledge.model_copy(update={"battery": battery})
 
@@ -184,7 +184,7 @@ def bid_for(mission: FleetMission, now: FleetRobot, low: float) -> Bid:
 
 
 def charging_time_s(charge: float, charged: float) -> float:
-    """Duration of charging from one state of charge to another (0 to 1), in s."""
+    """Duration of charging from one state of charge (0 to 1) to another, in s."""
     return max(0.0, charged - charge) / load_estimates().battery.charging_per_s
 
 
@@ -223,8 +223,8 @@ def is_reachable(planner: RoutePlanner, start: Pose2D, goal: Pose2D, zones: tupl
 class MissionProgress:
     """Progress of a mission.
 
-    The first `done` commands are finished. After them, `begun` is True once a skill that changes the world has begun,
-    and `put` once such a skill releases an object.
+    The first `done` commands are finished. In the command after them, `begun` is True once a skill that changes the
+    world has begun, and `put` is True once such a skill has released an object.
     """
 
     done: int
@@ -241,8 +241,8 @@ def is_plain(tree: CompiledTree) -> bool:
 def progress_of(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> MissionProgress:
     """Returns the progress of a tree; `statuses` returns the last status of a node by its path id.
 
-    Another robot can continue before a command that begins with an empty gripper. A mission with more than plain
-    commands counts as a whole.
+    Another robot can continue only before a command that begins with an empty gripper. A mission with more than plain
+    commands counts as one command.
     """
     done = 0
     for number, part in enumerate(tree.parts if is_plain(tree) else ()):
@@ -264,7 +264,7 @@ def is_lost(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> boo
 
 
 def _changing(node: NodeSpec, over: set[str]) -> list[NodeSpec]:
-    """Returns the skill nodes below a node that change the world, without those in the `over` parts."""
+    """Returns the nodes below a node whose skills change the world, except nodes in the parts `over`."""
     if any(node.path_id == path or node.path_id.startswith(f"{path}/") for path in over):
         return []
     own = [node] if node.skill is not None and node.skill.changes_world else []
@@ -272,7 +272,7 @@ def _changing(node: NodeSpec, over: set[str]) -> list[NodeSpec]:
 
 
 class ProgressJournal:
-    """Follows a mission's progress and reports each change; `last_known` is the place of its object."""
+    """Tracks the progress of a mission and reports each change; `last_known` is the last place of its object."""
 
     def __init__(self, tree: CompiledTree, tell: Callable[[MissionProgress], None]) -> None:
         self._tree, self._tell = tree, tell
@@ -281,7 +281,7 @@ class ProgressJournal:
         self.progress = MissionProgress(0)
 
     def note(self, note: TickNote) -> None:
-        """Takes the changes of a tick."""
+        """Updates the progress with the changes of a tick."""
         self._tracker.note(note.board, note.pose)
         if not note.changes:
             return
@@ -301,7 +301,7 @@ class ProgressJournal:
 
 @dataclass
 class FleetRobot:
-    """State of a robot of the fleet: its pose and charge when it is free next, at `free_at_s` (s on the robots' clock).
+    """State of a robot in the fleet: pose and charge at the time `free_at_s` when it is next free (s, robots' clock).
 
     `dock` is its charging mission; None if it cannot charge.
 
@@ -335,12 +335,12 @@ class FleetRobot:
         return self.placed.name
 
     def ready_s(self, now_s: float, *, busy: bool) -> float:
-        """Time until it is free (s); a robot that is already late is assumed to take as long again."""
+        """Time until the robot is free (s); a robot that is late by 10 s is assumed to need another 10 s."""
         left_s = self.free_at_s - now_s
         return abs(left_s) if busy else max(0.0, left_s)
 
     def routes(self, mission: FleetMission) -> RoutePlanner:
-        """Returns the robot's route planner in the world of its missions."""
+        """Returns the route planner for the robot in the world of its missions."""
         if self.planner is None:
             world = next(iter(mission.options.values())).world
             self.planner = route_planner_of(world, self.placed, cached=False)
@@ -348,17 +348,17 @@ class FleetRobot:
 
     @property
     def progress(self) -> MissionProgress:
-        """Progress of its mission."""
+        """Progress of the robot's mission."""
         return MissionProgress(0) if self.journal is None else self.journal.progress
 
     @property
     def last_known(self) -> LastKnown | None:
-        """Last known place of its mission's object."""
+        """Last known place of the object in the robot's mission."""
         return None if self.journal is None else self.journal.last_known
 
 
 class Offers:
-    """Bids of the robots, each computed once for each state of mission and robot."""
+    """Bids of the robots, each computed once for the same state of the mission and the robot."""
 
     def __init__(
         self,
@@ -373,7 +373,7 @@ class Offers:
         self._known: dict[tuple[int, str, int, Pose2D, float, bool], Bid] = {}
 
     def known(self, wanted: FleetMission, name: str) -> Bid:
-        """Returns a robot's bid for a mission of the queue, computed before if nothing has changed."""
+        """Returns a robot's bid for a queued mission; computes it only if the mission or the robot has changed."""
         robot = self._robots[name]
         if (tried := wanted.tried.get(name)) is not None:
             return Bid(wanted.number, name, 0.0, 0.0, problems=(tried,))
@@ -383,7 +383,7 @@ class Offers:
         return replace(self._known[key], ready_s=self._ready_s(name))
 
     def new(self, wanted: FleetMission, name: str) -> Bid:
-        """Computes a robot's bid from the pose where it is free next; a charging robot bids from its dock."""
+        """Computes a robot's bid from the pose where the robot is next free; a charging robot bids from its dock."""
         robot = self._robots[name]
         robot.routes(wanted)
         if name in self._auction.resting and robot.dock is not None:
@@ -396,9 +396,9 @@ class Offers:
         return self._robots[name].ready_s(self._now(), busy=busy)
 
     def takes_from(self, name: str, table: SurfaceFacts) -> bool:
-        """Returns whether an earlier bidder reaches an object that another robot puts on a table.
+        """Returns whether a robot that has bid before reaches an object that another robot puts on a table.
 
-        The other robot puts the object down at the spot nearest to the table's first viewpoint.
+        The other robot puts the object on the free spot nearest to the table's first viewpoint.
         """
         robot, arm = self._robots[name], robot_kind(self._robots[name].placed.kind).capabilities().arm
         view, planner = table.viewpoints[0], robot.planner
@@ -415,7 +415,7 @@ class Offers:
 
 
 def missions_json(store: MissionStore, numbers: Sequence[int]) -> list[dict[str, Any]]:
-    """Returns missions with their parts and parents, robots and outcomes, as JSON values."""
+    """Returns missions with robots and outcomes as JSON values; a split mission is returned with all its parts."""
     given = GivenMissions(store).all()
     missions = {mission.id: mission for mission in store.missions()}
     wanted = {*numbers, *(whole for number in numbers if (whole := given.get(number, GivenMission()).part_of))}

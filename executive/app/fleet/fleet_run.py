@@ -56,10 +56,10 @@ def run_fleet(
     first: Prepared | None = None,
     ended: Callable[[], None] | None = None,
 ) -> None:
-    """Runs until no mission can be assigned any more; writes log, recording and report into the folder `out`.
+    """Runs until no mission can be assigned; writes log, recording and report into the folder `out`.
 
-    `page` shows the run, `live` sends the log's messages, and `ended` is called as each mission ends. The log begins
-    with the map of the `first` mission. Raises InputError.
+    `page` shows the run, `live` sends the log's messages, and `ended` is called whenever a mission ends. The log begins
+    with the map of the `first` mission. Raises InputError if the page or the log cannot be opened.
     """
     backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
     watching = () if ended is None else (_EndedMissions(dispatch.store, (*dispatch.missions,), ended),)
@@ -94,7 +94,7 @@ def run_fleet(
 
 @dataclass
 class _EndedMissions(RunVisitor):
-    """Watch of the missions of these numbers: calls `ended` for each that has ended."""
+    """Visitor that calls `ended` once for each of the numbered missions when it has ended."""
 
     store: MissionStore
     numbers: Sequence[int]
@@ -102,7 +102,7 @@ class _EndedMissions(RunVisitor):
     count: int = 0
 
     def mission_ended(self, end: MissionEnd) -> None:
-        """Counts the missions; the dispatch has stored the end of the robot's mission before."""
+        """Calls `ended` for each mission that has ended since the last call; the dispatcher stored the end before."""
         states = [self.store.mission(number).state.value for number in self.numbers]
         for _ in range(self.count, over := sum(state not in _OPEN for state in states)):
             self.ended()

@@ -23,9 +23,9 @@ MOST_LETTERS: Final = 300
 
 @dataclass(frozen=True)
 class Checked:
-    """Result of checking a mission: errors and warnings, the tree of each robot, and one estimate for all robots.
+    """Result of a check: errors and warnings, the tree of each robot, and one estimate for all robots together.
 
-    `file` is the mission's file, if it has one.
+    `file` is the mission file; None for a mission without a file.
     """
 
     file: Path | None
@@ -52,19 +52,19 @@ class Checked:
 
 
 class Checker:
-    """Checker of missions, which plans each route once for each world and kind of robot."""
+    """Checker of missions, which plans each route once for each pair of a world and a kind of robot."""
 
     def __init__(self, like: Request | None = None) -> None:
-        """Takes the options that all files share: world, stack, start, robots and values of parameters."""
+        """Takes a request whose world, stack, start, robots and parameter values apply to every checked file."""
         self._like = like or Request()
         self._routes: dict[tuple[Path, str, Path | None], RoutePlanner] = {}
 
     def check_file(self, file: Path) -> Checked:
-        """Checks one file. Never raises for its content."""
+        """Checks one file; reports defects of the file as errors in the result instead of raising them."""
         return self.check(replace(self._like, file=file))
 
     def check(self, request: Request) -> Checked:
-        """Checks a request. Never raises for its content."""
+        """Checks a request; reports defects of the mission as errors in the result instead of raising them."""
         trees, file = tuple[CompiledTree, ...](), request.file
         try:
             prepared = prepare(request)
@@ -90,7 +90,7 @@ class Checker:
 
 
 def _total(prepared: Prepared, estimates: Mapping[str, Estimate]) -> Estimate:
-    """Combines the estimates of robots: the end of the last one, the sum of distances, the largest charge."""
+    """Combines the estimates of several robots: latest end, sum of the distances, largest charge."""
     after = {each.mission.robot_name: each.after for each in prepared.all}
     done_s: dict[str, float] = {}
     latest_s: dict[str, float] = {}

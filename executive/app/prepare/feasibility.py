@@ -27,10 +27,10 @@ from skills.stack import DEFAULT_FILE, ControllerComponent, default_component
 
 
 class _RoutesOnMap(RoutePlanner):
-    """Planner of routes on the robot's map of a world, for the robot's footprint.
+    """Planner of routes for a robot's footprint, on the map that the robot has of the world.
 
-    It reads the map at the first route. It loads only the costmap and the planner of the robot's stack, and in a world
-    with zones the controller.
+    The planner reads the map when the first route is planned. From the robot's stack it loads only costmap and planner,
+    and in a world with zones the controller.
     """
 
     def __init__(self, world: World, robot: PlacedRobot) -> None:
@@ -56,14 +56,14 @@ class _RoutesOnMap(RoutePlanner):
         return min(self._robot.capabilities.max_speed_m_s, controller.max_speed_m_s)
 
     def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
-        """Plans a route. Raises ValueError with one sentence if there is none, InputError if the map is broken."""
+        """Plans a route. Raises ValueError with one sentence if there is no route, InputError if the map is broken."""
         return self._routes.route(start, goal, zones)
 
 
 def route_planner_of(world: World, robot: PlacedRobot, *, cached: bool = True) -> RoutePlanner:
-    """Returns a planner of a robot's routes on its map of a world.
+    """Returns a planner of routes for a robot, on the map that the robot has of the world.
 
-    With `cached` the routes are stored for later processes. Without a map the first route raises InputError.
+    With `cached` the routes are stored for later processes. Without a map, the first route raises InputError.
 
     Raises:
         InputError: its stack file cannot be used; with file and line.
@@ -75,7 +75,7 @@ def route_planner_of(world: World, robot: PlacedRobot, *, cached: bool = True) -
 
 
 def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> Checked:
-    """Returns errors, warnings and an estimate of a prepared request. `planner` may hold routes from before.
+    """Returns errors, warnings and an estimate of a prepared request. A given `planner` may have routes cached.
 
     Raises:
         InputError: the world's map or the request's stack file cannot be used.
@@ -98,7 +98,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
 
 
 def refuse_impossible(prepared: Prepared) -> None:
-    """Raises InputError with all that `errand check` finds."""
+    """Raises InputError with all errors that `errand check` finds."""
     refuse_unusable(prepared.world)
     problems = Problems()
     for error in (error for each in prepared.all for error in check_prepared(each).errors):
@@ -107,7 +107,7 @@ def refuse_impossible(prepared: Prepared) -> None:
 
 
 def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
-    """Returns the abilities of a kind of robot in a world: imported models, people who take objects, full surfaces."""
+    """Returns the abilities of a kind of robot in a world, with the world's objects, recipients and full surfaces."""
     abilities = abilities_of(kind)
     masses, others = dict(abilities.masses_kg), {rule.model for rule in world.seed_rules.objects}
     for name in sorted(world.own_objects.keys() | (others & world.imports.keys())):
@@ -153,10 +153,10 @@ def abilities_of(kind: str) -> Abilities:
 
 
 def reached_heights_m(capabilities: Capabilities) -> tuple[float, float]:
-    """Lowest and highest surface that the arm reaches, in metres above the floor.
+    """Heights of the lowest and the highest surface that the arm reaches, in metres above the floor.
 
-    It depends on the arm's length, the range of body heights, and the nearest standing distance. Unlimited without a
-    plannable arm.
+    They depend on the arm's length, the range of body heights, and the nearest standing distance. They are infinite if
+    the robot has no arm that can be planned for.
     """
     try:
         model, arm = arm_model(capabilities), capabilities.arm
@@ -174,23 +174,23 @@ _SKILLS: Final = DEFAULT_FILE.parent
 
 
 class RouteCache(RoutePlanner):
-    """Cache of routes in a file; missing routes are planned and added for later processes."""
+    """Route planner that stores its routes in a file, so that later processes need not plan them again."""
 
     def __init__(self, file: Path, planned: RoutePlanner) -> None:
         self._file, self._planned = file, planned
 
     @cached_property
     def _routes(self) -> dict[str, list[float] | str]:
-        """Length and progress of each route by start and goal, or the reason why there is none."""
+        """Length and progress of each route by start and goal, or the reason why there is no route."""
         with suppress(OSError, ValueError):
             routes: dict[str, list[float] | str] = json.loads(self._file.read_text(encoding="utf-8"))
             return routes
         return {}
 
     def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
-        """Returns a stored route, or plans it; worlds with masks plan every route, because a mask's file may change.
+        """Returns a stored route, or plans the route; worlds with masks always plan, because a mask's file may change.
 
-        Raises ValueError with one sentence if there is none.
+        Raises ValueError with one sentence if there is no route.
         """
         if any(zone.mask is not None for zone in zones):
             return self._planned.route(start, goal, zones)
@@ -215,7 +215,7 @@ class RouteCache(RoutePlanner):
 
 
 def route_cache_of(world: World, planned: RoutePlanner, *robot_files: Path) -> RouteCache:
-    """Returns the route cache of a world; its file name depends on the maps, the planner and the robot's files."""
+    """Returns the route cache of a world; the file name is a hash over the maps, the planner and the robot's files."""
     planner = (DEFAULT_FILE, *_SKILLS.glob("navigate/*.py"), *_SKILLS.glob("estimate/*.py"), *_SKILLS.glob("*.py"))
     files, content = (*world.keepout_map_path.parent.glob("*"), *planner, *robot_files), hashlib.sha256()
     for file in sorted(path for path in files if path.is_file()):

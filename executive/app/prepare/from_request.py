@@ -82,16 +82,16 @@ def prepare_checked(request: Request, *, ask: Answerer | None = None, anyway: bo
 
 
 def prepare_alone(request: Request) -> Prepared:
-    """Understands and compiles a request for one robot; ignores the robots that it names. Raises InputError."""
+    """Understands and compiles a request for one robot, even if it names several. Raises InputError like `prepare`."""
     request, loaded, world, knowledge = _open(replace(request, robots=()))
     return _for_only_robot(_at_start(request, world, knowledge, None), loaded)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Request with its world, knowledge and robots (empty: the world's only robot).
+    """Request with its world, knowledge and robots; `robots` is empty if only the world's own robot runs.
 
-    `ask` answers questions about an ambiguous sentence; None: nobody does.
+    `ask` answers questions about an ambiguous sentence; None: nobody answers.
     """
 
     request: Request
@@ -101,19 +101,19 @@ class Setting:
     ask: Answerer | None = None
 
     def for_robot(self, name: str) -> Setting:
-        """Returns the setting with one robot's start, dock and knowledge."""
+        """Returns the setting as one robot has it: the robot's own start, dock and knowledge."""
         robot = self.robots[name]
         world = replace(self.world, start=robot.start, dock=robot.dock)
         return replace(self, world=world, knowledge=knowledge_for(robot, self.robots, self.knowledge))
 
     @property
     def require_wake(self) -> bool:
-        """True if a sentence must call the robot by name, by the request or else by the world."""
+        """True if a sentence must call the robot by name; the world decides if the request leaves it open."""
         asked = self.request.require_wake
         return self.knowledge.robot.require_wake if asked is None else asked
 
     def understand(self) -> Understanding:
-        """Understands the request's sentence, for the only robot or for several. Raises InputError."""
+        """Understands the request's sentence for one robot or several. Raises InputError if it is not understood."""
         from executive.language.several_robots import understand_for_robots  # a mission file does not need it
         from executive.language.understand import Status, ask_until_clear, understand
 
@@ -141,7 +141,7 @@ class Setting:
         return answer
 
     def part(self, name: str, meanings: Sequence[Understanding]) -> Prepared:
-        """Compiles all meanings that are for one robot into its mission. Raises InputError."""
+        """Compiles one robot's mission from all meanings that address it. Raises InputError for an impossible step."""
         steps = tuple(step for meant in meanings for step in meant.all_steps)
         notes = tuple(note for meant in meanings for note in meant.notes)
         mission = Mission.from_steps(steps, world=self.world.name, robot=name)
@@ -158,7 +158,7 @@ class Setting:
         return mission.model_copy(update={"name": request.name})
 
     def for_file(self, loaded: Mission) -> Prepared:
-        """Compiles a mission file for the robot of this setting. Raises InputError."""
+        """Compiles a mission file for the setting's world and robot. Raises InputError with file and line."""
         world = _with_imports(loaded, self.world)
         knowledge = knowledge_of_mission(loaded, with_own_objects(self.knowledge, world.own_objects))
         answer = self.answerer(self.request.questions or loaded.questions)
@@ -195,7 +195,7 @@ class Setting:
 
 
 def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
-    """Reads the request's mission file, if it has one, its world and the knowledge of it. Raises InputError."""
+    """Reads the world of a request, the world's knowledge, and the mission file, if any. Raises InputError."""
     loaded = None
     if request.file is not None:
         file = mission_file(request.file)
@@ -212,7 +212,7 @@ def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
 
 
 def _read_again(masks: Sequence[Path]) -> None:
-    """Reads filter masks again. Raises InputError for one that cannot be read."""
+    """Reads filter masks from their files again. Raises InputError if a mask cannot be read."""
     from skills.estimate.grid_map import load_filter_mask  # most worlds have no masks, and need no pictures
     from skills.navigate.zone_map import zone_map
 
@@ -223,7 +223,7 @@ def _read_again(masks: Sequence[Path]) -> None:
 
 
 def _named_robots(loaded: Mission | None, world: World, knowledge: Knowledge) -> tuple[RobotConfig, ...]:
-    """Returns the robots that a mission file names, else its world; empty if it is for the world's only robot."""
+    """Returns the robots that the mission file names, else the world's robots; empty for the world's only robot."""
     named = knowledge.robots if loaded is None or loaded.robots is None else loaded.robots
     if named is None:
         return ()
@@ -234,7 +234,7 @@ def _named_robots(loaded: Mission | None, world: World, knowledge: Knowledge) ->
 
 
 def _at_start(request: Request, world: World, knowledge: Knowledge, ask: Answerer | None) -> Setting:
-    """Returns the setting with the only robot at the request's start. Raises InputError if the start is not free."""
+    """Builds the setting for the only robot at the request's start. Raises InputError if the start is blocked."""
     start = request.start
     if isinstance(start, Pose2D):
         refuse_blocked(world, start)
@@ -245,7 +245,7 @@ def _at_start(request: Request, world: World, knowledge: Knowledge, ask: Answere
 
 
 def _for_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
-    """Prepares the mission of the world's only robot. Raises InputError."""
+    """Prepares the mission of the world's only robot. Raises InputError if it is not understood or not compiled."""
     request, robot = setting.request, setting.knowledge.robot
     if loaded is not None:
         return setting.for_file(loaded)
@@ -279,7 +279,7 @@ def _for_called_robots(setting: Setting) -> Prepared:
 
 
 def _part_for_each(part: Part, setting: Setting) -> Iterator[Part]:
-    """Yields each addressed robot's part. Raises InputError if none can do a part for any robot."""
+    """Yields each part for the robots that it addresses. Raises InputError if none can do a part for any robot."""
     from executive.language.addressees import RobotChoice
 
     if part.robot is RobotChoice.ALL:
@@ -375,7 +375,7 @@ def _refuse_cycles(waits: Mapping[str, Collection[str]]) -> None:
 
 
 def _with_people(loaded: Mission, world: World, knowledge: Knowledge) -> World:
-    """Adds the people who walk in a mission file to the world. Raises InputError."""
+    """Adds the walking people of a mission file to the world. Raises InputError if they do not fit the world."""
     routes = routes_of_people(loaded, knowledge)
     try:
         return world.with_routes(routes) if routes else world
@@ -384,7 +384,7 @@ def _with_people(loaded: Mission, world: World, knowledge: Knowledge) -> World:
 
 
 def _with_imports(loaded: Mission, world: World) -> World:
-    """Adds the models of a mission file to the world. Raises InputError."""
+    """Adds the models that a mission file imports to the world. Raises InputError if a model cannot be used."""
     problems = Problems()
     for index, folder in enumerate(import_folders(loaded)):
         try:
@@ -396,7 +396,7 @@ def _with_imports(loaded: Mission, world: World) -> World:
 
 
 def _with_objects(loaded: Mission, world: World, knowledge: Knowledge) -> World:
-    """Adds the objects of a mission file to the world. Raises InputError."""
+    """Adds the objects that a mission file places to the world. Raises InputError if they do not fit the world."""
     problems = Problems()
     for name, file in (loaded.objects or {}).items():
         surfaces = tuple(knowledge.place(surface) or surface for surface in file.surfaces)

@@ -1,4 +1,4 @@
-"""Mission files: the shipped ones by name, and saved poses, each as a mission of its own."""
+"""Finds mission files, the shipped ones by name, and saves poses as missions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def shipped_missions() -> dict[str, Path]:
 
 
 def request_of(mission: Request | str | Path, **fields: Unpack[RequestFields]) -> Request:
-    """Returns the request of a mission: a sentence, a file, or the name of a shipped mission. Raises InputError."""
+    """Returns the request for a sentence, a file or a shipped mission's name. Raises InputError for a wrong field."""
     from executive.mission.request import Request, with_fields
 
     if isinstance(mission, Request):

@@ -89,9 +89,9 @@ def _dock(robot: RobotConfig, knowledge: Knowledge) -> Pose2D | None:
 
 
 def _free_start(world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2D:
-    """Returns the free pose nearest to the world's start, clear of placed robots and of people's places.
+    """Returns the free pose nearest to the world's start that keeps clear of other robots and of people's places.
 
-    Raises InputError if there is none.
+    Raises InputError if there is no free pose.
     """
     from plant.worlds.seeding import standing_points_W
 
@@ -110,7 +110,7 @@ def _free_start(world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2
 
 
 def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRobot], world: World) -> None:
-    """Raises InputError if a robot would stand in another robot or in an obstacle."""
+    """Raises InputError if the robot's body would overlap another robot or an obstacle at a start."""
     own = _discs(robot.kind, start)
     for other in placed:
         theirs = _discs(other.kind, other.start)
@@ -130,14 +130,14 @@ def refuse_blocked(world: World, pose: Pose2D, name: str = "the robot", kind: st
 
 
 def _free_ground(world: World) -> GridMap:
-    """Loads the world's surveyed map, with unknown cells blocked."""
+    """Loads the world's surveyed map, in which unknown cells count as blocked."""
     from skills.estimate.grid_map import load_grid_map
 
     return load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
 
 
 def _discs(kind: str, pose: Pose2D) -> FloatArray:
-    """Returns discs (N, 3) of x, y and radius (m, world frame) that cover a kind of robot at a pose."""
+    """Returns discs that cover a kind of robot at a pose: (N, 3) of x, y and radius, in metres in the world frame."""
     discs = Footprint.of(robot_kind(kind).capabilities()).discs
     c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     middles = discs[:, :2] @ np.array([[c, s], [-s, c]]) + [pose.x_m, pose.y_m]
@@ -145,12 +145,12 @@ def _discs(kind: str, pose: Pose2D) -> FloatArray:
 
 
 def _reach_m(kind: str) -> float:
-    """Largest distance from the middle of a kind of robot to its outline, in metres."""
+    """Largest distance from the origin of a robot's footprint to its outline, in metres."""
     return float(np.linalg.norm(np.array(robot_kind(kind).capabilities().footprint_m), axis=1).max())
 
 
 def knowledge_for(robot: PlacedRobot, names: Iterable[str], knowledge: Knowledge) -> Knowledge:
-    """Returns the knowledge of one robot among several: its own name, start and dock, and the others' names."""
+    """Returns the knowledge of one robot among several: its own name, start and dock, and the names of the others."""
     others = tuple(other for other in names if other != robot.name)
     facts = RobotFacts(name=robot.name, others=others, require_wake=knowledge.robot.require_wake)
     dock = None if robot.dock is None else _pose(robot.dock)
@@ -163,9 +163,9 @@ def _pose(pose: Pose2D) -> Pose:
 
 
 def stand_at(world: World, start: Start, seed: int) -> Pose2D:
-    """Returns a given start, or a free pose chosen by the seed, away from people and with space to turn.
+    """Returns the given start, or a free pose that the seed chooses, away from people and with space to turn.
 
-    Raises InputError if there is none.
+    Raises InputError if there is no such pose.
     """
     if isinstance(start, Pose2D):
         return start
@@ -188,9 +188,9 @@ def _built(component: DetectorComponent) -> Detector:
 
 
 def shared_detector(stack: RobotStack | None = None, world: World | None = None) -> Detector:
-    """Returns the detector of a stack, or the default one, with the models of a world's own objects.
+    """Returns the detector of a stack (None: the default one), extended by the models of the world's own objects.
 
-    Loads the networks once in a process. Raises InputError.
+    Loads the networks once in a process. Raises InputError if a model cannot be read.
     """
     networks = _built((stack or default_stack()).detector)
     if world is None:

@@ -1,4 +1,4 @@
-"""Prepared requests: understood, compiled, and ready to be checked and run."""
+"""Prepared request: understood and compiled, and ready to be checked and run."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 class Prepared:
     """Compiled request with its mission, world and knowledge.
 
-    `meant` is the meaning of its sentence, if it has one. `robots` are all robots of the run by their names.
+    `meant` is the meaning of the sentence, if the request has a sentence. `robots` are all robots of the run by name.
 
     In a run with several robots, `others` are the missions of the other robots. This mission begins when the missions
-    of the robots `after` have ended; the speaker stands at `speaker_W` (None: beside this robot). `last_known` is the
-    place of the mission's object, as another robot last knew it.
+    of the robots `after` have ended. The speaker stands at `speaker_W` (None: beside this robot). `last_known` is where
+    another robot last knew the mission's object.
     """
 
     request: Request
@@ -62,7 +62,7 @@ class Prepared:
         return replace(self, mission=mission, meant=None).with_tree(tree)
 
     def with_tree(self, tree: CompiledTree) -> Prepared:
-        """Takes a tree; its name, commands and a fingerprint of its nodes go into the request."""
+        """Returns a copy with another tree, whose name, commands and fingerprint go into the request."""
         nodes = "\n".join(f"{node.kind} {node.path_id}" for node in tree.root.walk())
         fingerprint = hashlib.sha256(nodes.encode()).hexdigest()[:16]
         named = replace(

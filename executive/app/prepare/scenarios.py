@@ -1,4 +1,4 @@
-"""Scenario files: faults, random faults and events of a run; read into a request and its world."""
+"""Reads scenario files: faults, random faults and events that disturb a run."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ _BEYOND_M: Final = 0.5
 
 
 def with_scenario(request: Request, world: World, knowledge: Knowledge) -> Request:
-    """Reads a request's scenario files into it, and draws its random faults.
+    """Adds the content of a request's scenario files to its scenario, and draws the random faults.
 
-    Raises InputError if a fault is unknown, or the world lacks something that a file names; with the line.
+    Raises InputError with the line if a fault is unknown, or if the world lacks something that a file names.
     """
     cameras = tuple(camera.source for camera in spot_capabilities().cameras)
     scenario = request.scenario
@@ -67,7 +67,7 @@ def with_events(world: World, scenario: Scenario, seed: int = 0) -> World:
 
 
 def _with_doorways(scenario: Scenario, world: World) -> Scenario:
-    """Adds the true middle, width and direction of each door. Raises InputError if the map is broken."""
+    """Adds the surveyed centre, width and direction of each door. Raises InputError if the map is broken."""
     if not scenario.doors:
         return scenario
     grid = load_grid_map(world.surveyed.scan_map_path)
@@ -75,9 +75,9 @@ def _with_doorways(scenario: Scenario, world: World) -> Scenario:
 
 
 def doorway(grid: GridMap, at_W: tuple[float, float]) -> dict[str, Any]:
-    """Returns middle, clear width (m) and direction of the doorway at a point.
+    """Returns centre, clear width (m) and direction of the doorway at a point.
 
-    The shortest free line through the point crosses the doorway. The direction points to the longer wall beside it.
+    The shortest free line through the point is the doorway. The direction points to the side with the longer wall.
     """
     angles = np.arange(DIRECTIONS) * math.pi / DIRECTIONS
     lengths = [[_free_m(grid, at_W, angle), _free_m(grid, at_W, angle + math.pi)] for angle in angles]
@@ -130,7 +130,7 @@ class _Strict(BaseModel):
 
 
 class EventFile(Manner):
-    """Event of exactly one person, door or object."""
+    """Event that concerns exactly one person, door or object."""
 
     person: Name | None = Field(None, description="A person who walks: one of the world, or a new one.")
     door: tuple[Name, Name] | None = Field(None, description="The two rooms that a door joins.")
@@ -171,7 +171,7 @@ class EventFile(Manner):
 
 
 class ScenarioFile(_Strict):
-    """Faults and events of a run."""
+    """Scenario file: faults and events of a run."""
 
     faults: tuple[Text, ...] = Field(default=(), description="Faults in words.")
     random: RandomFaults = Field(0, description="Number of further faults that the run's seed draws.")
@@ -185,7 +185,7 @@ class ScenarioFile(_Strict):
 
 
 def _check_fault(words: str, cameras: tuple[str, ...], refusal: Callable[[str, str], InputError]) -> None:
-    """Raises the InputError of `refusal`, from a sentence and a hint, if there is no such fault."""
+    """Raises the error that `refusal` builds from a sentence and a hint, if there is no such fault."""
     try:
         parse_fault(words, cameras=cameras)
     except ValueError as error:
@@ -204,7 +204,7 @@ def read_scenario(
     """Reads a scenario file for a world; resolves its places to points.
 
     `cameras` are the robot's cameras, `objects` maps the world's objects to their classes, and `people` maps each
-    person to True if the person walks already.
+    person to True if the world already gives the person a route.
 
     Raises:
         InputError: a key is wrong, or a fault, place, door, object or person is unknown; with the line.
@@ -229,7 +229,7 @@ def read_scenario(
 
 
 class _EventReader:
-    """Reader of a file's events, which checks each against the world."""
+    """Reader of the events in a scenario file; checks each event against the world."""
 
     def __init__(
         self, source: YamlSource, knowledge: Knowledge, objects: Mapping[str, str], known_people: Mapping[str, bool]
@@ -241,7 +241,7 @@ class _EventReader:
         self.moves: list[Mapping[str, Any]] = []
 
     def add(self, event: EventFile, path: KeyPath) -> None:
-        """Adds an event. Raises InputError."""
+        """Adds an event. Raises InputError with the line if the world lacks what the event names."""
         if event.person is not None:
             self._add_walk(event, event.person, path)
         elif event.door is not None:
@@ -269,7 +269,7 @@ class _EventReader:
         self.people[name] = {**route, "waypoints": points}
 
     def _point(self, at: Corner | str, path: KeyPath) -> Corner:
-        """Returns the point of a place. Raises InputError."""
+        """Returns the point of a place. Raises InputError with the line if there is no such place."""
         if not isinstance(at, str):
             return at
         place = self._knowledge.place(at)
@@ -303,7 +303,7 @@ class _EventReader:
         self.moves.append({"name": (named or of_class)[0], "at": event.at, "to": self._rest(event.to, (*path, "to"))})
 
     def _rest(self, to: Any, path: KeyPath) -> str | Spot:
-        """Returns the surface or the point where an object is put. Raises InputError."""
+        """Returns the surface or the point where an event puts an object. Raises InputError for an unknown surface."""
         if not isinstance(to, str):
             x, y, z = to
             return x, y, z

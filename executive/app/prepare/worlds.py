@@ -31,7 +31,7 @@ def refuse_unusable(world: World) -> None:
 
 @cache
 def _try(directives: Path | None, models: tuple[Path, ...]) -> None:
-    """Loads the files in the simulation; once in a process if they are good."""
+    """Loads the files in the simulation to test them; files that passed are not tested again in this process."""
     from plant.diagram import try_geometry
 
     try_geometry(directives, models)

@@ -42,7 +42,7 @@ _AHEAD_M: Final[Mapping[str, float]] = MappingProxyType({"hand_over": 0.4})
 
 @dataclass
 class RobotArtifacts:
-    """Detections of one robot, the times (s) of its hand-over and placement, and pictures of skills, with captions."""
+    """Recorded detections of one robot, the times (s) of its hand-over and placement, and pictures from its skills."""
 
     seen: Mapping[str, Any] | None = None
     confirmed: Mapping[str, Any] | None = None
@@ -53,10 +53,10 @@ class RobotArtifacts:
 
 
 class Artifacts(RunVisitor):
-    """Collector of each robot's detections and moments for pictures; it adds a picture to each answer in the log.
+    """Visitor that collects what the pictures of a run need, and adds a picture to each answer in the log.
 
     `pictures` are small JPEG files of the answers, at most `MOST_BYTES` in all. `numbers` maps a node's path id and a
-    time (s) to the picture of the answer. `drawn` are the written files by name, `trees` the logged trees.
+    time (s) to the index of an answer's picture. `drawn` are the written files by name, `trees` the logged trees.
     """
 
     def __init__(self) -> None:
@@ -68,11 +68,11 @@ class Artifacts(RunVisitor):
         self.trees: list[Mapping[str, Any]] = []
 
     def of_robot(self, robot_name: str) -> RobotArtifacts:
-        """Returns the detections and moments of a robot."""
+        """Returns what was collected for a robot."""
         return self._of_robot.setdefault(robot_name, RobotArtifacts())
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Takes a logged message; adds a picture to an answer."""
+        """Collects from a logged message; returns the message, with a picture added if it is an answer."""
         own = self.of_robot(str(message.get("robot", "")))
         if topic == TREE:
             self.trees.append(message)
@@ -93,7 +93,7 @@ class Artifacts(RunVisitor):
         return message
 
     def _with_picture(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
-        """Adds a picture to an answer: the found object or person, or all views if nothing was found."""
+        """Adds a picture to an answer: the view with the found object or person, or all views if nothing was found."""
         looked = list(own.looked)
         own.looked.clear()
         if not looked:
@@ -117,7 +117,7 @@ class Artifacts(RunVisitor):
                     self._keep(event.data, np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8))
 
     def _keep(self, message: Mapping[str, Any], picture: Picture) -> None:
-        """Stores the small picture of an answer, once, up to `MOST_BYTES` in all."""
+        """Stores the small picture of an answer unless it is stored already, up to `MOST_BYTES` in all."""
         key = str(message["node"]), float(message.get("t", 0.0))
         if key in self.numbers or sum(map(len, self.pictures)) >= MOST_BYTES:
             return
@@ -128,7 +128,7 @@ class Artifacts(RunVisitor):
 
 
 def file_name(what: str, robot_name: str, robots: Sequence[str]) -> str:
-    """Returns the name of a robot's file without its ending; among several robots it has the robot's name."""
+    """Returns the name of a picture file without its ending; among several robots it includes the robot's name."""
     return f"{what}_{slug(robot_name)}" if len(robots) > 1 else what
 
 
@@ -174,7 +174,7 @@ def to_jpeg(picture: Picture) -> bytes:
 
 
 def _sheet(pictures: Sequence[Picture]) -> Picture:
-    """Arranges pictures in a grid with few empty places, each within the same smaller size."""
+    """Arranges pictures, shrunk to equal tiles, in a grid with few empty tiles."""
     columns = min(
         range(min(len(pictures), _ROW - 1), min(len(pictures), _ROW) + 1), key=lambda n: (-len(pictures) % n, -n)
     )
@@ -184,7 +184,7 @@ def _sheet(pictures: Sequence[Picture]) -> Picture:
 
 
 def _within(picture: Picture, size: tuple[int, int]) -> Picture:
-    """Shrinks a picture to fit into a tile of a size (width, height)."""
+    """Fits a picture into a tile of a size (width, height) in pixels."""
     height, width = picture.shape[:2]
     scale = min(size[0] / width, size[1] / height)
     inner = (max(1, round(width * scale)), max(1, round(height * scale)))
@@ -205,7 +205,7 @@ def detection_picture(message: Mapping[str, Any]) -> Picture:
 
 
 def _map(simulation: Simulation, robots: Sequence[str], zones: Sequence[Mapping[str, Any]]) -> Picture:
-    """Draws the world from above with zones, and the path of each robot; several robots have a colour each."""
+    """Draws the world from above with zones and the path of each robot; each of several robots has its own colour."""
     world, corners = simulation.world, np.array(simulation.world.corners)
     (x0, y0), (x1, y1) = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
     view = top_view(simulation.query_at(simulation.clock.now()), (float(x0), float(y0), float(x1), float(y1)))
@@ -222,7 +222,7 @@ def _map(simulation: Simulation, robots: Sequence[str], zones: Sequence[Mapping[
 
 
 def _view(simulation: Simulation, robot_name: str, time_s: float, ahead_m: float) -> Picture:
-    """Renders the hand at a time (s) from the side with the best view."""
+    """Renders the robot's hand at a time (s), from the side with the best view."""
     query = simulation.query_at(time_s)
     X_WH = simulation.hand_pose_at(robot_name, time_s)
     across = X_WH.rotation().matrix() @ np.array([0.2, 1.0, 0.0])

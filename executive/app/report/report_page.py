@@ -48,7 +48,7 @@ Picture = tuple[str, bytes]
 
 @dataclass(frozen=True)
 class StepRow:
-    """Row of a step at a depth: name, state, begin and end in s (None: not begun), and the last message."""
+    """Row of a step: name, state, depth of nesting, begin and end in s (None: not begun), and the last message."""
 
     name: str
     style: NodeStyle
@@ -90,8 +90,8 @@ class ReportPart:
 class ReportPage:
     """Content of `report.html`. `request` is the sentence or the file, `facts` are pairs of a name and a value.
 
-    `alone` is the part of a single robot. For several robots, `parts` has one part each, and `missions` the missions
-    of a fleet.
+    `alone` is the report on a single robot. For several robots, `parts` has one report for each robot, and `missions`
+    has the missions of a fleet.
     """
 
     title: str
@@ -110,7 +110,7 @@ class ReportPage:
 
 @dataclass(frozen=True)
 class EndedTree:
-    """Last state of a robot's tree, and the report on its mission."""
+    """Last state of a robot's tree, with the report on the robot's mission."""
 
     tree: CompiledTree
     view: NodeView
@@ -118,11 +118,11 @@ class EndedTree:
 
     @property
     def picture(self) -> str:
-        """Executed nodes of the tree as SVG."""
+        """Executed nodes of the tree, drawn as SVG."""
         return to_svg(readable(executed_tree(self.view), DRAWN_NODES), title=self.tree.mission_name)
 
     def steps(self, events: Sequence[Event]) -> tuple[StepRow, ...]:
-        """Returns the steps of the mission, with their times from the events of a log."""
+        """Returns a row for each step of the mission, with times from the events of the log."""
         below = (one for _, one in self.view.walk() if one.path_id == self.tree.mission.path_id)
         mission, spans = next(below, self.view), dict[str, tuple[float, float]]()
         for event in events:
@@ -186,9 +186,9 @@ def save_report(out: Path, page: ReportPage) -> Path:
 def step_rows(
     node: NodeView, parts: frozenset[str], spans: Mapping[str, tuple[float, float]], depth: int = 0
 ) -> Iterator[StepRow]:
-    """Yields a row for each part of a mission, and for each node above several parts.
+    """Yields a row for each command of a mission, and for each node that groups several commands.
 
-    `spans` are the times (s) of the first and last transition of each node. A decorator and its child share a row with
+    `spans` are the times (s) of the first and last transition of each node. A decorator and its child share a row, with
     the decorator's status and the child's name.
     """
     outer, within = node, [node]
@@ -205,9 +205,9 @@ def step_rows(
 
 
 def _decorated(node: NodeView, parts: frozenset[str]) -> NodeView | None:
-    """Returns a decorator's child: its only child, or its only child with parts of the mission.
+    """Returns the child that shares a row with a node: the only child, or the only child that contains commands.
 
-    None for a part itself and for a node with several children of this kind.
+    None for the node of a command, and for a node with several children that contain commands.
     """
     below = () if node.path_id in parts else _steps(node)
     if len(below) > 1 and node.behaviour.control != "Sequence":
@@ -234,7 +234,7 @@ def _row(outer: NodeView, within: Sequence[NodeView], spans: Mapping[str, tuple[
 
 
 def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
-    """Returns the facts of a run; an empty name stands for several robots."""
+    """Returns the facts on a run as pairs of name and value; with several robots `name` is empty."""
     facts = (
         ("world", f"{report.world}, seed {report.seed}"),
         ("duration", report.duration_text),
@@ -260,7 +260,7 @@ def map_of(artifacts: Artifacts, events: Sequence[Event], *, several: bool) -> P
 
 
 def _pictures(artifacts: Artifacts, robot: str, robots: Sequence[str]) -> Iterator[Picture]:
-    """Yields the pictures of a robot in a recorded run, else its first detection; then the pictures of its skills."""
+    """Yields a robot's pictures with captions: from the recorded run, else of a detection, and those of its skills."""
     detection = artifacts.of_robot(robot).detection
     for name, caption in _CAPTIONS.items():
         if (drawn := _drawn(artifacts, file_name(name, robot, robots))) is not None:
@@ -277,7 +277,7 @@ def _drawn(artifacts: Artifacts, name: str) -> bytes | None:
 def with_findings(
     report: RunReport, knowledge: Knowledge, result: RunResult, artifacts: Artifacts, events: Sequence[Event]
 ) -> RunReport:
-    """Adds the answers and the speech of all missions, in the order of time, and the seen objects to a report."""
+    """Adds to a report the answers and the speech of all missions in the order of time, and the seen objects."""
     parts = [part for tree in result.trees.values() for part in tree.parts]
     findings = sorted((one for each in result.every for one in each.findings), key=lambda one: one.t_s)
     said = sorted((one for each in result.every for one in each.said), key=lambda one: one.t_s)
@@ -290,7 +290,7 @@ def with_findings(
 
 
 def _answer(finding: Finding, parts: Sequence[StepPart], artifacts: Artifacts) -> ReportedAnswer:
-    """Returns an answer with its picture and the place of its command."""
+    """Returns an answer for the report, with its picture and the place that its command names."""
     path_id = finding.path_id
     commands = (part.command for part in parts if f"{path_id}/".startswith(f"{part.path_id}/"))
     return ReportedAnswer(

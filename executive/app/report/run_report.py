@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReportedAnswer:
-    """Answer to a question of the mission, with its time (s) and its place if one is known.
+    """Answer to a question in the mission, with its time (s) and the place that the command names, if any.
 
-    `picture` is the index of its picture in the run, if there is one.
+    `picture` is the index of the answer's picture in the run; None if there is no picture.
     """
 
     question: str
@@ -57,7 +57,7 @@ class ReportedObject:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Statement of `who` on a mission: `good` (None: not judged), one word, and the reason."""
+    """Verdict on a mission: who gives it, whether it is `good` (None: not judged), in one word, and the reason."""
 
     who: str
     good: bool | None
@@ -75,7 +75,7 @@ class Verdict:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Sentences of the reason, and parts that a semicolon ends."""
+        """Splits the reason into sentences and into parts that end with a semicolon."""
         return tuple(_SENTENCE_END.split(self.text))
 
 
@@ -106,13 +106,13 @@ class Ending:
 
     @property
     def seen(self) -> RefereeReport:
-        """The referee's verdict, or a verdict of nothing judged."""
+        """The referee's verdict; without a referee, a verdict that says that nothing was judged."""
         return self.referee or NOT_JUDGED
 
     def verdicts(self, *, name: str | None = None, counts: bool = False) -> Iterator[Verdict]:
-        """Yields the tree's claim, with the robot's `name` if given, and the referee's verdict, perhaps with counts.
+        """Yields what the tree claims, under the robot's `name` if given, and what the referee saw.
 
-        A run without a referee has a verdict that says so.
+        With `counts` the referee's verdict includes collisions and drops. Without a referee, a verdict says so.
         """
         cause = f" ({self.cause})" if self.cause else ""
         who = "The tree claims" if name is None else f"{name}'s tree claims"
@@ -126,7 +126,7 @@ class Ending:
 
 @dataclass(frozen=True)
 class RobotReport(Ending):
-    """End of the mission of one robot, with the kind of robot."""
+    """End of one robot's mission, with the kind of the robot."""
 
     kind: str
 
@@ -158,12 +158,12 @@ class RunReport(Ending):
 
     @property
     def duration_text(self) -> str:
-        """Duration in words; a run without a referee is not simulated."""
+        """Duration in words; says "simulated" only for a run with a referee."""
         simulated = "" if self.referee is None else f" simulated in {self.wall_time_s:.1f} s"
         return f"{self.sim_time_s:.1f} s{simulated}"
 
     def to_json(self) -> dict[str, Any]:
-        """Returns the report as JSON values, without the referee's sentences."""
+        """Returns the report as JSON values, without the events that the referee saw."""
         no_events = {"referee": {"events"}}
         without: dict[str, Any] = {**no_events, "robots": {"__all__": no_events}}
         for name in ("scenario", "notes", "zones", "robots"):
@@ -176,7 +176,7 @@ class RunReport(Ending):
         return values
 
     def _repr_html_(self) -> str:
-        """Returns the verdicts, and the page of the report in a frame if it lies beside the log."""
+        """Returns the verdicts as HTML; shows `report.html` in a frame if the file lies beside the log."""
         verdicts = [verdict for robot in self.robots.values() or (self,) for verdict in robot.verdicts()]
         lines = "".join(f"<p>{html_text(f'{each.who}: {each.word}: {each.text}')}</p>" for each in verdicts)
         page = Path(self.log).with_name("report.html")

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Durable:
-    """Stored state of a run, so that a later run can resume it.
+    """Stored state of a run, from which a later run can resume.
 
     `plant` is the file in which the plant stores its state for the mission `label`. With `take_up` the run begins from
     the state stored for `take_up_label` (None: for any mission). `journals` are the robots' journals by name, `poses`
-    their last estimated poses.
+    are the last estimated poses of the robots.
     """
 
     plant: Path
@@ -52,34 +52,34 @@ class Scene(Protocol):
         """Address of the picture."""
 
     def publish(self) -> None:
-        """Refreshes it now. A browser draws a texture at the first refresh after the texture has arrived."""
+        """Refreshes the picture now. A browser draws a texture at the first refresh after the texture has arrived."""
 
     def refresh_seldom(self) -> None:
-        """Refreshes it less often."""
+        """Refreshes the picture less often."""
 
     def follow(self, wanted: bool) -> None:
         """Lets the camera follow the robot, or shows the whole world."""
 
 
 class Backend(Protocol):
-    """Robots and their clock, perhaps with a referee, a recording and a live picture."""
+    """Interface of a backend: robots and their clock, perhaps with a referee, a recording and a live picture."""
 
     @property
     def clock(self) -> Clock:
         """The robots' clock."""
 
     def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
-        """Returns the robot of a tree with its estimators; with `durable` its state is stored, or resumed.
+        """Returns the robot of a tree with its estimators; with `durable` the robot's state is stored or resumed.
 
         Raises:
-            InputError: there is no such robot, or a file that it needs cannot be read.
+            InputError: there is no such robot, or a file that the robot needs cannot be read.
         """
 
     def happened(self) -> Sequence[tuple[float, str]]:
         """Returns the scenario's events so far, as times (s) and sentences; empty for a real robot."""
 
     def visitors(self, control: Control) -> Sequence[RunVisitor]:
-        """Returns the backend's own visitors of a run with this control; empty for a real robot."""
+        """Returns the visitors that the backend adds to a run with this control; empty for a real robot."""
 
     @property
     def notes(self) -> Sequence[str]:
@@ -89,7 +89,7 @@ class Backend(Protocol):
         """Returns the backend's work counters by name; empty for a real robot."""
 
     def attach(self, profile: Profile) -> None:
-        """Times the backend's subsystems."""
+        """Lets the profile time the backend's subsystems."""
 
     def show_live(self) -> Scene | None:
         """Starts the live picture; None if there is none."""
@@ -97,7 +97,7 @@ class Backend(Protocol):
     def judge(
         self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
     ) -> RefereeReport | None:
-        """Returns the referee's report on a mission since `since_s`, with the other robots' shares `before` it.
+        """Returns the referee's report on a mission since `since_s`; `before` are the parts that other robots did.
 
         None if there is no referee.
         """

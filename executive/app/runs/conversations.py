@@ -23,15 +23,14 @@ from executive.words.step import Step
 
 
 def load_ahead() -> None:
-    """Begins to load the parser in a thread of its own."""
+    """Loads the parser in a background thread."""
     threading.Thread(target=lambda: load_parser().parse("go"), name="errand-parser", daemon=True).start()
 
 
 class Conversations(RunVisitor):
     """Conversations with the robots of a run. All methods may be called from any thread.
 
-    A sentence is for the robot that it names, else for the first robot by name. A remark without a name, such as
-    "stop", is for all robots.
+    A sentence is for the robot that it names, else for the first robot by name; "stop" without a name is for all.
     """
 
     def __init__(self, prepared: Prepared, control: Control) -> None:
@@ -43,7 +42,7 @@ class Conversations(RunVisitor):
             conversation.listen(partial(listener, name))
 
     def set_missions(self) -> None:
-        """Tells each conversation its robot's first mission, so that users can correct it and ask about it."""
+        """Gives each conversation its robot's first mission, so that users can correct the mission and ask about it."""
         for prepared, conversation in self._each.values():
             conversation.set_mission(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
 
@@ -53,7 +52,7 @@ class Conversations(RunVisitor):
             conversation.tick(progress)
 
     def hear(self, text: str, robot: str | None = None) -> Reply:
-        """Obeys or answers a sentence, for one robot or for the robots that it names. Never raises on text."""
+        """Obeys or answers a sentence, for each robot that it addresses. Never raises, whatever the text."""
         if robot is not None and robot not in self._each:
             return Reply(ReplyKind.REFUSED, f"{robot} has nothing to do in this run")
         names, said = ((robot,), text) if robot is not None else self._addressees(text)
@@ -65,7 +64,7 @@ class Conversations(RunVisitor):
         return Reply(kind, "; ".join(f"{name}: {reply.text}" for name, reply in replies.items()))
 
     def _addressees(self, text: str) -> tuple[tuple[str, ...], str]:
-        """Returns the robots that a sentence is for, and the rest of the sentence."""
+        """Returns the robots that a sentence addresses, and the sentence without the address."""
         names = tuple(self._each)
         if len(names) == 1:
             return names, text
@@ -101,7 +100,7 @@ def conversation_of(prepared: Prepared, control: Control) -> Conversation:
 
 
 def _compile(steps: Sequence[Step], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
-    """Compiles and checks a mission of these steps, under a name that is not taken. Raises InputError."""
+    """Compiles and checks a mission under a name that is not `taken`. Raises InputError if it cannot be done."""
     mission = Mission.from_steps(steps, world=prepared.world.name, robot=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)

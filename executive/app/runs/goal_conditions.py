@@ -1,4 +1,4 @@
-"""Judges an ended mission: its goal conditions at the times of the run, and its speech."""
+"""Judges an ended mission by its goal conditions, each at its own times in the run, and by its speech."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -19,9 +19,9 @@ _MOVING = frozenset({GoalKind.GRASPED, GoalKind.PLACED, GoalKind.HANDED_OVER, Go
 
 @dataclass(frozen=True)
 class Share:
-    """Share of a mission that another robot did, before this robot or at the same time.
+    """Part of a mission that another robot did, before this robot or at the same time.
 
-    The first `done` parts of its tree are judged with the mission; objects that it moved count as moved by the mission.
+    The first `done` steps are judged with the mission; objects that the robot moved count as moved by the mission.
     """
 
     tree: CompiledTree
@@ -31,14 +31,14 @@ class Share:
 
 @dataclass(frozen=True)
 class _Move:
-    """Interval in which a mission moved objects of some classes on purpose (empty: of any class)."""
+    """Interval of time in which a robot moved objects of these classes as its task; no classes stand for any class."""
 
     classes: frozenset[str]
     from_s: float
     until_s: float
 
     def concerns(self, goal: GoalCondition) -> bool:
-        """Returns whether it may have moved the object of a goal condition."""
+        """Returns whether the robot may have moved an object that a goal condition is about."""
         return not self.classes or not goal.classes or not self.classes.isdisjoint(goal.classes)
 
 
@@ -52,9 +52,9 @@ def verdict_of(
 ) -> RefereeReport:
     """Returns the verdict on an ended tree; `judge` is the referee, which judges goal conditions.
 
-    A failed run has not fulfilled its mission, even if its goal conditions hold. A successful run is judged by its goal
-    conditions, answers and speech; the verdict names the steps that cannot be judged. The shares of other robots
-    `before` belong to the mission; events before `since_s` (simulated time) do not.
+    A failed run has not fulfilled its mission, even if the goal conditions hold. A successful run is judged by its goal
+    conditions, answers and speech; the verdict names the steps that cannot be judged. `before` are the parts of the
+    mission that other robots did; events before `since_s` (simulated time) are ignored.
     """
     conditions = conditions_of(tree, result, before=before)
     verdict = judge([replace(condition, since_s=since_s) for condition in conditions])
@@ -73,7 +73,7 @@ def verdict_of(
 
 
 def _unseen(tree: CompiledTree, result: RobotResult) -> Sequence[str]:
-    """Returns the names of executed skills that have no goal condition."""
+    """Returns the names of the executed skills for which there is no goal condition."""
     done = {one.path_id for one in result.executions if one.done}
     names = {node.path_id: node.name for node in tree.root.walk() if not is_speech(node)}
     paths = [_node_of(part) for part in tree.parts if part.goal is None and part.skill is not None]
@@ -83,10 +83,10 @@ def _unseen(tree: CompiledTree, result: RobotResult) -> Sequence[str]:
 def conditions_of(
     tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = ()
 ) -> tuple[GoalCondition, ...]:
-    """Returns the goal conditions of an ended tree: one for each execution of a part, and one for each answer.
+    """Returns the goal conditions of an ended tree: one for each execution of a step, and one for each answer.
 
-    A count of objects is one condition for all trips. The place of a robot must hold until it drives again; the place
-    or holder of an object must hold until the mission moves such an object again.
+    A count of objects is one condition for all trips. The place of a robot must hold until the robot drives again; the
+    place or holder of an object must hold until the mission moves such an object again.
     """
     shares = (*before, Share(tree, result, len(tree.parts)))
     moves = [move for share in shares for move in _moves(share)]
@@ -94,7 +94,7 @@ def conditions_of(
 
 
 def _conditions_of_share(share: Share, moves: Sequence[_Move], *, last: bool) -> Iterator[GoalCondition]:
-    """Yields the goal conditions of one robot's share."""
+    """Yields the goal conditions of the part that one robot did."""
     result = share.result
     for part in share.tree.parts[: share.done]:
         if part.goal is None:
@@ -111,7 +111,7 @@ def _conditions_of_share(share: Share, moves: Sequence[_Move], *, last: bool) ->
 
 
 def _answers(part: StepPart, condition: GoalCondition, result: RobotResult, *, done: bool) -> Iterator[GoalCondition]:
-    """Yields a condition for each answer of a check, even if the step around it failed, because the answer was said."""
+    """Yields a condition for each yes or no that a check answered, even if the step around the check failed later."""
     below = f"{part.path_id}/"
     answers = [one for one in result.findings if f"{one.path_id}/".startswith(below) and isinstance(one.answer, bool)]
     for finding in answers:
@@ -123,7 +123,7 @@ def _answers(part: StepPart, condition: GoalCondition, result: RobotResult, *, d
 def _timed(
     condition: GoalCondition, one: Execution, share: Share, moves: Sequence[_Move], *, last: bool
 ) -> GoalCondition:
-    """Returns the condition of one execution with the times at which it must hold."""
+    """Returns the goal condition of one execution, with the times between which it must hold."""
     result, ended_s = share.result, math.inf if one.ended_s is None else one.ended_s
     between = [_Move(frozenset(), each.began_s, _end(each)) for other in result.preempting for each in other.executions]
     later = [move for move in (*moves, *between) if move.until_s > ended_s and move.concerns(condition)]
@@ -145,7 +145,7 @@ def _timed(
 
 
 def _moves(share: Share) -> Iterator[_Move]:
-    """Yields the intervals in which a robot moved objects on purpose, also in failed or stopped parts."""
+    """Yields the intervals in which a robot moved objects as its task, also in steps that failed or were stopped."""
     for part in share.tree.parts:
         goal = part.goal
         if goal is None:
@@ -168,7 +168,7 @@ def _node_of(part: StepPart) -> str:
 
 
 def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str]]:
-    """Yields for each execution of a speech step whether the robot said the text, and a sentence on it.
+    """Yields whether the robot spoke as each executed speech step says, with a sentence on it.
 
     Each utterance counts for one step, in the order of time.
     """
@@ -195,7 +195,7 @@ def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str
 
 
 def _is_text(heard: str, text: str | Template | Expression | None) -> bool:
-    """Returns whether an utterance is the text of a step, with any values in it."""
+    """Returns whether an utterance matches the text of a step, in which any values may be filled in."""
     return text.matches(heard) if isinstance(text, Template) else not isinstance(text, str) or heard == text
 
 

@@ -74,8 +74,8 @@ def run_request(
     """Runs a prepared request and writes log, tree, report and pictures into its folder.
 
     The `backend` is by default the plant of the request's world. `visitors` and the log watch the run, `control`
-    pauses, steps and cancels it, `page` shows it, and `live` sends the log's messages. `durable` stores its state for
-    another process to resume, or resumes an earlier run. `profile` measures the time of the subsystems. The `worker`
+    pauses, steps and cancels the run, `page` shows it, and `live` sends the log's messages. `durable` stores the state
+    of the run for another process to resume, or resumes an earlier run. `profile` times the subsystems. The `worker`
     runs jobs in parallel to the ticks (None: in lock-step with the backend's clock).
 
     Raises InputError if the world or the stored state cannot be used.
@@ -129,7 +129,7 @@ def _conclude(
     artifacts: Artifacts,
     counts: Mapping[str, int],
 ) -> tuple[FinishedRun, Path | None]:
-    """Judges an ended run and writes report, pictures and recording; returns the recording's path as well."""
+    """Judges an ended run and writes report, pictures and recording; returns the report and the recording's path."""
     out, events = prepared.request.out, mission_events(log.path)
     artifacts.recall(events)
     finished, ended = _judge(prepared, backend, result, log)
@@ -155,19 +155,19 @@ def simulated_backend(prepared: Prepared) -> Backend:
 
 
 def mentioned_classes(prepared: Prepared) -> frozenset[str]:
-    """Classes of the objects that a mission mentions; clutter has none of them."""
+    """Returns the classes of the objects that a mission mentions; clutter contains no object of these classes."""
     named = {each.name for command in prepared.tree.commands for each in (command.item, command.object) if each}
     known = prepared.knowledge
     return frozenset(one for name in named for one in known.classes(known.object_name(name) or name))
 
 
 def log_map(log: EventLog, world: World, knowledge: Knowledge) -> None:
-    """Writes the map into the log, so that the log needs no other file."""
+    """Writes the map into the log, so that viewers need only the log."""
     log(MAP, map_message(load_grid_map(world.scan_map_path), knowledge, world=world.name))
 
 
 def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> RunEntry:
-    """Returns the robot of a mission with its faults, its numeric code compiled."""
+    """Returns the robot of a mission with its faults, after its numeric code is compiled."""
     entry, clock = backend.entry(prepared.tree, durable), backend.clock
     preload(entry)
     every = map(parse_fault, prepared.request.scenario.faults)
@@ -190,7 +190,7 @@ def _settings(request: Request) -> RunSettings:
 
 
 def log_name(start: int) -> str:
-    """Returns the name of the log of a mission's first start, second start, and so on."""
+    """Returns the file name of a mission's log; each restart of the mission has a log of its own."""
     return "log.mcap" if start == 1 else f"log-{start}.mcap"
 
 
@@ -217,7 +217,7 @@ def mission_events(log: Path) -> tuple[Event, ...]:
 def _judge(
     prepared: Prepared, backend: Backend, result: RunResult, log: EventLog
 ) -> tuple[FinishedRun, Sequence[EndedTree]]:
-    """Builds the report of a run with the referee's verdict, and the last state of each robot's tree.
+    """Builds the report on a run with the referee's verdict, and returns the last state of each robot's tree as well.
 
     Objects that the other robots moved count as moved by the mission.
     """
@@ -283,7 +283,7 @@ class RunProfile(RunVisitor):
     def __init__(
         self, profile: Profile, backend: Backend, logs: Iterable[RunVisitor], journals: Iterable[RunVisitor]
     ) -> None:
-        """`logs` are the visitors that write the log, `journals` those that write the store."""
+        """`logs` are the visitors that write the log, `journals` are the visitors that write the store."""
         self._profile, self._backend = profile, backend
         self._begun_s = 0.0
         for each in logs:
@@ -292,13 +292,13 @@ class RunProfile(RunVisitor):
             profile.attach("journal", each, "tick")
 
     def begin(self, settings: RunSettings, worker: Worker) -> None:
-        """Times the backend's subsystems."""
+        """Begins the measurement, with the backend's subsystems."""
         self._backend.attach(self._profile)
         self._profile.begin()
         self._begun_s = self._profile.enter()
 
     def mission_begun(self, nodes: Sequence[Behaviour], context: RunContext) -> None:
-        """Times a robot's estimators, detector and skills."""
+        """Adds a robot's estimators, detector and skills to the measurement."""
         attach = self._profile.attach
         attach("localiser", context.localiser, "update")
         attach("costmap", context.costmap, "update", "add_points", "clearance_m")
@@ -321,7 +321,7 @@ class DisturbanceLog(RunVisitor):
     """Logger of the faults that begin and end, and of the events in the world."""
 
     def __init__(self, publish: Publish, robot: Robot, happened: Happened) -> None:
-        """`happened` returns all events in the world so far, as times (s) and sentences."""
+        """`happened` returns all events in the world since the run began, as times (s) and sentences."""
         self._publish, self._happened = publish, happened
         self._robot = robot if isinstance(robot, FaultyRobot) else None
         self._active: tuple[str, ...] = ()

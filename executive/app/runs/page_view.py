@@ -1,4 +1,4 @@
-"""The live page of a run (`--view`), which stays as a replay after the end."""
+"""Live page of a run (`--view`), which replays the run after its end."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class PageView(RunVisitor):
-    """Live page of one run: call `serve` before the run, `offer` and `stay` after it."""
+    """Live page of one run: call `serve` before the run, and `offer` and then `stay` after it."""
 
     def __init__(
         self,
@@ -45,9 +45,9 @@ class PageView(RunVisitor):
         port: int = 0,
         later: Callable[[str], str] | None = None,
     ) -> None:
-        """Without a `prepared` request the page takes no sentences.
+        """Takes the request that the run was prepared from; without `prepared` the page takes no sentences.
 
-        `tell` shows a line. `later` queues a sentence and returns an answer; without it the page offers no queue.
+        `tell` shows a line. `later` queues a sentence and returns an answer; without `later` the page offers no queue.
         """
         self._tell, self._port, self._later = tell, port, later
         self.control = Control(attended=True)
@@ -91,12 +91,12 @@ class PageView(RunVisitor):
         self._progress.tick(progress)
 
     def offer(self, recording: Path | None) -> None:
-        """Shows the recording of the ended run, if there is one."""
+        """Adds the recording of the ended run to the page, if there is a recording."""
         if self._server is not None and recording is not None and recording.is_file():
             self._server.offer_recording(recording)
 
     def stay(self, limit_s: float | None) -> None:
-        """Serves until Ctrl-C or the limit (s, wall time), and closes."""
+        """Serves the page until Ctrl-C or the limit (s, wall time), and then closes it."""
         from executive.view.server import wait
 
         try:
@@ -107,7 +107,7 @@ class PageView(RunVisitor):
             self.close()
 
     def _refresh(self) -> None:
-        """Refreshes the scene of the ended run, for the textures of pages that are opened late."""
+        """Publishes the scene of the ended run again, so that a page opened late gets its textures."""
         if self._scene is not None:
             self._scene.publish()
 
@@ -120,7 +120,7 @@ class PageView(RunVisitor):
 
 
 def sentence_action(do: Callable[[str, str | None], str]) -> Action:
-    """Returns a page action that calls `do` with the typed sentence and its robot."""
+    """Returns a page action that calls `do` with the typed sentence and the robot chosen on the page."""
 
     def say(values: Mapping[str, Any]) -> str:
         sentence = text_of(values, "text")
@@ -133,10 +133,10 @@ def sentence_action(do: Callable[[str, str | None], str]) -> Action:
 
 
 def queue_function(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], str]:
-    """Returns a function that queues a sentence, as `errand queue add` does, and returns an answer.
+    """Returns a function that queues a typed sentence as `errand queue add` does, and returns the answer to show.
 
-    World, seed and robots are those of the prepared request. In place of a sentence it takes the name of a shipped
-    mission, with NAME=VALUE for its parameters.
+    World, seed and robots are those of the prepared request. In place of a sentence the function takes the name of a
+    shipped mission, with NAME=VALUE for the mission's parameters.
     """
     before = prepared.request
 
@@ -155,7 +155,7 @@ def queue_function(prepared: Prepared, *, store: Path, out: Path) -> Callable[[s
 
 
 def scene_actions(scene: Scene) -> Mapping[str, Action]:
-    """Returns the page's actions on the scene: a slower refresh for slow browsers, and the camera."""
+    """Returns the page's actions on the scene: refresh more slowly for slow browsers, and choose the camera."""
 
     def ease(_: Mapping[str, Any]) -> str:
         scene.refresh_seldom()

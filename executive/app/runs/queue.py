@@ -33,7 +33,7 @@ _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCEL
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Control and visitors of a run, as `run_request` takes them."""
+    """Arguments of `run_request` that a display chooses: the control, the visitors, and the page."""
 
     control: Control
     visitors: Sequence[RunVisitor] = ()
@@ -43,7 +43,7 @@ class RunOptions:
 
 
 class Screen(Protocol):
-    """Display of runs, with their control."""
+    """Display of runs, which also provides their control."""
 
     def tell(self, line: str, *, title: bool = False) -> None:
         """Shows a line."""
@@ -60,7 +60,7 @@ class Screen(Protocol):
 
 @dataclass(frozen=True)
 class MissionResult:
-    """Result of a stored mission. A mission that was set aside has no report.
+    """Result of a stored mission; `report` is None if the mission could not be run.
 
     `past` has a line for each restored part of a resumed mission; `hung_up` says that the terminal was closed.
     """
@@ -74,7 +74,7 @@ class MissionResult:
     hung_up: bool = False
 
     def to_json(self) -> dict[str, Any]:
-        """Returns its report as JSON values, with the mission's number."""
+        """Returns the report as JSON values, with the mission's number."""
         values = {"outcome": self.outcome, "message": self.message} if self.report is None else self.report.to_json()
         values |= {"mission": self.mission, "achieved": self.achieved}
         return values if self.past is None else {**values, "resumed": list(self.past)}
@@ -87,7 +87,7 @@ class Runner(Protocol):
         """Runs a mission to its end, or sets it aside. Raises InputError if no further mission can be run."""
 
     def set_aside(self, mission: StoredMission, cause: str) -> MissionResult:
-        """Ends a mission that cannot be run, with its cause."""
+        """Ends a mission that cannot be run, and stores the cause."""
 
     def cancel(self, reason: str) -> None:
         """Cancels the mission under way and all later ones. Signal handlers may call it."""
@@ -114,10 +114,7 @@ def run_in_turn(
 
 
 def queued_missions(missions: MissionStore) -> Iterator[StoredMission]:
-    """Yields the queued missions, each when its turn comes.
-
-    Raises InputError if an interrupted mission must be resumed first.
-    """
+    """Yields the queued missions in turn. Raises InputError if an interrupted mission must be resumed first."""
     interrupted = missions.missions(MissionState.RUNNING)
     if interrupted:
         raise interrupted_error(missions, interrupted[-1])
@@ -131,9 +128,9 @@ def next_queued(missions: MissionStore) -> StoredMission | None:
 
 
 class MissionRuns:
-    """Runner of a store's missions, which stores their beginning and their end.
+    """Runner of the missions in a store; it stores when each mission begins and ends.
 
-    A mission of a queue begins in the world of the mission before it, and has a folder of its own.
+    A queued mission begins in the world as the mission before left it, and writes its files into a folder of its own.
     """
 
     def __init__(
@@ -152,7 +149,7 @@ class MissionRuns:
     def run(self, mission: StoredMission, prepared: Prepared | None = None) -> MissionResult:
         """Runs a mission from its beginning, or resumes an interrupted or cancelled one, to its end.
 
-        Sets aside a queued mission that cannot be run. `prepared` is the mission if it is prepared already.
+        Sets aside a queued mission that cannot be run. `prepared` is the prepared mission; None: it is prepared here.
 
         Raises:
             StoreError: the store cannot be used, or the disk is full, so that no mission can be run.
@@ -183,7 +180,7 @@ class MissionRuns:
         return self.set_aside(mission, cause)
 
     def set_aside(self, mission: StoredMission, cause: str) -> MissionResult:
-        """Ends a mission that cannot be run, with its cause."""
+        """Ends a mission that cannot be run, and stores the cause."""
         self._missions.finish(mission.id, MissionState.ERROR, cause)
         self._screen.tell(f"Mission {mission.id} ({mission.request.name}) is set aside: {cause}")
         again = f"errand resume --mission {mission.id} --store {self._missions.path}"
@@ -222,7 +219,7 @@ class MissionRuns:
 
     @contextmanager
     def _cancelling(self, control: Control) -> Iterator[None]:
-        """Connects `cancel` with a run's control, also for a `cancel` before the run began."""
+        """Lets `cancel` reach the run's control; a `cancel` from before the run is passed on at once."""
         self._control = control
         if self._cancelled is not None:
             control.cancel(self._cancelled)
@@ -232,7 +229,7 @@ class MissionRuns:
             self._control = None
 
     def _before(self, mission: StoredMission) -> StoredMission | None:
-        """Returns the mission whose world this one continues; None if it begins in a new world."""
+        """Returns the mission that left the world in which this mission begins; None if it begins in a new world."""
         ended = [each for each in self._missions.missions(*_ENDED) if each.queued and each.starts]
         last = max((each for each in ended if each.id < mission.id), key=lambda each: each.id, default=None)
         if last is None or not same_world(last, mission) or last.clock_s is None:
@@ -245,8 +242,7 @@ class MissionRuns:
 def note_run(missions: MissionStore, mission: StoredMission) -> Iterator[Callable[[RunReport], None]]:
     """Stores that a mission runs, and its end when the yielded function gets the report.
 
-    If the run raises InputError before it began, the store is as before. Raises InputError with a hint if the disk is
-    full.
+    If the run raises InputError before it begins, the store is restored. Raises InputError if the disk is full.
     """
     missions.begin(mission.id)
     over = False
@@ -271,7 +267,7 @@ def note_run(missions: MissionStore, mission: StoredMission) -> Iterator[Callabl
 
 
 def _in_its_folder(mission: StoredMission, prepared: Prepared) -> Prepared:
-    """Sets the folder of a mission's files; each mission of a queue has its own."""
+    """Returns the mission with the folder for its files; each mission of a queue has its own folder."""
     asked = mission.request
     out = asked.out / f"{mission.id:03d}-{slug(asked.name)}" if mission.queued else asked.out
     return replace(prepared, request=replace(prepared.request, out=out))
@@ -285,7 +281,7 @@ def plant_file(store: MissionStore) -> Path:
 def new_run(
     store: MissionStore, mission: StoredMission, prepared: Prepared, before: StoredMission | None = None
 ) -> Durable:
-    """Begins the stored state of a mission in a new world, or in the world that the mission `before` left."""
+    """Returns the stored state for a mission in a new world, or in the world that the mission `before` left."""
     journals, label = _journals(store, mission, prepared), str(mission.id)
     starts = {name: robot.start for name, robot in prepared.robots.items()} if before is None else before.poses
     if prepared.request.robots:
@@ -296,7 +292,7 @@ def new_run(
 
 
 def _journals(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Mapping[str, StoreJournal]:
-    """Returns the journals of a mission's robots; a corrected mission is stored in place of the original."""
+    """Returns a journal for each robot of a mission; a correction of the mission is stored in place of the original."""
     bare = replace(prepared, request=replace(mission.request, sentence=None, file=None, text=None))
     return {
         each.mission.robot_name: store.journal(mission.id, _part_of(each)).allow_replacement(
@@ -307,7 +303,7 @@ def _journals(store: MissionStore, mission: StoredMission, prepared: Prepared) -
 
 
 def _part_of(prepared: Prepared) -> str | None:
-    """Name of the robot under which the store holds a part of a mission; None for the only robot of a run."""
+    """Name under which the store holds the robot's part of a mission; None for the only robot of a run."""
     return prepared.mission.robot_name if prepared.request.robots else None
 
 
@@ -320,7 +316,7 @@ def same_world(one: StoredMission, other: StoredMission) -> bool:
 
 @dataclass(frozen=True)
 class ResumedMission:
-    """Interrupted mission that is ready to continue, with a recollection for each robot."""
+    """Interrupted mission that is ready to continue, with the restored state of each robot as a recollection."""
 
     prepared: Prepared
     durable: Durable
@@ -333,7 +329,7 @@ class ResumedMission:
 
 
 def resume_mission(store: MissionStore, mission: StoredMission, *, ask: Answerer | None = None) -> ResumedMission:
-    """Restores an interrupted mission, each robot at its last pose; `ask` is that of `prepare`.
+    """Restores an interrupted mission, each robot at its last pose; `ask` answers questions as in `prepare`.
 
     Raises:
         InputError: the stored state cannot be read, or another version of the code or the world gives another tree.
@@ -380,13 +376,13 @@ def _other_version(store: MissionStore, mission: StoredMission) -> InputError:
 
 
 def interrupted_error(missions: MissionStore, mission: StoredMission) -> InputError:
-    """Returns the error that an interrupted mission must be resumed first."""
+    """Returns the error which says that an interrupted mission must be resumed first."""
     what = f"mission {mission.id} ({mission.request.name}) was interrupted"
     return InputError(what, hint="`errand resume` goes on with it and then with the queue", file=missions.path)
 
 
 def resumable_line(missions: MissionStore) -> str | None:
-    """Returns a line on how to resume the last mission; None unless it was cancelled."""
+    """Returns the line on how to resume the last mission; None unless that mission was cancelled."""
     begun = [each for each in missions.missions() if each.starts]
     if not begun or begun[-1].state is not MissionState.CANCELLED:
         return None

@@ -1,6 +1,6 @@
-"""Server of a queue: runs queued missions, and queues standing missions at times, HTTP calls and messages.
+"""Server of a queue: runs queued missions, and queues standing missions at set times, on HTTP calls and on messages.
 
-A port is open, and a plug-in runs, only while a standing mission waits for it.
+A port is open, and a plug-in runs, only while a standing mission needs it.
 """
 
 from __future__ import annotations
@@ -40,19 +40,19 @@ MOST_STARTS: Final = 3
 
 
 class Waiting(Protocol):
-    """Wait that another thread or process can end; `executive.store.wakeup.WakeupPipe` implements it."""
+    """Wait that another thread or process can end; `executive.store.wakeup.WakeupPipe` is an implementation."""
 
     def wait(self, until: datetime | None) -> None:
         """Blocks until `wake` is called, or until a time."""
 
     def wake(self) -> None:
-        """Ends the wait. Any thread or signal handler may call it."""
+        """Ends the wait. Any thread and any signal handler may call it."""
 
 
 class QueueServer:
     """Server of one store, which this process has claimed.
 
-    Stopping it cancels the mission under way, which `errand resume` continues. Queued missions stay queued.
+    A stop cancels the mission under way, which `errand resume` continues. Queued missions stay queued.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class QueueServer:
         follow: Callable[[Iterable[Trigger]], None],
         tell: Callable[[str], None],
     ) -> None:
-        """`follow` gives the listeners the triggers of the standing missions; `tell` shows a line."""
+        """`follow` makes the listeners wait for these triggers and no others; `tell` shows a line."""
         self._missions, self._standing, self._waiting, self._runner = missions, standing, waiting, runner
         self._follow, self._tell = follow, tell
         self._refused = ""
@@ -101,7 +101,7 @@ class QueueServer:
     def _next_missions(
         self, again: Sequence[StoredMission], serving_since: datetime, *, end: datetime | None, until_idle: bool
     ) -> Iterator[StoredMission]:
-        """Yields the missions that are resumed `again`, and then queued missions as triggers queue them."""
+        """Yields the missions to resume, `again`, and then the queued missions; queues missions whose triggers fire."""
         now = self._missions.now
         for each in again:
             if self.stopped is None:
@@ -124,7 +124,7 @@ class QueueServer:
                 self._waiting.wait(min(filter(None, (self._standing.due_next(), end)), default=None))
 
     def _update_listeners(self) -> None:
-        """Follows the present triggers; reports once what cannot be listened to."""
+        """Passes the present triggers to the listeners; reports a listener that cannot be opened once."""
         try:
             self._follow(each.trigger for each in self._standing.missions())
         except InputError as error:
@@ -236,9 +236,9 @@ class Listeners:
                 self._unheard.pop(kind, None)
 
     def _start(self, kind: str, topics: Sequence[str]) -> TriggerSource:
-        """Starts a plug-in. Raises InputError if there is none, or it does not start.
+        """Starts a plug-in. Raises InputError if it is not installed or does not start.
 
-        A plug-in that exceeds the time limit is not started again, and its later messages are dropped.
+        A plug-in that exceeds the time limit is not started again, and messages that it sends later are dropped.
         """
         if kind in self._stuck:
             raise InputError(self._stuck[kind], hint=_SEE)
@@ -265,7 +265,7 @@ class Listeners:
 
 
 class TriggerCalls:
-    """Receiver of calls and messages, which queues standing missions from any thread; `tell` prints a line."""
+    """Receiver of calls and messages; queues the standing missions that wait for them. `tell` prints a line."""
 
     def __init__(self, store: Path, tell: Callable[[str], None]) -> None:
         self._store, self._tell = store, tell
@@ -283,7 +283,7 @@ class TriggerCalls:
             self._tell(f"{OnTopic(kind, topic)}: {refusal}")
 
     def _queue(self, trigger: OnCall | OnTopic, body: bytes) -> tuple[StoredMission, ...]:
-        """Queues the standing missions of a trigger, with the values in the body. Raises CallError."""
+        """Queues the standing missions that wait for a trigger, with the values in the body. Raises CallError."""
         try:
             with self._one_at_a_time, MissionStore(self._store, create=False) as store:
                 standing = StandingMissions(store)
@@ -307,7 +307,7 @@ class TriggerCalls:
 
 
 def _request(standing: StandingMission, body: bytes) -> Request:
-    """Returns the request of a standing mission with the values in a body, checked. Raises CallError."""
+    """Returns a standing mission's request, checked with the values from a call. Raises CallError if they are wrong."""
     try:
         values = parse_json_values(body)
         if not values:
@@ -323,7 +323,7 @@ _FORM: Final = re.compile(r"[A-Za-z0-9._~+/=-]{8,512}")
 
 @dataclass(frozen=True)
 class CallToken:
-    """Token for calls, the file that holds it (None: the user gave it), and whether it is `new`."""
+    """Token for calls, with the file that holds it (None: the user gave it); `new` is True if it was just drawn."""
 
     text: str
     file: Path | None = None

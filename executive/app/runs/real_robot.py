@@ -59,9 +59,9 @@ class RealBackend:
         return self.connected.clock
 
     def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
-        """Returns the robot with its estimators, ready; the steps are stored, the world is not.
+        """Returns the robot with its estimators, ready to move; the progress is stored, the world is not.
 
-        Raises InputError for a robot of another name, and for a mission that was interrupted.
+        Raises InputError for a robot of another name, and for a mission that would be resumed.
         """
         robot = self.connected.robot
         if tree.robot_name != robot.name:
@@ -73,11 +73,11 @@ class RealBackend:
         return replace(entry, real=True)
 
     def happened(self) -> Sequence[tuple[float, str]]:
-        """Returns nothing: nobody knows what happens around a real robot."""
+        """Returns no events, because no simulation reports what happens around a real robot."""
         return ()
 
     def visitors(self, control: Control) -> Sequence[RunVisitor]:
-        """Returns no visitors: people talk to the robot by themselves."""
+        """Returns no visitors, because people talk to the real robot themselves."""
         return ()
 
     @property
@@ -166,7 +166,7 @@ def _options(text: str | None) -> dict[str, Any]:
 
 @contextmanager
 def _connected(driver: RobotBackend, place: str, name: str) -> Iterator[ConnectedRobot]:
-    """Connects to a robot. Raises InputError for defects of the plug-in before and after the block, not within it."""
+    """Connects to a robot. Raises InputError if the plug-in fails while it connects or disconnects."""
     with ExitStack() as stack:
         with _defects_named(driver):
             connected = stack.enter_context(driver.connect(place, name))
@@ -179,7 +179,7 @@ def _connected(driver: RobotBackend, place: str, name: str) -> Iterator[Connecte
 
 @contextmanager
 def _defects_named(driver: RobotBackend) -> Iterator[None]:
-    """Raises InputError for any error but InputError in the block."""
+    """Turns any other error than InputError and RobotStoppedError in the block into InputError."""
     try:
         yield
     except (InputError, RobotStoppedError):

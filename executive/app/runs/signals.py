@@ -60,7 +60,7 @@ class Ending:
 
 @contextmanager
 def interrupted_by_hang_up() -> Iterator[None]:
-    """Treats the end of the terminal as Ctrl-C, for commands that move no robot; later output is dropped."""
+    """Treats a closed terminal as Ctrl-C, for commands that move no robot; drops later output."""
     terminals = [output for output in _OUTPUTS if os.isatty(output)]
 
     def on_signal(_number: int, _frame: FrameType | None) -> None:

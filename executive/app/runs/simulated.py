@@ -72,12 +72,12 @@ class SimulatedBackend:
         return self._settled().referee
 
     def _settled(self) -> Simulation:
-        """Returns the simulation after the step under way has ended."""
+        """Returns the simulation after the step under way is finished."""
         self._pipeline.settle()
         return self._simulation
 
     def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
-        """Returns the robot with its estimators; with `durable` the plant's state is stored, or resumed."""
+        """Returns the robot with its estimators; with `durable` the plant's state is stored or resumed."""
         robot = self._robots.get(tree.robot_name)
         if robot is None:
             hint = f"known: {', '.join(self._robots)}"
@@ -93,9 +93,9 @@ class SimulatedBackend:
         return replace(entry, robot=self._pipeline.robots[tree.robot_name])
 
     def _world_keeper(self, durable: Durable) -> Callable[[], None]:
-        """Returns a function that stores the plant's state; the first call resumes an earlier state with `durable`.
+        """Returns a function that stores the plant's state; first restores an earlier state if `durable` says so.
 
-        Raises InputError if that state cannot be resumed.
+        Raises InputError if that state cannot be restored.
         """
         if self._keep is None:
             if durable.take_up:
@@ -204,7 +204,7 @@ def run_entry(
 ) -> RunEntry:
     """Returns a robot with the components of its stack and the maps of a world.
 
-    The robot localises at `start` if `surely`, else in a wide circle around it; without a start on the whole map.
+    With `surely` the robot localises at `start`, else in a wide circle around it; without a start on the whole map.
 
     Raises:
         InputError: the world's maps or the detector's model cannot be read.
@@ -229,10 +229,10 @@ def run_entry(
 
 
 class Bystanders(RunVisitor):
-    """People near the robots of a simulated run. A question that nobody hears stays open."""
+    """Visitor that lets people near the robots hear and answer; a question that nobody hears stays open."""
 
     def __init__(self, simulation: Simulation, pipeline: Pipeline, control: Control) -> None:
-        """`control` gets the answers and remarks; the `pipeline` steps the simulation."""
+        """`control` receives the answers and remarks; the `pipeline` steps the simulation."""
         self._simulation, self._pipeline, self._control = simulation, pipeline, control
         self._heard: dict[tuple[str, str, float], tuple[float, str | None]] = {}
         self._told = len(pipeline.words)
@@ -254,7 +254,7 @@ class Bystanders(RunVisitor):
             self._hear(each, progress.now_s)
 
     def _hear(self, each: OpenQuestion, now_s: float) -> None:
-        """Notes the people who hear a new question; later passes on their answer."""
+        """Finds the person who hears a new question; passes on that person's answer after a while."""
         key, question = (each.id, each.question.text, each.until_s), each.question
         if key not in self._heard:
             self._pipeline.settle()

@@ -1,1 +1,1 @@
-"""The pytest plug-in: fixtures, the small plant, and the collection of `*.skilltest.yaml` files."""
+"""Pytest plug-in: fixtures, the small plant, and the collection of `*.skilltest.yaml` files."""

@@ -1,6 +1,6 @@
 """Pytest plug-in with fixtures for tests of skills; it collects files named `*.skilltest.yaml`.
 
-Heavy modules are imported only when a test needs them, so that the tests of other projects start as fast as before.
+Heavy modules are imported only when a test needs them, so that tests in other projects do not start more slowly.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Hooks:
 
     @staticmethod
     def pytest_errand_skill_tests(settings: Any) -> None:
-        """Changes the settings of all skill tests of the session, before the first test is collected.
+        """Changes the settings for all skill tests in the session, before the first test is collected.
 
         `settings` is an `executive.testing.skill_suite.SkillTestSettings`: append to `fault_kinds`, add to `skills`, or
         replace benches in `makers`.
@@ -58,7 +58,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def _settings(config: pytest.Config) -> SkillTestSettings:
-    """Returns the settings of the session's skill tests, built when the first test is collected."""
+    """Returns the settings for the session's skill tests, built when the first test is collected."""
     if _SETTINGS not in config.stash:
         from executive.testing.skill_suite import SkillTestSettings
         from executive.testing.skill_test import scripted_maker
@@ -78,7 +78,7 @@ def _settings(config: pytest.Config) -> SkillTestSettings:
 
 @dataclass(frozen=True)
 class SmallPlant:
-    """Simulated room with a robot: `bench` runs skills, and its clock steps the plant."""
+    """Simulated room with a robot: `bench` runs skills, and the clock of the bench steps the plant."""
 
     world: World
     simulation: Simulation
@@ -124,7 +124,7 @@ def _spot() -> Capabilities:
 
 @pytest.fixture(scope="session")
 def robot_capabilities() -> Capabilities:
-    """Capabilities of the scripted robot: Spot with its arm. Override the fixture for another robot."""
+    """Capabilities of the scripted robot: Spot with its arm. Override this fixture to test with another robot."""
     return _spot()
 
 

@@ -1,1 +1,1 @@
-"""Nodes of trees by concept: each page has the plans and the py_trees behaviours."""
+"""Kinds of nodes, one page for each concept: its plans and its py_trees behaviours."""

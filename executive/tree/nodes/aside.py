@@ -1,4 +1,4 @@
-"""Moves an object that blocks every grasp of the wanted one aside, on its own surface."""
+"""Moves an object that blocks every grasp of the wanted object aside, on the surface where it stands."""
 
 import math
 from collections.abc import Sequence
@@ -24,11 +24,11 @@ SETTLE_S: Final = 0.5
 
 
 class InTheWay(ExplainedLeaf):
-    """Leaf that notes the object that blocks a grasp, and forbidden places for it.
+    """Leaf that writes which object blocks a grasp, and where the robot must not put it.
 
     Reads the blocking objects (`blocking_key`), and the wanted object (`wanted_key`). Writes the first blocking object
-    (`obstacle_key`), its surface (`surface_key`), the robot's pose (`pose_key`), and circles of `clear_m` around the
-    path from the robot to the wanted object (`clear_key`).
+    (`obstacle_key`), its surface (`surface_key`), the robot's pose (`pose_key`), and circles with radius `clear_m`
+    along the path from the robot to the wanted object (`clear_key`).
 
     | case | status |
     |---|---|
@@ -72,13 +72,13 @@ class InTheWay(ExplainedLeaf):
 
 
 def floor_square(pose: Pose2D, ahead_m: float, half_m: float) -> Surface:
-    """Square of floor around the point `ahead_m` before a pose, `half_m` to each side."""
+    """Square on the floor around the point `ahead_m` in front of a pose, `half_m` to each side."""
     corners = (compose(pose, Pose2D(ahead_m + x * half_m, y * half_m, 0.0)) for x, y in _CORNERS)
     return Surface(FLOOR, tuple((corner.x_m, corner.y_m) for corner in corners), 0.0)
 
 
 def _path_circles(wanted: ObjectObservation, pose: Pose2D, radius_m: float) -> tuple[Circle, ...]:
-    """Circles in a row from an object to the robot, 0.2 m apart."""
+    """Circles from an object to the robot, with centres at most 0.2 m apart."""
     x, y, _ = wanted.position_W
     off_x, off_y = pose.x_m - x, pose.y_m - y
     steps = max(1, round(math.hypot(off_x, off_y) / _STEP_M))
@@ -86,7 +86,7 @@ def _path_circles(wanted: ObjectObservation, pose: Pose2D, radius_m: float) -> t
 
 
 def can_move_aside(builder: PlanBuilder) -> bool:
-    """Returns whether the mission allows it, and the skills have the ports `in_the_way` and `clear_of`."""
+    """Returns whether the mission allows moving objects, and the skills have the ports `in_the_way` and `clear_of`."""
     has_ports = builder.has_ports("grasp", (), ("in_the_way",)) and builder.has_ports("place", ("clear_of",))
     return builder.move_aside > 0 and has_ports
 
@@ -99,10 +99,11 @@ def move_aside_plan(
     surfaces: tuple[Surface, ...] | FromBoard,
     tuck: NodeSpec,
 ) -> NodeSpec:
-    """Takes the first object under the key `blocking`, and puts it where it does not block the one under `wanted`.
+    """Takes the first object under the key `blocking`, and puts it where it does not block the object under `wanted`.
 
-    `tuck` draws the arm in between. Without space, the robot sets the object down anywhere on its surface, to free the
-    gripper. In the end the robot returns to its earlier pose, from which a grasp without the obstacle exists.
+    `tuck` draws the arm in between grasp and placement. If there is no such place, the robot sets the object down
+    anywhere on its surface, to free the gripper. Finally the robot returns to its earlier pose, from which it can now
+    grasp.
     """
     obstacle, surface, clear, pose = map(below.key, ("obstacle", "surface", "clear", "pose"))
     what = below.node(

@@ -1,4 +1,4 @@
-"""Plans to carry an object to a person, to the start or to a surface, and to pick it up again when it falls.
+"""Plans to carry an object to a person, to the start or to a surface, and to pick it up again if it falls.
 
 | event | detection | recovery |
 |---|---|---|
@@ -66,7 +66,7 @@ def _hand_over_plan(builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromB
 
 
 def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[NodeSpec, tuple[NodeSpec, ...]]:
-    """Carries the item to a surface of the place, or to the next one when that fails; returns also its guards.
+    """Carries the item to a surface at the place, or to the next surface if that fails; returns node and guards.
 
     Raises InputError when the place has no surfaces.
     """
@@ -82,7 +82,7 @@ def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[N
 
 
 def _put_on_plan(builder: PlanBuilder, item: ObjectKind, surface: str, to: str) -> NodeSpec:
-    """Carries the item to a surface and puts it down, both under guards."""
+    """Carries the item to a surface and puts it down, with guards around both."""
     view, carry = pose_2d(builder.knowledge.surfaces[surface].viewpoints[0]), builder.at("carry")
     place = builder.skill("place", {"surface": builder.surface(surface)}, _released(builder, "place"))
     return builder.sequence(
@@ -93,14 +93,14 @@ def _put_on_plan(builder: PlanBuilder, item: ObjectKind, surface: str, to: str) 
 
 
 def _released(builder: PlanBuilder, skill: str) -> dict[str, str]:
-    """Output of a skill that releases an object: the point of the release, for a later search."""
+    """Output that a skill writes when it releases an object: the point of release, where a later search can begin."""
     return {"released_W": builder.key("released")} if builder.has_ports(skill, (), ("released_W",)) else {}
 
 
 def carried_along_plan(builder: PlanBuilder, drive: NodeSpec, to: str) -> NodeSpec:
-    """Guards a drive with an object that an earlier step has grasped; the robot picks it up again where it falls.
+    """Guards a drive with an object that an earlier step has grasped; the robot picks up the object if it falls.
 
-    After a failed and skipped earlier step, the gripper is empty and the guard passes.
+    If the earlier step failed and was skipped, the gripper is empty and the guard lets the drive begin.
     """
     if builder.carried is None:
         return drive
@@ -111,18 +111,18 @@ def carried_along_plan(builder: PlanBuilder, drive: NodeSpec, to: str) -> NodeSp
 def _holding(
     builder: PlanBuilder, item: ObjectKind, to: str, below: NodeSpec, *, until_put_down: bool = False
 ) -> NodeSpec:
-    """Guards nodes below while the gripper holds the item, or until it puts the item down."""
+    """Builds a guard that requires the item in the gripper, or only until the robot puts it down."""
     condition = Holds(str(item), to, until_put_down, builder.search_classes(item.name), item.attributes)
     return builder.node("guard", f"holding the {item}", below, condition=condition)
 
 
 def goal_in_words(builder: PlanBuilder, goal: str) -> str:
-    """Text of a goal in a sentence."""
+    """Text for a goal within a sentence."""
     return goal if builder.knowledge.person(goal) else f"the {goal}"
 
 
 def goal_pose(builder: PlanBuilder, goal: str) -> Pose2D | FromBoard:
-    """Pose of the robot at a goal: a place, a person, or the start."""
+    """Pose that the robot takes at a goal: a place, a person, or the start."""
     if goal == START:
         return FromBoard(builder.start_key)
     person = builder.knowledge.person(goal)
@@ -132,7 +132,7 @@ def goal_pose(builder: PlanBuilder, goal: str) -> Pose2D | FromBoard:
 
 
 def person_pose(builder: PlanBuilder, person: str, at: str | None) -> Pose2D:
-    """Pose of the robot to meet a person: that of their place, turned towards them if their pose is known."""
+    """Pose at which the robot meets a person: at the person's place, and facing them if their pose is known."""
     facts = builder.knowledge.people[person]
     place = builder.place(at or facts.at)
     stand = builder.knowledge.place_pose(place)
@@ -142,7 +142,7 @@ def person_pose(builder: PlanBuilder, person: str, at: str | None) -> Pose2D:
 
 
 def _person_at_start(builder: PlanBuilder) -> str:
-    """Name of the only person in the room of the start, else "somebody"."""
+    """Name of the only person whose place is in the start's room; "somebody" if there are none or several."""
     knowledge = builder.knowledge
     start = (knowledge.start.x, knowledge.start.y)
     rooms = [name for name, place in knowledge.places.items() if inside(place.polygon, start)]
@@ -162,11 +162,11 @@ ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
 
 
 class Fallen(ExplainedLeaf):
-    """Leaf that notes the place of a lost object: RUNNING for `settle_s`, then SUCCESS.
+    """Leaf that writes where an object was lost: RUNNING for `settle_s`, then SUCCESS.
 
-    Writes the robot's pose (`pose_key`); the point of the fall on the floor, `ahead_m` before the body (`spot_key`);
-    the square of floor around it, `half_m` to each side (`floor_key`); this square and the `surfaces` within `within_m`
-    of the robot, onto which the object may have fallen (`around_key`). An object still in the gripper has slipped: the
+    Writes the robot's pose (`pose_key`); the point on the floor `ahead_m` in front of the body (`spot_key`); the square
+    of floor around this point, `half_m` to each side (`floor_key`); this square and the `surfaces` within `within_m` of
+    the robot, onto which the object may have fallen (`around_key`). An object still in the gripper has slipped: the
     leaf writes a smaller square of free floor to set it down (`set_down_key`), and the other keys for the grasp from
     there.
     """
@@ -202,7 +202,7 @@ class Fallen(ExplainedLeaf):
         return {options["spot_key"]: Sign.DROPPED}
 
     def initialise(self) -> None:
-        """Writes the places of the search for the object, by the robot's present pose."""
+        """Writes where to search for the object, from the robot's present pose."""
         self.clear_explanation()
         self._end_s = self.context.clock.now() + self.settle_s
         pose = self.context.pose()
@@ -224,7 +224,7 @@ class Fallen(ExplainedLeaf):
         return self.say(f"the {self.item} {happened} on the way {self.to}; it {then}")
 
     def _write(self, pose: Pose2D, ahead_m: float) -> None:
-        """Writes where the object lies: `ahead_m` before the body at a pose."""
+        """Writes the places for a search around the point `ahead_m` in front of a pose."""
         board, spot = self.context.board, compose(pose, Pose2D(ahead_m, 0.0, 0.0))
         floor = floor_square(pose, ahead_m, self.half_m)
         board.put(self.pose_key, pose)
@@ -233,7 +233,7 @@ class Fallen(ExplainedLeaf):
         board.put(self.around_key, (floor, *self._near))
 
     def _towards_free_floor(self) -> Pose2D:
-        """Robot's pose, turned by the least angle to free floor; a robot at a table has the table ahead."""
+        """Robot's pose, turned by the least angle towards free floor; ahead of a robot at a table is the table."""
         pose, costmap = self.context.pose(), self.context.free_space()
         turned = [compose(pose, Pose2D(0.0, 0.0, turn)) for turn in _TURNS_RAD]
         middles = [compose(each, Pose2D(self.set_down_ahead_m, 0.0, 0.0)) for each in turned]
@@ -244,9 +244,9 @@ class Fallen(ExplainedLeaf):
 class SurfacesNear(ExplainedLeaf):
     """Leaf that writes the surfaces within `within_m` of the robot, the nearest first.
 
-    `rooms` has the outline of each surface's room by the surface's name. If surfaces of the robot's own room are near,
-    the others do not count, since a wall hides them. SUCCESS with any surface; FAILURE with POSTCONDITION and the
-    message `otherwise` without one.
+    `rooms` has the outline of each surface's room by the surface's name. If surfaces in the robot's own room are near,
+    those in other rooms do not count, because a wall hides them. SUCCESS if any surface is near, else FAILURE with
+    POSTCONDITION and the message `otherwise`.
     """
 
     kind = "surfaces near"
@@ -281,7 +281,7 @@ def recover_fallen_plan(
     guards: tuple[NodeSpec, ...],
     hands_on: tuple[NodeSpec, ...] = (),
 ) -> NodeSpec:
-    """Recovers carrying `to` a goal: the robot picks a lost object up where it fell, after a guard breaks.
+    """Wraps carrying `to` a goal in a recovery: when a guard fails, the robot picks the object up where it fell.
 
     It does the same if a skill in `hands_on` has released the object and it is not at its goal. The carrying begins
     again at most `pick_ups` times, by the builder.
@@ -335,7 +335,7 @@ def _pick_up_again_plan(builder: PlanBuilder, item: ObjectKind, to: str) -> Node
 
 
 def _look_plan(builder: PlanBuilder, item: ObjectKind, keys: dict[str, str]) -> NodeSpec:
-    """Looks at the spot where the object fell, at the floor around, at near surfaces, then from either side."""
+    """Looks at the spot where the object fell, at the floor around it, at near surfaces, then from either side."""
     floor, detection = FromBoard(keys["floor"]), keys["detection"]
     aside = [
         below.sequence(
@@ -361,7 +361,7 @@ def _look_plan(builder: PlanBuilder, item: ObjectKind, keys: dict[str, str]) -> 
 
 
 def _near_plan(builder: PlanBuilder, item: ObjectKind, detection: str) -> NodeSpec:
-    """Looks at the surfaces near the place where the object was lost."""
+    """Looks at the surfaces that are near the place where the object was lost."""
     facts, near = builder.knowledge, builder.key("surfaces")
     surfaces = builder.node(
         "surfaces near",

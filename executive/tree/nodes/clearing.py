@@ -1,4 +1,4 @@
-"""Clearing a place: the robot takes away one object after the other, until a look finds none."""
+"""Clears a place: the robot takes away one object after another, until a look finds none."""
 
 import math
 from collections import Counter
@@ -33,7 +33,7 @@ MOST_MISSES: Final = 3
 
 
 class ForEachFound(MemoryComposite):
-    """Composite of a look (the first child, which writes the found object under `key`) and an action for each object.
+    """Composite of a look (first child, which writes the found object under `key`) and an action on each found object.
 
     | look | action | status |
     |---|---|---|
@@ -73,11 +73,11 @@ class ForEachFound(MemoryComposite):
 
     @classmethod
     def usual_children(cls, node: NodeSpec) -> tuple[NodeSpec, ...]:
-        """Returns the children for each of several objects."""
+        """Returns the children, repeated for the usual number of objects."""
         return node.children * cls.usually_found
 
     def _tick(self) -> Iterator[Behaviour]:
-        """Looks again in each round; until then the results of the round before stay visible."""
+        """Looks again in each round; the results of the round before stay visible until then."""
         if self._index == 0 and self.children[0].status != Status.RUNNING:
             self._reset_children()
         yield from super()._tick()
@@ -107,7 +107,7 @@ class ForEachFound(MemoryComposite):
             self._end(cause_of(look), f"{self._report()}, then {message_of(look)}")
 
     def _action_ended(self, action: Behaviour) -> None:
-        """Notes the object as done or missed, and begins the next look."""
+        """Records the object as done or missed, and begins the next look."""
         seen: ObjectObservation = self.board.get(self.key)
         x, y, _ = seen.position_W
         missed = self._noted(self.missed)
@@ -129,7 +129,7 @@ class ForEachFound(MemoryComposite):
             self._go_on(f"looks again, since {why}")
 
     def _nothing_left(self) -> None:
-        """Ends with SUCCESS, unless a missed object has disappeared."""
+        """Ends with SUCCESS, unless a missed object can no longer be found."""
         if missed := self._noted(self.missed):
             gone = listing(f"the {each.kind}" for each in missed)
             self._end(Cause.POSTCONDITION, f"{self._report()}, but {gone} is gone from there ({self._why})")
@@ -149,7 +149,7 @@ class ForEachFound(MemoryComposite):
 
 
 def is_clearing(get: Command, bring: Command | None) -> bool:
-    """Returns whether two commands in a row get everything and bring everything somewhere."""
+    """Returns whether two adjacent commands get everything from a place and bring everything somewhere."""
     if bring is None or get.task is not Task.GRASP or get.object is None or get.object.name != EVERYTHING:
         return False
     return bring.task in (None, Task.PLACE) and get.object == (bring.item if bring.task is None else bring.object)

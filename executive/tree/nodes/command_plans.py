@@ -44,7 +44,7 @@ _ANSWERS: Final[Mapping[str, tuple[str, type]]] = {"answer": ("key", bool), "cou
 
 
 def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembled:
-    """Plans one command, or two in a row that get and bring several objects, or all."""
+    """Plans one command, or two adjacent commands that get and bring several objects or everything."""
     if not step.commands:
         raise InputError("a step has no commands", hint="give it 'say', a command, a skill or a file to use")
     builder = replace(
@@ -77,7 +77,7 @@ def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembl
 
 
 def _pair_plan(assembler: Assembler, builder: PlanBuilder, bring: Command) -> Assembled:
-    """Plans two commands that get and bring several objects, or all."""
+    """Plans two commands that get and bring several objects or everything."""
     get, flow, knowledge = builder.command, assembler.flow, builder.knowledge
     goals: tuple[GoalCondition | None, ...]
     if is_clearing(get, bring):
@@ -95,7 +95,7 @@ def _pair_plan(assembler: Assembler, builder: PlanBuilder, bring: Command) -> As
 
 
 def _giving(assembler: Assembler, step: Do | Say, node: NodeSpec, builder: PlanBuilder) -> NodeSpec:
-    """Lets later steps read the answer of a status check. Raises InputError when it gives no such value."""
+    """Lets later steps read the answer to a question. Raises InputError for a value that the question does not give."""
     command, keys = builder.command, dict[str, str]()
     for port, name in (step.gives or {}).items():
         known = ("answer", "count") if command.object_count != 1 else ("answer",)
@@ -109,7 +109,7 @@ def _giving(assembler: Assembler, step: Do | Say, node: NodeSpec, builder: PlanB
 
 
 def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
-    """Returns the further surfaces on which a command may find its object."""
+    """Returns the surfaces outside the named place on which a command may find its object."""
     command, knowledge = builder.command, builder.knowledge
     if command.task is not Task.GRASP or command.object is None or command.goal is None or not builder.anywhere:
         return ()
@@ -118,11 +118,11 @@ def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
 
 
 def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
-    """Finds the object, approaches it, grasps it, draws the arm in.
+    """Finds the object, approaches it, grasps it, and draws the arm in.
 
     After a failed approach or grasp, the recovery for the failure runs and the robot tries again; a failed search is
-    final. With `anywhere`, the robot also searches elsewhere. It searches for an object from an earlier step's grasp
-    only with an empty gripper. While the gripper holds another object, the plan fails with PRECONDITION.
+    final. With `anywhere`, the robot also searches elsewhere. If an earlier step has grasped the object, the robot
+    searches only if the gripper is empty. While the gripper holds another object, the plan fails with PRECONDITION.
     """
     item = builder.required_object(builder.command.object)
     if builder.command.item is not None:
@@ -149,7 +149,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
 
 
 def go_plan(builder: PlanBuilder) -> NodeSpec:
-    """Goes to a place, a person or the start; carries the item if there is one."""
+    """Drives to a place, a person or the start; carries the item if the command has one."""
     command = builder.command
     if command.item is not None:
         return carry_plan(builder)
@@ -161,10 +161,7 @@ def go_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def wait_plan(builder: PlanBuilder) -> NodeSpec:
-    """Goes to the place, if one is named, and waits there for a time.
-
-    Raises InputError when the time is missing or too long.
-    """
+    """Goes to the named place, if any, and waits. Raises InputError when the time is missing or too long."""
     command = builder.command
     if command.item is not None:
         raise builder.error(f"the {command.item} cannot be carried by waiting", "take it there in a step of its own")
@@ -181,7 +178,7 @@ def wait_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def are_trips(get: Command, bring: Command | None) -> bool:
-    """Returns whether two commands in a row get several objects and bring the same number of them somewhere."""
+    """Returns whether two adjacent commands get several objects and bring the same number of them somewhere."""
     if bring is None or get.task is not Task.GRASP or get.object is None or get.object_count < 2:
         return False
     carried, count = (bring.item, bring.item_count) if bring.task is None else (bring.object, bring.object_count)
@@ -189,7 +186,7 @@ def are_trips(get: Command, bring: Command | None) -> bool:
 
 
 def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
-    """Gets one object and brings it to the goal, as often as requested; `builder` belongs to the command to get them.
+    """Gets one object and brings it to the goal, once for each object; `builder` belongs to the command to get them.
 
     Raises InputError for too many objects, a person as the goal, no source, or a source in which the robot would find
     the delivered objects again.
@@ -235,7 +232,7 @@ PLANS: Final[StepPlans] = {Do: _plan, Say: _plan}
 
 
 def _met_after(command: Command, met: frozenset[str], knowledge: Knowledge) -> frozenset[str]:
-    """Returns the people at the places of their meeting with the robot, after a successful command."""
+    """Returns the people whom the robot has met at their places, after a successful command."""
     if command.task in (Task.FOLLOW, Task.GUIDE) and command.object is not None:
         return met - {knowledge.person(command.object.name) or ""}
     goes = command.task is None and command.item is None and command.goal is not None

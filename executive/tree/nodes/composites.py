@@ -1,6 +1,6 @@
 """Composites with memory, and their plans: sequence, selector, round, alternatives, and parallel steps.
 
-The results of their children stay visible.
+The results of finished children stay visible.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,10 +55,10 @@ class MemorySelector(MemoryComposite):
     | FAILURE | ticks the next child in the same tick; FAILURE after the last |
     | halted | INVALID with CANCELLED |
 
-    The failure has the messages of all children that could begin, the decisive ones first. Its cause is ERROR if one
-    child had that, else the first that is neither PRECONDITION nor POSTCONDITION, else `exhausted_cause` if given, else
-    that of the last child, or PRECONDITION if no child applied. With `one_goal` all children lead to the same goal:
-    after a final failure of one, the others are passed over.
+    The failure has the messages of all children that could begin, the decisive messages first. Its cause is ERROR if a
+    child failed with ERROR, else the first cause that is neither PRECONDITION nor POSTCONDITION, else `exhausted_cause`
+    if given, else the cause of the last child, or PRECONDITION if no child applied. With `one_goal` all children lead
+    to the same goal: after a final failure of one child, the others are skipped.
     """
 
     kind = "selector"
@@ -71,7 +71,7 @@ class MemorySelector(MemoryComposite):
 
     @classmethod
     def usual_children(cls, node: NodeSpec) -> tuple[NodeSpec, ...]:
-        """Returns the branches for an unknown object."""
+        """Returns the branches that do not require a known object."""
         return tuple(child for child in node.children if child.options.get("known_as") is None)
 
     @classmethod
@@ -132,7 +132,7 @@ class MemoryRound(MemorySelector):
 
 
 class Choose(MemoryComposite):
-    """Composite of a decision (the first child, which writes its answer under `key`) and one branch for each answer.
+    """Composite of a decision (first child, which writes its answer under `key`) and one branch for each answer.
 
     `branches` has the index of the child for each answer.
 
@@ -153,7 +153,7 @@ class Choose(MemoryComposite):
 
     @classmethod
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
-        """Estimates the decision, then the range from the shortest branch to the longest; a single one may not run."""
+        """Estimates the decision, then the range from shortest to longest branch; a single branch may not run."""
         decides, *branches = node.children
         begun, here = walk.follow(decides, first=first), walk.mark()
         taken = [] if len(branches) > 1 else [(Estimate(), here)]
@@ -238,7 +238,7 @@ class Together(MemoryComposite):
 
     @classmethod
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
-        """Estimates parallel branches, which stop when as many as are needed are done.
+        """Estimates parallel branches, which stop when `needed` of them have succeeded.
 
         The walk continues where the branch with the longest drive ends.
         """
@@ -309,7 +309,7 @@ def _together_plan(assembler: Assembler, block: model.Together, builder: PlanBui
 
 
 def _refuse_collisions(branches: Sequence[NodeSpec], builder: PlanBuilder) -> None:
-    """Raises InputError for branches that use the same part of the robot."""
+    """Raises InputError for branches that need the same body part of the robot."""
     users: dict[Part, int] = {}
     for number, branch in enumerate(branches, start=1):
         skills = (node.options["skill"] for node in branch.walk() if node.kind == "skill")

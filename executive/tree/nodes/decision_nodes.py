@@ -1,6 +1,6 @@
-"""Decisions of a running mission: conditions as data, their looks, and the nodes that decide.
+"""Decisions of a running mission: conditions as data, the looks that they need, and the nodes that decide.
 
-A decision is true, false, or not known yet (None) before a look that it needs.
+A decision is true, false, or unknown (None) until a look that it needs has been taken.
 """
 
 import math
@@ -46,7 +46,7 @@ Keys = Mapping[str, str]
 
 @dataclass
 class View:
-    """Data of decisions: the context of the run, the time (s) at which the tree was built, and presses of buttons."""
+    """Data for decisions: run context, time (s) when the tree was built, and how often buttons were pressed then."""
 
     context: RunContext
     begun_s: float = field(init=False)
@@ -56,7 +56,7 @@ class View:
         self.begun_s, self.presses = self.context.clock.now(), self.context.presses()
 
     def values(self, keys: Keys) -> Mapping[str, Value]:
-        """Returns the readings, and the values of names under blackboard keys; each is read when it is used.
+        """Returns a mapping of readings and of named values on the blackboard, each of which is read when it is used.
 
         Names without a value are missing.
         """
@@ -78,7 +78,7 @@ class View:
         return f"{minutes // 60:02d}:{minutes % 60:02d}"
 
     def is_pressed(self, button: str) -> bool:
-        """Returns whether a button has been pressed since the beginning."""
+        """Returns whether a button has been pressed since the tree was built or since `forget_presses`."""
         return self.context.presses().get(button, 0) > self.presses.get(button, 0)
 
     def forget_presses(self) -> None:
@@ -88,7 +88,7 @@ class View:
 
 @dataclass(frozen=True)
 class _Values(Mapping[str, Value]):
-    """Values of the names in expressions."""
+    """Mapping from the names in expressions to their values."""
 
     view: View
     named: Keys
@@ -111,7 +111,7 @@ class _Values(Mapping[str, Value]):
 
 @dataclass(frozen=True)
 class Decision:
-    """Condition with the blackboard keys of its values and of the answers of its looks, in order."""
+    """Condition with the blackboard keys of the values that it reads, and of the answers to its looks in order."""
 
     condition: Condition
     keys: Keys = field(default_factory=dict)
@@ -123,7 +123,7 @@ class Decision:
         return tuple(part.button for part in parts_of(self.condition) if isinstance(part, ButtonPressed))
 
     def holds(self, view: View) -> bool | None:
-        """Returns whether it holds now; None before a look that it needs. Raises ExpressionError for missing values."""
+        """Returns whether it holds; None while a needed look is missing. Raises ExpressionError for missing values."""
         return self._holds(self.condition, view, iter(self.answers))
 
     def _holds(self, condition: Condition, view: View, answers: Iterator[str]) -> bool | None:
@@ -147,7 +147,7 @@ class Decision:
 
     @property
     def looks(self) -> tuple[tuple[str, Look | DoorOpen], ...]:
-        """Looks that it takes, each with the key of its answer."""
+        """Looks that the decision needs, each with the key for its answer."""
         looks = (part for part in parts_of(self.condition) if isinstance(part, Look | DoorOpen))
         return tuple(zip(self.answers, looks, strict=True))
 
@@ -161,7 +161,7 @@ def buttons_of(node: NodeSpec) -> tuple[str, ...]:
 
 @dataclass
 class MustHold(guard.Condition):
-    """Condition that a decision is true; PRECONDITION when it is not, ERROR when it has no value."""
+    """Guard condition that a decision is true; PRECONDITION if it is false, ERROR if it has no value."""
 
     decision: Decision
     words: str
@@ -190,17 +190,17 @@ class MustHold(guard.Condition):
 
 @dataclass
 class MustNotBegin(MustHold):
-    """Condition that calls an interrupt when the decision becomes true, and again only after it was false."""
+    """Condition that calls an interrupt when the decision becomes true, and again only after it has been false."""
 
     _called: bool = field(default=False, init=False, repr=False, compare=False)
 
     def begin(self, context: RunContext) -> None:
-        """Handles the start of the steps: no call yet."""
+        """Handles the start of the guarded steps: the condition has not called its interrupt."""
         super().begin(context)
         self._called = False
 
     def note_call(self) -> None:
-        """Notes that the interrupt has begun."""
+        """Records that the interrupt has begun."""
         self._called = True
         if self._view is not None:
             self._view.forget_presses()
@@ -215,7 +215,7 @@ class MustNotBegin(MustHold):
 
 
 class Decide(MemoryComposite):
-    """Composite that decides, and takes its looks (the children) in order while the decision needs them.
+    """Composite that evaluates a decision, and takes the looks (children) in order as the decision needs them.
 
     | case | status |
     |---|---|
@@ -227,8 +227,8 @@ class Decide(MemoryComposite):
     | no look left, not decided | FAILURE with ERROR |
     | halted | INVALID with CANCELLED |
 
-    The n-th child is the look for the n-th answer of the decision. Each start clears the answers, except those not
-    older than their `max_age_s`.
+    The n-th child is the look for the n-th answer of the decision. Each start clears the answers that are older than
+    their `max_age_s`, and those without `max_age_s`.
     """
 
     kind = "decide"
@@ -276,7 +276,7 @@ class Decide(MemoryComposite):
         self.context.board.forget(k for k, look in looks if look.max_age_s <= 0.0 or ages_s[k] > look.max_age_s)
 
     def _decided(self) -> bool:
-        """Decides if possible; returns whether the node has ended."""
+        """Decides if all needed looks are taken; returns whether the node has ended."""
         try:
             holds = self.decision.holds(self.view)
         except ExpressionError as error:
@@ -290,9 +290,9 @@ class Decide(MemoryComposite):
 
 
 def decide_plan(flow: Flow, condition: Condition, builder: PlanBuilder) -> tuple[NodeSpec, str, tuple[StepPart, ...]]:
-    """Plans a decision; returns its node, the key of its answer, and the parts with goals that it checks.
+    """Plans a decision; returns its node, the key of its answer, and the looks that have goal conditions.
 
-    Raises InputError for an expression that is not true or false, an unknown name, or an object that no look can find.
+    Raises InputError for an expression that is no truth value, an unknown name, or an object that no look can find.
     """
     decision, key, words = decision_of(flow, condition, builder), builder.key("decided"), str(condition)
     looks = [look_plan(builder, number, look, answer) for number, (answer, look) in enumerate(decision.looks, start=1)]
@@ -302,7 +302,7 @@ def decide_plan(flow: Flow, condition: Condition, builder: PlanBuilder) -> tuple
 
 
 def look_plan(builder: PlanBuilder, number: int, look: Look | DoorOpen, key: str) -> tuple[NodeSpec, StepPart]:
-    """Plans a look of a decision; returns its node, and its part with the goal."""
+    """Plans a look for a decision; returns its node, and its step with the goal condition."""
     below = builder.at(f"look-{number}")
     if isinstance(look, DoorOpen):
         plan = door_plan(below, look.between, key, look.max_age_s)
@@ -315,7 +315,7 @@ def look_plan(builder: PlanBuilder, number: int, look: Look | DoorOpen, key: str
 
 
 def decision_of(flow: Flow, condition: Condition, builder: PlanBuilder) -> Decision:
-    """Returns the decision of a condition with the looks of `builder`. Raises InputError like `decide_plan`."""
+    """Builds the decision for a condition whose looks `builder` builds. Raises InputError like `decide_plan`."""
     source, parts = builder.source, list(parts_of(condition))
     expressions = [part.expression for part in parts if isinstance(part, ValueIs)]
     for expression in expressions:
@@ -332,7 +332,7 @@ def decision_of(flow: Flow, condition: Condition, builder: PlanBuilder) -> Decis
 
 
 def instant_decision(flow: Flow, condition: Condition, builder: PlanBuilder) -> Decision:
-    """Returns the decision of a monitored condition. Raises InputError when it takes a look, or like `decision_of`."""
+    """Builds the decision for a monitored condition. Raises InputError if it needs a look, or like `decision_of`."""
     look = next((part for part in parts_of(condition) if isinstance(part, Look | DoorOpen)), None)
     if look is not None:
         hint = "look once with 'if', or again and again with 'repeat: {until: ..}'"
@@ -341,7 +341,7 @@ def instant_decision(flow: Flow, condition: Condition, builder: PlanBuilder) -> 
 
 
 class Check(ExplainedDecorator):
-    """Decorator that publishes the decision of its child under `ANSWER_TOPIC`, as an answer of the mission.
+    """Decorator that publishes its child's decision under `ANSWER_TOPIC`, as an answer of the mission.
 
     Status as the child; `key` holds the child's answer.
     """

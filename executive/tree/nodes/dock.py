@@ -1,4 +1,4 @@
-"""Charging at the dock: plans of the command and of the block."""
+"""Plans charging at the dock, for the command and for the block."""
 
 import math
 from dataclasses import replace
@@ -30,7 +30,7 @@ def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
 
 
 def _onto_dock(builder: PlanBuilder, dock: Pose2D) -> tuple[NodeSpec, ...]:
-    """Drives onto the dock; with a tag at the dock, first before it, where the cameras show the tag."""
+    """Drives onto the dock; if the dock has a tag, first to a pose from which the cameras see the tag."""
     tag = next((tag for tag in builder.knowledge.known_tags() if tag.on == DOCK), None)
     if tag is None or "locate_dock" not in builder.registry:
         return (builder.navigate(dock, "the dock", exactly=True),)
@@ -43,7 +43,7 @@ def _onto_dock(builder: PlanBuilder, dock: Pose2D) -> tuple[NodeSpec, ...]:
 
 
 def charge_plan(builder: PlanBuilder) -> NodeSpec:
-    """Charges at the dock. Raises InputError when the command names more than that."""
+    """Plans charging at the dock. Raises InputError when the command names anything else."""
     command, facts = builder.command, builder.knowledge
     if any(part is not None for part in (command.item, command.goal, command.object)):
         raise builder.error("the robot charges itself, at its dock", "say 'do: charge' alone")

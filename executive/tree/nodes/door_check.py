@@ -1,6 +1,6 @@
-"""Doors: the check whether one is open, from before it, or else from its other side; and the opening of a door.
+"""Checks whether a door is open, from one side or else from the other, and opens doors.
 
-A closed door may block the path to its viewpoint, so the robot also looks from the end of its drive.
+A closed door may block the path to its viewpoint, so the robot also looks from where its drive ended.
 """
 
 import math
@@ -46,7 +46,7 @@ _BODY_M: Final = (1.3, 0.7)
 
 
 class KnownDoor(ExplainedLeaf):
-    """Leaf that applies while the robot knows a door as it was up to `max_age_s` ago; SUCCESS, with `key` for open."""
+    """Leaf that applies if the robot saw a door at most `max_age_s` ago; writes under `key` whether it is open."""
 
     kind = "known door"
     output_types: ClassVar = {"key": bool}
@@ -56,7 +56,7 @@ class KnownDoor(ExplainedLeaf):
     context: RunContext
 
     def applies(self) -> bool:
-        """Returns whether the robot saw the door lately."""
+        """Returns whether the robot has seen the door within `max_age_s`."""
         seen = self.context.door_memory.last_seen(self.door)
         return seen.state is not DoorState.UNKNOWN and self.context.clock.now() - seen.seen_s <= self.max_age_s
 
@@ -68,14 +68,14 @@ class KnownDoor(ExplainedLeaf):
 
 
 class BeforeDoor(MemoryComposite):
-    """Composite that applies while the robot's pose has a view through a door; status as its only child."""
+    """Composite that applies while the robot sees through a door from its pose; has the status of its only child."""
 
     kind = "before door"
     door: Doorway
     context: RunContext
 
     def applies(self) -> bool:
-        """Returns whether the robot stands before the door."""
+        """Returns whether the robot stands in front of the door and sees through it."""
         pose = self.context.known_pose()
         here = None if pose is None else (pose.x_m, pose.y_m)
         if here is None or self.door.distance_m(here) > _HERE_M:
@@ -84,7 +84,7 @@ class BeforeDoor(MemoryComposite):
 
 
 def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str, max_age_s: float = 0.0) -> NodeSpec:
-    """Looks at a door; the answer goes to `key`. The robot's knowledge counts up to an age of `max_age_s`.
+    """Looks at a door and writes the answer to `key`; knowledge at most `max_age_s` old makes a look unnecessary.
 
     Raises InputError when the world has no such door.
     """
@@ -97,16 +97,16 @@ def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str, max_age_
 
 
 def _known_or(builder: PlanBuilder, door: Door, look: NodeSpec, key: str, max_age_s: float) -> NodeSpec:
-    """Takes what is known of a door, or else a look."""
+    """Uses recent knowledge of a door, or else looks."""
     options = {"door": doorway(builder.knowledge, door), "max_age_s": max_age_s, "key": key}
     known = builder.node("known door", "what is known of it", part="known", **options)
     return builder.node("selector", f"is the {_name(door)} open?", known, look)
 
 
 def _looks(builder: PlanBuilder, door: Door, key: str) -> Iterator[NodeSpec]:
-    """Looks from the robot's pose before the door, else from the room on one side, else from the other.
+    """Looks from the robot's pose if it is before the door, else from the room on one side, else from the other side.
 
-    The room with more doors comes first, since the robot can reach it more easily when this door is closed.
+    The room with more doors comes first, because the robot can reach it more easily when this door is closed.
     """
     knowledge, name = builder.knowledge, _name(door)
     ports = _ports(knowledge, door)
@@ -126,7 +126,7 @@ def _looks(builder: PlanBuilder, door: Door, key: str) -> Iterator[NodeSpec]:
 
 
 def _open_plan(_: Assembler, block: OpenDoor, builder: PlanBuilder) -> Assembled:
-    """Looks at a door; if it is closed, calls its plug-in, or asks the people there and waits before it."""
+    """Looks at a door; if it is closed, calls the door's plug-in, or asks the people there and waits."""
     door, key, wanted = _door(builder, block.door.between), builder.key("open"), block.door
     look = builder.at("look")
     first = look.node("selector", _FROM_EITHER, *_looks(look, door, key), part="look")
@@ -163,7 +163,7 @@ def _door(builder: PlanBuilder, between: tuple[str, str]) -> Door:
 
 
 def _ports(knowledge: Knowledge, door: Door) -> Mapping[str, object]:
-    """Inputs of the skills that look at a door, or open it."""
+    """Inputs for the skills that look at a door or open it."""
     return {
         "middle_W": door.at,
         "width_m": door.width,
@@ -179,7 +179,7 @@ def _name(door: Door) -> str:
 def view_of(knowledge: Knowledge, door: Door, room: str) -> Pose2D | None:
     """Viewpoint in a room to see through a door: before it, or to the side; None if the room has no free pose.
 
-    The robot faces the door, or stands along the wall in a narrow space; its LiDAR sees all around.
+    The robot faces the door, or stands along the wall in a narrow space, because its LiDAR sees all around.
     """
     across = _through_rad(knowledge, door)
     outline = knowledge.places[room].polygon
@@ -189,7 +189,7 @@ def view_of(knowledge: Knowledge, door: Door, room: str) -> Pose2D | None:
 
 
 def _before(door: Door, into_rad: float) -> Iterator[Pose2D]:
-    """Iterates over poses before a door, the best viewpoint first."""
+    """Yields poses in front of a door, the best viewpoint first."""
     for far_m in _BEFORE_M:
         for aside_rad, turned_rad, before_m in product(_ASIDE_RAD, _TURNED_RAD, far_m):
             bearing_rad = into_rad + aside_rad
@@ -209,14 +209,14 @@ def doorway(knowledge: Knowledge, door: Door) -> Doorway:
 
 
 def _through_rad(knowledge: Knowledge, door: Door) -> float:
-    """Direction (rad) through a door: across the side of the room in which it lies."""
+    """Direction (rad) through a door: perpendicular to the room's side that contains the door."""
     sides = [nearest_side(knowledge.places[room].polygon, door.at, door.width) for room in door.between]
     (x0, y0), (x1, y1) = min(sides, key=lambda side: side.off_m).ends
     return math.remainder(math.atan2(y1 - y0, x1 - x0) + math.pi / 2, math.tau)
 
 
 def _from(point: Point, bearing_rad: float, by_m: float) -> Point:
-    """Point at a distance in a direction."""
+    """Point at a distance (m) from another point, in a direction (rad)."""
     return point[0] + by_m * math.cos(bearing_rad), point[1] + by_m * math.sin(bearing_rad)
 
 

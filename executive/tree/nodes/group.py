@@ -1,4 +1,4 @@
-"""Groups of steps with `when`, `while` and `always`: the plan and its node."""
+"""Plans groups of steps with `when`, `while` and `always`, and defines their nodes."""
 
 from dataclasses import replace
 from typing import Final
@@ -30,7 +30,7 @@ from skills.inputs.errors import InputError
 
 
 class Always(Afterwards):
-    """Composite of work (the first child), and of steps that run in the end (the second), whatever the result.
+    """Composite of work (first child), and of steps that run after the work (second child), whatever its result.
 
     | work | steps in the end | status |
     |---|---|---|
@@ -70,7 +70,7 @@ class Always(Afterwards):
 
 
 class InZones(ExplainedDecorator):
-    """Decorator that adds `zones` to those of the nodes above, for its subtree.
+    """Decorator that adds `zones` to the zones in force, for its subtree.
 
     | child | status |
     |---|---|
@@ -84,7 +84,7 @@ class InZones(ExplainedDecorator):
 
     @classmethod
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
-        """Estimates the child, which minds further zones."""
+        """Estimates the child, for a robot that obeys these zones as well."""
         outer, walk.zones = walk.zones, tuple(dict.fromkeys((*walk.zones, *node.options["zones"])))
         try:
             return walk.all_of(node, first)
@@ -105,7 +105,7 @@ def _plan(assembler: Assembler, block: model.Group, builder: PlanBuilder) -> Ass
 def frame_plan(
     assembler: Assembler, body: Assembled, group: model.Group | Mission, builder: PlanBuilder, before: Flow
 ) -> Assembled:
-    """Adds `when`, `while` and `always` to steps; `before` is the flow before them."""
+    """Adds `when`, `while` and `always` around steps; `before` is the data flow before the steps."""
     node, parts = body.node, body.parts
     if group.when:
         after, calls = assembler.flow, []
@@ -158,7 +158,7 @@ def _is_holding(condition: Condition) -> bool:
 
 
 def mission_plan(assembler: Assembler, mission: Mission, base: str) -> Assembled:
-    """Plans a mission's steps, with its values set before, and its `when`, `while` and `always` around them."""
+    """Plans a mission's steps: sets its values first, and adds the mission's `when`, `while` and `always` around."""
     builder, flow = assembler.builder(base, mission.source), assembler.flow
     outer, known = (assembler.values_base, flow.declared), dict(flow.names)
     assembler.values_base = f"{base}/values"
@@ -174,7 +174,7 @@ def mission_plan(assembler: Assembler, mission: Mission, base: str) -> Assembled
 
 
 def _declare(assembler: Assembler, mission: Mission, builder: PlanBuilder) -> NodeSpec:
-    """Builds the leaf that sets a mission's values at the beginning."""
+    """Builds the leaf that sets a mission's declared values at the beginning."""
     values, kinds = dict[str, Expression | Template](), dict[str, type]()
     for name, value in (mission.variables or {}).items():
         kind = PYTHON_TYPES[kind_of(value)]
@@ -197,7 +197,7 @@ def _use_plan(assembler: Assembler, step: UseMission, builder: PlanBuilder) -> A
 
 
 def whole_mission(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec, ...]) -> NodeSpec:
-    """Builds a mission's steps under its policy."""
+    """Builds the node of a whole mission from its steps, under the mission's policy."""
     remember = builder.node("remember", "where it starts", part="remember-start", key=builder.start_key, keep=True)
     all_steps = list(mission.walk())
     used = (step.mission for step in all_steps if isinstance(step, UseMission))

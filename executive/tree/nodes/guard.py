@@ -1,4 +1,4 @@
-"""Conditions that must hold while nodes run, and the policies for old readings.
+"""Conditions that must hold while nodes run, and the policies for readings that are too old.
 
 A compiled tree has them as plain data; each run uses its own copies. A condition returns None when it holds, `Failed`
 when it does not, and `Waiting` while its value is unknown.
@@ -36,7 +36,7 @@ Verdict = Failed | Waiting | None
 
 @dataclass(frozen=True)
 class Freshness:
-    """Greatest age (s) of a reading, the policy for an older one, and the greatest duration (s) of WAIT."""
+    """Greatest age (s) of a reading, the policy for an older reading, and how long (s) WAIT waits at most."""
 
     max_age_s: float = 1.0
     policy: StaleData = StaleData.WAIT
@@ -66,27 +66,27 @@ class Condition(ABC):
         """Judges the condition by the readings; None when it holds."""
 
     def stamp_s(self, context: RunContext) -> float:
-        """Stamp (s) of the reading; the present time for a condition without one."""
+        """Stamp (s) of the reading that the condition judges; the present time for a condition without a reading."""
         return context.clock.now()
 
     def for_run(self, context: RunContext) -> Self:
-        """Returns a copy for a run that begins now."""
+        """Returns a copy of the condition for a run that begins now."""
         mine = copy.copy(self)
         mine.run_begins(context)
         return mine
 
     def run_begins(self, context: RunContext) -> None:  # noqa: B027 - most conditions need not know
-        """Handles the beginning of the run for which this is a copy."""
+        """Handles the beginning of the run to which this copy belongs."""
 
     def begin(self, context: RunContext) -> None:
-        """Handles a new start of the subtree: clears all durations."""
+        """Handles another start of the subtree: forgets how long readings were old or missing."""
         self._since_s = self._stale_since_s = None
 
     def note_call(self) -> None:  # noqa: B027 - most conditions need not know
-        """Handles the beginning of the interrupt that the condition has called."""
+        """Records that the interrupt which the condition called has begun."""
 
     def check_end(self, context: RunContext) -> Failed | None:
-        """Returns the failure that contradicts a success of the subtree, or None."""
+        """Returns the failure if the condition contradicts a success of the subtree; None if it agrees."""
         return None
 
     def check(self, context: RunContext) -> Verdict:
@@ -108,7 +108,7 @@ class Condition(ABC):
 
 
 def is_known_as(item: ObjectKind | None, classes: Sequence[str], attributes: Sequence[str] = ()) -> bool:
-    """Returns whether an object is of one of these classes, or any (`ANY_OBJECT`), with these attributes."""
+    """Returns whether an object is of one of these classes (or of any, with `ANY_OBJECT`) and has these attributes."""
     if item is None:
         return False
     return (ANY_OBJECT in classes or item.name in classes) and set(attributes) <= set(item.attributes)
@@ -116,7 +116,7 @@ def is_known_as(item: ObjectKind | None, classes: Sequence[str], attributes: Seq
 
 @dataclass
 class Holds(Condition):
-    """Condition that the gripper holds `item`, which is brought `to` a goal ("to the kitchen").
+    """Condition that the gripper holds `item`, while the robot brings it `to` a goal ("to the kitchen").
 
     | gripper | verdict | verdict with `until_put_down` |
     |---|---|---|
@@ -142,11 +142,11 @@ class Holds(Condition):
     _watch: HoldWatch = field(default_factory=HoldWatch, init=False, repr=False, compare=False)
 
     def stamp_s(self, context: RunContext) -> float:
-        """Stamp (s) of the gripper."""
+        """Stamp (s) of the gripper's reading."""
         return context.robot.gripper().stamp_s
 
     def begin(self, context: RunContext) -> None:
-        """Handles a new start of the subtree: watches the grip from now on."""
+        """Handles another start of the subtree: the grip is watched from now on."""
         super().begin(context)
         self._watch, self._begins = hold_watch(context.robot.capabilities()), True
 
@@ -186,10 +186,10 @@ class Holds(Condition):
 
 @dataclass
 class HoldsNothingElse(Condition):
-    """Condition that the gripper holds no other object before `item` is grasped.
+    """Condition that the gripper holds no other object before the robot grasps `item`.
 
-    PRECONDITION at the start when it holds an object that was recognised as another than the classes `known_as` with
-    `attributes`; an unrecognised object, as after a restart, is left to the skill that grasps.
+    PRECONDITION at the start if the gripper holds an object that was recognised as not being of the classes `known_as`
+    with `attributes`; an unrecognised object, as after a restart, is left to the skill that grasps.
     """
 
     reading = "the gripper"
@@ -199,7 +199,7 @@ class HoldsNothingElse(Condition):
     _begins: bool = field(default=True, init=False, repr=False, compare=False)
 
     def begin(self, context: RunContext) -> None:
-        """Handles a new start of the subtree: the next judgement counts."""
+        """Handles another start of the subtree: only the next judgement matters."""
         super().begin(context)
         self._begins = True
 
@@ -216,14 +216,14 @@ class HoldsNothingElse(Condition):
 
 @dataclass
 class KnowsPlace(Condition):
-    """Condition that the robot is localised; PRECONDITION after `patience_s` (robot's clock) without."""
+    """Condition that the robot is localised; PRECONDITION after `patience_s` (robot's clock) without localisation."""
 
     reading = "its place"
     freshness = Freshness(2.0)
     patience_s: float = 5.0
 
     def stamp_s(self, context: RunContext) -> float:
-        """Stamp (s) of the estimate."""
+        """Stamp (s) of the localiser's estimate."""
         return context.localiser.estimate().stamp_s
 
     def judge(self, context: RunContext) -> Verdict:
@@ -240,31 +240,31 @@ class KnowsPlace(Condition):
 
 @dataclass
 class BatteryAtLeast(Condition):
-    """Condition that the battery's charge (0 to 1) is at least `charge`; accepts old readings, as it changes slowly."""
+    """Condition that the battery's charge (0 to 1) is at least `charge`; accepts old readings of the slow charge."""
 
     reading = "the battery"
     freshness = Freshness(10.0, StaleData.ACCEPT)
     charge: float
 
     def stamp_s(self, context: RunContext) -> float:
-        """Stamp (s) of the battery."""
+        """Stamp (s) of the battery's reading."""
         return context.robot.battery().stamp_s
 
     def judge(self, context: RunContext) -> Verdict:
-        """Returns a failure with PRECONDITION when the charge is below the least one."""
+        """Returns a failure with PRECONDITION when the charge is below the least charge."""
         charge, least = context.robot.battery().charge, self.least(context)
         if charge >= least:
             return None
         return Failed(Cause.PRECONDITION, f"the battery is at {charge:.0%}, less than {least:.0%}")
 
     def least(self, context: RunContext) -> float:
-        """Least charge that suffices here."""
+        """Least charge that suffices at the robot's pose."""
         return self.charge
 
 
 @dataclass
 class BatteryForWork(BatteryAtLeast):
-    """Condition that the charge is at least `charge`, and suffices for the route to the dock.
+    """Condition that the charge is at least `charge`, and enough to reach the dock.
 
     The length of the route is estimated as twice the straight distance, at `per_m` of charge for each metre.
     """
@@ -273,14 +273,14 @@ class BatteryForWork(BatteryAtLeast):
     per_m: float = 0.0008
 
     def least(self, context: RunContext) -> float:
-        """Least charge that suffices here; it grows with the distance to the dock."""
+        """Least charge that suffices at the robot's pose; it grows with the distance to the dock."""
         here = context.pose()
         return max(self.charge, 2.0 * self.per_m * math.hypot(here.x_m - self.dock.x_m, here.y_m - self.dock.y_m))
 
 
 @dataclass
 class NoStopButton(Condition):
-    """Condition that no stop button is pressed; the mission stands still while one is."""
+    """Condition that no stop button is pressed; suspends the mission while one is pressed."""
 
     def judge(self, context: RunContext) -> Verdict:
         """Returns Waiting while a stop button is pressed."""
@@ -290,7 +290,7 @@ class NoStopButton(Condition):
 
 @dataclass
 class OwnLease(Condition):
-    """Condition that no other program holds the robot's lease; the mission stands still while one does."""
+    """Condition that no other program holds the robot's lease; suspends the mission while one holds it."""
 
     def judge(self, context: RunContext) -> Verdict:
         """Returns Waiting while another program holds the lease."""
@@ -302,17 +302,17 @@ class OwnLease(Condition):
 
 @dataclass
 class NotAfter(Condition):
-    """Condition that at most `limit_s` on the robot's clock have passed since the run began; TIMEOUT after that."""
+    """Condition that the run began at most `limit_s` ago (s on the robot's clock); TIMEOUT afterwards."""
 
     limit_s: float
     _begun_s: float = field(default=0.0, init=False, repr=False, compare=False)
 
     def run_begins(self, context: RunContext) -> None:
-        """Counts from now on."""
+        """Starts to count the time limit."""
         self._begun_s = context.clock.now()
 
     def judge(self, context: RunContext) -> Verdict:
-        """Returns a failure when the time is over."""
+        """Returns a failure when the time limit is exceeded."""
         if context.clock.now() - self._begun_s <= self.limit_s:
             return None
         return Failed(Cause.TIMEOUT, f"more than {self.limit_s:g} s have passed since the mission began")

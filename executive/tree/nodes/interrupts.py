@@ -2,7 +2,7 @@
 
     stop button > lost lease > battery low > localisation lost > mission
 
-A monitor that is violated ends the mission. An interrupt that is called suspends all below it and does its work (it
+A violated monitor ends the mission. A called interrupt suspends everything of lower priority and does its work (it
 charges at the dock, or localises the robot); then the mission continues where it was.
 """
 
@@ -58,7 +58,7 @@ class Monitor(ExplainedLeaf):
         self.condition.begin(self.context)
 
     def wants_tick(self, mission: Behaviour) -> bool:
-        """Returns True: a monitor is ticked at every tick."""
+        """Returns True, because a monitor is ticked at every tick."""
         return True
 
     def update(self) -> Status:
@@ -107,7 +107,7 @@ class Interrupt(ExplainedDecorator):
             condition.begin(self.context)
 
     def wants_tick(self, mission: Behaviour) -> bool:
-        """Returns whether it is running or called; sets `waiting` while its condition cannot be judged."""
+        """Returns whether the interrupt is running or called; sets `waiting` while its condition cannot be judged."""
         self.waiting = ""
         if self.status == Status.RUNNING:
             return True
@@ -124,7 +124,7 @@ class Interrupt(ExplainedDecorator):
         return True
 
     def initialise(self) -> None:
-        """Counts a call."""
+        """Counts the call that begins."""
         self.count += 1
         self.condition.note_call()
 
@@ -195,7 +195,7 @@ class Interrupts(MemoryComposite):
 
 
 def watch_plan(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
-    """Builds the root with monitors and interrupts above the mission; `builder` is the mission's own.
+    """Builds the root with monitors and interrupts above the mission; `builder` is the builder of the mission.
 
     Raises InputError when a skill that the interrupts need is not registered.
     """
@@ -210,7 +210,7 @@ def watch_plan(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
 
 
 def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
-    """Charges at the dock and returns to the earlier pose; urgent at half of the charge that calls it."""
+    """Charges at the dock and returns to the earlier pose; urgent below half of the charge that triggers charging."""
     facts, dock = builder.knowledge.battery, pose_2d(place)
     key = builder.key("where")
     work = builder.at("charge").sequence(

@@ -1,4 +1,4 @@
-"""People: plans and nodes to find a person, and to go to, follow, guide and greet them.
+"""Plans and nodes to find a person, and to go to, follow, guide and greet people.
 
 The robot recognises no faces. Among several people, it asks each "Are you Robin?".
 """
@@ -43,16 +43,16 @@ STILL_NEAR_S: Final = 120.0
 
 
 class OnlyIfNear(OnlyIfKnown):
-    """Composite that applies while the robot is near the person under `key` and met them a short time ago.
+    """Composite that applies while the robot is near the person under `key` and saw them a short time ago.
 
-    Status as its only child.
+    Has the status of its only child.
     """
 
     kind = "only if near"
     context: RunContext
 
     def applies(self) -> bool:
-        """Returns whether a person was met here a short time ago."""
+        """Returns whether the robot is near where it saw the person a short time ago."""
         if not super().applies():
             return False
         met, here = self.board.get(self.key), self.context.pose()
@@ -72,7 +72,7 @@ class AskWhoItIs(AskPeople):
     | nobody answers within `limit_s` | FAILURE with TIMEOUT |
     | halted | INVALID with CANCELLED; the question is withdrawn |
 
-    After a success the observation of the person stands under `met`, and the robot's pose beside them under `beside`.
+    After a success, the person's observation is written under `met`, and the robot's pose beside them under `beside`.
     """
 
     kind = "who is it"
@@ -89,7 +89,7 @@ class AskWhoItIs(AskPeople):
         return {**super().writes(options), options["met"]: ObjectObservation, options["beside"]: Pose2D}
 
     def initialise(self) -> None:
-        """Asks, if there is any doubt."""
+        """Asks the person, unless there is no doubt."""
         known = self.context.board
         self._asks = self.always or (self.observations in known and len(known.get(self.observations)) > 1)
         self.clear_explanation()
@@ -97,7 +97,7 @@ class AskWhoItIs(AskPeople):
             super().initialise()
 
     def update(self) -> Status:
-        """Acts on the answer when there is one."""
+        """Acts on the person's answer once there is one."""
         if not self._asks:
             return self._met(f"{describe_seen(self._here())}, taken for {self.person}, since nobody else is known")
         status = super().update()
@@ -112,7 +112,7 @@ class AskWhoItIs(AskPeople):
         return self._met(f"{where} is {self.person}")
 
     def report(self, answer: Value) -> None:
-        """Leaves the answer out of the findings, since the claim tells who was met."""
+        """Adds no finding, because the mission's claim says who was met."""
 
     def _here(self) -> ObjectObservation:
         here: ObjectObservation = self.context.board.get(self.seen)
@@ -131,9 +131,9 @@ def describe_seen(seen: ObjectObservation) -> str:
 
 
 class EachInTurn(ForEachFound):
-    """Composite like `ForEachFound`, for people and rooms: a look finds the next one under `key`, an action goes there.
+    """Composite like `ForEachFound`, but for people or rooms: a look writes the next under `key`, an action goes there.
 
-    All whose turn is over stand under `done`. Status as there, except:
+    The people or rooms that had their turn are written under `done`. Status as there, except:
 
     | look | action | status |
     |---|---|---|
@@ -141,7 +141,7 @@ class EachInTurn(ForEachFound):
     | SUCCESS | SUCCESS, with `first` | SUCCESS |
     | SUCCESS | FAILURE other than ERROR or CANCELLED | RUNNING; the next tick looks again |
 
-    With `first` and `expected`, a single person who gave no answer counts at the end; the message says so.
+    With `first` and `expected`, if a single person gave no answer, that person counts as found; the message says so.
     """
 
     kind = "each in turn"
@@ -196,7 +196,7 @@ class EachInTurn(ForEachFound):
 class NearRoom(ExplainedLeaf):
     """Leaf that checks that the robot is in a room, or at most `NEAR_ROOM_M` from it, with a view of its people.
 
-    SUCCESS if it is, else FAILURE with EXECUTION.
+    SUCCESS if the robot is there, else FAILURE with EXECUTION.
     """
 
     kind = "near room"
@@ -213,9 +213,9 @@ class NearRoom(ExplainedLeaf):
 
 
 class NextRoom(ExplainedLeaf):
-    """Leaf that chooses the nearest of `places` whose turn is not `over`, and writes its name, pose and outline.
+    """Leaf that chooses the nearest of `places` that is not in `over`, and writes its name, pose and outline.
 
-    SUCCESS while there is one, else FAILURE with POSTCONDITION.
+    SUCCESS while such a place is left, else FAILURE with POSTCONDITION.
     """
 
     kind = "next room"
@@ -228,7 +228,7 @@ class NextRoom(ExplainedLeaf):
     context: RunContext
 
     def update(self) -> Status:
-        """Chooses a room."""
+        """Chooses the next room."""
         board, here = self.context.board, self.context.pose()
         over = board.get(self.over) if self.over in board else ()
         left = {name: pose_2d(place.pose) for name, place in self.places.items() if name not in over}
@@ -247,7 +247,7 @@ def person_text(person: str) -> str:
 
 
 def person_of(builder: PlanBuilder) -> str:
-    """Returns the person of the command: a known person, `ANYBODY` or `SPEAKER`. Raises InputError otherwise."""
+    """Returns the person whom a command names: a known person, `ANYBODY` or `SPEAKER`. Raises InputError otherwise."""
     whom = builder.command.object
     name = "" if whom is None else whom.name
     person = SPEAKER if name == SPEAKER else builder.knowledge.somebody(name)
@@ -282,7 +282,7 @@ def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> No
 
 
 def _elsewhere_plan(builder: PlanBuilder, person: str, rooms: tuple[str, ...]) -> NodeSpec:
-    """Goes through rooms until the person is met."""
+    """Searches room after room until the person is met."""
     room, pose, area, over = (builder.key(name) for name in ("room", "pose", "area", "rooms"))
     places = MappingProxyType({each: builder.knowledge.places[each] for each in rooms})
     following = builder.node(
@@ -300,7 +300,7 @@ def _elsewhere_plan(builder: PlanBuilder, person: str, rooms: tuple[str, ...]) -
 def _meet_one_plan(
     builder: PlanBuilder, person: str, ports: Mapping[str, object], *, expected: bool = True
 ) -> NodeSpec:
-    """Goes to one person after the other, until one of them is the right one."""
+    """Goes to one person after another, until one of them is the requested person."""
     seen, observations, met = builder.key("seen"), builder.key("all"), builder.met_key(person)
     who = builder.node(
         "who is it",
@@ -327,7 +327,7 @@ def _meet_one_plan(
 
 
 def _in_room(builder: PlanBuilder, room: str, then: NodeSpec) -> NodeSpec:
-    """Goes to a room, and does something there."""
+    """Goes to a room, and then runs another node there."""
     place = builder.knowledge.places[room]
     to = _to_room(builder, pose_2d(place.pose), Constant(place.polygon), f"the {room}")
     return builder.sequence(f"in the {room}", to, then)
@@ -362,7 +362,7 @@ def _each_in_turn(
 
 
 def _go_beside(builder: PlanBuilder, person: str, key: str, place: object = "", **options: object) -> NodeSpec:
-    """Goes to the person detected under a key, in a room called `place`; updates the person's position there."""
+    """Goes beside the person detected under a key, in a room called `place`; updates the person's position."""
     ports = {"person": person, "place_W": PlaceOf(key), "place": place, **options}
     return builder.skill("meet_person", ports, {"person": key})
 
@@ -377,7 +377,7 @@ def go_to_goal_plan(builder: PlanBuilder, goal: str) -> NodeSpec:
 
 
 def follow_plan(builder: PlanBuilder) -> NodeSpec:
-    """Follows a person, after finding them; the speaker, or anybody, is the person before the robot."""
+    """Finds a person and follows them; the speaker, or anybody, is the person in front of the robot."""
     person, goal = person_of(builder), builder.command.goal
     ports: dict[str, object] = {"person": ANYBODY if person == SPEAKER else person}
     if goal is not None:
@@ -388,7 +388,7 @@ def follow_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def guide_plan(builder: PlanBuilder) -> NodeSpec:
-    """Guides a person to a place, after finding them."""
+    """Finds a person and guides them to a place."""
     person, goal = person_of(builder), builder.command.goal
     if goal is None:
         raise builder.error(f"it is not said where to guide {person_text(person)}", "name a place")
@@ -400,7 +400,7 @@ def guide_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def _guided_area(builder: PlanBuilder, goal: str) -> tuple[tuple[float, float], ...]:
-    """Outline of the room to which a person is guided; the room around the start, or of another person's place."""
+    """Outline of the room that a person is guided to: that of the place, of the start, or of another person's place."""
     knowledge, person = builder.knowledge, builder.knowledge.person(goal)
     if goal == START:
         at = (knowledge.start.x, knowledge.start.y)
@@ -417,7 +417,7 @@ def _with_person(builder: PlanBuilder, person: str, title: str, skill: str, port
 
 
 def greet_plan(builder: PlanBuilder) -> NodeSpec:
-    """Greets a person, or each person in a room once. Raises InputError when the room is not said."""
+    """Greets a person, or once each person in a room. Raises InputError when the command names no room."""
     person, goal = person_of(builder), builder.command.goal
     place = None if goal is None else builder.place(goal)
     if person == SPEAKER:

@@ -1,7 +1,7 @@
-"""Plans to pick an object up: approach it, grasp it, draw the arm in, with recoveries for each failure.
+"""Plans to pick up an object: approach it, grasp it, draw the arm in, with recoveries for each failure.
 
-Other recoveries stand with their work: of drives in `executive.tree.plan`, of searches in
-`executive.tree.nodes.search`, of a dropped object in `executive.tree.nodes.carry`, of charging in
+Other recoveries are defined beside the work that fails: drives in `executive.tree.plan`, searches in
+`executive.tree.nodes.search`, a dropped object in `executive.tree.nodes.carry`, charging in
 `executive.tree.nodes.dock`.
 """
 
@@ -61,7 +61,7 @@ def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> Nod
 
 
 def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float, float], Pose2D | FromBoard]:
-    """Returns poses beside a goal by their offsets (m); for a known goal only those in the same room."""
+    """Returns poses beside a goal by their offsets (m); if the goal is known now, only poses in the same room."""
     if isinstance(pose, FromBoard):
         return {offset: BesideBoard(pose.key, *offset) for offset in NEARBY_M}
     rooms = [
@@ -82,7 +82,7 @@ def pick_up_plan(
     *,
     seen: bool = False,
 ) -> NodeSpec:
-    """Finds an object (`search`, which writes `key`), approaches it, grasps it and draws the arm in, with recoveries.
+    """Finds an object by `search`, which writes `key`, approaches and grasps it, and draws the arm in, with recoveries.
 
     A failure ends with the arm stowed. With `seen`, an earlier node has just written `key`, and the search runs only
     before further attempts.
@@ -152,7 +152,7 @@ def tuck_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def held_plan(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
-    """Builds a branch that succeeds while the gripper holds the object of an earlier step."""
+    """Builds a branch that succeeds while the gripper holds the object that an earlier step grasped."""
     below = builder.at("in-gripper")
     return below.node(
         "only if holding", f"the {item} is in the gripper", below.pause("settle", "hold it", LOOK_AGAIN_S)
@@ -160,12 +160,12 @@ def held_plan(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
 
 
 def known_held_plan(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
-    """Draws the arm in if a failed or interrupted grasp holds the object, and no other one."""
+    """Draws the arm in if the gripper holds the object, and no other, after a failed or interrupted grasp."""
     known = {"known_as": builder.search_classes(item.name), "attributes": item.attributes}
     tuck = _tucked(builder, item)
     return builder.node("only if holding", f"it took hold of the {item}", tuck, part="only-if", **known)
 
 
 def _tucked(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
-    """Draws the arm in under a guard that the gripper holds the object."""
+    """Draws the arm in, with a guard that the gripper holds the object."""
     return builder.node("guard", f"holding the {item}", tuck_plan(builder), part="held", condition=Holds(str(item)))

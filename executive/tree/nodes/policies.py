@@ -1,4 +1,4 @@
-"""Policy of a step or of a whole mission: nodes around its subtree.
+"""Builds the policy of a step or of a whole mission as nodes around its subtree.
 
 From the inside: the subtree, its timeout, its retries, its guards, and the action after a failure (skip, ask, go back).
 So each attempt has its own time, and a violated guard ends all attempts.
@@ -37,7 +37,7 @@ STOP: Final = "stop"
 
 
 class Timeout(ExplainedDecorator):
-    """Decorator with a time limit on the robot's clock; suspended time does not count. `late` is said at the limit.
+    """Decorator with a time limit on the robot's clock; suspended time does not count. `late` is the failure's message.
 
     | child | time | status |
     |---|---|---|
@@ -55,12 +55,12 @@ class Timeout(ExplainedDecorator):
 
     @classmethod
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
-        """Limits the estimate to a timeout."""
+        """Limits the child's estimate to the timeout."""
         taken, limit_s = walk.all_of(node, first), node.options["limit_s"]
         return taken if taken.most_s <= limit_s else taken.up_to(limit_s, f"{limit_s:g} s at most")
 
     def initialise(self) -> None:
-        """Starts the time."""
+        """Starts to count the time limit."""
         self._time = StoppableTime(self.clock)
 
     def suspend(self) -> None:
@@ -68,7 +68,7 @@ class Timeout(ExplainedDecorator):
         self._time.stop()
 
     def update(self) -> Status:
-        """Returns the child's status, unless the time is over."""
+        """Returns the child's status, or FAILURE when the time limit is exceeded."""
         self._time.go_on()
         late = self._time.elapsed_s() > self.limit_s
         if late and self.decorated.status != Status.FAILURE:
@@ -77,7 +77,7 @@ class Timeout(ExplainedDecorator):
 
 
 class Retry(ExplainedDecorator):
-    """Decorator that tries again after failures with given causes.
+    """Decorator that starts its child again after failures with the given causes.
 
     | child | status |
     |---|---|
@@ -98,7 +98,7 @@ class Retry(ExplainedDecorator):
         self.attempt = 1
 
     def update(self) -> Status:
-        """Returns the child's status, unless another attempt is due."""
+        """Returns the child's status, or RUNNING when another attempt follows."""
         status = self.pass_on()
         if status != Status.FAILURE:
             return status
@@ -112,7 +112,7 @@ class Retry(ExplainedDecorator):
 
 
 class Skip(ExplainedDecorator):
-    """Decorator of a step that may fail; `step` is the step in words.
+    """Decorator that turns a step's failure into a success; `step` describes the step in words.
 
     | child | status |
     |---|---|
@@ -128,11 +128,11 @@ class Skip(ExplainedDecorator):
     skipped: str | None = field(default=None, init=False)
 
     def initialise(self) -> None:
-        """Clears the reason of an earlier skip."""
+        """Clears the reason for an earlier skip."""
         self.skipped = None
 
     def update(self) -> Status:
-        """Returns the child's status, or skips a failure."""
+        """Returns the child's status, or SUCCESS instead of a failure that may be skipped."""
         status = self.pass_on()
         if status != Status.FAILURE or self.cause in FINAL_CAUSES:
             return status
@@ -144,14 +144,14 @@ class Skip(ExplainedDecorator):
         return f"{self.step} ({self.skipped})" if is_skipped else None
 
     def skip(self) -> Status:
-        """Returns SUCCESS, and notes the child's failure as the reason."""
+        """Returns SUCCESS, and records the child's failure as the reason for the skip."""
         self.skipped, self.cause = self.message, None
         self.message = f"skipped: {self.skipped}"
         return Status.SUCCESS
 
 
 class AskOperator(Skip):
-    """Decorator of a step about which the operator is asked when it fails.
+    """Decorator that asks the operator what to do when a step fails.
 
     | child | answer | status |
     |---|---|---|
@@ -194,7 +194,7 @@ class AskOperator(Skip):
         super().stop(new_status)
 
     def _held_back(self) -> Status | None:
-        """Acts on the answer when there is one."""
+        """Acts on the operator's answer once there is one."""
         if self._asked is None or not self._asked.done():
             return None if self._asked is None else Status.RUNNING
         answer, self._asked, failure = self._asked.result(), None, self._failure
@@ -207,7 +207,7 @@ class AskOperator(Skip):
 
 
 class GoBack(MemoryComposite):
-    """Composite that drives back (the second child) after a failure of the work (the first child).
+    """Composite that drives back (second child) if the work (first child) fails.
 
     | work | drive back | status |
     |---|---|---|
@@ -241,7 +241,7 @@ class GoBack(MemoryComposite):
 
 
 class Summary(ExplainedDecorator):
-    """Decorator of a mission in which steps may be skipped; `steps` are the path ids of its steps' outermost nodes.
+    """Decorator for a mission that may skip steps; `steps` are the path ids of the outermost node of each step.
 
     | child | status |
     |---|---|
@@ -288,12 +288,12 @@ class RememberPose(ExplainedLeaf):
 
     @classmethod
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
-        """Notes the pose."""
+        """Stores the pose of the walk under the node's key."""
         walk.noted[node.options["key"]] = walk.pose
         return Estimate()
 
     def initialise(self) -> None:
-        """Starts the patience."""
+        """Starts to count the patience."""
         self.clear_explanation()
         self._started_s = self.context.clock.now()
 
@@ -339,7 +339,7 @@ def under_policy(
 
 
 def _conditions(guards: Guards) -> Iterator[tuple[str, str, Condition]]:
-    """Iterates over the guards, the outermost last: part of the path id, name and condition."""
+    """Yields the guards, the outermost last: end of the path id, name and condition of each."""
     if guards.localised:
         yield "guard-localised", "knows where it is", KnowsPlace(stale=guards.stale)
     if guards.time_s is not None:

@@ -1,4 +1,4 @@
-"""Recovery by cause: an attempt, and recoveries for certain failures.
+"""Retries an attempt after recoveries that depend on the cause of its failure.
 
 After a failure one recovery runs, then the next attempt. All counts are bounded; attempts share only intended data.
 """
@@ -23,10 +23,9 @@ from skills.api import Cause, ObjectObservation
 
 @dataclass(frozen=True)
 class Trigger:
-    """Kind of failure: of the node `node` (None: of the whole attempt), with one of `causes`.
+    """Failure that triggers a recovery: the node `node` (None: the whole attempt) failed with one of `causes`.
 
-    With `own`, the failure must be the node's own, such as a guard's, not that of a node below it. A final failure fits
-    no trigger.
+    With `own`, the node itself must have caused the failure, as a guard does. A final failure fits no trigger.
     """
 
     causes: frozenset[Cause]
@@ -38,7 +37,7 @@ class Trigger:
         return f"{causes} of {self.node}" if self.node else causes
 
     def fits(self, attempt: Behaviour) -> bool:
-        """Returns whether an attempt has such a failure."""
+        """Returns whether a node in the attempt has failed in this way."""
         return any(self._fits(node, attempt) for node in attempt.iterate())
 
     def _fits(self, node: Behaviour, attempt: Behaviour) -> bool:
@@ -53,10 +52,10 @@ class Trigger:
 
 @dataclass(frozen=True)
 class Recovery:
-    """Rule of a recovery: it runs after failures that fit one of the triggers, at most `uses` times.
+    """Rule for a recovery, which runs after failures that fit one of the triggers, at most `uses` times.
 
-    With `given` it runs only while the blackboard has a value under this key. After a failed `final` recovery no other
-    one runs. The success of a recovery that `completes` is the success of the whole.
+    With `given` it runs only while the blackboard has a value under this key. If a `final` recovery fails, no other
+    recovery runs. If a recovery that `completes` succeeds, the whole node succeeds without another attempt.
     """
 
     triggers: tuple[Trigger, ...]
@@ -70,11 +69,11 @@ class Recovery:
         return f"after {' or '.join(map(str, self.triggers))}{times}"
 
     def bind(self, paths: Mapping[str, str]) -> Recovery:
-        """Replaces the names of steps in its triggers by the path ids of their nodes."""
+        """Replaces the names of steps in the triggers by the path ids of their nodes."""
         return replace(self, triggers=tuple(replace(each, node=paths[each.node or ""]) for each in self.triggers))
 
     def fits(self, attempt: Behaviour, board: Board) -> bool:
-        """Returns whether it fits the failure of an attempt."""
+        """Returns whether the rule's triggers fit the failure of an attempt."""
         if self.given is not None and not (self.given in board and board.get(self.given)):
             return False
         return any(trigger.fits(attempt) for trigger in self.triggers)
@@ -82,7 +81,7 @@ class Recovery:
 
 @dataclass(frozen=True)
 class _AttemptFailure:
-    """Failure of an attempt, and the number of its successful steps."""
+    """Failure of an attempt, and how many of its steps had succeeded."""
 
     cause: Cause
     message: str
@@ -95,7 +94,7 @@ class _AttemptFailure:
 
 
 class Recover(MemoryComposite):
-    """Composite of an attempt (the first child) and recoveries (the others, each with its `Recovery` rule).
+    """Composite of an attempt (first child) and recoveries (other children, each with its `Recovery` rule).
 
     | attempt | recovery | status |
     |---|---|---|
@@ -110,9 +109,9 @@ class Recover(MemoryComposite):
     | halted | halted | INVALID with CANCELLED |
 
     A recovery that does not apply (`Conditional`) does not fit. The failure has the cause and the message of the
-    attempt with the most successful children, the last of several: if a grasp slips and the next search finds nothing,
-    the slip is decisive. The messages of the last attempt and of a failed recovery are appended; a recovery's ERROR is
-    the cause. A new start counts recoveries from zero and clears the blackboard keys in `forgets`.
+    attempt in which most children succeeded (of several, the last): if a grasp slips and the next search finds nothing,
+    the slip is decisive. The messages of the last attempt and of a failed recovery are appended; if a recovery failed
+    with ERROR, this is the cause. A new start counts recoveries from zero and clears the blackboard keys in `forgets`.
     """
 
     kind = "recover"
@@ -146,7 +145,7 @@ class Recover(MemoryComposite):
             self._recovery_ended(child)
 
     def _attempt_ended(self, attempt: Behaviour) -> None:
-        """Ends after a success; queues the recoveries that fit a failure."""
+        """Ends after a successful attempt; after a failure, queues the recoveries that fit."""
         if attempt.status == Status.SUCCESS:
             self._end(None, message_of(attempt))
             return
@@ -195,7 +194,7 @@ class Recover(MemoryComposite):
 
 
 class Afterwards(MemoryComposite):
-    """Composite of work (the first child) and of a step that tidies up after it (the second), after any result.
+    """Composite of work (first child) and of a step that tidies up after any result of the work (second child).
 
     | work | tidying | status |
     |---|---|---|
@@ -211,7 +210,7 @@ class Afterwards(MemoryComposite):
 
     @classmethod
     def usual_children(cls, node: NodeSpec) -> tuple[NodeSpec, ...]:
-        """Returns the work, and what always follows it."""
+        """Returns the work, and the tidying step if it follows every result."""
         return node.children[:1] if node.options.get("only_after_failure") else node.children
 
     def _following(self, child: Behaviour) -> int | None:
@@ -231,7 +230,7 @@ class Afterwards(MemoryComposite):
 
 
 class OnlyIfKnown(MemoryComposite):
-    """Composite that applies only while the blackboard has a value under `key`; status as its only child."""
+    """Composite that applies only while the blackboard has a value under `key`; has the status of its only child."""
 
     kind = "only if known"
     output_types: ClassVar = {"key": ObjectObservation}
@@ -251,7 +250,7 @@ class OnlyIfKnown(MemoryComposite):
 
 
 class OnlyIfHolding(MemoryComposite):
-    """Composite that applies only while the gripper holds an object; status as its only child.
+    """Composite that applies only while the gripper holds an object; has the status of its only child.
 
     With `known_as`, the object must have been recognised as one of these classes with all `attributes`.
     """
@@ -263,7 +262,7 @@ class OnlyIfHolding(MemoryComposite):
     attributes: tuple[str, ...] = ()
 
     def applies(self) -> bool:
-        """Returns whether the gripper holds an object, or that object."""
+        """Returns whether the gripper holds an object, and one of the classes `known_as` if given."""
         if not self.context.robot.gripper().holding:
             return False
         return self.known_as is None or is_known_as(self.context.payload.kind, self.known_as, self.attributes)

@@ -1,4 +1,4 @@
-"""Repetition of steps in rounds: the plan and its node."""
+"""Repeats steps in rounds: the plan and its node."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -26,7 +26,7 @@ from skills.robot import Clock
 
 
 class Repeat(MemoryComposite):
-    """Composite that repeats its last child, the body; a decision, whose answer stands under `key`, may come before it.
+    """Composite that repeats its last child, the body; a decision, which writes its answer under `key`, may precede it.
 
     | decision | body | status |
     |---|---|---|
@@ -43,8 +43,8 @@ class Repeat(MemoryComposite):
     | none (mode `times`) | SUCCESS | RUNNING until the next round; SUCCESS after `times` rounds |
     | halted | halted | INVALID with CANCELLED |
 
-    A round begins in the tick after the end of the one before, and not before `every_s` have passed since that one
-    began. `count` is the blackboard key of the number of begun rounds.
+    A round begins in the tick after the previous round ended, at the earliest `every_s` after the previous round began.
+    The number of rounds begun is written under the blackboard key `count`.
     """
 
     kind = "repeat"
@@ -63,7 +63,7 @@ class Repeat(MemoryComposite):
 
     @classmethod
     def _repeated(cls, node: NodeSpec, walk: Walk, first: bool, begun: Estimate, times: int) -> Estimate:
-        """Estimates all rounds, of which the first is `begun`."""
+        """Estimates all rounds; `begun` is the estimate of the first round."""
         if times == 1:
             return begun
         again, more = walk.all_of(node, first), times - 1
@@ -74,7 +74,7 @@ class Repeat(MemoryComposite):
 
     @classmethod
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
-        """Estimates a known number of rounds, else at least one; the second round stands for all later ones."""
+        """Estimates the known number of rounds, else one round; the second round stands for all later rounds."""
         times, fixed = node.options["times"], node.options["mode"] == "times"
         begun = walk.all_of(node, first)
         if fixed and times:
@@ -211,7 +211,7 @@ def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> As
 
 
 def _refuse_endless(block: model.Repeat, condition: Condition | None, builder: PlanBuilder) -> None:
-    """Raises InputError for rounds that never end, since no step changes the values of their condition."""
+    """Raises InputError for rounds that never end, because no step changes the values that their condition reads."""
     if condition is None or block.loop.times is not None or block.timeout_s is not None:
         return
     read: set[str] = set()
@@ -225,7 +225,7 @@ def _refuse_endless(block: model.Repeat, condition: Condition | None, builder: P
 
 
 def _given(steps: Iterable[Step]) -> set[str]:
-    """Returns the names that steps may give a value."""
+    """Returns the names to which the steps may give a value."""
     found: set[str] = set()
     for step in (below for each in steps for below in each.walk()):
         match step:

@@ -1,4 +1,4 @@
-"""Search for objects and people: viewpoints in order, and the answer whether they are there."""
+"""Searches for objects and people from viewpoints in order, and answers whether they are there."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -40,7 +40,7 @@ _TALLY: Final = "observations"
 
 
 class Answer(ExplainedDecorator):
-    """Decorator that turns a search into the answer yes or no.
+    """Decorator that turns the result of a search into the answer yes or no.
 
     | child | surfaces | status |
     |---|---|---|
@@ -53,11 +53,11 @@ class Answer(ExplainedDecorator):
     | with `tallies`: ended, fewer counted | some not seen | FAILURE with the cause that prevented the look |
     | halted | any | INVALID with CANCELLED |
 
-    `looks` has the leaves of each surface, one for each viewpoint; the surface is seen when all of them succeeded, or
+    `looks` has the leaves for each surface, one for each viewpoint; a surface is seen when each leaf succeeded or
     failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; with `tells` it includes the found object.
-    `question` is the text of a yes, `denied` of a no; without `yes_or_no` they stand alone, since "is it empty" and "is
-    there anything on it" are one question. The leaves write all found objects under the blackboard keys `tallies`. Each
-    object counts once; the number goes to `count_key`, if given.
+    `question` is the text for yes, `denied` the text for no; without `yes_or_no` the text stands alone, because "is it
+    empty" and "is there anything on it" are one question. The leaves write all found objects under the blackboard keys
+    `tallies`. Each object counts once; the number is written under `count_key`, if given.
     """
 
     kind = "answer"
@@ -85,11 +85,11 @@ class Answer(ExplainedDecorator):
         self.answer = self.board.get(self.key) if status == Status.SUCCESS else None
 
     def initialise(self) -> None:
-        """Clears an earlier answer."""
+        """Clears the answer of an earlier run."""
         self.answer = None
 
     def update(self) -> Status:
-        """Answers as soon as the search is over."""
+        """Answers once the search has ended."""
         status = self.pass_on()
         if status == Status.RUNNING:
             return status
@@ -132,7 +132,7 @@ class Answer(ExplainedDecorator):
 
 
 def _looked(leaves: Sequence[str], nodes: Mapping[str, Explained]) -> bool:
-    """Returns whether each of the leaves took a look, with or without a found object."""
+    """Returns whether each of these leaves took a look, even if it found nothing."""
     looks = [nodes.get(leaf) for leaf in leaves]
     return all(look and (look.status == Status.SUCCESS or look.cause == Cause.POSTCONDITION) for look in looks)
 
@@ -140,8 +140,10 @@ def _looked(leaves: Sequence[str], nodes: Mapping[str, Explained]) -> bool:
 def surfaces_elsewhere(
     knowledge: Knowledge, item: str, place: str | None, avoided: frozenset[str] = frozenset()
 ) -> tuple[str, ...]:
-    """Returns the surfaces to search when the object is not in its place: its usual places, then others of the same
-    room, then the rest, the nearest first; at most `MOST_ELSEWHERE`, and none in `avoided`."""
+    """Returns the surfaces to search when the object is not in its place, at most `MOST_ELSEWHERE`, none in `avoided`.
+
+    Its usual surfaces come first, then others in the same room, then the nearest others.
+    """
     if place is None:
         return ()
     usual = (name for spot in knowledge.usual_surfaces(item) for name in knowledge.surfaces_in(spot))
@@ -165,8 +167,8 @@ def look_plans(
 ) -> tuple[tuple[str, NodeSpec], ...]:
     """Builds a drive and a look for each surface and viewpoint; returns them with the names of the surfaces.
 
-    The detected object goes to `key`; `extra` are further ports of `detect`. With `tallied`, all objects of a look go
-    to a key of its own (see `tally_of`).
+    The detected object is written under `key`; `extra` are more inputs of `detect`. With `tallied`, each look writes
+    all objects that it found under a separate key (see `tally_of`).
     """
     plans = []
     for name in surfaces:
@@ -180,7 +182,7 @@ def look_plans(
 
 
 def tally_of(leaf: NodeSpec) -> str:
-    """Returns the blackboard key to which the leaf of a tallied look writes all found objects."""
+    """Returns the blackboard key under which a tallied look writes all objects that it found."""
     key: str = leaf.options["outputs"][_TALLY]
     return key
 
@@ -190,7 +192,7 @@ def people_looks(
 ) -> tuple[tuple[str, NodeSpec], ...]:
     """Builds a drive and a look around for each room of the search for a person; see `look_plans`.
 
-    Raises InputError for a surface as the place, and for one of several people, because all look alike to the robot.
+    Raises InputError for a surface as the place, and for a named person among several, who all look alike to the robot.
     """
     knowledge = builder.knowledge
     if place in knowledge.surfaces:
@@ -218,7 +220,7 @@ def detect_plan(
     *,
     tallied: bool = False,
 ) -> NodeSpec:
-    """Looks for the object on surfaces, by name or from the blackboard, from the robot's present pose."""
+    """Looks for the object from the robot's present pose, on surfaces given by name or on the blackboard."""
     where_to_look: tuple[Surface, ...] | FromBoard
     if isinstance(surfaces, FromBoard):
         where_to_look = surfaces
@@ -230,7 +232,7 @@ def detect_plan(
 
 
 def find_again_plan(builder: PlanBuilder, item: ObjectKind, surfaces: tuple[str, ...], key: str) -> NodeSpec:
-    """Looks from the present pose at the place where the object was detected before, and at the floor beside."""
+    """Looks from the present pose at the place where the object was detected before, and at the floor beside it."""
     seen_on = SurfaceOfDetection(key, tuple(map(builder.surface, surfaces)))
     floor = builder.optional_ports("detect", {"floor": True})
     look = detect_plan(builder, item, seen_on, key, floor)
@@ -242,9 +244,9 @@ def search_plan(
 ) -> NodeSpec:
     """Looks for the object where it was detected before, then at each surface; the first detection ends the search.
 
-    If it is not in its place, the robot looks at some surfaces from the side, then, with `anywhere`, at surfaces
-    elsewhere. At the surface of another robot's last detection, the floor nearby counts too, since the object may have
-    fallen out of that robot's gripper. Raises InputError when the place has no surfaces.
+    If the object is not in its place, the robot looks at up to `MOST_ASIDE` surfaces from the side, then, with
+    `anywhere`, at surfaces elsewhere. Where another robot last detected the object, the floor nearby is searched too,
+    because the object may have fallen out of that robot's gripper. Raises InputError when the place has no surfaces.
     """
     surfaces = surfaces_first_known(builder, item, place)
     name = builder.knowledge.object_name(item.name) or item.name
@@ -280,7 +282,7 @@ def last_known_floor(builder: PlanBuilder, item: ObjectKind) -> Surface | None:
 
 
 def _looks_at_last_known(builder: PlanBuilder, item: ObjectKind, key: str) -> Iterator[NodeSpec]:
-    """Iterates over looks at the floor where another robot last knew the object to be."""
+    """Yields looks at the floor where another robot last knew the object to be."""
     known, floor = builder.last_known_of(item), last_known_floor(builder, item)
     if known is None or floor is None or known.robot_W is None:
         return
@@ -292,7 +294,7 @@ def _looks_at_last_known(builder: PlanBuilder, item: ObjectKind, key: str) -> It
 def _looks_from_aside(
     builder: PlanBuilder, item: ObjectKind, surfaces: tuple[str, ...], key: str
 ) -> Iterator[NodeSpec]:
-    """Iterates over further looks at surfaces with only one viewpoint, from beside it."""
+    """Yields additional looks from the side, at surfaces that have only one viewpoint."""
     facts = builder.knowledge.surfaces
     single = [name for name in surfaces if len(facts[name].viewpoints) == 1]
     for name in single[:MOST_ASIDE]:
@@ -308,14 +310,14 @@ def _looks_from_aside(
 
 
 def surfaces_first_known(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
-    """Returns the required surfaces, after the surface of another robot's last detection of the object."""
+    """Returns the required surfaces, and before them the surface where another robot last detected the object."""
     known, surfaces = builder.last_known_of(item), required_surfaces(builder, item, place)
     first = [known.surface] if known is not None and known.surface in builder.knowledge.surfaces else []
     return tuple(dict.fromkeys((*filter(None, first), *surfaces)))
 
 
 def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
-    """Returns the surfaces to search. Raises InputError when there are none."""
+    """Returns the surfaces to search. Raises InputError when the place has no surfaces."""
     surfaces = surfaces_to_search(builder.knowledge, builder.knowledge.object_name(item.name) or item.name, place)
     if not surfaces:
         raise builder.error(f"'{place}' has no surface to look at", "add one under 'surfaces' in the knowledge file")
@@ -330,10 +332,10 @@ def place_phrase(knowledge: Knowledge, place: str | None) -> str:
 
 
 def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
-    """Looks at the surfaces of the place and answers yes or no, with the place or the number if the question asks it.
+    """Looks at the place's surfaces and answers yes or no, with the place or the number if the question asks for it.
 
-    The answer goes to `answer_key` (None: a key of this subtree). The first found object ends the search, unless
-    objects are counted: then all surfaces are searched. People are searched in rooms.
+    The answer is written under `answer_key` (None: a key of this subtree). The first found object ends the search,
+    unless objects are counted: then all surfaces are searched. People are searched in rooms.
     """
     command, knowledge = builder.command, builder.knowledge
     place = None if command.goal is None else builder.place(command.goal)
@@ -380,21 +382,21 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
 
 
 def _asked_for(item: str, count: int) -> str:
-    """Text of the object of a question: "a beer", "two beers", or "beers" for any number."""
+    """Text for the object that a question is about: "a beer", "two beers", or "beers" for any number."""
     if count == 1:
         return with_article(item)
     return count_of(count, item) if count else plural(item)
 
 
 def set_answer_options(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
-    """Sets options of the answer node of a status check, such as the key of its answer."""
+    """Sets options of the node that answers a question, such as the key for the answer."""
     if node.kind == Answer.kind:
         return node.with_options(**keys)
     return replace(node, children=tuple(set_answer_options(child, keys) for child in node.children))
 
 
 def refuse_several(builder: PlanBuilder) -> None:
-    """Raises InputError for a command about several objects, or an open number, unless it asks, waits or greets."""
+    """Raises InputError for a command on several or an open number of objects, unless it asks, waits or greets."""
     command = builder.command
     asked = 1 if command.task in (Task.FIND, Task.WAIT, *PEOPLE_TASKS) else command.object_count
     for item, count in ((command.item, command.item_count), (command.object, asked)):

@@ -1,4 +1,4 @@
-"""Leaf of every skill: it binds the ports, limits the time, turns defects into failures, and always ends the skill."""
+"""Leaf that runs a skill: binds ports, limits the time, turns exceptions into failures, and always ends the skill."""
 
 import traceback
 from collections.abc import Callable, Mapping, Sequence
@@ -56,8 +56,8 @@ class SkillLeaf(ExplainedLeaf):
     | halted | INVALID with CANCELLED |
 
     The leaf calls `end` in every case. Each attempt gets a new skill object, so that attempts share no state. `first`
-    are the skills that stow the arm: they run before the skill if the arm may be anywhere, unless the robot has no arm.
-    After an arm skill without a path follows the next one, which moves the base, and so on.
+    are skills that stow the arm: they run before the skill if the arm may be anywhere, unless the robot has no arm. If
+    the arm has no free path, the next of them moves the base, then the arm is tried again.
     """
 
     kind = "skill"
@@ -77,7 +77,7 @@ class SkillLeaf(ExplainedLeaf):
 
     @classmethod
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
-        """Estimates a drive by its route, and another skill by its typical duration."""
+        """Estimates a drive from its route, and another skill from its typical duration."""
         goal = _drive_goal(node, walk)
         walk.written.update(node.options["outputs"].values())
         if goal is None:
@@ -102,7 +102,7 @@ class SkillLeaf(ExplainedLeaf):
 
     @classmethod
     def signs(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Returns the keys of the skill's ports that show an object; people are none."""
+        """Returns the keys under which the skill writes an object's place; people do not count."""
         keys = {} if options["skill"].name == "find_people" else options["outputs"]
         return {keys[port]: sign for port, sign in _SIGNS.items() if port in keys}
 
@@ -112,7 +112,7 @@ class SkillLeaf(ExplainedLeaf):
 
     @property
     def active(self) -> bool:
-        """Returns whether it is between the skill's `begin` and `end`."""
+        """Returns whether the skill has begun and not ended."""
         return self._skill is not None
 
     @property
@@ -127,11 +127,11 @@ class SkillLeaf(ExplainedLeaf):
 
     @property
     def suspended(self) -> bool:
-        """Returns whether it is between `suspend` and the next tick."""
+        """Returns whether the skill is suspended until the next tick."""
         return self.active and self._time.stopped
 
     def initialise(self) -> None:
-        """Begins a new attempt; `update` reports a defect, since an exception here would leave the tree RUNNING."""
+        """Begins a new attempt; `update` reports an error, since an exception here would leave the tree RUNNING."""
         self.clear_explanation()
         self.progress = None
         self._false_start = self._guarded(self._begin)
@@ -199,7 +199,7 @@ class SkillLeaf(ExplainedLeaf):
         self._first.begin(kind.Inputs())
 
     def _go_on(self) -> None:
-        """Resumes the skill in the first tick after a suspension; `update` reports a defect."""
+        """Resumes the skill in the first tick after a suspension; `update` reports an exception of the skill."""
         assert self._skill is not None
         first, skill = self._first, self._skill
         self._time.go_on()
@@ -216,7 +216,7 @@ class SkillLeaf(ExplainedLeaf):
         return step
 
     def _bring_in(self, first: Skill[Any], skill: Skill[Any]) -> Running:
-        """Runs one step of a skill that stows the arm; then begins the next one, or the leaf's skill and its time."""
+        """Runs one step of a skill that stows the arm; after it, begins the next one, or the leaf's skill and time."""
         step = first.step()
         if isinstance(step, Running) and self._time.elapsed_s() <= first.default_timeout_s:
             return step
@@ -232,7 +232,7 @@ class SkillLeaf(ExplainedLeaf):
         return Running("the arm is brought in" if isinstance(step, Succeeded) else f"goes on: {step.message}")
 
     def _judged(self, step: Step) -> Step:
-        """Turns a step after the time limit, and a success on old data, into a failure."""
+        """Turns a step after the time limit into a failure, and a success with data that is too old."""
         drives = Part.BASE in self.skill.uses and bool(self.context.zones)
         limit_s = self.limit_s * (self.context.zone_map().slowdown if drives else 1.0)
         if self._time.elapsed_s() > limit_s and not isinstance(step, Failed):
@@ -243,14 +243,14 @@ class SkillLeaf(ExplainedLeaf):
         return step
 
     def _ended(self) -> Failed | None:
-        """Calls `end` once; returns Failed when it raises."""
+        """Calls the skill's `end` once; returns Failed when `end` raises."""
         active, self._first, self._skill = self._first or self._skill, None, None
         return None if active is None else self._guarded(active.end)
 
     def _written(self, step: Succeeded | Failed) -> Succeeded | Failed:
         """Writes the outputs to the blackboard; returns a defect for a missing or wrongly typed output.
 
-        A failure may have outputs for the next attempt, and need not fill all ports.
+        A failure may write outputs for the next attempt, but need not fill all ports.
         """
         given = step.outputs if isinstance(step, Failed) else self.skill.outputs
         for port, kind in self.skill.outputs.items():
@@ -278,7 +278,7 @@ class SkillLeaf(ExplainedLeaf):
 
 
 def _drive_goal(node: NodeSpec, walk: Walk) -> Pose2D | None:
-    """Goal of a drive, as far as it is known before the run."""
+    """Goal of a drive, if it is known before the run."""
     binding = node.options["inputs"].get("goal") if node.name in _DRIVES else None
     if isinstance(binding, FromBoard):
         return walk.noted.get(binding.key)
@@ -299,7 +299,7 @@ def refuse_stale(skill: type[Skill[Any]], success: Succeeded, context: RunContex
 
 
 def _stamp_s(source: str, outputs: Mapping[str, Any], context: RunContext) -> float | None:
-    """Stamp (s) of the data: of an output port, of the localisation, or of a reading of the robot."""
+    """Stamp (s) of the data that a skill used: an output port, the localisation, or a reading from the robot."""
     if source in outputs:
         return float(outputs[source].stamp_s)
     if source == "localisation":
@@ -309,7 +309,7 @@ def _stamp_s(source: str, outputs: Mapping[str, Any], context: RunContext) -> fl
 
 
 def _plan(assembler: Assembler, call: CallSkill, builder: PlanBuilder) -> Assembled:
-    """Plans the leaf of a single skill.
+    """Plans the leaf that runs a single skill.
 
     Raises InputError for an unknown skill, port or name, or a value that does not fit its port.
     """

@@ -1,4 +1,4 @@
-"""Speech: saying a text, and asking a question whose answer the mission uses; the plans and the node."""
+"""Says a text, or asks a question whose answer the mission uses: the plans and the node."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +30,7 @@ _FILLERS: Final = re.compile(
 
 
 class AskPeople(ExplainedLeaf):
-    """Leaf that asks a question, aloud and on the page (in a silent zone only there), and writes the answer to `key`.
+    """Leaf that asks a question aloud and on the page, in a silent zone only on the page; writes the answer to `key`.
 
     | case | status |
     |---|---|
@@ -41,8 +41,8 @@ class AskPeople(ExplainedLeaf):
     | the text reads a missing value | FAILURE with PRECONDITION |
     | halted | INVALID with CANCELLED; the question is withdrawn |
 
-    The answer is one of `names` (by spoken form in lower case), or a number or any text if it `gives` that type. It is
-    published under `ANSWER_TOPIC`.
+    The answer is one of `names` (which maps spoken forms in lower case), or, by the type `gives`, a number or any text.
+    The node publishes the answer under `ANSWER_TOPIC`.
     """
 
     kind = "question"
@@ -80,7 +80,7 @@ class AskPeople(ExplainedLeaf):
         self._put(self._text)
 
     def update(self) -> Status:
-        """Acts on the answer when there is one."""
+        """Acts on the answer once there is one."""
         if self._false_start is not None or self._asked is None:
             return self.fail(self._false_start or Failed(Cause.ERROR, "the question was not put"))
         if not self._asked.done():
@@ -142,7 +142,7 @@ class AskPeople(ExplainedLeaf):
 
 
 def _number(said: str) -> float | None:
-    """Parses a number within the range of expressions; None if it is none."""
+    """Parses a number within the range that expressions allow; None for any other text."""
     try:
         number = float(said)
     except ValueError:

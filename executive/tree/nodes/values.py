@@ -1,4 +1,4 @@
-"""Computed values of a mission: the plan and its node."""
+"""Computes values of a mission: the plan and its node."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -18,9 +18,9 @@ from skills.api import Cause, Failed
 
 
 class SetValues(ExplainedLeaf):
-    """Leaf that computes values in order, each under its blackboard key; a text with braces is filled.
+    """Leaf that computes values in order and writes each under its blackboard key; fills in texts with braces.
 
-    SUCCESS when all have a value; FAILURE with PRECONDITION at the first without one.
+    SUCCESS when all values are computed; FAILURE with PRECONDITION at the first that cannot be computed.
     """
 
     kind = "set"
@@ -61,7 +61,7 @@ def set_plan(
     part: str,
     name: str,
 ) -> NodeSpec:
-    """Builds a leaf that computes values; `values` and `kinds` are by the blackboard keys of the results."""
+    """Builds a leaf that computes values; `values` and `kinds` are keyed by the blackboard keys of the results."""
     keys = flow.keys_of(*values.values())
     options = {"values": MappingProxyType(dict(values)), "keys": MappingProxyType(dict(keys))}
     return builder.node("set", name, part=part, **options, kinds=MappingProxyType(kinds))

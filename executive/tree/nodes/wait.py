@@ -1,4 +1,4 @@
-"""Waiting for a duration, for a time of day, or until a condition holds: the plan and its nodes."""
+"""Waits for a duration, for a time of day, or until a condition holds: the plan and its nodes."""
 
 import math
 from typing import Final
@@ -30,12 +30,12 @@ class Pause(ExplainedLeaf):
         return Estimate(node.options["duration_s"])
 
     def initialise(self) -> None:
-        """Starts the time."""
+        """Starts to count the duration."""
         self.clear_explanation()
         self._end_s = self.clock.now() + self.duration_s
 
     def update(self) -> Status:
-        """Waits until the time is over."""
+        """Returns SUCCESS once the duration is over."""
         done = self.clock.now() >= self._end_s
         return self.say(f"waited {self.duration_s:g} s") if done else self.say("waits a moment", Status.RUNNING)
 
@@ -61,11 +61,11 @@ class WaitFor(ExplainedDecorator):
 
     @classmethod
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
-        """Estimates a wait of unknown length."""
+        """Estimates a wait whose length is unknown."""
         return walk.all_of(node, first).up_to(math.inf, f"until {node.options['words']}")
 
     def initialise(self) -> None:
-        """Asks for the first decision at once; presses of buttons count from now on."""
+        """Makes the first decision due at once; counts only presses of buttons from now on."""
         self._due_s = self.clock.now()
         if isinstance(self.decorated, Decide):
             self.decorated.view.forget_presses()
@@ -92,7 +92,7 @@ class WaitFor(ExplainedDecorator):
 class WaitUntilClock(ExplainedLeaf):
     """Leaf that is RUNNING until a time of day (s after midnight), then SUCCESS.
 
-    SUCCESS at once when that time was up to twelve hours ago.
+    SUCCESS at once if that time passed at most twelve hours ago.
     """
 
     kind = "wait until"
@@ -106,14 +106,14 @@ class WaitUntilClock(ExplainedLeaf):
         return Estimate().up_to(DAY_S, f"until {node.options['words']}")
 
     def initialise(self) -> None:
-        """Computes the end of the wait."""
+        """Computes when the wait ends."""
         self.clear_explanation()
         now_s = self.context.clock.now()
         ahead_s = (self.time_s - self.context.day_began_s - now_s) % DAY_S
         self._end_s = now_s + ahead_s if ahead_s <= DAY_S / 2 else now_s
 
     def update(self) -> Status:
-        """Waits until the time has come."""
+        """Returns SUCCESS once the time has come."""
         done = self.context.clock.now() >= self._end_s - 1e-9
         return self.say(f"it is {self.words}") if done else self.say(f"waits until {self.words}", Status.RUNNING)
 

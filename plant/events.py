@@ -32,7 +32,7 @@ SPEED_M_S = 0.6
 CLEAR_M = 0.12
 """A panel waits while a robot or a person is nearer than this to the doorway's middle line."""
 AJAR = 0.05
-"""A door that is closed to more than this share stops people."""
+"""A door that is closed to more than this fraction stops people."""
 _KG = 40.0
 _COLOUR = np.array([0.55, 0.42, 0.30, 1.0])
 _FRICTION = CoulombFriction(0.6, 0.5)

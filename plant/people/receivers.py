@@ -200,7 +200,7 @@ RAMP_S = 0.6
 PAUSE_S = 4.0
 """Time between two pulls."""
 DOWN = 0.95
-"""Downward share of the pull; the rest points towards the person."""
+"""Downward component of the pull; the rest points towards the person."""
 GIVES_M = 0.01
 """The gripper gives way when the object has moved this far in the hand, or the fingers have opened as follows."""
 GIVES_RAD = 0.03

@@ -19,9 +19,9 @@ _AVOIDED_M = 0.08
 _DOUBTED = 0.08
 """Belief in one of the wanted classes from which on a track of another class is worth a closer view."""
 _LEAST_LENGTH = 0.4
-"""Share of the shortest object of a class: a cluster may be hidden in part."""
+"""Fraction of the shortest object of a class: a cluster may be hidden in part."""
 _MOST_LENGTH = 1.3
-"""Share of the longest object of a class: clusters may be merged."""
+"""Fraction of the longest object of a class: clusters may be merged."""
 _FREE_M = 0.15
 """Distance to the next object beyond which more does not count."""
 
@@ -29,7 +29,7 @@ _FREE_M = 0.15
 _SEEN_AGAIN_M = 0.06
 """Distance from where an object was seen within which a segment without a label may be it."""
 _SAME_SIZE_M = 0.015
-"""Difference within which two sizes are alike; for larger objects, this share of the size."""
+"""Difference within which two sizes are alike; for larger objects, this fraction of the size."""
 _SAME_SIZE_SHARE = 0.3
 
 

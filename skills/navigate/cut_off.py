@@ -208,7 +208,7 @@ class Regions:
         return bool(here) and not any(here & self._at((goal.x_m, goal.y_m)) for goal in self._goals)
 
     def doors_between(self, doors: Sequence[Doorway]) -> tuple[Doorway, ...]:
-        """Those of `doors` that lie on a path from the robot to a goal; none when no path exists."""
+        """The doors in `doors` that lie on a path from the robot to a goal; none when no path exists."""
         begin = self._near((self._here.x_m, self._here.y_m))
         ends = set[int]().union(*(self._at((goal.x_m, goal.y_m)) for goal in self._goals))
         joins = {door: sides for door in doors if len(sides := self._sides(door)) == 2}

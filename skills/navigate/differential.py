@@ -14,7 +14,7 @@ from skills.navigate.path import clearances
 from skills.robot import FloatArray
 
 CELL_SHARE = 0.5
-"""Cell size as a share of the usual one; cells are small because the base cannot shift to a door's middle."""
+"""Cell size as a fraction of the usual one; cells are small because the base cannot shift to a door's centre."""
 _LONG_STEPS = 4
 """Cells of a long move for each of a short one."""
 _LEGS_M = np.arange(0.2, 2.1, 0.2)

@@ -72,7 +72,7 @@ class GivingWayOptions:
 
 
 class Avoided(enum.Enum):
-    """What a plan avoids of the other robots, besides the obstacles in the costmap."""
+    """Parts of the other robots that a plan avoids, besides the obstacles in the costmap."""
 
     PATHS = "paths"  # their bodies, and their reserved paths with priority over this robot
     BODIES = "bodies"  # their bodies: the robot stops before a reserved path
@@ -125,7 +125,7 @@ class GivingWay:
         return with_outlines(with_others, [(one.discs, _thinned(one)) for one in self.robots_with_priority()])
 
     def less_avoided(self, avoided: Avoided) -> Avoided | None:
-        """What to avoid less of after no path was found; None when avoiding less would not help."""
+        """The next smaller set to avoid after no path was found; None when avoiding less would not help."""
         if avoided is Avoided.PATHS and self.robots_with_priority():
             return Avoided.BODIES
         if avoided is not Avoided.WORKING and any(_will_move(one) for one in self._traffic.others()):

@@ -19,7 +19,7 @@ _ZONE_STEP_M = 0.1
 _BACK_SHARE = -0.02
 """Cosine between a motion and a one-way direction below which the motion goes against it."""
 _SLOWER_SHARE = 0.3
-"""Extra time of a combined shift and turn, as a share of the shorter of the two."""
+"""Extra time of a combined shift and turn, as a fraction of the shorter of the two."""
 
 
 class Weights(NamedTuple):

@@ -29,7 +29,7 @@ _BRAKING_M_S2 = 0.4
 _ON_PATH_M = 0.35
 _ON_PATH_RAD = 0.3
 _EARLY = 0.4
-"""The robot begins to stop within this share of the goal's tolerances."""
+"""The robot begins to stop within this fraction of the goal's tolerances."""
 
 
 class _OnReservedPath(Exception):  # noqa: N818 - no program error

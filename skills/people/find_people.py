@@ -38,7 +38,7 @@ _PERSON_CLEAR_M = 0.2
 _GRID_M = 0.4
 """Distance between such positions."""
 _OWN_M = 0.3
-"""Distance from the robot's middle within which an obstacle hides nothing."""
+"""Distance from the robot's centre within which an obstacle hides nothing."""
 _BEST_VIEWPOINTS = 4
 """Number of best viewpoints to which the robot tries to drive."""
 _YAWS_RAD = (0.0, 0.8, -0.8, 1.6, -1.6, math.pi)

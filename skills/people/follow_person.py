@@ -59,9 +59,9 @@ _PERSON_M = 0.3
 _BY_DOOR_M = 1.2
 """Distance from a doorway at which robot or person may stand in its way."""
 _WAITED_SHARE = 0.25
-"""Share of the search at the beginning after which a standing person without a picture is followed, too."""
+"""Fraction of the search at the beginning after which a standing person without a picture is followed, too."""
 _COMES_SHARE = 0.6
-"""Share of a person's speed towards the robot from which on they come to it."""
+"""Fraction of a person's speed towards the robot from which on they come to it."""
 _BETWEEN_M = 0.5
 """Distance beyond `near_m` up to which a person who stands in the named place is there."""
 

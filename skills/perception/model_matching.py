@@ -36,20 +36,20 @@ _TURNS: Final = 24
 _POSES: Final = 3
 """Number of the best poses that are refined."""
 _STEPS: Final = 8
-"""Number of steps of iterated closest points."""
+"""Number of steps of ICP."""
 _POINTS: Final = 250
 """Number of a segment's points that a refinement uses, about."""
 _HEIGHT_M: Final = 0.010
-"""Largest difference of the height, plus the next share of the model's height."""
+"""Largest difference of the height, plus the next fraction of the model's height."""
 _HEIGHT_SHARE: Final = 0.06
 _WIDER_M: Final = 0.015
 """Distance by which a segment may be wider than its model."""
 _LEAST_WIDTH: Final = 0.6
-"""Least width of a segment as a share of its model's width."""
+"""Least width of a segment as a fraction of its model's width."""
 _WIDER_THAN_BOX_M: Final = 0.010
 """The same for a model of photographs: what is hidden in part does not look as in them."""
 _LEAST_WIDTH_OF_BOX: Final = 0.8
-"""Least width of a segment as a share of the width of a model of photographs."""
+"""Least width of a segment as a fraction of the width of a model of photographs."""
 _FAR_M: Final = 0.02
 """Distance from the model beyond which a point is not on it."""
 _FAR_SIGMAS: Final = 10.0
@@ -65,7 +65,7 @@ _LEAST: Final = 0.35
 _ALIKE: Final = 0.75
 """Quality of another fit, as a fraction of the best one's, from which on the object may be either."""
 _MOST_HIDDEN: Final = 0.5
-"""Largest share of a model's front that may be hidden."""
+"""Largest fraction of a model's front that may be hidden."""
 _OPAQUE: Final = 127
 _LOW_M: Final = 0.02
 """Height below which points stand for the object's lowest part, too, which the surface's noise hides."""

@@ -16,7 +16,7 @@ from skills.quantities import Count, Delay, Duration, Length, Margin, Share, Spe
 from skills.robot import FloatArray
 
 _PARTLY = 0.7
-"""Share of its cells below which a cluster counts as hidden in part."""
+"""Fraction of its cells below which a cluster counts as hidden in part."""
 _SETS_OFF = 1.5
 """Ratio of the short-term to the long-term speed above which an object has just set off."""
 

@@ -31,9 +31,9 @@ _CONFUSED = 0.02
 _MISSED_IF_THERE = 0.15
 _MISSED_IF_NOT = 0.88
 _SEEN_BY_CHANCE = 0.25
-"""Share of objects among all detections, faint ones included."""
+"""Fraction of objects among all detections, faint ones included."""
 _NEW_IN_A_VIEW = 0.5
-"""Share of a view's evidence that is new; 1 would be views with independent errors."""
+"""Fraction of a view's evidence that is new; 1 would be views with independent errors."""
 _MOST_SURE = 0.97
 _MOST_BELIEF = 0.999
 _LEAST_BELIEF = 0.05

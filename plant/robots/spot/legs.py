@@ -180,7 +180,7 @@ class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_p
 
     @property
     def stance(self) -> tuple[bool, ...]:
-        """Whether each foot stands on the floor."""
+        """Flags of the feet that stand on the floor."""
         lifted = _PAIRS[self._swinging] if self._swinging is not None else ()
         return tuple(foot not in lifted for foot in range(len(LEGS)))
 

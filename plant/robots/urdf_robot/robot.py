@@ -37,7 +37,7 @@ _LIFT_ARRIVED_M = 0.01
 _SAME_HEIGHT_M = 1e-6
 _HEAD_ARRIVED_RAD, _HEAD_STILL_RAD_S = 0.01, 0.05
 _HEAD_SPEED_SHARE = 0.8
-"""Share of the head's top speed that its weak motors can follow."""
+"""Fraction of the head's top speed that its weak motors can follow."""
 _TOLERANCES = {
     GripperKind.PARALLEL: GripperTolerances(arrived=0.002, stall_rate=0.004),
     GripperKind.HINGED: GripperTolerances(arrived=0.03, stall_rate=0.03),

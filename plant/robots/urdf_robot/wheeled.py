@@ -19,7 +19,7 @@ from plant.saved_state import Stateful
 from skills.robot import FloatArray, Pose2D, quantities
 
 _MEAN_AHEAD = 0.75
-"""Mean share of a control period's distance at the ends of its two plant steps."""
+"""Mean fraction of a control period's distance at the ends of its two plant steps."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ _THINNEST_M = 0.01
 _LESS_M = 0.01
 """Margin by which the box of a held object is smaller on each side than its observation."""
 _LEVEL = 0.5
-"""Fingers whose direction has a larger level share point to a side, not down."""
+"""Fingers whose direction has a larger horizontal component point to a side, not down."""
 _FLAT = 1.2
 """Ratio of height to width below which an object cannot fall over."""
 _LONG = 1.5

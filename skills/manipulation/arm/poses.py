@@ -20,7 +20,7 @@ _FOREARM_ROLL = 3
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
 """Pitches of a hand that cannot keep the object upright while it carries, in groups, best first."""
 _HANGS_M = 0.03
-"""Least distance of a hanging object's middle beyond the fingertips."""
+"""Least distance of a hanging object's centre beyond the fingertips."""
 _TURNS_HANGING_RAD = tuple(np.linspace(-np.pi, np.pi, 8, endpoint=False))
 _CLOSE_BELOW_RAD = tuple(np.radians([42.0, 35.0, 50.0, 58.0, 28.0]))
 """Angles below level at which a close view looks down, the best first."""

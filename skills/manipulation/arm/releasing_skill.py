@@ -20,7 +20,7 @@ _WIDE = 0.75
 _ASIDE_M = 0.018
 """Distance of fixed finger and palm from the object before the hand draws back, so that they do not drag it."""
 _LEVEL = 0.5
-"""A closing direction with a smaller vertical share is level."""
+"""A closing direction with a smaller vertical component is level."""
 _BACK_M = (0.16, 0.12, 0.08, 0.05)
 """Distances by which the hand is drawn back, the best first."""
 _STILL_S = 0.5

@@ -35,7 +35,7 @@ _LEAST_OF_THIN = 0.35
 _LEAST_BEYOND = 0.25
 """Largest height of the fingertips above a flat object's centre, as a fraction of its height."""
 _WELL_BEYOND_M = 0.006
-"""Depth of the fingertips below an object's middle: rounded tips above it press a round handle out."""
+"""Depth of the fingertips below an object's centre: rounded tips above it press a round handle out."""
 _PER_HIGH_M = 60.0
 """Cost of fingers that end higher, per metre."""
 _BESIDE_THIN_M = 0.012

@@ -64,10 +64,10 @@ _SLIM_M = 0.01
 _PER_SLIM_M = 40.0
 """Additional cost of the width missing below that, per metre."""
 _USUAL_SHARE = 0.56
-"""Usual height of a grip, as a share of the height of a low upright object, within the next limits."""
+"""Usual height of a grip, as a fraction of the height of a low upright object, within the next limits."""
 _USUAL_HEIGHTS_M = (0.05, 0.095)
 _USUAL_SHARE_OF_TALL = 0.45
-"""Least usual height of a grip, as a share of the object's height; decisive for a tall one."""
+"""Least usual height of a grip, as a fraction of the object's height; decisive for a tall one."""
 _SLICE_M = 0.03
 """Half the height of a slice of an upright object, and the distance between slices."""
 _FEWEST_POINTS = 25

@@ -36,7 +36,7 @@ _LIFT_STEP_M = 0.01
 _LIFT_MARGIN_M = 0.002
 """Least gap between the lifted object and an obstacle."""
 _LEVEL = 0.5
-"""Level share of the fingers' direction below which they point down."""
+"""Horizontal component of the fingers' direction below which they point down."""
 _ALIKE_RAD = 0.3
 """Largest difference of equal arm postures: a lift that fails from one fails from the other."""
 

@@ -54,7 +54,7 @@ _FEEL_M = 0.014
 """Additional depth of the fingers, to feel the surface."""
 _FEEL_RAD_S = 0.12
 _DOWN = 0.8
-"""Vertical share of a direction that counts as down."""
+"""Vertical component of a direction that counts as down."""
 _ASIDE_RAD = (0.0, 0.8, -0.8)
 """Angles of the viewpoints about a partly hidden object."""
 _MOST_OF_LENGTH = 0.7

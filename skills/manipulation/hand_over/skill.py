@@ -37,7 +37,7 @@ _STILL_S = 0.5
 _LETS_GO = "let go"
 _KEEPS = "hold on"
 _POINTS_DOWN = 0.8
-"""Vertical share of the hand's direction from which on the hand points down."""
+"""Vertical component of the hand's direction from which on the hand points down."""
 _TRIES = 2
 _HOLD_OUT_RAD_S = 0.8
 

@@ -48,7 +48,7 @@ _PER_CLEARANCE = 3.0
 _ANOTHER_M = 0.2
 """Least distance between two spots that are tried after each other."""
 _SAME_OBJECT_M = 0.08
-"""Distance between the middles of clusters in two pictures up to which they show the same object."""
+"""Distance between the centres of clusters in two pictures up to which they show the same object."""
 _SAMPLE_M = 0.01
 """Distance between the points of a surface that no picture shows."""
 _CELL_M = 0.01

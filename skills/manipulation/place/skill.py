@@ -70,7 +70,7 @@ _STANDS_OUT_M = 0.03
 _HIGHEST_M = 0.5
 """Largest height over the surface of points that belong to objects on it."""
 _BESIDE = 0.6
-"""Share of the hand's direction to a side that a tucked hand exceeds."""
+"""Lateral component of the hand's direction that a tucked hand exceeds."""
 _TUCKED_M = 0.03
 """Distance beyond the tucked position at which a hand still counts as tucked."""
 _AHEAD_RAD = 0.6

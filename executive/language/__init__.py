@@ -1,1 +1,1 @@
-"""Understanding of English requests."""
+"""Understands English requests."""

@@ -1,4 +1,4 @@
-"""Actions: the robot's work that each clause asks for."""
+"""Reads actions: the work that each clause asks of the robot."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -30,10 +30,10 @@ from executive.words.command import TIME_UNITS_S
 class Action:
     """Action of one verb: on `objects` at `source`, towards `goal`.
 
-    `kind` is None for a statement on the place of an object. `said` is the text of the clause, `unknown` are its
-    unknown words, `choices` phrases joined by "or", `teller` is the person who put the object there. `departs` marks a
-    place that the robot only leaves, `passes` are places on the route, `time` is the length of a wait. `follows` marks
-    an action after "then" or "after that"; `again`, set once pronouns are resolved, a repeated object.
+    `kind` is None for a statement on the place of an object. `said` is the clause's text, `unknown` are the unknown
+    words in it, `choices` are phrases joined by "or", `teller` is the person who put the object there. `departs` marks
+    a place that the robot only leaves, `passes` are places on the route, `time` is the length of a wait. `follows`
+    marks an action after "then" or "after that"; `again`, set once pronouns are resolved, a repeated object.
     """
 
     kind: VerbKind | None
@@ -53,7 +53,7 @@ class Action:
 
     @property
     def target(self) -> Phrase | None:
-        """The one object of the action, once pronouns are resolved."""
+        """Only object of the action, once pronouns are resolved; None if it has no object."""
         return self.objects[0] if self.objects else None
 
 
@@ -69,7 +69,7 @@ def read_actions(
 ) -> tuple[Action, ...]:
     """Reads the actions of all clauses, in order.
 
-    `elliptic` says that earlier objects may be left out; `recipient` receives objects where a clause names nobody.
+    With `elliptic`, a clause may omit an earlier object; `recipient` receives objects if a clause names nobody.
     """
     found: list[Action] = []
     follows = False
@@ -97,7 +97,7 @@ def read_actions(
 
 
 def _without_idle_waits(actions: list[Action]) -> list[Action]:
-    """Removes a wait without a time behind the last drive: the robot stays there. Raises RefusalError for others."""
+    """Removes a wait without a time after the last drive: the robot stays there. Raises RefusalError for others."""
     waits = [action for action in actions if action.verb in lexicon().wait and action.time is None]
     idle = [action for action in waits if action.kind is VerbKind.WAIT and action.unknown == (action.verb,)]
     if idle and idle[-1] is actions[-1] and len(actions) > 1 and actions[-2].kind is VerbKind.GO:
@@ -147,7 +147,7 @@ def _being(clause: Predicate, being: Being) -> Action:
 
 
 def _narrated(clause: Predicate, being: Being) -> Action:
-    """Reads an event with its object; an event is no request."""
+    """Reads a narrated event with its object; an event is no request."""
     roles = read_roles(clause.items, describes=False)
     lacked = [place.phrase for place in roles.sources if place.preposition == "out of"]
     topics = [phrase for phrase in (*roles.objects, roles.searched, *lacked) if phrase is not None]
@@ -158,7 +158,7 @@ def _narrated(clause: Predicate, being: Being) -> Action:
 
 
 def _is_state(clause: Predicate, being: Being) -> bool:
-    """Returns whether a clause only describes a state ("I'm thirsty", "the baby is crying"): a reason, no request."""
+    """Returns whether a clause only describes a state as a reason, as in "I'm thirsty" or "the baby is crying"."""
     if clause.subject is None or clause.whether or (being.asked and _asks(clause.subject.phrase)):
         return False
     states = any(isinstance(item, Unknown | Adverb) for item in clause.items) or clause.subject.phrase.speaker
@@ -197,7 +197,7 @@ def _acting(clause: Predicate, verb: Verb) -> Iterator[Action]:
 
 
 def _departs(verb: Verb, roles: Roles) -> bool:
-    """Returns whether a place is only left ("leave the kitchen and go to the hall"), as a part of going elsewhere."""
+    """Returns whether a place is only left on the way elsewhere, as in "leave the kitchen and go to the hall"."""
     left = roles.objects if verb.text in lexicon().leaves else []
     if verb.text not in lexicon().leaves and VerbKind.GO in verb.kinds and not roles.objects:
         left = [place.phrase for place in roles.sources if place.phrase is not None]
@@ -256,7 +256,7 @@ def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
 
 
 def _waiting(blank: Action, roles: Roles) -> Action:
-    """Waits for a time, here or in a place; without a time it only goes there."""
+    """Waits for a time, here or in a place; a wait without a time only goes to the place."""
     times = [phrase for phrase in (roles.searched, *roles.objects) if phrase is not None]
     places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
     fits = len(times) == 1 and times[0].head.word in TIME_UNITS_S and times[0].count > 0
@@ -278,15 +278,15 @@ def _charging(blank: Action, roles: Roles) -> Action:
 
 
 def _beyond(roles: Roles) -> Iterator[Location]:
-    """Yields the locations that a verb without motion cannot have: sources, paths, recipients, more places."""
+    """Yields the locations that do not fit a verb without motion: sources, paths, recipients, additional places."""
     recipient = () if roles.recipient in (None, HERE) else (roles.recipient,)
     yield from (place for place in (*roles.sources, *roles.paths, *recipient, *roles.joined_goals) if place)
 
 
 def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
-    """Takes, brings and puts: assigns source, goal and recipient.
+    """Reads taking, bringing and putting: assigns source, goal and recipient.
 
-    An indefinite object goes to each of several places: "a beer to Robin and Charlie".
+    "A beer to Robin and Charlie" gives one action for each recipient or place.
     """
     goals, sources, ats = list(roles.goals), list(roles.sources), list(roles.ats)
     if roles.recipient is not None and not (roles.favour and ats and blank.kind is VerbKind.PLACE):
@@ -313,6 +313,6 @@ def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
 
 
 def _with_object(action: Action, extra: Sequence[str]) -> Action:
-    """Adds the unknown words to the action, and its verb when the object is missing."""
+    """Adds unknown words to the action, and the verb itself when its object is missing."""
     missing = () if action.objects else (action.verb,)
     return replace(action, unknown=(*action.unknown, *extra, *missing))

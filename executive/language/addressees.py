@@ -1,4 +1,4 @@
-"""Addressees: the robots that a sentence names, and the text for each: "Alice, go home and let Bob bring a coke"."""
+"""Finds the robots that a sentence addresses, and the text for each: "Alice, go home and let Bob bring a coke"."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ Addressee = tuple[str, ...] | RobotChoice
 
 @dataclass(frozen=True)
 class AddressedText:
-    """Text for one addressee: `who` is None if the text names nobody; `joint` are the words before it.
+    """Text for one addressee: `who` is None if the text names nobody; `joint` are the joining words before the text.
 
-    `then` marks a text that follows the one before; `behind` names the robots whose earlier parts must be done first.
-    `otherwise` marks a text under the condition of the one before. `past` marks a description of the robot's finished
-    work, which is its task.
+    `then` marks a text that follows the previous text; `behind` names the robots whose earlier parts must be done
+    first. `otherwise` marks a text under the condition of the previous text. `past` marks a text that describes work as
+    finished, which the robot must then do.
     """
 
     who: Addressee | None
@@ -56,7 +56,7 @@ class AddressedText:
 
 @cache
 def _verbs() -> Mapping[str, str]:
-    """Verbs by their forms: "bring" and "brings" are bring."""
+    """Returns verbs by their forms: "bring" and "brings" map to "bring"."""
     table = read_table("robots.yaml")
     bases = {verb[0] for verb in lexicon().verbs} | set(table["verbs_too"].split("|"))
     forms = {f"{base}{'es' if re.search('(?:s|x|z|ch|sh)$', base) else 's'}": base for base in bases}
@@ -65,31 +65,31 @@ def _verbs() -> Mapping[str, str]:
 
 @cache
 def addressees(names: tuple[str, ...]) -> Addressees:
-    """Finder of the robots of these names."""
+    """Returns the finder of robots with these names."""
     return Addressees(names)
 
 
 @dataclass(frozen=True)
 class Addressees:
-    """Finder of the robots `names` in a sentence, which splits the text by robot."""
+    """Finds the robots `names` in a sentence, and splits the text by robot."""
 
     names: tuple[str, ...]
 
     @cached_property
     def begins(self) -> tuple[tuple[str, re.Pattern[str]], ...]:
-        """Patterns that begin another robot's part, in the order of trying."""
+        """Patterns that begin another robot's part, in the order in which they are tried."""
         return self.forms.mapping("begins")
 
     @cached_property
     def forms(self) -> Patterns:
-        """Patterns of calls and instructions."""
+        """Patterns for calls and instructions."""
         words = {"one": rf"(?:{any_of(self.names)})(?![\w'-])", "verbs": rf"(?:{any_of(_verbs())})(?![\w'])"}
         return Patterns("robots.yaml", words=words)
 
     def find_robots(self, said: str, but: Sequence[str] = ()) -> Addressee:
-        """Finds the robots that `said` names; "the other robot" is the one outside `but`.
+        """Finds the robots that `said` names; "the other robot" is the robot that is not in `but`.
 
-        Raises RefusalError when the number of robots in `said` is wrong.
+        Raises RefusalError when `said` states a wrong number of robots.
         """
         words = " ".join(said.lower().split())
         if self.forms.other.fullmatch(words):
@@ -107,7 +107,7 @@ class Addressees:
         return tuple(dict.fromkeys(filter(None, (find_robot(name, self.names) for name in found))))
 
     def split_call(self, text: str) -> tuple[Addressee, str] | None:
-        """Splits off the robots that a text calls first. Raises RefusalError: see `find_robots`."""
+        """Splits off the robots that a text calls at its beginning. Raises RefusalError like `find_robots`."""
         match = self.forms.talk.match(text)
         return None if match is None else (self.find_robots(match["who"]), text[match.end() :])
 
@@ -116,9 +116,9 @@ class Addressees:
         return re.search(rf"\b{self.forms.one.pattern}", self.forms.narrated.sub("", text), re.IGNORECASE) is None
 
     def parts(self, text: str) -> tuple[Addressee | None, tuple[AddressedText, ...]]:
-        """Splits a sentence into its addressee and its parts; successive parts for the same robots become one.
+        """Splits a sentence into its addressee and its parts; joins adjacent parts that are for the same robots.
 
-        Raises RefusalError when it is not clear which robots it names, or when it forbids an action.
+        Raises RefusalError when the sentence names robots unclearly, or forbids an action.
         """
         parting = _Parting(self, *self.listener(text))
         found: list[AddressedText] = []
@@ -133,7 +133,7 @@ class Addressees:
         return parting.listener, tuple(found)
 
     def listener(self, text: str) -> tuple[Addressee | None, str]:
-        """Splits off the addressee of a sentence. Raises RefusalError: see `find_robots`."""
+        """Splits off the addressee of a sentence. Raises RefusalError like `find_robots`."""
         if (match := self.forms.first.match(text)) is not None:
             return self.find_robots(_who(match)), text[match.end() :]
         if (match := self.forms.last.search(text)) is not None:
@@ -152,13 +152,13 @@ class Addressees:
         return self.forms.third_person.sub(lambda match: f"{match[1]}{_verbs()[match[2].lower()]}", text)
 
     def tidy(self, text: str) -> str:
-        """Strips signs from both ends, and joints from the beginning."""
+        """Strips punctuation from both ends of a text, and joining words from its beginning."""
         return self.forms.begins_with_joints.sub("", text.strip(" ,;:-")).strip(" ,;:-")
 
 
 @dataclass(frozen=True)
 class _Found:
-    """Position where another robot's part begins; its text begins at `end`, and `lead` is an implied verb."""
+    """Beginning of another robot's part: the part's text begins at `end`, after the implied verb `lead`."""
 
     who: str
     end: int
@@ -168,7 +168,7 @@ class _Found:
 
 @dataclass
 class _Parting:
-    """Splitter of one sentence by robot."""
+    """Splits one sentence into parts by robot."""
 
     calls: Addressees
     listener: Addressee | None
@@ -199,7 +199,7 @@ class _Parting:
         return tuple(self._sentences())
 
     def _begins(self, start: int, at: int) -> _Found | None:
-        """Part of another robot that begins here. Raises RefusalError when it forbids an action."""
+        """Part for another robot that begins here; None if none begins. Raises RefusalError if it forbids an action."""
         current = self.found[-1]
         for kind, form in self.calls.begins:
             match = form.match(self.text, start)
@@ -216,7 +216,7 @@ class _Parting:
         return None if verb is None else _Found(match["who"], match.end(), "gap", f"{verb[1]} ")
 
     def _take(self, found: _Found, before: str) -> None:
-        """Ends the part with the text `before`, and begins the found one."""
+        """Ends the present part with the text `before`, and begins the part that was found."""
         joint_at = self.calls.forms.joint.search(before)
         at = len(before) if joint_at is None else joint_at.start()
         said, joint = before[:at], before[at:]
@@ -250,19 +250,19 @@ class _Parting:
         self.address = who if found.kind == "call" else self.address
 
     def _add(self, more: str) -> None:
-        """Adds to the text of the last part."""
+        """Adds to the text of the last part, if the text is not empty."""
         last = self.found[-1]
         self.found[-1] = replace(last, text=self.calls.tidy(f"{last.text}{more}"))
 
     def _who(self, found: _Found) -> Addressee:
-        """Robots of a name, of "you" or of "the other robot"."""
+        """Robots that a name, "you" or "the other robot" stands for."""
         named = [name for one in self.found if isinstance(one.who, tuple) for name in one.who]
         if found.who.lower() in _YOU:
             return self.calls.find_robots("the other robot", named) if self.address is None else self.address
         return self.calls.find_robots(found.who, self.address if isinstance(self.address, tuple) else named[-1:])
 
     def _sentences(self) -> Iterator[AddressedText]:
-        """Yields the parts with text; a further sentence within another robot's part is again for the addressee."""
+        """Yields the parts with text; a new sentence inside another robot's part is for the addressee again."""
         tidy, imperative = self.calls.tidy, self.calls.imperative
         for one in self.found:
             split = self.address is not None and self.address != one.who
@@ -274,7 +274,7 @@ class _Parting:
 
 
 def _who(match: re.Match[str]) -> str:
-    """Words that name the robots."""
+    """Words in a match that name the robots."""
     return next(words for key, words in match.groupdict().items() if key.startswith("who") and words)
 
 

@@ -1,4 +1,4 @@
-"""Spoken numbers, spans of time, times of day and shares."""
+"""Parses spoken numbers, durations, times of day and fractions."""
 
 import re
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _SPANS_S: Final = {
 
 @dataclass(frozen=True)
 class TimeOfDay:
-    """Time of day (s after midnight); `taken` says that the speaker left the half of the day open."""
+    """Time of day (s after midnight); `taken` is True if the speaker left open whether it is before or after noon."""
 
     seconds: float
     taken: bool = False
@@ -32,7 +32,7 @@ class TimeOfDay:
         return f"{int(self.seconds // 3600):02d}:{int(self.seconds % 3600 // 60):02d}"
 
     def notes(self, said: str) -> tuple[str, ...]:
-        """Note on the chosen half of the day, if it was left open."""
+        """Note on the half of the day that was chosen, if the speaker left it open."""
         return (f"I take '{said}' as {self.text}",) if self.taken else ()
 
 
@@ -51,7 +51,7 @@ def parse_number(text: str) -> float | None:
 
 
 def parse_times(text: str) -> int | None:
-    """Parses "three times" or "twice"; None for other texts than whole numbers from 1 to 100."""
+    """Parses "three times" or "twice"; None for any text but whole numbers from 1 to 100."""
     words = re.sub(r" in a row$", "", text.lower())
     if words == "twice" or words == "a couple of times":
         return 2
@@ -60,7 +60,7 @@ def parse_times(text: str) -> int | None:
 
 
 def parse_seconds(text: str) -> float | None:
-    """Parses a span of time (s)."""
+    """Parses a duration (s); None for any other text."""
     words = re.sub(r"^(?:a )?quarter(?: of an)? hour$", "quarter", text.lower().strip())
     if words in _SPANS_S:
         return _SPANS_S[words]
@@ -75,7 +75,7 @@ def parse_seconds(text: str) -> float | None:
 
 
 def parse_share(text: str) -> float | None:
-    """Parses a share from 0 to 1: "thirty percent" or "half"."""
+    """Parses a fraction from 0 to 1, such as "thirty percent" or "half"."""
     words = text.lower().strip()
     if words.startswith("half"):
         return 0.5
@@ -84,7 +84,7 @@ def parse_share(text: str) -> float | None:
 
 
 def parse_time(text: str) -> TimeOfDay | None:
-    """Parses a time of day; one to six without more are in the afternoon."""
+    """Parses a time of day; "one" to "six" without more words are in the afternoon."""
     words = " ".join(text.lower().replace("o' clock", "o'clock").split())
     if words in _NAMED:
         return TimeOfDay(3600.0 * _NAMED[words])

@@ -1,4 +1,4 @@
-"""Splitter of a sentence into clauses, each with its addressee, its cue and its words."""
+"""Splits a sentence into clauses, each with its addressee, its cue and its words."""
 
 import enum
 import re
@@ -18,7 +18,7 @@ ACTS: Final = Patterns("structures.yaml", "acts", AMOUNTS)
 
 
 class Cue(enum.Enum):
-    """Relation of a clause to the one before it."""
+    """Relation of a clause to the clause before it."""
 
     FAILED = "failed"  # "if that fails"
     SO = "so"  # "if so"
@@ -35,10 +35,10 @@ class Cue(enum.Enum):
 
 @dataclass(frozen=True)
 class Clause:
-    """Clause: the words that join it to the one before, its cue (`kind`, and `cue` in words), and its other words.
+    """Clause: the words that join it to the previous clause, the cue (`kind`, and `cue` in words), and its other words.
 
-    `part` is the text of its addressee. `lead` are implied items before it, its verb among them. `before` is the action
-    before a trailing cue, as in "go home if ...".
+    `part` is the addressee's text that contains the clause. `lead` are implied items before the clause, such as its
+    verb. `before` is the action before a trailing cue, as in "go home if ...".
     """
 
     joint: str
@@ -56,17 +56,17 @@ class Clause:
 
     @property
     def outer(self) -> bool:
-        """Returns whether the clause follows all earlier ones."""
+        """Returns whether the words before the clause say that it follows all earlier clauses, not only the last."""
         return CLAUSES.outer.search(self.joint) is not None
 
     @property
     def anyway(self) -> bool:
-        """Returns whether the clause runs at the end in any case."""
+        """Returns whether the clause runs at the end, whatever happens before."""
         return CLAUSES.whatever.search(self.joint) is not None
 
     @property
     def ends_anyway(self) -> bool:
-        """Returns whether the last words say that the clause runs in any case."""
+        """Returns whether the last words say that the clause runs whatever happens before."""
         return self.kind is None and CLAUSES.ends_anyway.search(self.text) is not None
 
     @property
@@ -77,16 +77,16 @@ class Clause:
 
 @dataclass(frozen=True)
 class Split:
-    """Clauses of a sentence, and its addressee."""
+    """Clauses of a sentence, and the sentence's addressee."""
 
     clauses: tuple[Clause, ...]
     listener: Addressee | None = None
 
 
 def split(text: str, robots: tuple[str, ...] = ()) -> Split:
-    """Splits one or several sentences into clauses, each with the part of its addressee among `robots`.
+    """Splits sentences into clauses, each with the part of the text for its addressee among `robots`.
 
-    Raises RefusalError when it is not clear which robots it names, or when it forbids an action.
+    Raises RefusalError when it is not clear which robots a sentence names, or when it forbids an action.
     """
     listener, parts = addressees(robots).parts(text) if len(robots) > 1 else (None, (AddressedText(None, text),))
     found: list[Clause] = []
@@ -112,7 +112,7 @@ def cut(text: str) -> tuple[Clause, ...]:
 
 
 def _cuts(text: str) -> Iterator[tuple[int, int]]:
-    """Begin and end of the words that join two clauses."""
+    """Yields begin and end of the words that join two clauses."""
     first = _joint().match(text)
     begin = 0 if first is None else first.end()
     yield 0, begin
@@ -127,7 +127,7 @@ def _cuts(text: str) -> Iterator[tuple[int, int]]:
 
 
 def _kind(text: str) -> tuple[Cue, str] | None:
-    """Cue at the beginning of a clause; after a complete cue ("if not") a clause can begin."""
+    """Cue at the beginning of a clause; None if there is none. After a complete cue ("if not") a clause can begin."""
     for kind, form in _kinds():
         match = form.match(text)
         behind_it = None if match is None or kind not in _WHOLE else _NEXT.match(text, match.end())
@@ -139,7 +139,7 @@ def _kind(text: str) -> tuple[Cue, str] | None:
 
 
 def trailing_cue(text: str) -> Clause | None:
-    """First cue after an action in a clause, as a condition or repetition of that action."""
+    """First cue after an action in a clause, which makes the action conditional or repeated; None if there is none."""
     forms = CLAUSES.mapping("behind")
     found = [(match.start(), Cue(kind), match) for kind, form in forms for match in form.finditer(text, 1)]
     found = [one for one in found if one[1] is not Cue.IF or not CLAUSES.asks_before.search(text[: one[0]])]
@@ -150,13 +150,13 @@ def trailing_cue(text: str) -> Clause | None:
 
 
 def begins_action(text: str) -> bool:
-    """Returns whether the first word is a verb of a clause."""
+    """Returns whether the first word is a verb that can begin a clause."""
     word = re.match(r"[\w']+", text)
     return word is not None and word[0].lower() in _verbs()
 
 
 def verb_positions(text: str) -> Iterator[int]:
-    """Positions after the first word where a clause may begin without a comma before it."""
+    """Yields the positions of verbs after the first word, where a clause may begin without a comma before it."""
     for match in re.finditer(r"[\w']+", text):
         if match.start() and match[0].lower() in _verbs():
             yield match.start()

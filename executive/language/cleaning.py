@@ -1,8 +1,8 @@
-"""Cleaning of a sentence: odd characters, and the wake phrase.
+"""Cleans a sentence of odd characters, and finds the wake phrase.
 
-The wake phrase is "Hey Alice", or the bare name set off by a comma. A greeting right before the name calls at the
-beginning and at the end of a sentence, and after a pause; the bare name calls at the beginning or the end. A name in a
-story ("Hey, Alice told me ...", "my sister, Alice") does not call.
+The wake phrase is "Hey Alice", or only the name, set off by a comma. A greeting right before the name calls the robot
+at the beginning and at the end of a sentence, and after a pause; the name alone calls at the beginning or the end. A
+name in a story ("Hey, Alice told me ...", "my sister, Alice") calls nobody.
 """
 
 import re
@@ -26,9 +26,9 @@ _PLACEHOLDER: Final = re.compile(
 
 
 def clean(text: str) -> str:
-    """Removes control characters, brackets and pictures, and joins blanks.
+    """Removes control characters, brackets and emoji, and reduces repeated blanks to one.
 
-    Quotes become plain, and short forms stand in one piece ("i 'm" becomes "i'm").
+    Quotes become plain, and short forms are joined ("i 'm" becomes "i'm").
     """
     plain = unicodedata.normalize("NFKC", _PERCENT.sub(" percent", _AND.sub("and", text)))
     plain = plain.replace("\u2019", "'").replace("\u2018", "'").replace("...", ",")
@@ -38,7 +38,7 @@ def clean(text: str) -> str:
 
 
 def placeholder(text: str) -> str | None:
-    """Finds a placeholder ("${room}", "[object]", "ROOM_NAME") or another piece that is no word; None without any."""
+    """Finds a placeholder ("${room}", "[object]", "ROOM_NAME") or another piece that is no word; None without one."""
     found = _PLACEHOLDER.search(_PERCENT.sub(" percent", _AND.sub("and", text)))
     return None if found is None else found[0]
 
@@ -49,7 +49,7 @@ _MOST_LETTERS: Final = 2000
 
 
 def foreign_reason(text: str) -> str | None:
-    """Refusal of a text in another script or language; None for English."""
+    """Reason to refuse a text in another script or language; None for English."""
     letters = [c for c in text[:_MOST_LETTERS] if c.isalpha()]
     if letters and 2 * sum("LATIN" in unicodedata.name(c, "") for c in letters) < len(letters):
         return "I understand English only, in Latin letters"
@@ -70,14 +70,14 @@ SAME_NAME_ALONE: Final = 0.05
 
 @dataclass(frozen=True)
 class Address:
-    """Robot that a sentence calls (None: nobody), and the text without the wake phrase."""
+    """Robot that a sentence calls (None: no robot), and the text without the wake phrase."""
 
     name: str | None
     text: str
 
 
 def find_address(text: str, names: Collection[str]) -> Address:
-    """Finds the robot among `names` that a sentence calls; the first wake phrase counts."""
+    """Finds the robot among `names` that a sentence calls, by the first wake phrase."""
     calls = [(start, -end, name) for name in names for start, end in _calls(text, name)]
     if not calls:
         return Address(None, text)
@@ -89,7 +89,7 @@ def find_address(text: str, names: Collection[str]) -> Address:
 def find_heard_wake(transcript: str, name: str, *, others: Collection[str] = ()) -> Address:
     """Finds the wake phrase for the robot `name` in a transcript, where the name may be misspelled ("Hey Ellis").
 
-    `others` are names of other robots: a word with a sound nearer to one of them does not call this robot.
+    `others` are names of other robots: a word that sounds more like one of these does not call this robot.
     """
     exact = find_address(transcript, (name, *others))
     if exact.name is not None:
@@ -101,8 +101,8 @@ def find_heard_wake(transcript: str, name: str, *, others: Collection[str] = ())
 def strip_wake(text: str, name: str, others: Collection[str] = ()) -> Address:
     """Removes the wake phrase for the robot called `name`; `others` are other robots.
 
-    A bare name at the beginning without a comma is removed, too, but calls nobody. When the sentence calls another
-    robot, its name is returned.
+    A name without a comma at the beginning is also removed, but calls nobody. If the sentence calls another robot, that
+    robot's name is returned.
     """
     address = find_address(text, (name, *others))
     if address.name is not None:
@@ -113,12 +113,12 @@ def strip_wake(text: str, name: str, others: Collection[str] = ()) -> Address:
 
 @lru_cache(maxsize=64)
 def _forms(name: str) -> Patterns:
-    """Patterns of calls to a robot of that name."""
+    """Patterns for calls to a robot with that name."""
     return _FORMS.with_words(own=rf"{re.escape(name)}\b")
 
 
 def _calls(text: str, name: str) -> Iterator[tuple[int, int]]:
-    """Spans of text that call a robot: by a greeting, by the name first, or by the name last."""
+    """Yields spans of text that call a robot: by a greeting, or by the name at the beginning or the end."""
     forms = _forms(name)
     for match in forms.greets.finditer(text):
         before, after = text[: match.start()], text[match.end() :]
@@ -137,7 +137,7 @@ def _calls(text: str, name: str) -> Iterator[tuple[int, int]]:
 
 
 def _corrected(transcript: str, name: str, others: Collection[str]) -> Iterator[str]:
-    """Corrections of a transcript whose beginning sounds like the wake phrase or the name."""
+    """Yields corrections of a transcript whose beginning sounds like the wake phrase or the name."""
 
     def alike(heard: str, limit: float) -> bool:
         distance = sound_distance(heard, name)

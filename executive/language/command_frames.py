@@ -1,4 +1,4 @@
-"""Command frames: resolved actions as commands with spoken names, one to take an object and one to carry it."""
+"""Builds command frames: resolved actions as commands with spoken names, one to take an object and one to carry it."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ _ALONE: Final[Mapping[VerbKind | None, Task | None]] = {
 
 @dataclass(frozen=True)
 class CommandFrame:
-    """Command whose names are still as spoken."""
+    """Command with names that are not grounded in a world."""
 
     verb: str
     item: Phrase | None = None
@@ -35,7 +35,7 @@ class CommandFrame:
 def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
     """Converts actions to command frames, in order.
 
-    The robot looks for the next action's object at its first destination; it does not fetch a held object.
+    After a bare "go", the next action's object is searched at that destination; a held object is not fetched again.
 
     Raises RefusalError when the destination of an object is missing.
     """
@@ -75,7 +75,7 @@ def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
 
 
 def _puts_down(action: Action, before: Action) -> bool:
-    """Returns whether an action puts down an object after its transport: "take it to the desk and set it down"."""
+    """Returns whether an action puts down the object that was carried: "take it to the desk and set it down"."""
     goal = before.goal if before.kind in _GOES_FOR else None
     carried = goal is not None and goal is not HERE and not goal.person
     return carried and action.kind is VerbKind.PLACE and action.again and action.target == before.target
@@ -107,7 +107,7 @@ def _set_down(actions: Sequence[Action]) -> tuple[Action, ...]:
 
 
 def _join_going(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Merges a bare "go" with the next action, if that has no place; "then fetch" stays separate."""
+    """Merges a bare "go" with the next action if that action names no place; "then fetch" stays separate."""
     joined: list[Action] = []
     for action in actions:
         before = joined[-1] if joined and joined[-1].kind is VerbKind.GO else None
@@ -131,7 +131,7 @@ def _join_going(actions: Sequence[Action]) -> tuple[Action, ...]:
 
 
 def _meets(action: Action, wish: Action) -> bool:
-    """Returns whether an action fetches the object of a wish."""
+    """Returns whether an action already fetches the object that a wish asks for."""
     same = action.target is not None and wish.target is not None and action.target.tokens == wish.target.tokens
     somebody = wish.goal is not None and (wish.goal is HERE or wish.goal.living)
     wished = wish.kind is VerbKind.ROUND_TRIP and somebody and wish.source is None and not wish.again
@@ -140,7 +140,7 @@ def _meets(action: Action, wish: Action) -> bool:
 
 
 def _one_by_one(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Carries each object before the next is taken: "take the milk and the cup and put them on the table"."""
+    """Carries each object before taking the next: "take the milk and the cup and put them on the table"."""
     ordered: list[Action] = []
     for action in actions:
         last = next((n for n in range(len(ordered) - 1, -1, -1) if ordered[n].target == action.target), None)
@@ -151,7 +151,7 @@ def _one_by_one(actions: Sequence[Action]) -> tuple[Action, ...]:
 
 
 def spoken_command(frame: CommandFrame) -> Command:
-    """Command with its names as spoken."""
+    """Command with names as the speaker said them."""
     goal, within = frame.goal, None if frame.goal is None else frame.goal.within
     person = goal is not None and goal.person
     return Command(

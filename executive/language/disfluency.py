@@ -1,4 +1,4 @@
-"""Repair of disfluencies: corrections ("the wrench, no, the hammer") and negations ("not the coke")."""
+"""Repairs disfluencies: corrections ("the wrench, no, the hammer") and negations ("not the coke")."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -46,7 +46,7 @@ def repair_disfluencies(items: Iterable[Item]) -> tuple[Item, ...]:
 
 
 def unwanted_phrases(items: Sequence[Item]) -> tuple[Phrase, ...]:
-    """Noun phrases right after "not"."""
+    """Noun phrases directly after "not"."""
     pairs = pairwise(item for item in items if not isinstance(item, Separator))
     return tuple(b.phrase for a, b in pairs if isinstance(a, Negation) and isinstance(b, Chunk))
 
@@ -86,15 +86,15 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
 
 
 def _forbidden(mark: Negation, ahead: Sequence[Item]) -> RefusalError:
-    """Refusal of a prohibition."""
+    """Refusal because the speaker forbids an action."""
     said = spoken_words([mark, *ahead]).replace(" n't", "n't")
     return RefusalError(f"I cannot follow {said!r}; say only what I am to do", [said])
 
 
 def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> bool:
-    """Returns whether the next verb replaces the negated one: going for going, handling for handling.
+    """Returns whether the next verb replaces the negated verb: both go somewhere, or both handle objects.
 
-    Without an action before it, a negated handling is dropped.
+    If no action comes before it, a negated verb that handles objects is replaced by any verb.
     """
     after = next((item for item in rest if isinstance(item, Verb)), None)
     goes = negated.kinds == {VerbKind.GO}
@@ -113,7 +113,7 @@ def _meant_instead(negated: Chunk, mark: Negation, done: Sequence[Item], rest: S
 
 
 def _one_of_them(rest: list[Item], negated: Phrase) -> list[Item]:
-    """Replaces "one" or "it" by the negated phrase ("don't take the red cup, take the blue one")."""
+    """Replaces "one" or "it" by the negated phrase: "don't take the red cup, take the blue one"."""
     at = next((n for n, item in enumerate(rest) if isinstance(item, Chunk) and item.role is None), None)
     new = None if at is None else rest[at]
     one = isinstance(new, Chunk) and new.phrase.stands_for_one
@@ -124,7 +124,7 @@ def _one_of_them(rest: list[Item], negated: Phrase) -> list[Item]:
 
 
 def _corrected(done: list[Item], rest: list[Item], mark: Correction) -> tuple[list[Item], list[Item]]:
-    """Replaces the corrected item by the next one."""
+    """Replaces the corrected item by the item that follows it."""
     ahead = _without_separators(rest)
     verb = next((n for n in range(len(done) - 1, -1, -1) if isinstance(done[n], Verb)), None)
     if all(isinstance(item, Separator) for item in done):
@@ -166,7 +166,7 @@ def _replaced(clause: Sequence[Item], new: Item) -> list[Item]:
 
 
 def _corrected_index(clause: Sequence[Item], new: Item) -> int | None:
-    """Index of the last item that `new` can replace."""
+    """Index of the last item that `new` can replace; None if there is none."""
     return next((n for n in range(len(clause) - 1, -1, -1) if _corrects(new, clause[n])), None)
 
 

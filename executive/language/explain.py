@@ -1,4 +1,4 @@
-"""Explanations of how a sentence became its commands: JSON values, lines of text, a drawing of the dependencies."""
+"""Explains how a sentence became its commands: as JSON values, lines of text, or a drawing of the dependencies."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -64,14 +64,14 @@ def _action_values(action: Action) -> dict[str, Any]:
 
 
 def _part(clause: Predicate) -> str:
-    """The words of a clause, its verb in front."""
+    """Words of a clause, with its verb first."""
     verb = [] if clause.verb is None else [spoken_words([clause.verb])]
     subject = [clause.subject.phrase.spoken] if clause.subject is not None else []
     return " | ".join([*verb, *subject, *filter(None, (spoken_words([item]) for item in clause.items))])
 
 
 def explanation_lines(trace: Trace) -> Iterator[str]:
-    """Explains each step of understanding a sentence in lines with a heading; empty steps are left out."""
+    """Explains each step of understanding a sentence in lines with headings; omits empty steps."""
     values = explain(trace)
     sections: dict[str, Sequence[str]] = {
         "heard": [trace.text],
@@ -103,7 +103,7 @@ def _action_lines(action: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _table(tokens: Sequence[Token]) -> list[str]:
-    """The words in columns."""
+    """Formats words in columns."""
     rows = []
     for token in map(_token_values, tokens):
         head = next((other.text for other in tokens if other.index == token["head"]), "")
@@ -115,7 +115,7 @@ def _table(tokens: Sequence[Token]) -> list[str]:
 
 
 def tree_lines(tokens: Sequence[Token], head: Token | None = None, indent: str = "") -> Iterator[str]:
-    """The dependency tree as lines of text: each word below the word that it depends on."""
+    """Formats the dependency tree as lines of text: each word below the word that it depends on."""
     if head is None:
         for root in (token for token in tokens if token.head == token.index):
             yield f"{root.text} ({root.pos} {root.relation})"

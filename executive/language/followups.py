@@ -1,6 +1,6 @@
-"""Follow-ups to an earlier request: remarks about the run, corrections, additions, repetitions.
+"""Parses follow-ups to an earlier request: remarks about the run, corrections, additions, repetitions.
 
-They amend the commands of the earlier request; names are grounded before.
+Follow-ups amend the commands of the earlier request, once their names are grounded.
 """
 
 import enum
@@ -17,7 +17,7 @@ from skills.api import ObjectKind
 
 
 class FollowUpKind(enum.Enum):
-    """Relation of a sentence to the request before it."""
+    """Relation of a sentence to the previous request."""
 
     CORRECTION = "correction"  # in place of it
     ADDITION = "addition"  # after it
@@ -26,7 +26,7 @@ class FollowUpKind(enum.Enum):
 
 @dataclass(frozen=True)
 class FollowUp:
-    """Follow-up to a request: its words, their preposition, and the words that they replace."""
+    """Follow-up to a request: the words, the preposition before them, and the words that they replace."""
 
     kind: FollowUpKind
     said: str = ""
@@ -35,15 +35,15 @@ class FollowUp:
 
     @property
     def whole(self) -> str:
-        """Words with their preposition."""
+        """Words with the preposition before them."""
         return f"{self.preposition} {self.said}".strip()
 
 
 @dataclass(frozen=True)
 class Amendment:
-    """Grounded change of a request: an object, with its spoken number if any, or else a place or a person.
+    """Grounded change to a request: an object, with the number that was said, or else a place or a person.
 
-    `source` marks the place of the object, not the destination; `old` is the replaced name, if it was said.
+    `source` is True if the place is where the object is, not the destination; `old` is the replaced name, if said.
     """
 
     kind: ObjectKind | None = None
@@ -55,7 +55,7 @@ class Amendment:
 
 
 def parse_follow_up(text: str) -> FollowUp | None:
-    """Parses a follow-up; None for a sentence that stands for itself."""
+    """Parses a follow-up; None for a sentence that is complete without the earlier request."""
     plain = " ".join(text.replace("’", "'").split()).strip(" .!,")
     if _FORMS.again.fullmatch(plain):
         return FollowUp(FollowUpKind.AGAIN)
@@ -87,9 +87,10 @@ def amend(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> t
 
 
 def skip_fetching(commands: Sequence[Command], held: ObjectKind | None, knowledge: Knowledge) -> tuple[Command, ...]:
-    """Removes the commands that are needless with a held object.
+    """Removes the commands that are unnecessary because the gripper holds an object.
 
-    The robot does not fetch the same object again; it first puts another one back at its usual place.
+    The robot does not fetch the held object again; if it holds another object, it first returns that object to its
+    usual place.
     """
     if held is None or not commands:
         return tuple(commands)
@@ -119,7 +120,7 @@ def _with_thing(command: Command, by: Amendment, knowledge: Knowledge) -> Comman
 
 
 def _counted(command: Command, count: int | None) -> Command:
-    """Sets the number of objects in a command, where one was said."""
+    """Sets the number of objects in a command, if a number was said."""
     item_count, object_count = (command.item_count, command.object_count) if count is None else (count, count)
     return replace(
         command,
@@ -129,7 +130,7 @@ def _counted(command: Command, count: int | None) -> Command:
 
 
 def _place_of(commands: Sequence[Command], by: Amendment) -> int:
-    """Index of the command whose goal a place changes."""
+    """Index of the command whose goal a new place changes."""
     named = [n for n, command in enumerate(commands) if by.old is not None and command.goal == by.old]
     sources = [n for n, command in enumerate(commands) if command.item is None and command.task is not None]
     goals = [n for n, command in enumerate(commands) if n not in sources]
@@ -140,7 +141,7 @@ def _place_of(commands: Sequence[Command], by: Amendment) -> int:
 
 
 def _split(said: str) -> tuple[str, str]:
-    """Splits off a preposition at the beginning."""
+    """Splits off a preposition at the beginning of the words."""
     match = _FORMS.placed.fullmatch(said)
     return (match.group(1).lower(), match.group(2)) if match else ("", said)
 

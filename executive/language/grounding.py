@@ -1,6 +1,6 @@
-"""Grounding: spoken names become names of the world, and open places get their defaults.
+"""Grounds spoken names in the names of the world, and open places in their defaults.
 
-It looks a name up as spoken, then by its synonyms, then by its noun alone; an ambiguous or similar name makes a
+A name is looked up as spoken, then by its synonyms, then by its noun alone; an ambiguous or similar name makes a
 question.
 """
 
@@ -38,8 +38,8 @@ def ground(
 ) -> tuple[tuple[Command, ...], tuple[str, ...]]:
     """Converts frames to commands in the world's own names, with default places for omitted ones.
 
-    Also returns a note on each name that was interpreted as another. The parser's similarity of English words widens
-    the meaning of unknown names.
+    Also returns a note on each name that was interpreted as another. Unknown names are compared with known ones by the
+    parser's similarity of words.
 
     Raises RefusalError when an object, place or person is unknown or ambiguous; with a question if that helps.
     """
@@ -51,7 +51,7 @@ def ground(
 def check_unwanted(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge) -> None:
     """Refuses to exclude one kind among several that a command takes: "a drink, but not a beer".
 
-    Raises RefusalError.
+    Raises RefusalError if the excluded kind is one of several that a command may take.
     """
     for phrase in unwanted:
         names = filter(None, (knowledge.object_name(form) for _, form in _readings(phrase)))
@@ -63,14 +63,14 @@ def check_unwanted(unwanted: Sequence[Phrase], commands: Sequence[Command], know
 
 @dataclass
 class _Grounder:
-    """Grounder of names in one world; notes the names that it interpreted as others."""
+    """Grounds names in one world; collects notes on names that were interpreted as others."""
 
     knowledge: Knowledge
     parser: DependencyParser
     notes: list[str] = field(default_factory=list)
 
     def needed_there(self, frames: Sequence[CommandFrame]) -> tuple[CommandFrame, ...]:
-        """Moves the destination into a room without surfaces when an object is asked for there."""
+        """If an object is fetched from a room without surfaces, brings it to that room instead."""
         found = list(frames)
         for k, (takes, brings) in enumerate(pairwise(frames)):
             place, fetched = takes.goal, takes.task is Task.GRASP and brings.item == takes.object
@@ -110,7 +110,7 @@ class _Grounder:
         )
 
     def target(self, phrase: Phrase, task: Task | None) -> ObjectKind:
-        """Object of a task: a known object, or a time."""
+        """Object of a task: a known object or person, or a duration."""
         if task is Task.WAIT:
             return ObjectKind(phrase.head.lemma)
         if task is not Task.FIND:
@@ -118,12 +118,12 @@ class _Grounder:
         return self.object_kind(phrase) if (person := self._sought(phrase)) is None else ObjectKind(person)
 
     def taken(self, phrase: Phrase) -> ObjectKind:
-        """Known class or category of a phrase; "all the objects" is everything."""
+        """Known class or category that a phrase names; "all the objects" means everything."""
         kind = self.object_kind(phrase)
         return replace(kind, name=EVERYTHING) if kind.name == ANYTHING and phrase.count == 0 else kind
 
     def _sought(self, phrase: Phrase) -> str | None:
-        """Person to look for, a known one or anybody; None for an object.
+        """Person to look for, a known person or anybody; None if the phrase names an object.
 
         Raises RefusalError for a person whom the robot cannot distinguish from others.
         """
@@ -144,7 +144,7 @@ class _Grounder:
         return None
 
     def _supported_goal(self, frame: CommandFrame, location: Location, people: bool) -> tuple[str, str | None]:
-        """Goal of a frame, whose relation the command keeps, and for a person the place."""
+        """Goal of a frame, if the command supports the preposition; for a person also the place."""
         looks = frame.task in (Task.GRASP, Task.FIND)
         if looks and location == HERE:
             raise RefusalError("I take and find objects on surfaces, and people in rooms: name a place", [HERE.name])
@@ -164,7 +164,7 @@ class _Grounder:
         return goal, goal_at
 
     def object_kind(self, phrase: Phrase) -> ObjectKind:
-        """Known class or category of a phrase, with the adjectives before it."""
+        """Known class or category that a phrase names, with the adjectives before it."""
         known = self._known(self.knowledge.object_names())
         for attributes, form in _readings(phrase):
             if (name := self.knowledge.object_name(form)) is not None:
@@ -178,7 +178,7 @@ class _Grounder:
         raise self._unknown(Slot.THING, (phrase.text, phrase.singular), known)
 
     def place(self, location: Location) -> str:
-        """Known place of a location. The room around it decides among several surfaces with the same noun ("table")."""
+        """Known place that a location names. Among surfaces with the same noun ("table"), the room around decides."""
         if location.phrase is None:
             raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
         if location.phrase.said_count not in (None, 1) or location.every_room:
@@ -194,7 +194,7 @@ class _Grounder:
         return self._only(inside, Slot.PLACE, Phrase(location.phrase.tokens).text)
 
     def _room(self, location: Location) -> str | None:
-        """Room around a location, where one was said ("in the kitchen", "of the kitchen", "bedroom table")."""
+        """Room that a location names besides the place ("in the kitchen", "of the kitchen", "bedroom table")."""
         extra = () if location.phrase is None else location.phrase.extra
         around = " ".join(extra[1:]) if extra[:1] == ("of",) else None
         around = around if location.within is None else location.within.text
@@ -208,7 +208,7 @@ class _Grounder:
         return next(filter(None, map(self.knowledge.place, words)), None)
 
     def _places(self, phrase: Phrase, room: str | None, known: Mapping[str, str]) -> Sequence[str]:
-        """Places with exactly this name, or else with this noun; with a room, also those with a synonym."""
+        """Places with exactly this name, or else with this noun; if a room is given, also places with a synonym."""
         groups = {"room": tuple(self.knowledge.places), "surface": tuple(self.knowledge.surfaces)}
         named = len(phrase.content) > 1 or self.knowledge.place(phrase.text) is not None
         if not named and groups.get(phrase.head.lemma):  # any place: "the room", "a surface"
@@ -231,7 +231,7 @@ class _Grounder:
         return list(dict.fromkeys([*own, *other, *called] if room is not None else own or other))
 
     def _left_over(self, phrase: Phrase, name: str) -> bool:
-        """Returns whether words remain that belong to no name of the place or its room ("kitchen 3")."""
+        """Returns whether words remain that belong neither to the place's name nor to its room's ("kitchen 3")."""
         extra = () if phrase.extra[:1] == ("of",) else phrase.extra
         said = {word for part in (*(t.word for t in phrase.content[:-1]), *extra) for word in part.lower().split()}
         spellings = self.knowledge.spellings([name, self.knowledge.room(name)])
@@ -239,7 +239,7 @@ class _Grounder:
         return not said <= {word.lower() for other in known for word in other.split()}
 
     def _person(self, phrase: Phrase) -> str | None:
-        """Known person; None when the words name nobody."""
+        """Known person; None if the words name no known person."""
         name = self.knowledge.person(phrase.text)
         if name is not None or not phrase.person or self.knowledge.place(phrase.text) is not None:
             return name
@@ -249,7 +249,7 @@ class _Grounder:
         raise self._unknown(Slot.PERSON, (phrase.text,), self._known(people))
 
     def _only(self, candidates: Sequence[str], slot: Slot, heard: str) -> str:
-        """The only candidate; several make a question."""
+        """Single candidate. Raises RefusalError with a question if there are several."""
         if len(candidates) > 1:
             raise _asking(which_question(slot, heard, tuple(candidates)))
         if slot is not Slot.PLACE:
@@ -260,11 +260,11 @@ class _Grounder:
         self.notes += [f"I take '{heard}' to be {name}" for name in names if heard.lower() != name.lower()]
 
     def _known(self, names: Iterable[str]) -> Mapping[str, str]:
-        """Names by each of their spellings in lower case."""
+        """Names by each of their spellings, in lower case."""
         return {word.lower(): name for name in names for word in self.knowledge.spellings([name])}
 
     def _unknown(self, slot: Slot, forms: Sequence[str], known: Mapping[str, str]) -> RefusalError:
-        """Question about names of similar spelling, sound or meaning; without any, a refusal."""
+        """Error with a question about names of similar spelling, sound or meaning; without such names, a refusal."""
         heard = forms[0]
         ends = (name for form in forms for spelling, name in known.items() if spelling == _last(form))
         near = (name for form in forms for name in look_alikes(form, known, self.parser))
@@ -275,7 +275,7 @@ class _Grounder:
 
 
 def _count(phrase: Phrase | None, kind: ObjectKind | None) -> int:
-    """Number of objects; everything counts as one."""
+    """Number of objects; "everything" counts as one."""
     return 1 if phrase is None or kind is None or kind.name == EVERYTHING else phrase.count
 
 
@@ -284,7 +284,7 @@ def _asking(question: ClarifyingQuestion) -> RefusalError:
 
 
 def _readings(phrase: Phrase) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Splits of a phrase into adjectives and a name: the longest name first, as spoken and in singular."""
+    """Yields splits of a phrase into adjectives and a name: the longest name first, as spoken and in the singular."""
     *left, head = phrase.tokens
     words = [t for t in left if t.text in phrase.text.split()]
     for first in range(len(words) + 1):

@@ -1,4 +1,4 @@
-"""Indirect requests: questions and statements that ask for an action."""
+"""Reads indirect requests: questions and statements that ask for an action."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -47,7 +47,7 @@ def where_is(row: Row, items: list[Item]) -> Item | None:
 
 
 def _is_be(row: Row, at: int) -> bool:
-    """Returns whether a form of "to be" stands at a position."""
+    """Returns whether a form of "to be" is at a position."""
     return at < len(row.tokens) and (row.tokens[at].lemma == "be" or row.tokens[at].word == "'s")
 
 
@@ -96,7 +96,7 @@ def what_is(row: Row, items: list[Item]) -> Item | None:
 
 
 def _whatever(row: Row) -> Chunk | None:
-    """Place after "what is" or "is there anything", with its preposition."""
+    """Place, with its preposition, after "what is" or "is there anything"."""
     at, asked = row.at, False
     for word in (token.word for token in row.tokens[row.at :]):
         whatever = word in ("what", "anything", "something")
@@ -114,7 +114,7 @@ def _whatever(row: Row) -> Chunk | None:
 
 
 def _fullness(row: Row) -> Chunk | None:
-    """Place in "is the bench empty"."""
+    """Place that "is the bench empty" asks about."""
     phrase = row.phrase_at(row.at + 1) if _is_be(row, row.at) else None
     end = row.at + 1 + (0 if phrase is None else len(phrase.tokens))
     if phrase is None or end >= len(row.tokens) or row.tokens[end].word not in lexicon().fullness:
@@ -143,7 +143,7 @@ def reported_speech(row: Row, items: list[Item]) -> Item | None:
 
 
 def _subject(items: Sequence[Item]) -> tuple[int, Chunk | None]:
-    """Bare phrase at the end, with the places after it, and its index: "the patient in room four"."""
+    """Index of the last phrase without a preposition, and the phrase: "the patient" in "the patient in room four"."""
     at = len(items) - 1
     while at > 0 and isinstance(item := items[at], Chunk) and item.role is not None:
         at -= 1
@@ -212,7 +212,7 @@ def narration(row: Row, items: list[Item]) -> Item | None:
 
 
 def _told_verb(row: Row) -> int:
-    """Number of words of a narrating verb that begins here; 0 for none."""
+    """Number of words in a narrating verb that begins here; 0 if none does."""
     tags = [t.tag for t in row.tokens[row.at : row.at + 4]]
     first, words = row.tokens[row.at], [t.word for t in row.tokens[row.at : row.at + 3]]
     if first.tag == "VBD" and first.pos == "VERB":

@@ -1,4 +1,4 @@
-"""Sentence as a row of items: verbs, noun phrases with their prepositions, and small words.
+"""Represents a sentence as a row of items: verbs, noun phrases with their prepositions, and small words.
 
 Parsers err most in the attachment of prepositions; the row keeps the order of the words, and the verbs assign roles to
 the places later.
@@ -17,20 +17,20 @@ from executive.language.tokens import Token
 
 @dataclass(frozen=True)
 class Verb:
-    """Verb that the robot understands, with its particles."""
+    """Verb that the robot understands, with the verb's particles."""
 
     text: str
     kinds: frozenset[VerbKind]
 
 
 def verb(text: str) -> Verb:
-    """Makes an item of a verb in the dictionary."""
+    """Makes an item from a verb in the dictionary."""
     return Verb(text, lexicon().verbs[tuple(text.split())])
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """Noun phrase with the preposition before it; `role` is None without one."""
+    """Noun phrase with the preposition before it; `role` is None if it has no preposition."""
 
     phrase: Phrase
     preposition: str = ""
@@ -58,8 +58,9 @@ class Adverb:
 class Being:
     """Form of "to be"; `existential` with "there", `asked` before its subject.
 
-    `teller` is the person who left an object at its place ("Anna left her umbrella"); `narrated` marks any verb of a
-    narration ("somebody spilled milk on the floor"), and `topic` is its object ("the ball rolled under the sofa").
+    `teller` is the person who left an object at its place ("Anna left her umbrella"). `narrated` marks any verb in a
+    narration ("somebody spilled milk on the floor"), and `topic` is what the narration is about ("the ball rolled under
+    the sofa").
     """
 
     text: str
@@ -72,7 +73,7 @@ class Being:
 
 @dataclass(frozen=True)
 class Whether:
-    """ "If" or "whether"."""
+    """Word "if" or "whether"."""
 
 
 @dataclass(frozen=True)
@@ -85,20 +86,20 @@ class Separator(_Word):
 
 
 class Unknown(_Word):
-    """Word that fits nowhere."""
+    """Word that does not fit anywhere in the sentence."""
 
 
 class Outside(_Word):
-    """Verb that the robot does not know; the items after it belong to it."""
+    """Verb that the robot does not know; the items after it belong to this verb."""
 
 
 class Negation(_Word):
-    """ "Not" and the like: the speaker excludes the next item."""
+    """Words such as "not", by which the speaker excludes the next item."""
 
 
 @dataclass(frozen=True)
 class Correction(_Word):
-    """ "No", "I mean": the next item replaces an earlier one; a `soft` one may also mean nothing."""
+    """Words such as "no": the next item replaces an earlier item; a `soft` correction may also mean nothing."""
 
     soft: bool
 
@@ -117,7 +118,7 @@ def spoken_words(items: Iterable[Item]) -> str:
 
 
 def without_objects(items: Sequence[Item]) -> tuple[Item, ...]:
-    """Verb with its recipient and goal, for another object; nothing when there are several verbs."""
+    """Verb with its recipient and goal, to be used for another object; empty if there are several verbs."""
     verbs = [item for item in items if isinstance(item, Verb | Being | Outside | Negation | Correction)]
     if len(verbs) != 1 or not isinstance(verbs[0], Verb):
         return ()
@@ -137,7 +138,7 @@ LONGEST: Final = 6
 
 @dataclass
 class Row:
-    """Words of a sentence, its noun phrases by their first word, and the position of the reader.
+    """Words of a sentence, the noun phrases by their first word, and the reader's position.
 
     The reader skips words in `silent`.
     """
@@ -148,12 +149,12 @@ class Row:
     silent: set[int] = field(default_factory=set)
 
     def match(self, phrases: Container[tuple[str, ...]]) -> tuple[str, ...] | None:
-        """Longest of the phrases that stands here."""
+        """Longest of the phrases that begins at the position."""
         spoken = tuple(t.word for t in self.tokens[self.at : self.at + LONGEST])
         return next((spoken[:length] for length in range(len(spoken), 0, -1) if spoken[:length] in phrases), None)
 
     def phrase_at(self, start: int) -> Phrase | None:
-        """Noun phrase that begins at `start`, also when its first words were taken."""
+        """Noun phrase that begins at `start`, even if its first words have been taken."""
         whole = self.phrases.get(start)
         if whole is not None:
             return whole
@@ -161,17 +162,17 @@ class Row:
         return None if cut is None else Phrase(tuple(t for t in cut.tokens if t.index >= start))
 
     def take(self, count: int) -> str:
-        """Takes the next words."""
+        """Takes the next words, and moves the position behind them."""
         self.at += count
         return " ".join(t.text for t in self.tokens[self.at - count : self.at])
 
     def take_words(self, phrase: Sequence[str]) -> str:
-        """Takes the words of a phrase of the dictionaries."""
+        """Takes the words of a phrase from the dictionaries."""
         self.at += len(phrase)
         return " ".join(phrase)
 
     def ahead(self, count: int = 1) -> Sequence[Token]:
-        """The `count` words after the next one, fewer at the end."""
+        """Next `count` words after the present one; fewer at the end."""
         return self.tokens[self.at + 1 : self.at + 1 + count]
 
 
@@ -184,8 +185,8 @@ def may_begin_command(items: Sequence[Item]) -> bool:
 class Predicate:
     """Verb, or a form of "to be", with the items after it; the robot may not know the verb.
 
-    `verb` is None for items before the first verb; `subject` stands before a form of "to be"; `whether` says that "if"
-    or "whether" stands before it.
+    `verb` is None for items before the first verb; `subject` precedes a form of "to be"; `whether` is True if "if" or
+    "whether" precedes the subject.
     """
 
     verb: Verb | Being | Outside | None
@@ -200,7 +201,7 @@ class Predicate:
 
 
 def predicates(items: Iterable[Item]) -> tuple[Predicate, ...]:
-    """Splits the row of items at its verbs."""
+    """Splits the row of items into predicates, one for each verb."""
     found: list[Predicate] = [Predicate(None)]
     for item in items:
         if isinstance(item, Being):
@@ -230,7 +231,7 @@ def _ungapped(clause: Predicate) -> Iterator[Predicate]:
 
 
 def _gives_another(items: Sequence[Item], at: int) -> bool:
-    """Returns whether another recipient and object stand after a separator: "me the book and Anna the pen"."""
+    """Returns whether another recipient and object follow a separator: "me the book and Anna the pen"."""
     joint, who, what = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
     if not (isinstance(joint, Separator) and isinstance(who, Chunk) and isinstance(what, Chunk)):
         return False
@@ -239,7 +240,7 @@ def _gives_another(items: Sequence[Item], at: int) -> bool:
 
 
 def _gap(items: Sequence[Item], at: int) -> bool:
-    """Returns whether a separator stands between two objects that each have a place of the same role."""
+    """Returns whether a separator is between two objects, each of which has a place with the same role."""
     joint, what, place = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
     if not (isinstance(joint, Separator) and isinstance(what, Chunk) and isinstance(place, Chunk)):
         return False
@@ -249,7 +250,7 @@ def _gap(items: Sequence[Item], at: int) -> bool:
 
 
 def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
-    """Begins a clause of "to be"; moves its subject, and the "if" before it, from the clause before."""
+    """Begins a clause with "to be"; takes its subject, and the "if" before the subject, from the clause before."""
     rest, subject = last.items, last.items[-1] if last.items and not being.existential else None
     if not isinstance(subject, Chunk) or subject.role is not None:
         subject = None
@@ -261,7 +262,7 @@ def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
 
 
 def drop_name(clauses: Sequence[Predicate]) -> tuple[Predicate, ...]:
-    """Removes a bare name before the first verb, which only calls somebody ("Michael go to the kitchen")."""
+    """Removes a name without a comma before the first verb, which calls somebody ("Michael go to the kitchen")."""
     first, *rest = clauses or [Predicate(None)]
     name = first.content[0] if len(first.content) == 1 else None
     if first.verb is not None or not rest or not isinstance(name, Chunk) or name.role is not None:
@@ -306,10 +307,10 @@ def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
 
 
 def _without_reasons(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
-    """Removes the speakers' own plans before or after the request."""
+    """Removes the speaker's own plans before or after the request."""
 
     def own_affair(verb: Verb | Being | Outside | None, before: Sequence[Item]) -> bool:
-        """Returns whether the verb is a plan of the speaker and no request: "I am about to sing"."""
+        """Returns whether the verb expresses a plan of the speaker and no request: "I am about to sing"."""
         wants = [item.word for item in before if isinstance(item, Unknown)]
         return isinstance(verb, Outside) and verb.word.lower() not in lexicon().asks and wants[-1:] == ["to"]
 
@@ -328,7 +329,7 @@ def _without_reasons(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
 
 
 def _without_checks(clauses: Sequence[Predicate]) -> Iterator[Predicate]:
-    """Removes "see" and "check" before "if there is": the question stands alone."""
+    """Removes "see" and "check" before "if there is": only the question remains."""
     asks = False
     for clause, after in zip_longest(clauses, clauses[1:]):
         checks = isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds

@@ -1,4 +1,4 @@
-"""Dictionaries of verbs and small words, read from their files once."""
+"""Reads the dictionaries of verbs and small words from their files, once."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class PrepositionRole(enum.Enum):
 
 @cache
 def read_table(name: str) -> Any:
-    """Reads a table of this package; all scalars are text, "on" and "no" among them."""
+    """Reads a table in this package; all scalars are text, even "on" and "no"."""
     text = resources.files(__package__).joinpath("tables", name).read_text(encoding="utf-8")
     return yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
 
@@ -89,14 +89,14 @@ def lexicon() -> Lexicon:
 
 
 def any_of(phrases: Iterable[str]) -> str:
-    """Regular expression of any of the phrases, the longest first."""
+    """Regular expression that matches any of the phrases, the longest first."""
     return "|".join(map(re.escape, sorted(phrases, key=len, reverse=True)))
 
 
 class Patterns:
-    """Regular expressions of a table, or of its section, case-insensitive; each is compiled at first use.
+    """Regular expressions from a table or from one of its sections, case-insensitive; each is compiled at first use.
 
-    {name} in an expression stands for another expression of the section, of the table, or of `words`.
+    {name} in an expression stands for another expression in the section, the table, or `words`.
     """
 
     def __init__(self, table: str, section: str | None = None, words: Mapping[str, str] | None = None) -> None:
@@ -111,15 +111,15 @@ class Patterns:
         return found
 
     def compiled(self, text: str) -> re.Pattern[str]:
-        """Compiles an expression that stands in no table."""
+        """Compiles an expression that is not in any table."""
         return re.compile(self._filled(text), re.IGNORECASE)
 
     def each(self, name: str) -> tuple[re.Pattern[str], ...]:
-        """Expressions of a list."""
+        """Expressions in a list."""
         return tuple(form for _, form in self.mapping(name))
 
     def mapping(self, name: str) -> tuple[tuple[str, re.Pattern[str]], ...]:
-        """Expressions of a mapping, each with its name; those of a list have numbers."""
+        """Expressions in a mapping, each with its name; those in a list have numbers."""
         if name not in self._mappings:
             entry = self._entry(name)
             rows = entry.items() if isinstance(entry, dict) else enumerate(entry)
@@ -127,11 +127,11 @@ class Patterns:
         return self._mappings[name]
 
     def text(self, name: str) -> str:
-        """Expression as text, with the named ones inserted."""
+        """Text of an expression, with the named expressions inserted."""
         return self._words[name] if name in self._words else self._filled(self._entry(name))
 
     def with_words(self, **words: str) -> Patterns:
-        """Copies the patterns, with more words to insert."""
+        """Copies the patterns with more words that expressions may insert."""
         return Patterns(self._table, self._section, {**self._words, **words})
 
     def _entry(self, name: str) -> Any:

@@ -1,4 +1,4 @@
-"""Limits of the robot: harm, unsupported routes and relations, and objects and places out of reach."""
+"""Refuses what the robot cannot do: harm, unsupported routes and relations, and objects and places out of reach."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -46,7 +46,7 @@ def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> No
 
 
 def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None) -> RefusalError:
-    """Refusal with the unknown words, each with its whole clause."""
+    """Refusal with the unknown words, each within its whole clause."""
     named = []
     for clause in dict.fromkeys(clause for _, clause in parts):
         words = dict.fromkeys(part for part, other in parts if other == clause)
@@ -64,7 +64,7 @@ def _asks_for_people(action: Action) -> bool:
 
 
 def _moved(action: Action, target: Phrase) -> bool:
-    """Returns whether an action moves a definite object from or to a place in the house, and no abstract idea.
+    """Returns whether an action moves a concrete, definite object from or to a place in the house.
 
     Examples are "the mail from the desk", and documents ("take the report to the boss").
     """
@@ -84,7 +84,7 @@ def _moved(action: Action, target: Phrase) -> bool:
 
 
 def _outside(action: Action, moved: bool) -> Iterator[str]:
-    """Parts of an action that are out of reach; `moved` says that its object lies in a place of the house."""
+    """Yields the words in an action that are out of reach; `moved` says that the object is in a place in the house."""
     target = action.target
     if target is not None:
         odd = target.universal or target.addressed or target.counts
@@ -125,7 +125,7 @@ def _holdable(phrase: Phrase, action: Action) -> bool:
 
 
 def _idle(phrase: Phrase, place: Location, verb: str) -> bool:
-    """Returns whether going there is an idiom or an act, not a route: "go to bed", "reach my wife"."""
+    """Returns whether going there is an idiom or an activity instead of a route: "go to bed", "reach my wife"."""
     out = place.preposition.startswith("out")
     if phrase.person and (out or not phrase.named_person) and place.within is None and verb in lexicon().calls:
         return True
@@ -134,7 +134,7 @@ def _idle(phrase: Phrase, place: Location, verb: str) -> bool:
 
 
 def _reachable(phrase: Phrase, place: Location) -> bool:
-    """Returns whether the robot can go there; a name before a place is a person's ("Paris at the desk")."""
+    """Returns whether the robot can go there; a name before a place belongs to a person ("Paris at the desk")."""
     if phrase.known or phrase.person or (place.within is not None and phrase.head.pos == "PROPN"):
         return True
     nominal = phrase.head.pos not in ("ADJ", "ADV") or len(phrase.tokens) > 1
@@ -167,7 +167,7 @@ def _does_harm(clause: Predicate) -> bool:
 
 
 def _somebody(phrase: Phrase) -> bool:
-    """Returns whether the phrase is a person, or a part of one."""
+    """Returns whether the phrase means a person, or a part of a person."""
     bare = len(phrase.content) == 1
     living = phrase.person or phrase.speaker or phrase.stands_for_somebody or (bare and phrase.kind is NounKind.PERSON)
     owned = not bare or any(token.tag in ("PRP$", "POS") for token in phrase.tokens)
@@ -175,7 +175,7 @@ def _somebody(phrase: Phrase) -> bool:
 
 
 def check_routes_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Action]) -> None:
-    """Refuses a prescribed route, and relations to the speaker other than "to me". Raises RefusalError."""
+    """Refuses a prescribed route, and relations to the speaker except "to me". Raises RefusalError."""
     for place in (place for action in actions for place in action.passes):
         if place.phrase is None or place.phrase.head.lemma not in read_table("relations.yaml")["doors"]:
             raise _refused("go", place.preposition, place.name)

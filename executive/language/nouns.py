@@ -1,7 +1,7 @@
-"""Kinds of nouns, judged by the nearness of their meaning to examples of each kind.
+"""Classifies nouns by how near their meaning is to examples of each kind.
 
-The examples are in nouns.yaml by kind. Linear discriminant analysis on word vectors judges a noun that is no example;
-`errand_train.nouns` learns its weights.
+The examples are in nouns.yaml by kind. Linear discriminant analysis on word vectors classifies a noun that is no
+example; `errand_train.nouns` learns its weights.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _MARGIN: Final = 2.0
 
 
 class NounKind(enum.Enum):
-    """Kind of a noun's meaning."""
+    """Kind of object, place or person that a noun means."""
 
     THING = "thing"  # an object that can be found, and mostly taken
     PLACE = "place"  # where one can go, or where objects are stored
@@ -39,13 +39,13 @@ class NounKind(enum.Enum):
 
     @property
     def within_reach(self) -> bool:
-        """Returns whether a robot in a house can handle or reach objects of the kind."""
+        """Returns whether a robot in a house can handle or reach what a noun of this kind means."""
         return self not in (NounKind.ELSEWHERE, NounKind.ABSTRACT)
 
 
 @cache
 def noun_examples() -> Mapping[str, NounKind]:
-    """Shipped examples: each noun, or pair of nouns, and its kind."""
+    """Returns the shipped examples: each noun, or pair of nouns, with its kind."""
     table = read_table("nouns.yaml").items()
     kinds = [(NounKind(kind), noun) for kind, fields in table for nouns in fields.values() for noun in nouns]
     return {noun: kind for kind, noun in reversed(kinds)}
@@ -53,7 +53,7 @@ def noun_examples() -> Mapping[str, NounKind]:
 
 @dataclass(frozen=True)
 class NounKinds:
-    """Classifier of nouns; `weights`, of shape (dimensions + 1, kinds), gives the scores, its last row constant."""
+    """Classifier of nouns; `weights`, of shape (dimensions + 1, kinds), give the scores, the last row as constants."""
 
     examples: Mapping[str, NounKind]
     vector_of: VectorOf
@@ -68,7 +68,7 @@ class NounKinds:
     def kind(self, words: Sequence[str], *, lemma: str) -> NounKind | None:
         """Kind of a noun, the last of `words`, with the words before it; None for an unknown noun.
 
-        `lemma` is its dictionary form. A doubtful noun gets a kind within reach.
+        `lemma` is the noun's dictionary form. If the scores are not decisive, the noun gets a kind within reach.
         """
         *before, noun = words
         pairs = [f"{before[-1]} {form}" for form in (noun, lemma)] if before else []
@@ -79,7 +79,7 @@ class NounKinds:
         return None if scores is None else list(NounKind)[int(np.argmax(scores))]
 
     def scores(self, words: Sequence[str]) -> FloatArray | None:
-        """Score of each kind for a noun; the words before it count less."""
+        """Score of each kind for a noun; the words before the noun weigh less."""
         vector = self.vector_of(words[-1])
         if vector is None:
             return None

@@ -1,6 +1,6 @@
-"""Dependency parser: spaCy's English model, loaded in little time.
+"""Parses dependencies by spaCy's English model, which is loaded quickly.
 
-It loads spaCy without the parts that commands never use; these take most of the loading time.
+It loads spaCy without the modules that commands never use; these take most of the loading time.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _RELATIONS: Final = {"dobj": "obj", "dative": "iobj", "pobj": "obl", "ROOT": "ro
 class DependencyParser:
     """Dependency parser of sentences, by spaCy with the English model that comes as a package.
 
-    Its word vectors also judge the kinds of nouns.
+    The model's word vectors also serve to classify nouns.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -63,13 +63,13 @@ class DependencyParser:
         return NounKinds.load(self.vector)
 
     def release(self) -> None:
-        """Frees the model's memory; the parser loads it again at the next use."""
+        """Frees the model's memory; the next use loads the model again."""
         for loaded in ("_model", "_nouns"):
             self.__dict__.pop(loaded, None)
         self._parsed.clear()
 
     def parse(self, text: str) -> tuple[Token, ...]:
-        """Parses `text` into words, in order; never raises on text. The latest texts are cached."""
+        """Parses `text` into words, in order; never raises, whatever the text. The latest texts are cached."""
         from executive.language.tokens import Token, repair_parse
 
         if text not in self._parsed:
@@ -106,7 +106,7 @@ class DependencyParser:
         return self._kinds[words]
 
     def vector(self, word: str) -> FloatArray | None:
-        """Unit vector of a word's meaning; None when it has none."""
+        """Unit vector of a word's meaning; None if the word has no vector."""
         vocab = self._pipeline.vocab
         row = vocab.vectors.find(key=vocab.strings[word])
         if row < 0:
@@ -121,14 +121,14 @@ class DependencyParser:
         return any(pipeline.vocab.strings[form] in rows.frequent for form in (word.lower(), word.title()))
 
     def similarity(self, word: str, other: str) -> float:
-        """Similarity of two words in meaning, from -1 to 1; 0 when one has no vector."""
+        """Similarity of two words in meaning, from -1 to 1; 0 if one of them has no vector."""
         first, second = self._pipeline.vocab[word], self._pipeline.vocab[other]
         return float(first.similarity(second)) if first.has_vector and second.has_vector else 0.0
 
 
 @cache
 def load_parser() -> DependencyParser:
-    """Loads the parser of this process; its model is loaded at first use.
+    """Returns the parser of this process; its model is loaded at first use.
 
     Raises InputError when the model's package is not installed.
     """
@@ -147,8 +147,8 @@ _YAML_OF_SPACY: Final = ("read_yaml", "write_yaml", "yaml_dumps", "yaml_loads", 
 def load_english(folder: Path) -> tuple[Language, WordRows]:
     """Loads the pipeline in a folder, and the rows of its word vectors.
 
-    It omits the store of strings, which holds every word of the vectors, because only labels are looked up. The vectors
-    stay in their file until their first use. The tokenizer's rules come from the folder alone.
+    It omits the store of strings, which contains every word with a vector, because only labels are looked up. The
+    vectors stay in their file until their first use. Only the folder determines the tokenizer's rules.
     """
     with _small_spacy():
         from spacy.tokenizer import Tokenizer
@@ -174,13 +174,13 @@ def load_english(folder: Path) -> tuple[Language, WordRows]:
 
 
 def _affix(find: Callable[[re.Pattern[str], str], Any], pattern: str, nothing: Any = None) -> Callable[[str], Any]:
-    """Finds a pattern, compiled when a word first needs it: words of letters, and blanks, never match."""
+    """Finds a pattern, which is compiled when first needed; words of letters, and blanks, never match."""
     compiled = cache(lambda: re.compile(pattern))
     return lambda word: nothing if word.isascii() and (word.isalpha() or word == " ") else find(compiled(), word)
 
 
 class RuleTokenizer:
-    """Tokenizer of spaCy that adds the rule for a word ("don't", "o'clock") once a text has the word."""
+    """Tokenizer of spaCy that adds the rule for a word ("don't", "o'clock") once a text contains the word."""
 
     def __init__(self, tokenizer: Callable[[str], Doc], rules: Mapping[str, Sequence[Mapping[Any, str]]]) -> None:
         self._tokenizer: Any = tokenizer
@@ -247,9 +247,9 @@ _HEADER_BYTES: Final = 5
 
 
 class WordRows(Mapping[int, int]):
-    """Rows of vectors by the hash of a word, read from a msgpack file on demand.
+    """Rows of word vectors by the hash of a word, read from a msgpack file on demand.
 
-    The frequent words are a dictionary. A search for a rarer word in the bytes of the file takes 2 to 3 ms; after 40
+    The frequent words are in a dictionary. A search for a rarer word in the bytes of the file takes 2 to 3 ms; after 40
     searches the whole file becomes the dictionary, which is faster for many sentences.
     """
 
@@ -268,7 +268,7 @@ class WordRows(Mapping[int, int]):
         return self._unpacked(len(self), len(self._data))
 
     def _unpacked(self, entries: int, end: int) -> Mapping[int, int]:
-        """First entries of the file, all of them before the byte `end`."""
+        """First entries in the file: all that precede the byte `end`."""
         from srsly.msgpack import Unpacker
 
         unpacker = Unpacker(max_buffer_size=len(self._data), strict_map_key=False)
@@ -287,7 +287,7 @@ class WordRows(Mapping[int, int]):
         return row
 
     def _rare(self, key: int) -> int | None:
-        """Row of a word that is not frequent; None when it has none."""
+        """Row of a word that is not frequent; None if the word has no row."""
         if key not in self._searched:
             if len(self._searched) >= _SEARCHES or key.bit_length() <= 32:  # short keys could be part of a longer one
                 return self._all.get(key)

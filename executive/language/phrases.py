@@ -1,4 +1,4 @@
-"""Noun phrases: the words around a noun, and their meaning."""
+"""Finds noun phrases: the words around a noun, and what they mean."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ _HEADLIKE: Final = frozenset({"obj", "iobj", "obl", "nsubj", "attr", "conj", "ro
 class Phrase:
     """Noun with the words around it.
 
-    `extra` are the words joined after it ("of wine"), `of_kind` is the kind of the noun after "of", and `numbered` a
-    separate count ("make that two").
+    `extra` are the words joined after the noun ("of wine"), `of_kind` is the kind of the noun after "of", and
+    `numbered` is a count that was said separately ("make that two").
     """
 
     tokens: tuple[Token, ...]
@@ -49,13 +49,13 @@ class Phrase:
 
     @property
     def singular(self) -> str:
-        """Text with the noun in its dictionary form."""
+        """Text of the phrase, with the noun in its dictionary form."""
         *left, head = self.content
         return _joined_text((*left, head.lemma, *self.extra))
 
     @property
     def object_kind(self) -> ObjectKind:
-        """Kind of object that the phrase names: leading adjectives are attributes."""
+        """Kind of object that the phrase names; its leading adjectives become attributes."""
         words = self.content
         leads = (n for n, t in enumerate(words[:-1]) if not t.adjective)
         first = next(leads, len(words) - 1)
@@ -64,18 +64,18 @@ class Phrase:
 
     @property
     def plural(self) -> bool:
-        """Returns whether the noun is in the plural."""
+        """Returns whether the noun is plural."""
         return self.head.tag in ("NNS", "NNPS")
 
     @property
     def count(self) -> int:
-        """Number said; 1 for a singular, 0 for a plural without a number."""
+        """Number that was said; without a number, 1 for a singular and 0 for a plural."""
         said = self.said_count
         return said if said is not None else 0 if self.plural else 1
 
     @property
     def said_count(self) -> int | None:
-        """Number said, if any; also that of "one" and "two" alone."""
+        """Number that was said, or None; "one" and "two" without a noun count too."""
         said = next((_value(numeral) for numeral in self._numerals()), None)
         if said is None and self.plural and self.tokens[0].word == "both":
             said = 2
@@ -92,18 +92,18 @@ class Phrase:
 
     @property
     def pronoun(self) -> bool:
-        """Returns whether the phrase stands for an earlier phrase ("it", "one", "two of them")."""
+        """Returns whether the phrase refers to an earlier phrase ("it", "one", "two of them")."""
         word = self.head.word in lexicon().pronouns and not self.stands_for_one
         return word and all(map(_is_determiner, self.tokens[:-1]))
 
     @property
     def stands_for_one(self) -> bool:
-        """Returns whether the noun is "one" with words before it ("the red one")."""
+        """Returns whether the noun is "one", with words before it ("the red one")."""
         return self.head.word in _ONE and len(self.tokens) > 1
 
     @property
     def stands_for_somebody(self) -> bool:
-        """Returns whether the phrase is a pronoun that can mean a person."""
+        """Returns whether the phrase is a pronoun that can refer to a person."""
         return len(self.tokens) == 1 and self.head.word in lexicon().somebody
 
     @property
@@ -113,7 +113,7 @@ class Phrase:
 
     @property
     def person(self) -> bool:
-        """Returns whether the phrase is a person: a noun for people, or a person's name."""
+        """Returns whether the phrase means a person: a noun for people, or a person's name."""
         return self.head.lemma in lexicon().people or self.head.word in lexicon().people or self.named_person
 
     @property
@@ -130,7 +130,7 @@ class Phrase:
 
     @property
     def proper(self) -> bool:
-        """Returns whether the phrase is written as a name, of any kind."""
+        """Returns whether the phrase is written as a proper name."""
         return not self._determined() and all(token.pos == "PROPN" for token in self.tokens)
 
     @property
@@ -141,7 +141,7 @@ class Phrase:
 
     @property
     def addressed(self) -> bool:
-        """Returns whether the phrase means the robot, or an object of the robot ("your phone"): a robot owns none."""
+        """Returns whether the phrase means the robot, or something of the robot ("your phone"), which owns nothing."""
         if len(self.tokens) == 1 and self.head.word in ("you", "yourself"):
             return True
         held = self.kind is NounKind.THING or self.head.lemma in lexicon().fixtures
@@ -149,17 +149,17 @@ class Phrase:
 
     @property
     def indefinite(self) -> bool:
-        """Returns whether the phrase means any one of its kind: no article but "a", no possessive."""
+        """Returns whether the phrase means any object of its kind: it has "a" or no article, and no possessive."""
         return not any(t.word in lexicon().definite or t.tag in ("PRP$", "POS") for t in self.tokens)
 
     @property
     def known(self) -> bool:
-        """Returns whether the world knows the name."""
+        """Returns whether the world knows the phrase as a name."""
         return self.head.known
 
     @property
     def kind(self) -> NounKind | None:
-        """Kind of the noun; for "a piece of advice" the kind of the advice."""
+        """Kind of the noun; for "a piece of advice" the kind of "advice"."""
         meant = self.head.lemma in lexicon().quantities or self.head.lemma in _ENDS
         return self.of_kind if meant and self.of_kind else self.head.kind
 
@@ -175,7 +175,7 @@ class Phrase:
 
     @property
     def distributed(self) -> Phrase:
-        """All objects of the kind for "each cube"; the phrase itself for other words, as for "every second cube"."""
+        """Phrase "all cubes" for "each cube"; the phrase itself for other words, such as "every second cube"."""
         each, *between = self.tokens[:-1] or self.tokens
         counted = any(t.tag == "CD" or t.word in _SOME_OF_THEM for t in between)
         objects = self.kind is None or (self.kind.within_reach and self.head.lemma not in lexicon().fixtures)
@@ -186,20 +186,20 @@ class Phrase:
         return replace(self, tokens=(replace(each, text=_ALL, lemma=_ALL), *between, head))
 
     def with_extra(self, *words: str) -> Phrase:
-        """Adds words after the noun."""
+        """Returns the phrase with additional words after the noun."""
         return replace(self, extra=(*self.extra, *words))
 
     def with_contents(self, inner: Phrase) -> Phrase:
-        """Adds "of" and the contents after the noun; of a mere number nothing can be held."""
+        """Returns the phrase with "of" and the contents after the noun; a mere number has no contents."""
         head = replace(self.head, kind=NounKind.ABSTRACT) if inner.counts else self.head
         return replace(self.with_extra("of", inner.text), tokens=(*self.tokens[:-1], head), of_kind=inner.kind)
 
     def with_count(self, count: int) -> Phrase:
-        """Sets the number."""
+        """Returns the phrase with another number."""
         return replace(self, numbered=count)
 
     def replace_one(self, meant: Phrase) -> Phrase:
-        """Replaces "one" by the noun of `meant`; its own adjectives stay."""
+        """Replaces "one" by the noun of `meant`, and keeps the adjectives before "one"."""
         noun = [t for t in meant.tokens if not t.adjective and not _is_determiner(t)] or [meant.head]
         single = self.head.word == "one" and meant.plural
         last = replace(noun[-1], text=noun[-1].lemma, tag="NN") if single else noun[-1]
@@ -210,14 +210,14 @@ class Phrase:
 
     @property
     def content(self) -> tuple[Token, ...]:
-        """Words without article, possessive and number."""
+        """Words of the phrase without article, possessive and number."""
         *left, head = self.tokens
         units = {n for n in range(len(left)) if self._measures(n)}
         mine = {n for n, t in enumerate(left) if t.tag == "POS" and left[n - 1].tag not in ("PRP$", "PRP")}
         return (*(t for n, t in enumerate(left) if n in units | mine or not _is_determiner(t)), head)
 
     def _numerals(self) -> Iterator[tuple[Token, ...]]:
-        """Yields the counting numbers, each in its successive words, without those of measures ("ten inch nails")."""
+        """Yields each number that counts objects, without numbers in measures ("ten inch nails")."""
         left = tuple(t for n, t in enumerate(self.tokens[:-1]) if not self._measures(n))
         for numeral, run in groupby(
             self.tokens if self.counts else left,
@@ -227,7 +227,7 @@ class Phrase:
                 yield tuple(run)
 
     def _measures(self, at: int) -> bool:
-        """Returns whether the number there belongs to a unit of measure."""
+        """Returns whether the number at a position belongs to a unit of measure."""
         unit = at + 2 < len(self.tokens) and self.tokens[at + 1].word in lexicon().units
         return unit and _number(self.tokens[at]) is not None
 
@@ -244,7 +244,7 @@ _TENS: Final = frozenset(range(20, 100, 10))
 
 
 def _joined_text(words: Sequence[Token | str]) -> str:
-    """Joins words by blanks, without one before the "'s" of an owner."""
+    """Joins words by blanks, except before the "'s" of a possessive."""
     text = ""
     for word in words:
         owner = isinstance(word, Token) and word.tag == "POS"
@@ -259,7 +259,7 @@ def _is_determiner(token: Token) -> bool:
 
 
 def _value(numeral: Sequence[Token]) -> int | None:
-    """Number of successive words: "twenty one", "two dozen"; None for other words."""
+    """Number that successive words express: "twenty one", "two dozen"; None for other words."""
     first, *rest = map(_number, numeral)
     if first is None or not rest:
         return first
@@ -277,7 +277,7 @@ def _number(token: Token) -> int | None:
 
 
 def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:
-    """Finds all noun phrases, by the index of their first word; they do not overlap."""
+    """Finds all noun phrases, which do not overlap; returns them by the index of the first word."""
     phrases: dict[int, Phrase] = {}
     end = len(tokens)
     for head in reversed(tokens):
@@ -298,7 +298,7 @@ def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:
 
 
 def _compound(before: Phrase, phrase: Phrase) -> bool:
-    """Returns whether adjacent nouns without an article are one phrase: "the kitchen" and "counter"."""
+    """Returns whether two adjacent nouns without an article form one phrase, such as "kitchen" and "counter"."""
     if before.head.lemma in lexicon().people and phrase.named_person and phrase.proper:
         return before.head.pos in ("NOUN", "PROPN") and not before.plural
     nouns = before.head.pos == "NOUN" and all(t.pos == "NOUN" for t in phrase.tokens)
@@ -317,7 +317,7 @@ def _is_head(token: Token, tokens: Sequence[Token]) -> bool:
 
 
 def _belongs(token: Token, head: Token, tokens: Sequence[Token]) -> bool:
-    """Returns whether a word before `head` depends on it only through words of its own phrase."""
+    """Returns whether a word before `head` depends on it directly or through other words of the phrase."""
     for _ in range(_DEEPEST):
         if token.relation not in _LEFT or token.word == "," or token.word in _LOOSE:
             return False

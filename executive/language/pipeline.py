@@ -1,4 +1,4 @@
-"""Pipeline from a cleaned sentence to its commands, with the trace of its steps."""
+"""Pipeline from a cleaned sentence to its commands, with a trace of the steps."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,15 +30,15 @@ _MOST_CHARACTERS: Final = 800
 
 @dataclass(frozen=True)
 class Trace:
-    """Results of each step on a sentence, in the order of the fields; steps after a refusal are empty.
+    """Result of each step for a sentence, in the order of the fields; steps after a refusal are empty.
 
-    The first fields are inputs. `memory` is the memory of earlier sentences, and afterwards of this one. `lead` are
-    items before the words, `asked` marks a statement to check, `elliptic` allows an omitted "it", `recipient` receives
-    objects if the sentence names nobody.
+    The first fields are inputs. `memory` has the referents from earlier sentences, and at the end those from this one.
+    `lead` are items before the words, `asked` marks a statement to check, `elliptic` allows an omitted "it",
+    `recipient` receives objects if the sentence names nobody.
 
     `affirmed` is a checked statement without its negation, `unwanted` are phrases after "not", `meanings` are pronouns
-    with their meanings, `notes` tell names that were interpreted as others. `refused_at` is the refusing step. `steps`
-    is the mission of a sentence with conditions, loops or waits, and `parts` are its clauses.
+    with their meanings, `notes` list names that were interpreted as others. `refused_at` is the step that refused the
+    sentence. If it has conditions, loops or waits, `steps` is its mission and `parts` are its clauses.
     """
 
     text: str
@@ -68,15 +68,15 @@ class Trace:
 
 @dataclass(frozen=True)
 class Pipeline:
-    """Steps from words to commands in one world; with `knowledge` None all names stay as spoken."""
+    """Steps from words to commands in one world; with `knowledge` None, all names stay as spoken."""
 
     parser: DependencyParser
     knowledge: Knowledge | None
 
     def run(self, trace: Trace, *, behind: str | None = None, upto: str | None = None) -> Trace:
-        """Runs all steps, or those after one and up to another by their names.
+        """Runs all steps, or only the steps after one named step and up to another.
 
-        Never raises on text, which has no wake phrase.
+        Never raises, whatever the text. The text must not contain the wake phrase.
         """
         names = tuple(_STEPS)
         last = len(names) if upto is None else names.index(upto) + 1
@@ -118,7 +118,7 @@ class Pipeline:
         return replace(trace, actions=read_actions(trace.clauses, elliptic=elliptic, recipient=trace.recipient))
 
     def _check(self, trace: Trace) -> Trace:
-        """Refuses the whole sentence when any part of it was not understood."""
+        """Refuses the whole sentence if some of its words were not understood."""
         unknown = [(word, action.said) for action in trace.actions for word in action.unknown]
         if unknown:
             raise not_understood(unknown, self.knowledge)
@@ -153,7 +153,7 @@ class Pipeline:
 
 
 def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError:
-    """Question about phrases joined by "or", if only one of them is possible."""
+    """Question that remains about phrases joined by "or" if only one of them is possible."""
     heard = " ".join(t.text for t in tokens[choice[0].content[0].index : choice[-1].head.index + 1]).replace(" ,", ",")
     place = all(phrase.kind is NounKind.PLACE for phrase in choice)
     slot = Slot.PLACE if place else Slot.PERSON if all(phrase.person for phrase in choice) else Slot.THING

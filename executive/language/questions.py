@@ -18,7 +18,7 @@ _LONG_WORD: Final = re.compile(r"(\S{40})\S{20,}")
 
 
 class Slot(Enum):
-    """Role of the asked name in a command."""
+    """Role that the name in question has in a command."""
 
     THING = "thing"  # which object
     PLACE = "place"  # which place
@@ -27,7 +27,7 @@ class Slot(Enum):
 
     @property
     def noun(self) -> str:
-        """Noun for the role in a sentence."""
+        """Noun for the role, for use in a sentence."""
         return "object" if self is Slot.THING else self.value
 
 
@@ -35,8 +35,8 @@ class Slot(Enum):
 class ClarifyingQuestion:
     """Question that the robot asks before it acts.
 
-    `candidates` are the possible answers, empty if any name will do; `default` is the likeliest. The answer replaces
-    the words `heard`; None adds it.
+    `candidates` are the possible answers (empty: any name), `default` is the likeliest answer. The answer replaces the
+    words `heard`; if `heard` is None, the answer is added to the sentence.
     """
 
     text: str
@@ -55,7 +55,7 @@ Answerer = Callable[[ClarifyingQuestion], str | None]
 
 
 def make_answerer(policy: QuestionPolicy, person: Answerer | None = None) -> Answerer:
-    """Makes the answerer of a policy; `person` asks somebody, and is None where nobody is there."""
+    """Returns the function that answers questions by a policy; `person` asks a person (None: nobody can be asked)."""
     if policy is QuestionPolicy.FIRST:
         return lambda question: question.default or next(iter(question.candidates), None)
     if policy is QuestionPolicy.ASK and person is not None:
@@ -64,7 +64,7 @@ def make_answerer(policy: QuestionPolicy, person: Answerer | None = None) -> Ans
 
 
 def which_question(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQuestion:
-    """Question which of several candidates a name means."""
+    """Question which of several candidates a name stands for."""
     text = f"Which {heard}: {listing(candidates, last='or')}?"
     return ClarifyingQuestion(text, slot, candidates, candidates[0], heard)
 
@@ -77,13 +77,13 @@ def perhaps_question(slot: Slot, heard: str, candidates: tuple[str, ...]) -> Cla
 
 
 def open_question(reason: str, heard: str | None) -> ClarifyingQuestion:
-    """Question about missing words: the destination, or the meaning of "it" and "there"."""
+    """Question about missing words: the destination, or what "it" or "there" means."""
     slot = Slot.GOAL if heard is None else Slot.PLACE if heard in _PLACE_WORDS else Slot.THING
     return ClarifyingQuestion(f"{reason[:1].upper()}{reason[1:]}", slot, heard=heard)
 
 
 def chosen_candidate(question: ClarifyingQuestion, answer: str) -> str | None:
-    """Candidate of an answer: by its number, its name, a word of it, or a similar one; None when unclear."""
+    """Candidate that an answer means: by number, name, a word of the name, or a similar name; None if unclear."""
     words = _FILLERS.sub("", answer.lower()).strip(" ,.!?")
     said = re.sub(r"\s+(?:one|please)$", "", _LEADING.sub("", words)).strip(" ,.!?")
     for number, candidate in enumerate(question.candidates, 1):
@@ -102,7 +102,7 @@ def chosen_candidate(question: ClarifyingQuestion, answer: str) -> str | None:
 
 
 def insert_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> str:
-    """Inserts the answer into the sentence: the chosen candidate, otherwise the answer's own words."""
+    """Inserts the answer into the sentence: the candidate that it means, otherwise the answer's own words."""
     value = chosen_candidate(question, answer) or _FILLERS.sub("", answer).strip(" ,.!?")
     if question.heard is None:
         return f"{sentence.rstrip(' .,!?')} {_whereto(value)}"
@@ -118,7 +118,7 @@ def insert_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> s
 
 
 def _nearly(question: ClarifyingQuestion, said: str) -> list[str]:
-    """Candidates with a spelling or sound like the answer's."""
+    """Candidates whose spelling or sound is similar to the answer."""
     from rapidfuzz.distance import OSA
 
     from executive.language.spelling import nearest_by_sound
@@ -150,7 +150,7 @@ _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth")
 
 
 class RefusalKind(Enum):
-    """Machine-readable kind of a refusal; its reason is for people."""
+    """Machine-readable kind of a refusal; the reason is written for people."""
 
     NOT_UNDERSTOOD = "not_understood"  # words outside the robot's abilities
     NOTHING_TO_DO = "nothing_to_do"  # it asks for no action

@@ -1,4 +1,4 @@
-"""Reader of the words of a sentence, from left to right, as a row of items."""
+"""Reads the words of a sentence from left to right as a row of items."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -37,7 +37,7 @@ _OF_ALL: Final = re.compile(r"all|none|(?:any|every|no)(?:where|one|body|thing)"
 
 
 class Reader(Row):
-    """Reader of the words of a sentence from left to right."""
+    """Reads the words of a sentence from left to right."""
 
     def read(self, lead: Sequence[Item] = ()) -> tuple[Item, ...]:
         """Reads the words as items after `lead`: each word becomes an item, except the silent ones."""
@@ -60,7 +60,7 @@ class Reader(Row):
         return tuple(items)
 
     def _mark(self, items: list[Item]) -> Item | None:
-        """Reads a negation or correction: "not", "no, the hammer"; "no milk" is none."""
+        """Reads a negation or correction: "not", "no, the hammer"; "no" in "no milk" is neither."""
         correction, negation = (self.match(lexicon().corrections), self.match(lexicon().negations))
         if correction is not None and len(correction) >= len(negation or ()):
             behind = self.tokens[self.at + len(correction) : self.at + len(correction) + 1]
@@ -84,7 +84,7 @@ class Reader(Row):
         return verb(" ".join(found))
 
     def _takes_preposition(self, verb: tuple[str, ...]) -> bool:
-        """Returns whether the last word of a verb begins a longer preposition instead ("go | in front of")."""
+        """Returns whether a verb's last word begins a longer preposition instead ("go | in front of")."""
         if verb[:-1] not in lexicon().verbs:
             return False
         start = self.at + len(verb) - 1
@@ -95,7 +95,7 @@ class Reader(Row):
         return any(ahead[:n] in lexicon().prepositions for n in range(2, len(ahead) + 1))
 
     def _gerund(self, items: list[Item]) -> tuple[str, ...] | None:
-        """Verb in the form "bringing" or "brought" where a command begins, as after "would you mind"."""
+        """Verb in a form such as "bringing" or "brought" where a command begins, as after "would you mind"."""
         first = self.tokens[self.at]
         past = first.tag in ("VBD", "VBN") and not items
         if not (past or (first.tag == "VBG" and may_begin_command(items))):
@@ -131,7 +131,7 @@ class Reader(Row):
         return Chunk(phrase, " ".join(preposition), lexicon().prepositions[preposition] if preposition else None)
 
     def _level(self, items: list[Item]) -> Item | None:
-        """Reads "upstairs" as a destination, or a place to search; before a place it adds nothing."""
+        """Reads "upstairs" as a destination or a place to search; before a place, the word adds nothing."""
         token, ahead = self.tokens[self.at], self.ahead()
         if token.word not in lexicon().levels:
             return None
@@ -153,7 +153,7 @@ class Reader(Row):
         return Phrase((replace(self.tokens[start], tag="DT", pos="DET"), *phrase.tokens))
 
     def _of(self, phrase: Phrase) -> Phrase:
-        """Joins "of wine" to a bottle, and "of cups" to "two" or "a couple"."""
+        """Joins "of wine" to "a bottle", and "of cups" to "two" or "a couple"."""
         while self.at < len(self.tokens) and self.tokens[self.at].word == "of":
             inner = self.phrase_at(self.at + 1)
             if inner is None:
@@ -165,7 +165,7 @@ class Reader(Row):
         return phrase
 
     def _numbered(self, phrase: Phrase) -> Phrase:
-        """Joins the number of a place: "room four"."""
+        """Joins a number to the place before it: "room four"."""
         token, behind = self.tokens[self.at] if self.at < len(self.tokens) else None, self.ahead()
         counts = bool(behind) and behind[0].pos in ("NOUN", "ADJ", "PROPN")
         countable = phrase.kind in (NounKind.PLACE, NounKind.THING) and not (phrase.plural or phrase.pronoun)
@@ -174,7 +174,7 @@ class Reader(Row):
         return phrase.with_extra(self.take(1))
 
     def _description_end(self, phrase: Phrase) -> int:
-        """End of a description after a noun: of a person's action or clothes, or of an object's contents."""
+        """End of a description after a noun: of a person's activity or clothes, or of an object's contents."""
         if self.at >= len(self.tokens):
             return self.at
         here = [t.word for t in (self.tokens[self.at], *self.ahead())]
@@ -196,7 +196,7 @@ class Reader(Row):
         return end
 
     def _doing_end(self) -> int:
-        """End of "raising their left arm" or "wearing a blue shirt"."""
+        """End of a description such as "raising their left arm" or "wearing a blue shirt"."""
         end = self.at + 1
         inner = self.phrase_at(end)
         if inner is not None and not inner.person:
@@ -206,7 +206,7 @@ class Reader(Row):
         return end
 
     def _directional(self, start: int) -> int:
-        """Number of words from `start` that give a direction or a posture."""
+        """Number of words from `start` on that give a direction or a posture."""
         if self.tokens[start].relation == "prt":
             return 1
         preposition = int(self.tokens[start].pos in ("ADP", "PART"))
@@ -243,14 +243,14 @@ class Reader(Row):
         return None if filler is None else Separator(self.take_words(filler))
 
     def _excepts(self, items: Sequence[Item]) -> bool:
-        """Returns whether "but" means "except": behind "everything", or "all the drinks" with a noun after it."""
+        """Returns whether "but" means "except": after "everything", or after "all the drinks" if a noun follows."""
         last = items[-1] if items else None
         words = {token.word for token in last.phrase.tokens} if isinstance(last, Chunk) else set()
         of_all = bool(words & {"all", "any", "every", "each"}) and self.phrase_at(self.at + 1) is not None
         return of_all or _OF_ALL.fullmatch(self.tokens[self.at - 1].word) is not None
 
     def _idle(self, items: Sequence[Item]) -> bool:
-        """Returns whether the next word adds nothing: in "that clamp over there", "I need like a towel"."""
+        """Returns whether the next word adds nothing, as in "that clamp over there" or "I need like a towel"."""
         token, behind = self.tokens[self.at], self.ahead()
         if token.word in lexicon().there and self._points(items):
             return True
@@ -264,7 +264,7 @@ class Reader(Row):
         return not items and token.word in ("after", "upon", "by") and bool(behind) and behind[0].tag == "VBG"
 
     def _points(self, items: Sequence[Item]) -> bool:
-        """Returns whether "over there" only goes with a "that", as in "that clamp over there"."""
+        """Returns whether "over there" only accompanies "that", as in "that clamp over there"."""
         named = next((item for item in reversed(items) if not isinstance(item, Separator)), None)
         behind = self.ahead()
         beyond = self.tokens[self.at - 1].word == "over" or (bool(behind) and behind[0].tag == "IN")
@@ -285,7 +285,7 @@ class Reader(Row):
         return (particle,)
 
     def _outside(self, items: list[Item]) -> Item | None:
-        """Unknown verb at a possible beginning of a clause."""
+        """Unknown verb at a position where a clause may begin."""
         token = self.tokens[self.at]
         if token.pos != "VERB" or token.tag not in _VERB_TAGS or not (may_begin_command(items) or token.tag == "VB"):
             return None
@@ -293,7 +293,7 @@ class Reader(Row):
 
 
 def _handles(items: Sequence[Item], phrase: Phrase) -> bool:
-    """Returns whether the last verb carries or finds objects such as the phrase; "is every beer there" does not."""
+    """Returns whether the last verb carries or finds objects like the phrase; "is every beer there" does not."""
     last = next((item for item in reversed(items) if isinstance(item, Verb | Being | Outside | Whether)), None)
     kinds = last.kinds if isinstance(last, Verb) else frozenset()
     carries = kinds & {VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PICK, VerbKind.PLACE}
@@ -301,5 +301,5 @@ def _handles(items: Sequence[Item], phrase: Phrase) -> bool:
 
 
 def _place(token: Token, role: PrepositionRole) -> Chunk:
-    """Makes a place of a word."""
+    """Makes a place out of a word."""
     return Chunk(Phrase((replace(token, pos="NOUN", tag="NN", kind=NounKind.PLACE),)), "", role)

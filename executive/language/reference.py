@@ -1,4 +1,4 @@
-"""Reference resolution: the meanings of "it", "one" and "there", and the places of objects in statements."""
+"""Resolves references: what "it", "one" and "there" mean, and where statements say that objects are."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,7 @@ from executive.language.roles import THERE, Location
 class Memory:
     """Latest referents of the conversation: objects, their location, a place, a person.
 
-    `gathered` are all objects named since the last transport, `locations` are those of objects in statements.
+    `gathered` are all objects named since the last transport; `locations` are where statements say that objects are.
     """
 
     objects: tuple[Phrase, ...] = ()
@@ -26,13 +26,13 @@ class Memory:
     locations: tuple[tuple[Phrase, Location], ...] = ()
 
     def where_is(self, item: Phrase) -> Location | None:
-        """Location that a statement gave for an object of that name."""
+        """Location that a statement has given for an object with that name."""
         return next((place for phrase, place in reversed(self.locations) if phrase.head.lemma == item.head.lemma), None)
 
 
 @dataclass(frozen=True)
 class Resolution:
-    """Actions of a sentence without pronouns, the memory after it, and each pronoun with its meaning."""
+    """Actions of a sentence with pronouns resolved, the memory afterwards, and each pronoun with its meaning."""
 
     actions: tuple[Action, ...] = ()
     memory: Memory = field(default_factory=Memory)
@@ -40,9 +40,9 @@ class Resolution:
 
 
 def resolve(actions: Sequence[Action], memory: Memory) -> Resolution:
-    """Replaces pronouns in actions, which then have one object at most; `memory` is that of earlier sentences.
+    """Replaces pronouns, so that each action has at most one object; `memory` has the referents from earlier sentences.
 
-    Raises RefusalError when a pronoun stands for no earlier phrase.
+    Raises RefusalError when a pronoun refers to no earlier phrase.
     """
     resolved = Resolution(memory=memory)
     for action in actions:
@@ -87,7 +87,7 @@ def _done(action: Action, before: Resolution) -> Resolution:
 
 
 def _named_before(item: Phrase, action: Action, actions: Sequence[Action]) -> Phrase | None:
-    """Object of an earlier action under the same name: "get the bread, go to the hall and put the bread there"."""
+    """Earlier object with the same name: "get the bread, go to the hall and put the bread there"."""
     if item.indefinite or action.source is not None or action.kind not in (VerbKind.PLACE, VerbKind.SINGLE_TRIP):
         return None
     taken = (one.target for one in reversed(actions) if one.target is not None and one.kind is not VerbKind.PLACE)
@@ -95,7 +95,7 @@ def _named_before(item: Phrase, action: Action, actions: Sequence[Action]) -> Ph
 
 
 def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
-    """Yields each pronoun of an action with its meaning."""
+    """Yields each pronoun in an action with its meaning."""
     for n, phrase in enumerate(action.objects):
         meant = _all_meant(action.objects[: n + 1], memory)[n:]
         if meant != (phrase,):
@@ -107,7 +107,7 @@ def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
 
 
 def _stated(action: Action, before: Resolution) -> Resolution:
-    """Remembers a statement; "it is in the drawer" gives the place of an earlier action's object."""
+    """Remembers a statement; "it is in the drawer" gives the place of an object in an earlier action."""
     memory = before.memory
     where = _place(action.source, memory)
     somebody = any(phrase.stands_for_somebody for phrase in action.objects)
@@ -128,7 +128,7 @@ def _stated(action: Action, before: Resolution) -> Resolution:
 
 
 def _remember(action: Action, where: Location | None, memory: Memory) -> Memory:
-    """Memory after a statement on the place of a person or an object."""
+    """Memory after a statement on where a person or an object is."""
     people = [phrase for phrase in action.objects if phrase.person]
     if people:
         return replace(memory, person=Location(people[-1], within=where))
@@ -145,7 +145,7 @@ def _remember(action: Action, where: Location | None, memory: Memory) -> Memory:
 
 
 def _all_meant(phrases: Sequence[Phrase], memory: Memory) -> tuple[Phrase, ...]:
-    """Meanings of all objects of an action; each may refer to an earlier one ("the big box and the small one")."""
+    """Meanings of all objects in an action; each may refer to an earlier object ("the big box and the small one")."""
     objects: list[Phrase] = []
     for phrase in phrases:
         meant = _meant(phrase, replace(memory, objects=tuple(objects) or memory.objects))
@@ -155,7 +155,7 @@ def _all_meant(phrases: Sequence[Phrase], memory: Memory) -> tuple[Phrase, ...]:
 
 
 def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:
-    """Meaning of a phrase: itself, unless it is "it", "two of them" or "the red one"."""
+    """Meaning of a phrase: the phrase itself, or what "it", "two of them" or "the red one" refers to."""
     if not (phrase.pronoun or phrase.stands_for_one):
         return [phrase]
     if not memory.objects:
@@ -169,7 +169,7 @@ def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:
 
 
 def _place(place: Location | None, memory: Memory) -> Location | None:
-    """Meaning of a place: "there" is the last place, "her" the last person."""
+    """Meaning of a place: "there" refers to the last place, "her" to the last person."""
     phrase = None if place is None else place.phrase
     pronoun = phrase is not None and (phrase.pronoun or phrase.stands_for_one or phrase.stands_for_somebody)
     if place is None or not (place == THERE or pronoun):

@@ -1,4 +1,4 @@
-"""Roles in a clause: the object of its verb, source, goal and recipient."""
+"""Assigns roles in a clause: the object of its verb, source, goal and recipient."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from executive.language.phrases import Phrase
 class Location:
     """Place or person as spoken.
 
-    `preposition` stands before it; `within` is a larger place around it ("the table in the kitchen"), or the place of a
-    person. `phrase` is None for HERE and THERE.
+    `preposition` precedes the location; `within` is a larger place around it ("the table in the kitchen"), or the place
+    where a person is. `phrase` is None for HERE and THERE.
     """
 
     phrase: Phrase | None
@@ -31,17 +31,17 @@ class Location:
 
     @property
     def living(self) -> bool:
-        """Returns whether the location is a person of any profession, or an animal: "him" and "her" can mean them."""
+        """Returns whether the location is a person, by profession too, or an animal: "him" and "her" can mean them."""
         return self.phrase is not None and (self.phrase.person or self.phrase.kind is NounKind.PERSON)
 
     @property
     def kind(self) -> NounKind | None:
-        """Kind of place, or person."""
+        """Kind of the place, or PERSON."""
         return None if self.phrase is None else self.phrase.kind
 
     @property
     def role(self) -> PrepositionRole | None:
-        """Role of the preposition."""
+        """Role that the preposition gives to the place."""
         return lexicon().prepositions.get(tuple(self.preposition.split()))
 
     @property
@@ -51,12 +51,12 @@ class Location:
 
     @property
     def name(self) -> str:
-        """Words of the place itself, without articles; "start" for HERE."""
+        """Words for the place itself, without articles; "start" for HERE."""
         return "start" if self.phrase is None else self.phrase.text
 
     @property
     def text(self) -> str:
-        """Words of the place with the larger place around it."""
+        """Words for the place, with the larger place around it."""
         if self.within is None:
             return self.name
         return f"{self.name} {self.within.preposition} {self.within.text}"
@@ -74,8 +74,8 @@ THERE: Final = Location(None, preposition="there")
 class Roles:
     """Items after a verb, sorted into noun phrases, places by their prepositions, and unknown words.
 
-    `first_at` is the place of the first bare phrase if that is a person, `listed` marks phrases joined by "and".
-    `choices` are phrases joined by "or". `favour` marks a recipient after "for".
+    `first_at` is where the person is if the first phrase without a preposition is a person; `listed` marks phrases
+    joined by "and". `choices` are phrases joined by "or". `favour` marks a recipient after "for".
     """
 
     objects: list[Phrase] = field(default_factory=list)
@@ -93,7 +93,7 @@ class Roles:
     favour: bool = False
 
     def add(self, one: _Placed) -> None:
-        """Adds a phrase with the larger place, by the preposition."""
+        """Adds a phrase to the role that its preposition gives, with the larger place around it."""
         phrase, role, location = one.chunk.phrase, one.chunk.role, one.location
         joined = bool(one.joint and self.goals)
         if role is None:
@@ -134,7 +134,7 @@ class Roles:
 
 @dataclass(frozen=True)
 class _Placed:
-    """Chunk, the "and" or "or" right before it, and the place around it."""
+    """Noun phrase with the "and" or "or" directly before it, and the place around it."""
 
     chunk: Chunk
     joint: str
@@ -142,7 +142,7 @@ class _Placed:
 
     @property
     def location(self) -> Location:
-        """Chunk as a location."""
+        """Noun phrase as a location."""
         if self.chunk.phrase.speaker:
             return HERE
         return Location(self.chunk.phrase, self.chunk.preposition, self.within)
@@ -151,8 +151,8 @@ class _Placed:
 def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) -> Roles:
     """Sorts the items after a verb into roles.
 
-    With `describes`, a first "near" or "on top of" before more places identifies the object. With `puts`, "on" after
-    "from" is the destination, as in "put the cup from the desk on the bed".
+    With `describes`, "near" or "on top of" before further places identifies the object. With `puts`, "on" after "from"
+    is the destination, as in "put the cup from the desk on the bed".
     """
     roles = Roles()
     spoken = list(_spoken(items, roles))
@@ -178,7 +178,7 @@ def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) ->
 
 
 def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Placed]:
-    """Yields the chunks, and collects unknown words."""
+    """Yields the noun phrases, and collects unknown words."""
     joint, relative = "", False
     before: Chunk | None = None
     for item in items:
@@ -193,7 +193,7 @@ def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Placed]:
 
 
 def _described(spoken: list[_Placed]) -> list[_Placed]:
-    """Makes "the object on top of the cup from the desk" an object of its own and a source."""
+    """Splits "the object on top of the cup from the desk" into an object and a source."""
     places = [n for n, one in enumerate(spoken) if one.chunk.role not in (None, PrepositionRole.FOR)]
     if len(places) < 2 or places[0] == 0:
         return spoken
@@ -209,7 +209,7 @@ def _described(spoken: list[_Placed]) -> list[_Placed]:
 
 
 def _nested(spoken: Sequence[_Placed], puts: bool) -> Iterator[_Placed]:
-    """Joins a place to the one before it that it contains: no "and" between, and another preposition."""
+    """Joins a place to the previous place if it contains that place: no "and" between, and another preposition."""
     rest = list(spoken)
     while rest:
         first = rest.pop(0)
@@ -234,7 +234,7 @@ def _somebody(phrase: Phrase) -> bool:
 
 
 def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
-    """Phrases joined by an "or" after the row: the last one, and those joined to it by commas."""
+    """Phrases that an "or" after the row joins: the last phrase, and those that commas join to it."""
     first = len(row) - 1
     while first > 0 and row[first].joint in _LISTING:
         before, chunk = row[first - 1].chunk, row[first].chunk

@@ -1,4 +1,4 @@
-"""Understanding for several robots: a part for each, the order of the parts, and objects that change hands."""
+"""Understands sentences for several robots: a part for each, the order of the parts, and objects that change hands."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -36,11 +36,11 @@ def understand_for_robots(
     memory: Memory | None = None,
     correct: bool = True,
 ) -> Understanding:
-    """Understands `sentence` for the robots called `robots`, in parts; for one robot as `understand` does.
+    """Understands `sentence` in parts for the robots named `robots`; for one robot, works like `understand`.
 
-    Any robot may do a part that names none. With several robots the world's names must be known. With `require_wake`
-    the sentence must call one robot by name, or all. The other arguments are those of `understand`. Never raises on
-    text.
+    Any robot may do a part that names none. With several robots, `knowledge` must be given. With `require_wake` the
+    sentence must call one robot by name, or all robots. The other arguments are those of `understand`. Never raises,
+    whatever the text.
     """
     text = clean(sentence)
     names = tuple(map(display_name, robots))
@@ -63,7 +63,7 @@ def understand_for_robots(
     addressed = True
 
     def read(text: str, known: Knowledge | None) -> Understanding:
-        """Understands a sentence without rules for rooms."""
+        """Understands a sentence that contains no rules for rooms."""
         nonlocal addressed
         assert known is not None
         cut = split(text, names)
@@ -89,7 +89,7 @@ def understand_for_robots(
 
 @dataclass(frozen=True)
 class _Read:
-    """Part with its meaning, and the numbers of the parts that it waits for."""
+    """Part of a sentence with its meaning, and the numbers of the parts that it waits for."""
 
     part: AddressedText
     meaning: Understanding
@@ -103,7 +103,7 @@ class _Reader:
     knowledge: Knowledge
 
     def addressed(self, sentence: str, cut: Split, memory: Memory | None) -> Understanding:
-        """Understands the parts of a split sentence."""
+        """Understands the parts into which a sentence was split."""
         read: list[_Read] = []
         pending: tuple[Clause, ...] = ()
         parts = [tuple(clauses) for _, clauses in groupby(cut.clauses, key=lambda clause: id(clause.part))]
@@ -157,7 +157,7 @@ class _Reader:
         return _Read(part, meant, frozenset(after))
 
     def _said_before(self, part: AddressedText, before: Sequence[_Read]) -> Iterator[int]:
-        """Yields the parts that the sentence puts before this one."""
+        """Yields the parts that must be done before this part, as the sentence says."""
         for number in range(len(before) - 1, -1, -1) if part.then else ():
             if before[number].part.who != part.who:
                 yield number
@@ -174,7 +174,7 @@ class _Reader:
         yield found[-1]
 
     def _check_in_hand(self, before: Understanding, meant: Understanding, who: Addressee | None) -> None:
-        """Refuses to take an object that another robot holds, or has handed over."""
+        """Refuses to take an object that another robot holds or has handed over. Raises RefusalError."""
         again = meant.trace is not None and any(one.again for one in meant.trace.resolved)
         again = again or re.search(_IT, meant.text, re.IGNORECASE) is not None
         carried = [command for command in before.commands if command.item is not None or command.object is not None]
@@ -189,7 +189,7 @@ class _Reader:
             raise RefusalError(what, [str(item)])
 
     def _check_one_thing(self, part: AddressedText, meant: Understanding) -> None:
-        """Refuses to send several robots for one object."""
+        """Refuses to send several robots for one single object. Raises RefusalError."""
         several = part.who is RobotChoice.ALL or (isinstance(part.who, tuple) and len(part.who) > 1)
         if not several or meant.trace is None or all(command.task is not Task.GRASP for command in meant.commands):
             return
@@ -200,7 +200,7 @@ class _Reader:
             raise RefusalError(what, [definite[0].text])
 
     def _refuse_as_person(self, text: str) -> None:
-        """Raises RefusalError when a part treats a robot as a person, except in quotes and descriptions."""
+        """Raises RefusalError when a part treats a robot as a person, except within quotes and descriptions."""
         named = [name for name in self.robots if re.search(rf"\b{re.escape(name)}\b", text, re.IGNORECASE)]
         named = [name for name in named if self.knowledge.person(name) is None]
         quotes = re.match(r"(?:say|announce|shout)\b(?!.* to \w+\W*$)", text, re.IGNORECASE)
@@ -213,7 +213,7 @@ class _Reader:
             raise RefusalError(reason, [name])
 
     def _parts(self, read: Sequence[_Read], cut: Split) -> Iterator[Part]:
-        """Yields a part for each robot of each part."""
+        """Yields a part for each robot that each part of the text addresses."""
         by = find_robot(cut.listener[0], self.robots) if isinstance(cut.listener, tuple) else None
         numbers: list[tuple[int, ...]] = []
         count = 0
@@ -234,7 +234,7 @@ class _Reader:
 
 
 def _moved(before: Understanding, meant: Understanding) -> Location | None:
-    """Last destination of an object that `meant` names again without its place ("the beer")."""
+    """Last destination of an object that `meant` names again without a place ("the beer")."""
     if meant.trace is None or before.trace is None or meant.status is not Status.OK or before.memory is None:
         return None
     named = (one.target for one in meant.trace.resolved if one.source is None and not one.again)
@@ -245,7 +245,7 @@ def _moved(before: Understanding, meant: Understanding) -> Location | None:
 
 
 def _where(meant: Understanding) -> Location | None:
-    """Last known place of the objects; None with a person, or if it is unknown."""
+    """Last known place of the objects; None if the place is unknown or a person has them."""
     memory = meant.memory
     if memory is None or meant.trace is None:
         return None

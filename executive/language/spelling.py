@@ -1,15 +1,15 @@
 """Spelling and sound of words: finds the known name of a synonym, a misspelled or a misheard word.
 
-Text and speech share tables and distance. Rules from letters to sounds turn a word into a row of sounds
+Text and speech share tables and distance. Rules for letters convert a word to a sequence of sounds
 (`letter_sounds.yaml`; Elovitz, Johnson, McHugh and Shore, "Letter-to-sound rules for automatic translation of English
-text to phonetics", 1976, have the form of the rules, and far more of them). An edit distance compares two rows; its
+text to phonetics", 1976, have the form of the rules, and far more of them). An edit distance compares two sequences;
 substitutions cost less for similar sounds.
 
 The sounds: p b t d k g f v s z h m n l r w y as in print, T (thin), S (ship), C (chip), J (jam), N (sing); the vowels i
 (bit, beat), e (bet, bait), a (bat), V (but), o (pot, boat), u (boot), @ (the), and A (buy), W (now), Y (boy).
 
-Two corrections are certain: a general synonym (`synonyms.yaml`) of one known name, and a non-English word that
-misspells one known name. All others become a question or a refusal.
+Two corrections are made without a question: a synonym (`synonyms.yaml`) of exactly one known name, and a non-English
+word that misspells exactly one known name. All others become a question or a refusal.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _MOST_CANDIDATES: Final = 4
 
 @dataclass(frozen=True)
 class Alike:
-    """Known phrase with its similarity to the sound of some words.
+    """Known phrase, and how similar it sounds to given words.
 
     `cost` is about 1 for each changed sound, `distance` from 0 (the same) to 1 (nothing in common). `name`
     distinguishes names of objects and places from other words.
@@ -60,7 +60,7 @@ class Alike:
 
 
 class SoundAlikes:
-    """Index of known phrases by sound: `names` of objects and places, and other words."""
+    """Index that finds known phrases by sound: `names` of objects and places, and other words."""
 
     def __init__(self, names: Iterable[str], others: Iterable[str] = ()) -> None:
         kinds = {**dict.fromkeys(others, False), **dict.fromkeys(names, True)}
@@ -77,11 +77,11 @@ class SoundAlikes:
         self.nearest = lru_cache(maxsize=4096)(self._nearest)
 
     def knows(self, word: str) -> bool:
-        """Returns whether the word is one of the phrases, or in one."""
+        """Returns whether the word is a known phrase or occurs in one."""
         return word.lower() in self._words
 
     def similarities(self, words: str) -> tuple[Alike, ...]:
-        """All phrases with a sound, in their order, with their similarity to `words`."""
+        """Returns all phrases that have a sound, in order, with their similarity to `words`."""
         heard = sounds_of(words)
         if not self._phrases:
             return ()
@@ -92,14 +92,14 @@ class SoundAlikes:
         return tuple(Alike(phrase, cost, distance, name) for (phrase, name), cost, distance in rows)
 
     def _nearest(self, words: str) -> tuple[Alike, ...]:
-        """Phrases that sound like `words`, the nearest first, without these words themselves."""
+        """Phrases that sound like `words`, the most similar first, without the words themselves."""
         heard, same = sounds_of(words), words.lower()
         most = min(_PART_CHANGED * len(heard) + _ALWAYS_CHANGED, _MOST_COST)
         found = [one for one in self.similarities(words) if heard and one.cost <= most and one.phrase.lower() != same]
         return tuple(sorted(found, key=lambda one: one.cost)[:_MOST_ALIKES])
 
     def _costs(self, heard: str) -> Costs:
-        """Least cost of changing some sounds into those of every phrase, column by column of the table for all."""
+        """Least cost of changing the given sounds to those of each phrase, computed for all phrases at once."""
         count, longest = self._sounds.shape
         above = np.zeros((longest + 1, count))
         above[1:] = np.cumsum(self._drops[self._sounds], axis=1).T
@@ -129,7 +129,7 @@ def _alikes(names: tuple[str, ...]) -> SoundAlikes:
 
 
 def nearest_by_sound(words: str, vocabulary: Iterable[str]) -> Alike | None:
-    """Name in `vocabulary` with the sound nearest to `words` (one or several); the first of equals.
+    """Name in `vocabulary` that sounds most like `words` (one or several); the first of equally similar names.
 
     A distance of up to about 0.2 is a likely mishearing. None for an empty vocabulary.
     """
@@ -142,13 +142,13 @@ def nearest_by_sound(words: str, vocabulary: Iterable[str]) -> Alike | None:
 
 @lru_cache(maxsize=4096)
 def sound_distance(first: str, second: str) -> float:
-    """Distance in sound between two words or groups of words, from 0 to 1; blanks make no sound."""
+    """Distance in sound between two words or groups of words, from 0 to 1; blanks are silent."""
     return next((one.distance for one in SoundAlikes((second,)).similarities(first)), 1.0)
 
 
 @lru_cache(maxsize=4096)
 def sounds_of(words: str) -> str:
-    """Sounds of one or several words, a character each; other than Latin letters make none."""
+    """Sounds of one or more words, one character for each sound; only Latin letters have sounds."""
     letters = unicodedata.normalize("NFKD", words[:_MAX_LETTERS].lower())  # accents are taken off
     plain = re.sub(r"[^a-z ]", "", re.sub(r"[-_\s]", " ", letters))
     return "".join(map(_word_sounds, plain.split()))
@@ -166,7 +166,7 @@ def _word_sounds(word: str) -> str:
 
 @cache
 def _rules(letter: str) -> Sequence[tuple[re.Pattern[str], re.Pattern[str], str]]:
-    """Rules for a letter: the letters before it, its letters, and their sounds."""
+    """Rules for a letter: the letters that precede it, the letters that it covers, and their sounds."""
     return tuple(
         (re.compile(rf"(?:{left})$"), re.compile(rf"(?:{letters})(?={right})"), sounds)
         for left, letters, right, sounds in read_table("letter_sounds.yaml")[letter]
@@ -175,14 +175,14 @@ def _rules(letter: str) -> Sequence[tuple[re.Pattern[str], re.Pattern[str], str]
 
 @cache
 def _drop_cost(sound: str) -> float:
-    """Cost of leaving a sound out, from 0 to 1; some are lost easily."""
+    """Cost of omitting a sound, from 0 to 1; some sounds cost less."""
     usual = _VOWEL_DROP if sound in _vowels() else _CONSONANT_DROP
     return float(read_table("sounds.yaml")["weak"].get(sound, usual))
 
 
 @cache
 def _change_cost(a: str, b: str) -> float:
-    """Cost of saying one sound for another, from 0 to 1."""
+    """Cost of replacing one sound by another, from 0 to 1."""
     if a == b:
         return 0.0
     vowels, alike = _vowels(), read_table("sounds.yaml")["alike"].items()
@@ -205,7 +205,7 @@ def _vowels() -> Mapping[str, tuple[float, float]]:
 
 @dataclass(frozen=True)
 class CorrectedText:
-    """Sentence with misspelled names corrected, and a note on each."""
+    """Sentence in which misspelled names are corrected, and a note on each correction."""
 
     text: str
     notes: tuple[str, ...] = ()
@@ -220,7 +220,7 @@ def synonyms_for(name: str) -> tuple[str, ...]:
 
 
 def synonyms_of(word: str, known: Mapping[str, str]) -> tuple[str, ...]:
-    """Known names that an unknown word stands for; `known` maps each spelling to its name."""
+    """Known names that an unknown word may stand for; `known` maps each spelling to a name."""
     wanted = word.lower()
     rings, kinds = _synonyms()
     ring = (known[other] for ring in rings if wanted in ring for other in ring if other in known)
@@ -231,7 +231,7 @@ def synonyms_of(word: str, known: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def look_alikes(word: str, known: Mapping[str, str], facts: DependencyParser) -> tuple[str, ...]:
-    """Known names with a spelling or meaning near to an unknown word's, likeliest first."""
+    """Known names with a spelling or meaning similar to that of an unknown word, the likeliest first."""
     wanted = word.lower()
     if len(wanted) > _MOST_LETTERS:
         return ()
@@ -248,8 +248,8 @@ def look_alikes(word: str, known: Mapping[str, str], facts: DependencyParser) ->
 def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -> CorrectedText:
     """Replaces misspelled words that can only mean one known name.
 
-    A word is misspelled when it is no English word; the name must be within one typing error, or two for long names.
-    Names that are written together or apart ("night stand", "nightstand") are the same.
+    Only words that are not English count as misspelled; they may have one typing error, or two in long names. A name
+    may be written as one word or two ("night stand", "nightstand").
     """
     own = [*knowledge.object_names(), *knowledge.place_names(), *knowledge.people]
     known = _known(knowledge.spellings(own))
@@ -280,7 +280,7 @@ class _Known:
 def _corrected_at(
     words: Sequence[re.Match[str]], at: int, known: _Known, facts: DependencyParser
 ) -> tuple[int, str | None]:
-    """Number of words from here in one name, and the name if it needs another spelling."""
+    """Number of words from here that form a name, and the name if its spelling must change."""
     rows = [[word.group().lower() for word in words[at : at + count]] for count in range(_LONGEST_NAME, 0, -1)]
     fitting = [row for row in rows if at + len(row) <= len(words)]
     for row in fitting:
@@ -297,7 +297,7 @@ def _corrected_at(
 
 
 def _only_near(row: Sequence[str], known: _Known, facts: DependencyParser) -> str | None:
-    """The one known name that misspelled words can mean; None where they are English or ambiguous."""
+    """Only known name that misspelled words can mean; None if they are English or ambiguous."""
     strange = [word for word in row if word not in known.words]
     if not strange or any(not _FEWEST_LETTERS <= len(word) <= _MOST_LETTERS for word in strange):
         return None
@@ -312,7 +312,7 @@ def _only_near(row: Sequence[str], known: _Known, facts: DependencyParser) -> st
 
 
 def _slips(word: str, name: str) -> int:
-    """Number of typing errors between two words: missing, extra, wrong or swapped letters; 3 for more than 2."""
+    """Number of typing errors between two words (missing, extra, wrong or swapped letters); 3 if more than 2."""
     return OSA.distance(word, name, score_cutoff=2)
 
 
@@ -321,7 +321,7 @@ def _slips_allowed(name: str) -> int:
 
 
 def _slip(word: str, name: str, sound: float) -> float:
-    """Score of a word as a misspelling of a name: below 1 when they look or sound alike, lower for more likely ones."""
+    """Score of a word as a misspelling of a name: below 1 if they look or sound alike; lower is likelier."""
     slips = _slips(word, name)
     if len(word) >= _FEWEST_LETTERS - 1 and slips <= _slips_allowed(name) // 2 + (len(name) > 3):
         return slips / len(name)
@@ -330,7 +330,7 @@ def _slip(word: str, name: str, sound: float) -> float:
 
 @lru_cache(maxsize=16)
 def _known(spelled: tuple[str, ...]) -> _Known:
-    """Names of a world with their aliases, and the general synonyms of those."""
+    """Names in a world with their aliases, and the general synonyms of both."""
     written = {name.lower(): name for name in spelled}
     names = tuple(dict.fromkeys([*written, *(word for name in written for word in synonyms_for(name))]))
     words = frozenset(word for name in names for word in name.split())

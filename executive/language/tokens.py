@@ -1,4 +1,4 @@
-"""Words with their place in the sentence and in the dependency tree, known names among them.
+"""Words with their position in the sentence and in the dependency tree; known names become single words.
 
 The tagger has seen few commands: it tags "sink" in "the bathroom sink" and a name in lower case after "to" as verbs,
 and "look" in "go to the counter look for the bowl" as a noun. `repairs.yaml` has rules for a word and its neighbours,
@@ -19,12 +19,12 @@ from executive.words.knowledge import Knowledge
 
 @dataclass(frozen=True)
 class Token:
-    """Word with its place in the sentence and in the tree.
+    """Word with its position in the sentence and in the dependency tree.
 
-    `start` is its first character in the text, `pos` the universal part of speech, `tag` the Penn tag, `head` the index
-    of the word on which it depends (its own for the root), `relation` the dependency (nsubj, obj, iobj, prep, obl,
-    ...), `entity` the entity of a known name (PERSON), `kind` its kind as a noun, and `known` whether the world knows
-    the name.
+    `start` is the index of its first character, `pos` the universal part of speech, `tag` the Penn tag, `head` the
+    index of the word that it depends on (the root's is its own), `relation` the dependency (nsubj, obj, iobj, prep,
+    obl, ...), `entity` the entity of a known name (PERSON), `kind` its kind as a noun, and `known` whether the world
+    knows the name.
     """
 
     index: int
@@ -62,7 +62,7 @@ def repair_parse(tokens: Iterable[Token]) -> tuple[Token, ...]:
 
 @dataclass(frozen=True)
 class _Repair:
-    """Conditions on the words around a word, by relative position, and their new values."""
+    """Conditions on the words around a word, by relative position, and the word's new values."""
 
     where: Mapping[int, Mapping[str, re.Pattern[str]]]
     then: Mapping[int, Mapping[str, str]]
@@ -101,7 +101,7 @@ def _repairs() -> tuple[_Repair, ...]:
 
 
 def _fact(tokens: Sequence[Token], at: int, name: str) -> str:
-    """Field of a word, or the name of a passed test; empty for a failed one, and outside the sentence."""
+    """Field of a word, or the name of a test that it passes; empty if it fails, or outside the sentence."""
     if not 0 <= at < len(tokens):
         return ""
     if name in _IS:
@@ -111,7 +111,7 @@ def _fact(tokens: Sequence[Token], at: int, name: str) -> str:
 
 
 def _begins_command(tokens: Sequence[Token], at: int) -> bool:
-    """Returns whether a known verb with its particles and an object stand here."""
+    """Returns whether a known verb with its particles and an object begin here."""
     words = tuple(t.word for t in tokens[at : at + 3])
     length = next((n for n in range(len(words), 0, -1) if words[:n] in lexicon().verbs), None)
     behind = tokens[at + length : at + length + 1] if length is not None else []
@@ -153,7 +153,7 @@ def name_table(knowledge: Knowledge) -> NameTable:
 def parse_with_names(
     text: str, parse: Callable[[str], tuple[Token, ...]], table: NameTable | None
 ) -> tuple[Token, ...]:
-    """Parses `text` with each known name as one token, whose text and lemma are the name as spoken and in singular."""
+    """Parses `text` with each known name as one token; its text is the name as spoken, its lemma the singular."""
     if table is None:
         return parse(text)
     pattern, stand_ins = table
@@ -176,7 +176,7 @@ def parse_with_names(
 
 @dataclass(frozen=True)
 class Affirmed:
-    """Statement without its negation: its words, those to skip, and whether it was denied.
+    """Statement without its negation: its words, the positions to skip, and whether it was negated.
 
     "There is no beer in the hall" becomes "any beer", "nobody is there" becomes "anybody", "it is not there" loses its
     "not".
@@ -188,7 +188,7 @@ class Affirmed:
 
 
 def affirmation(tokens: Sequence[Token], *, there: bool = False) -> Affirmed:
-    """Removes the negation from a statement on a place; any other negation stays.
+    """Removes the negation from a statement on where something is; any other negation stays.
 
     `there` marks a statement after "there is".
     """
@@ -219,7 +219,7 @@ def affirmation(tokens: Sequence[Token], *, there: bool = False) -> Affirmed:
 
 
 def _instead(tokens: Sequence[Token], at: int, word: str) -> tuple[Token, ...]:
-    """Replaces one of the words."""
+    """Replaces one word by another."""
     tag, pos = ("DT", "DET") if word == "any" else ("IN", "ADP") if word == "in" else ("NN", "PRON")
     new = replace(tokens[at], text=word, lemma=word, tag=tag, pos=pos)
     return (*tokens[:at], new, *tokens[at + 1 :])
@@ -248,7 +248,7 @@ _TABLES: Final = (
 
 
 def rephrase(text: str) -> str:
-    """Simplifies the sentence to a plain command, in single blanks: "could you please get it" becomes "get it".
+    """Simplifies a sentence to a plain command with single blanks: "could you please get it" becomes "get it".
 
     Hesitations and repeated words are removed. A polite form inside the sentence becomes a comma. "I would like
     something to drink" becomes "bring me a drink".
@@ -259,7 +259,7 @@ def rephrase(text: str) -> str:
 
 
 def smooth(text: str) -> str:
-    """Writes short forms in full, removes hesitations, asides and repeated words, and joins "tell me" to questions."""
+    """Expands short forms, removes hesitations, asides and repetitions, and joins "tell me" to questions."""
     for pattern, instead in _rules(_SMOOTHED):
         text = pattern.sub(instead, text)
     text = re.sub(r"\b([ap])\.\s?m\.?(?![\w'])", r"\1m", text, flags=re.IGNORECASE)
@@ -284,7 +284,7 @@ def _rules(families: tuple[str, ...] | None = None) -> tuple[_Rule, ...]:
 
 
 def _break(match: re.Match[str]) -> str:
-    """Replaces an opener by a comma, unless there is one or the sentence ends."""
+    """Replaces an opening phrase by a comma, unless there is a comma already or the sentence ends."""
     return ", " if match.string[: match.start()].strip() and match.string[match.end() :].strip(" .!?") else " "
 
 

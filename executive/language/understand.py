@@ -1,4 +1,4 @@
-"""Understanding of a sentence: its commands, or the reason for a refusal in one line."""
+"""Understands a sentence: its commands, or the reason for a refusal in one line."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class Understanding:
 
     `steps` is the whole mission of a sentence with conditions, loops or waits, and empty otherwise. `parts` assign it
     to robots by name; with several robots `commands` and `steps` are empty. `question` is the robot's question, `notes`
-    tell names that were interpreted as others, `memory` has the referents for the next sentence, `trace` the results of
-    each step. `addressed` is True if the sentence calls a robot by its name.
+    list names that were interpreted as others, `memory` has the referents for the next sentence, `trace` has the result
+    of each step. `addressed` is True if the sentence calls a robot by its name.
     """
 
     text: str
@@ -61,12 +61,12 @@ class Understanding:
 
     @property
     def all_steps(self) -> tuple[Step, ...]:
-        """Steps of the sentence; its commands as steps where it has no blocks."""
+        """Steps of the sentence; if it has no blocks, one step for each command."""
         return self.steps or steps_of_commands(self.commands)
 
     @property
     def refused_as(self) -> RefusalKind | None:
-        """Kind of the refusal; None for commands, or for a sentence to another robot."""
+        """Kind of the refusal; None if there is no refusal, or the sentence is for another robot."""
         return None if self.trace is None or self.trace.refusal is None else self.trace.refusal.kind
 
     def _repr_html_(self) -> str:
@@ -92,8 +92,8 @@ class Understanding:
 class Part:
     """Part for one robot, for each (`RobotChoice.ALL`), or for any (`RobotChoice.ANY`).
 
-    It begins once the parts `after` (from 0) are done. "Me" and "here" mean the start of the robot `speaker_by`. None:
-    the world's start.
+    The part begins once the parts `after` (numbered from 0) are done. "Me" and "here" mean the start of the robot
+    `speaker_by`; None: the world's start.
     """
 
     robot: str | RobotChoice
@@ -159,7 +159,7 @@ def understand(
 
 
 def under_rules(rules: RoomRules, meant: Understanding) -> Understanding:
-    """Puts the steps, or those of each part, into a group with the rules for rooms.
+    """Puts the steps, or the steps of each part, into a group that has the rules for rooms.
 
     Raises RefusalError for work in a forbidden room.
     """
@@ -172,7 +172,7 @@ def under_rules(rules: RoomRules, meant: Understanding) -> Understanding:
 
 
 def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = None) -> Understanding:
-    """Understands a text for one robot, given as an empty trace, and optionally its clauses."""
+    """Understands a text for one robot; takes an empty trace with the inputs, and optionally the text's clauses."""
     trace = pipeline.run(said)
     mentioned = _MENTIONED.search(said.text) is not None
     refused = trace.refusal is not None and trace.refused_at != "cleaning"
@@ -192,9 +192,9 @@ def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = 
 
 
 def ask_until_clear(sentence: str, meant: Callable[[str], Understanding], answer: Answerer) -> Understanding:
-    """Understands a sentence, and inserts the answers to its questions, at most three; `text` has them, too.
+    """Understands a sentence, and inserts the answers to at most three questions, also into the result's `text`.
 
-    The result is a question after no answer, or after one that is not understood.
+    The result is a question if there is no answer, or if an answer is not understood.
     """
     found = meant(sentence)
     for _ in range(_MOST_QUESTIONS):

@@ -1,4 +1,4 @@
-"""Rules for rooms in a sentence: keep out, drive slowly, be quiet."""
+"""Reads rules for rooms in a sentence: keep out, drive slowly, be quiet."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ Zones = Mapping[str, ZoneFacts]
 
 @dataclass(frozen=True)
 class RoomRules:
-    """Rules of a sentence as zones by name, and the `rest` of it; no zones for a sentence without rules.
+    """Rules in a sentence as zones by name, and the `rest` of the sentence; no zones if it contains no rules.
 
-    The `knowledge` for the rest expects no object in a forbidden room.
+    In `knowledge`, which serves to understand the rest, no object is usually in a forbidden room.
     """
 
     rest: str
@@ -43,11 +43,11 @@ class RoomRules:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Note on each rule."""
+        """Notes, one on each rule."""
         return tuple(f"until it is done, {facts.zone(name, {name: ()}).words}" for name, facts in self.zones.items())
 
     def around(self, steps: Sequence[Step]) -> Group:
-        """Puts steps into a group with the zones. Raises RefusalError for work in a forbidden room."""
+        """Puts steps into a group that has the zones. Raises RefusalError for work in a forbidden room."""
         forbidden, knowledge = _forbidden(self.zones), self.knowledge
         assert knowledge is not None
         for command in (command for step in steps for each in step.walk() for command in each.commands):
@@ -59,10 +59,7 @@ class RoomRules:
 
 
 def read_rules(text: str, knowledge: Knowledge | None) -> RoomRules:
-    """Reads the rules for rooms in a sentence.
-
-    Raises RefusalError for a rule without work, and for an unclear one.
-    """
+    """Reads rules for rooms in a sentence. Raises RefusalError for a rule without any work or an unclear rule."""
     if knowledge is None or _FORMS.mentions.search(text) is None:
         return RoomRules(text, knowledge)
     rest, zones = take_rules(text, knowledge)
@@ -77,14 +74,14 @@ def read_rules(text: str, knowledge: Knowledge | None) -> RoomRules:
 
 
 def _forbidden(zones: Zones) -> frozenset[str]:
-    """Rooms that the robot keeps out of."""
+    """Rooms that the robot must keep out of."""
     return frozenset(zone.place for zone in zones.values() if zone.place and zone.kind is ZoneKind.KEEP_OUT)
 
 
 def take_rules(text: str, knowledge: Knowledge) -> tuple[str, Zones]:
-    """Takes the rules for rooms out of a sentence; returns the rest of it, and the zones by name.
+    """Removes the rules for rooms from a sentence; returns the rest of the sentence, and the zones by name.
 
-    Raises RefusalError for a speed limit that is no clause of its own, or that no robot can keep.
+    Raises RefusalError for a speed limit that is not a separate clause, or that no robot can obey.
     """
     zones: dict[str, ZoneFacts] = {}
     own = {
@@ -116,7 +113,7 @@ def take_rules(text: str, knowledge: Knowledge) -> tuple[str, Zones]:
 
 
 def _end(text: str, match: re.Match[str]) -> int | None:
-    """End of the clause of a rule; None if it is no separate clause, is conditional, or is quoted speech."""
+    """End of a rule's clause; None if the rule is no separate clause, is conditional, or is quoted speech."""
     begin, tail = text[: match.start()], _FORMS.tail.match(text, match.end())
     end = match.end() if tail is None else tail.end()
     sentence = re.split(r"[.;!?]", begin)[-1]
@@ -131,7 +128,7 @@ def _end(text: str, match: re.Match[str]) -> int | None:
 
 
 def _joined(begin: str, behind: str) -> str:
-    """Joins the words before and behind a rule."""
+    """Joins the words before and after a rule."""
     joint = _FORMS.text("joined")
     begin = re.sub(rf"{joint}$", "", begin, flags=re.IGNORECASE)
     rest = re.sub(rf"^(?:{joint}|[.;!?])*", "", behind, flags=re.IGNORECASE)
@@ -144,7 +141,7 @@ def _joined(begin: str, behind: str) -> str:
 
 
 def _facts(kind: str, match: re.Match[str], room: str) -> ZoneFacts:
-    """Zone of a rule for a room. Raises RefusalError for a speed that no robot keeps."""
+    """Zone for a room's rule. Raises RefusalError for a speed that no robot can obey."""
     if kind not in _SPEEDS:
         return ZoneFacts(kind=ZoneKind(kind), place=room)
     said = match.groupdict()
@@ -158,7 +155,7 @@ def _facts(kind: str, match: re.Match[str], room: str) -> ZoneFacts:
 
 
 def _without(knowledge: Knowledge, rooms: Collection[str]) -> Knowledge:
-    """Knowledge in which objects are usually in other rooms than these."""
+    """Knowledge in which no objects are usually in these rooms."""
     if not rooms:
         return knowledge
 

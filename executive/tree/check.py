@@ -200,7 +200,7 @@ def _objection(part: StepPart, held: InGripper | None, knowledge: Knowledge, abi
 def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:
     """Yields the errors of an impossible command.
 
-    The robot may not recognise or be able to take an object, a person may take nothing, or a surface be out of reach.
+    The object may be unknown or impossible to take, the person may take nothing, or the surface may be out of reach.
     """
     handles = command.item is not None or command.task in (Task.GRASP, Task.PLACE)
     if handles and not abilities.gripper:

@@ -72,7 +72,7 @@ class RunContext(SkillContext):
     """Context of all nodes of a robot's tree: the context of skills, the blackboard, the stop button.
 
     `seed` is the seed of the run. `stop_pressed` returns why nothing may move while a stop button is pressed, else
-    None. `presses` counts how often each button was pressed. `day_began_s` is the time of day (s) at clock 0.
+    None. `presses` counts the presses of each button. `day_began_s` is the time of day (s after midnight) at clock 0.
     """
 
     board: Board

@@ -69,7 +69,7 @@ class RoutePlanner(Protocol):
     """Planner of routes on the map."""
 
     def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
-        """Plans the route from start to goal that obeys the zones. Raises ValueError with one sentence without one."""
+        """Plans the route from start to goal that obeys the zones. Raises ValueError with a sentence if none exists."""
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""Structured sentences as steps of a mission: conditions, loops, waits and sequences."""
+"""Reads structured sentences as steps of a mission: conditions, loops, waits and sequences."""

@@ -1,4 +1,4 @@
-"""Spoken conditions: "there is a beer in the kitchen", "the battery is low"."""
+"""Parses spoken conditions: "there is a beer in the kitchen", "the battery is low"."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -47,7 +47,7 @@ def parse_condition(text: str, state: State, reader: PlainReader) -> SpokenCondi
 
 
 def usual_condition(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
-    """Parses a condition of a usual form: battery, gripper, place, clock, button, door, or people who come or go."""
+    """Parses a condition in a usual form: battery, gripper, place, clock, button, door, or people who come or go."""
     return next((found for read in _READERS if (found := read(words, state, reader)) is not None), None)
 
 
@@ -101,13 +101,13 @@ def _button(words: str, state: State, reader: PlainReader) -> SpokenCondition | 
 
 
 def button_condition(button: str, words: str, state: State) -> SpokenCondition:
-    """Condition that a button is pressed, named with its article; `words` are its text."""
+    """Condition that a button is pressed; the text names the button with its article, `words` are the whole text."""
     name = re.sub(r"^(?:the|a|any)\b\s*|\s*\bbutton$", "", button.strip(), flags=re.IGNORECASE).strip()
     return SpokenCondition(ButtonPressed(button=name.lower() or "button"), words, state, state)
 
 
 def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
-    """Condition that a door is open or closed; "it" is the last door. Raises RefusalError: see `_between`."""
+    """Condition that a door is open or closed; "it" refers to the last door. Raises RefusalError like `_between`."""
     match = _P.stands.fullmatch(words) or _P.turns.fullmatch(words)
     if match is None or (match["it"] and state.door is None):
         return None
@@ -119,9 +119,9 @@ def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | No
 
 
 def parse_opening(text: str, state: State, reader: PlainReader) -> tuple[OpenDoor, State] | None:
-    """Parses a request to have a door opened, with the state after it; None for other texts.
+    """Parses a request to have a door opened, and returns the state afterwards; None for other texts.
 
-    Raises RefusalError for a door without a plug-in that the robot would have to open, and see `_between`.
+    Raises RefusalError like `_between`, and if the robot would have to open a door that has no plug-in.
     """
     text = re.sub(r" for (?:me|us|you|him|her|them)$", "", text, flags=re.IGNORECASE)
     match = next((found for form in _P.each("opening") if (found := form.fullmatch(text)) is not None), None)
@@ -138,7 +138,7 @@ def parse_opening(text: str, state: State, reader: PlainReader) -> tuple[OpenDoo
 def _between(match: re.Match[str], knowledge: Knowledge) -> tuple[str, str]:
     """Rooms on the two sides of a door.
 
-    Raises RefusalError when there is no such door, or several, then with a question.
+    Raises RefusalError when there is no such door; with a question when there are several.
     """
     bare = re.sub(r"^(?:the|that|this|a) ", "", match["door"], flags=re.IGNORECASE)
     if not knowledge.doors:
@@ -201,7 +201,7 @@ def presence_condition(
 
 
 def _look(words: str, state: State, reader: PlainReader) -> SpokenCondition:
-    """Condition that something is visible, or not. Raises RefusalError."""
+    """Condition that something is visible, or not visible. Raises RefusalError."""
     if (match := _P.sees.fullmatch(words)) is not None:
         return _seen(match, words, state, reader)
     match = _P.fullness.fullmatch(re.sub(r"n't\b", " not", words))
@@ -214,7 +214,7 @@ def _look(words: str, state: State, reader: PlainReader) -> SpokenCondition:
 
 
 def _seen(match: re.Match[str], words: str, state: State, reader: PlainReader) -> SpokenCondition:
-    """Condition that the robot sees, or does not see, something or somebody."""
+    """Condition that the robot sees, or does not see, an object or a person."""
     what = re.sub(r"^(?:him|them)(?= )", "it", match["what"], flags=re.IGNORECASE)
     looks = re.match(r"you (?:can |do |could |\w+n't |not )*(?:see|spot|notice)\b", words, re.IGNORECASE)
     if re.fullmatch(r"it|one|him|her|them", what, re.IGNORECASE):
@@ -229,7 +229,7 @@ def _seen(match: re.Match[str], words: str, state: State, reader: PlainReader) -
 
 
 def _joined(words: str, state: State, reader: PlainReader) -> tuple[SpokenCondition | None, RefusalError | None]:
-    """Conditions joined by "and" or "or", otherwise a question about one of them."""
+    """Joins two conditions by "and" or "or"; returns None if that fails, with the first question that a half raised."""
     left_open: RefusalError | None = None
     for word, kind in ((" and ", AllOf), (" or ", AnyOf)):
         for before, after in _halves(words, word):
@@ -259,7 +259,7 @@ def _halves(words: str, word: str) -> Iterator[tuple[str, str]]:
 
 
 def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[SpokenCondition, SpokenCondition]:
-    """Parses two conditions; the second may omit words of the first, or the first the place of both."""
+    """Parses two joined conditions; the second may omit words of the first, and the first the place of both."""
     first = parse_condition(before, state, reader)
     denied = isinstance(first.condition, Not)
     if _P.there.match(before) and _P.bare.match(after):

@@ -1,4 +1,4 @@
-"""Builder of conditional and repeated steps: "if", "otherwise", "whatever happens", "every hour"."""
+"""Builds conditional and repeated steps: "if", "otherwise", "whatever happens", "every hour"."""
 
 import re
 from collections.abc import Sequence
@@ -42,9 +42,9 @@ from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, 
 
 
 class DecisionBuilder:
-    """Builder of steps that decide and repeat. Its methods raise RefusalError.
+    """Builder of steps that decide and repeat. Its methods raise RefusalError for a clause that they cannot build.
 
-    `statement` is the referent of "tell Robin", `given` the last clause with an object, `notes` tell words that were
+    `statement` is what "tell Robin" refers to, `given` is the last clause with an object, `notes` list words that were
     interpreted as others; `special` marks a mission without blocks that is more than a list of commands.
     """
 
@@ -58,11 +58,11 @@ class DecisionBuilder:
         raise NotImplementedError
 
     def nest(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
-        """Builds the steps of clauses within others."""
+        """Builds the steps of clauses that are inside others."""
         return self.sequence([replace(clauses[0], joint=""), *clauses[1:]], state)
 
     def flush(self, row: StepRow) -> None:
-        """Understands the pending clauses."""
+        """Understands the pending clauses, and adds their steps."""
         if not row.plain:
             return
         last = row.plain[-1].text
@@ -74,31 +74,31 @@ class DecisionBuilder:
             row.asked = replace(row.asked, supposed=replace(row.asked.supposed, said=said))
 
     def read_together(self, clauses: Sequence[Clause], state: State) -> PlainReading:
-        """Understands plain clauses together."""
+        """Understands several plain clauses together."""
         return self.reader.read_commands(
             join_clauses([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead
         )
 
     def add(self, row: StepRow, reading: PlainReading) -> None:
-        """Adds the commands of a plain part."""
+        """Adds the commands of a plain part of the sentence."""
         self.notes += reading.trace.notes
         row.steps += steps_of_commands(reading.commands)
         before, row.state = row.state, reading.state
         row.asked = find_last_check(reading, before, self.reader)
 
     def put(self, row: StepRow, block: Step, state: State) -> None:
-        """Adds a block; `state` is the state after it."""
+        """Adds a block of steps; `state` is the state after the block."""
         self.put_done(row, ((block,), state, ()))
 
     def put_done(self, row: StepRow, done: Done) -> None:
-        """Adds steps with the state after them, and notes."""
+        """Adds steps, the state after them, and notes."""
         steps, row.state, notes = done
         row.steps += steps
         row.asked = None
         self.notes += notes
 
     def put_always(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
-        """Adds steps that run at the end in any case."""
+        """Adds steps that run at the end, whatever happens."""
         self.flush(row)
         first = clauses[at]
         if not row.steps:
@@ -175,7 +175,7 @@ class DecisionBuilder:
     def choose(
         self, row: StepRow, supposed: SpokenCondition, body: Sequence[Clause], clauses: Sequence[Clause], end: int
     ) -> int:
-        """Adds a choice of two branches; `end` is after the first, and the returned index after the second."""
+        """Adds a choice of two branches; `end` is after the first branch, and the returned index after the second."""
         then, after = self.branch(body, supposed, supposed.holds)
         otherwise: Steps = ()
         other_state = supposed.fails
@@ -213,7 +213,7 @@ class DecisionBuilder:
         return found
 
     def attach(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
-        """Builds a branch for "if so", "otherwise" or "if that fails", which refer to the last look or action."""
+        """Builds a branch for "if so", "otherwise" or "if that fails", which refers to the last look or action."""
         clause, end, both = clauses[at], end_of_scope(clauses, at + 1, branch=True), end_of_scope(clauses, at + 1)
         cue, words = clause.kind, [clause.cue]
         self.flush(row)
@@ -252,7 +252,7 @@ class DecisionBuilder:
         return end
 
     def _replace_missing(self, row: StepRow, asked: LastCheck, said: str, body: Sequence[Clause]) -> None:
-        """Builds a choice: the last steps if their object is there, otherwise the steps of the body.
+        """Builds a choice: the last steps if their object is found, otherwise the steps of the body.
 
         Raises RefusalError when "there" could be the object's source or its destination.
         """
@@ -296,7 +296,7 @@ class DecisionBuilder:
         return end
 
     def put_rounds(self, row: StepRow, rounds: Rounds, body: Sequence[Clause]) -> None:
-        """Adds rounds of some clauses."""
+        """Adds rounds that repeat given clauses."""
         steps, state = self.nest(body, replace(rounds.state, goal=None, at=None))
         commands = [command for step in steps for each in step.walk() for command in each.commands]
         stays = len(commands) == 1 and commands[0].item is None and commands[0].task in (None, Task.CHARGE)
@@ -306,7 +306,7 @@ class DecisionBuilder:
         self.put(row, merge_repeats(Repeat(loop=rounds.loop, steps=_done(steps, join_clauses(body)))), state)
 
     def _how_often(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> tuple[Rounds, str]:
-        """Splits the rounds from the action after them."""
+        """Splits the number or interval of rounds from the action that follows."""
         text, state = clause.text, row.state
         if clause.kind is Cue.TIMES:
             return Rounds(Loop(times=times_of_cue(clause.cue)), state), text
@@ -325,7 +325,7 @@ class DecisionBuilder:
         return rounds_by(clause.kind, supposed), rest
 
     def limit_rounds(self, every_s: float, text: str, state: State) -> Rounds | None:
-        """Parses the rounds within "for an hour", "until three o'clock" or "five times"; None for other texts."""
+        """Parses the end of rounds in "for an hour", "until three o'clock" or "five times"; None for other texts."""
         if not text:
             return Rounds(Loop(every_s=every_s), state)
         if (match := ACTS.for_span.fullmatch(text)) is not None:
@@ -362,7 +362,7 @@ class DecisionBuilder:
         raise RefusalError(f"I do not understand '{clause.cue} {text}'", [text])
 
     def put_together(self, row: StepRow, where: str, body: Sequence[Clause]) -> None:
-        """Adds a speech in parallel to a drive."""
+        """Adds speech in parallel to a drive."""
         reading = self.reader.read_commands(where, row.state, (verb("go"),))
         said = parse_speech(body[0].text, self.reader) if len(body) == 1 else None
         if said is None or said.text is None or said.to is not None or len(reading.commands) != 1:
@@ -371,7 +371,7 @@ class DecisionBuilder:
         self.put(row, Together(steps=both), reading.state)
 
     def modify(self, row: StepRow, clause: Clause, found: Clause) -> None:
-        """Adds an action with a trailing condition or number of rounds."""
+        """Adds an action that a trailing condition or number of rounds modifies."""
         scope = self._scope(row, clause, found)
         rounds: Rounds | None
         if found.kind in (Cue.IF, Cue.UNLESS):
@@ -401,7 +401,7 @@ class DecisionBuilder:
         return replace(rounds_by(found.kind, parse_condition(found.text, state, self.reader)), state=row.state)
 
     def _scope(self, row: StepRow, clause: Clause, found: Clause) -> list[Clause]:
-        """Clauses to which a trailing cue belongs. Raises RefusalError when they are ambiguous."""
+        """Clauses that a trailing cue applies to. Raises RefusalError when these are ambiguous."""
         main = replace(clause, text=found.before)
         alone = clause.begins or (clause.then and not ACTS.comes_back.fullmatch(found.before))
         earlier = [] if alone else list(row.plain)
@@ -439,7 +439,7 @@ class DecisionBuilder:
 
 
 def _done(steps: Steps, said: str) -> Steps:
-    """Returns the steps. Raises RefusalError when there are none ("do nothing twice")."""
+    """Returns the steps. Raises RefusalError when there are no steps ("do nothing twice")."""
     if not steps:
         raise RefusalError(f"'{said}' is nothing to do; leave it out", [said])
     return steps

@@ -1,4 +1,4 @@
-"""Requests about people: to follow, guide, meet and greet them."""
+"""Parses requests about people: to follow, guide, meet and greet them."""
 
 import re
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ _TASKS: Final = {
 
 @dataclass(frozen=True)
 class PeopleRequest:
-    """Request about a person: the task (None: go to them), and the person, their place and the destination in words.
+    """Request about a person: the task (None: go to the person), and person, place and destination in words.
 
     `form` is the group of patterns that matched.
     """
@@ -42,12 +42,12 @@ class PeopleRequest:
 
     @property
     def task(self) -> Task | None:
-        """Task of the command."""
+        """Task that the command gets."""
         return _TASKS[self.form]
 
     @property
     def refers(self) -> bool:
-        """Returns whether a pronoun stands for the person."""
+        """Returns whether a pronoun refers to the person."""
         return self.who.lower() in _PRONOUNS
 
 
@@ -87,7 +87,7 @@ _AROUND: Final = re.compile(
 
 
 def refers_to_somebody(text: str) -> bool:
-    """Returns whether a clause has "him", "her" or "them"."""
+    """Returns whether a clause contains "him", "her" or "them"."""
     return _PEOPLE.refers.search(text) is not None
 
 
@@ -99,7 +99,7 @@ def _of_world(people: tuple[str, ...], places: tuple[str, ...]) -> Patterns:
 def commands_on_people(
     request: PeopleRequest, state: State, reader: PlainReader
 ) -> tuple[tuple[Command, ...], State, tuple[str, ...]]:
-    """Builds the commands of a request, with the state after them and notes. Raises RefusalError."""
+    """Builds the commands for a request, with the state after them and notes. Raises RefusalError."""
     person, notes = _person(request, state, reader), tuple[str, ...]()
     found = person == ANYBODY and request.refers and state.memory.person is None and state.memory.place is not None
     where = "there" if found and request.at is None else request.at
@@ -136,7 +136,7 @@ def commands_on_people(
 
 
 def _go_to(person: str, at: str | None, verb: str, state: State) -> list[Command]:
-    """Goes to a known person at a place; for anybody to the place, unless the robot is there already."""
+    """Goes to a known person at a place; for anybody only to the place, unless the robot is there already."""
     if person != ANYBODY:
         return [Command(goal=person, goal_at=at, verb=verb)]
     return [] if at == state.goal else [Command(goal=at, verb=verb)]
@@ -154,7 +154,7 @@ _PRONOUNS: Final = frozenset({"him", "her", "them", "he", "she", "they", "this p
 
 
 def _person(request: PeopleRequest, state: State, reader: PlainReader) -> str:
-    """Person of a request: a known one, the speaker or anybody. Raises RefusalError for an unclear pronoun."""
+    """Person that a request is about: known, the speaker or anybody. Raises RefusalError for an unclear pronoun."""
     who, before = request.who.lower(), state.memory.person
     if who in _SPEAKERS:
         if request.at is not None:
@@ -168,7 +168,7 @@ def _person(request: PeopleRequest, state: State, reader: PlainReader) -> str:
 
 
 def _place(text: str, state: State, reader: PlainReader) -> str | None:
-    """Own name of a place in words; None for "home". Raises RefusalError when it is no place."""
+    """World's name for a place in words; None for "home". Raises RefusalError when it is no place."""
     if text.lower() == "home" and reader.knowledge.place(text) is None:
         return None
     if text.lower() in ("here", "back"):
@@ -180,7 +180,7 @@ def _place(text: str, state: State, reader: PlainReader) -> str | None:
 
 
 def _home(request: PeopleRequest, person: str, reader: PlainReader) -> tuple[str, tuple[str, ...]]:
-    """Room where a person usually is, with a note. Raises RefusalError for a person whose room is unknown."""
+    """Room where a person usually is, and a note. Raises RefusalError when that room is unknown."""
     knowledge = reader.knowledge
     if (place := knowledge.place("home")) is not None:
         return place, ()

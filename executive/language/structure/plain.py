@@ -1,4 +1,4 @@
-"""Plain parts of a sentence, from their items to commands, and the row of steps that the builders fill."""
+"""Reads plain parts of a sentence, from their items to commands, and collects steps in a row for the builders."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ SEES: Final = "I can see whether something or somebody is somewhere"
 
 @dataclass(frozen=True)
 class State:
-    """State of the mission at the beginning of a part of the sentence.
+    """State of the mission where a part of the sentence begins.
 
     `memory` has the referents, `held` the object in the gripper, `goal` the robot's last destination, `at` its room
     (None: unknown), `door` the last door, `recipient` the default recipient of objects. `somebody` is True after a
-    condition has found anybody in the place of the memory.
+    condition has found anybody in the remembered place.
     """
 
     memory: Memory = field(default_factory=Memory)
@@ -51,9 +51,9 @@ class State:
 
 @dataclass(frozen=True)
 class SpokenCondition:
-    """Condition with its words, and the states after it for true and false.
+    """Condition with its words, and the state of the mission after true and after false.
 
-    The words of a `quotable` condition may be repeated as a statement; `items` are those of a look, which another
+    The words of a `quotable` condition may be repeated as a statement; `items` are the items of a look, which another
     condition may omit.
     """
 
@@ -66,13 +66,13 @@ class SpokenCondition:
     items: tuple[Item, ...] = field(default=(), repr=False)
 
     def negate(self, said: str) -> SpokenCondition:
-        """Negation, with its words."""
+        """Negated condition, with its words."""
         return SpokenCondition(negate(self.condition), said, self.fails, self.holds, self.notes, items=self.items)
 
 
 @dataclass(frozen=True)
 class PlainReading:
-    """Plain part: its commands, the state after it, and the trace of its understanding."""
+    """Reading of a plain part: its commands, the state after it, and the trace of its understanding."""
 
     commands: tuple[Command, ...]
     state: State
@@ -85,14 +85,14 @@ def negate(condition: Condition) -> Condition:
 
 
 def initial_state(knowledge: Knowledge, memory: Memory) -> State:
-    """State at the beginning of a sentence."""
+    """State where a sentence begins."""
     start = (knowledge.start.x, knowledge.start.y)
     room = next((name for name, place in knowledge.places.items() if inside(place.polygon, start)), None)
     return State(memory=memory, at=room)
 
 
 def phrase_of_name(name: str, kind: NounKind) -> Phrase:
-    """Noun phrase of a name that the world knows."""
+    """Noun phrase that stands for a name in the world."""
     entity = "PERSON" if kind is NounKind.PERSON else ""
     pos, tag = ("PROPN", "NNP") if entity else ("NOUN", "NN")
     return Phrase((Token(0, 0, name, name.lower(), pos, tag, 0, "obl", entity, kind, known=True),))
@@ -115,7 +115,7 @@ _THERE_IS: Final = Being("there is", existential=True, asked=False)
 
 @dataclass(frozen=True)
 class PlainReader:
-    """Reader of plain parts in one world. Its methods raise RefusalError."""
+    """Reads plain parts in one world. Its methods raise RefusalError for words that they cannot understand."""
 
     pipeline: Pipeline
     knowledge: Knowledge
@@ -132,17 +132,17 @@ class PlainReader:
         return self._reading(self._run(trace), state)
 
     def commands_from_items(self, items: Sequence[Item], state: State, tokens: Sequence[Token] = ()) -> PlainReading:
-        """Understands items, and the words from which they were read."""
+        """Understands items and the words that they were read from."""
         trace = Trace("", state.memory, tokens=tuple(tokens), items=tuple(items))
         return self._reading(self._run(trace, behind="reading"), state)
 
     def commands_from_actions(self, trace: Trace, actions: Sequence[Action], state: State) -> PlainReading:
-        """Understands actions in place of those of a trace."""
+        """Understands these actions instead of the actions in a trace."""
         trace = replace(trace, actions=tuple(actions), memory=state.memory)
         return self._reading(self._run(trace, behind="understanding"), state)
 
     def read_actions(self, text: str, state: State) -> Trace:
-        """Understands a plain part up to its actions."""
+        """Understands a plain part as far as its actions."""
         return self._run(Trace(text, state.memory, elliptic=True), upto="understanding")
 
     def _reading(self, trace: Trace, state: State) -> PlainReading:
@@ -153,16 +153,16 @@ class PlainReader:
         return PlainReading(commands, self.state_after(commands, trace.memory, state), trace)
 
     def read_items(self, text: str) -> tuple[Item, ...]:
-        """Reads the items of some words."""
+        """Reads words as items."""
         return self._run(Trace(text), upto="reading").items
 
     def go_to(self, text: str, state: State) -> PlainReading:
-        """Understands going to a place, given by a noun phrase or "there"."""
+        """Understands going to a place, which a noun phrase or "there" names."""
         items = (Adverb(here=False),) if text.lower() == "there" else self.read_items(text)
         return self.commands_from_items((verb("go"), *with_preposition(items, "to")), state)
 
     def check(self, text: str, state: State, lead: Sequence[Item] = (), *, said: str | None = None) -> SpokenCondition:
-        """Condition that the statement in the text holds; `said` is its full text."""
+        """Condition that the statement in a text holds; `said` is the full text."""
         read = self._run(Trace(text, lead=(verb("check"), Whether(), *lead), asked=True), upto="reading")
         assert read.affirmed is not None
         words = [token.word for token in read.tokens if token.index not in read.affirmed.silent]
@@ -172,7 +172,7 @@ class PlainReader:
         return found.negate(said or text) if read.affirmed.denied else found
 
     def exists(self, what: str, text: str, state: State) -> SpokenCondition:
-        """Condition that an object exists, or does not ("no beer in the hall"); `text` is its full text."""
+        """Condition that an object exists, or does not exist ("no beer in the hall"); `text` is the full text."""
         return self.check(what, state, (_THERE_IS,), said=text)
 
     def look(self, who: str, room: str, text: str, state: State) -> SpokenCondition:
@@ -183,7 +183,7 @@ class PlainReader:
     def look_by_items(
         self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()
     ) -> SpokenCondition:
-        """Condition of the looks of some items; `text` is its full text."""
+        """Condition of the looks that given items ask for; `text` is the full text."""
         try:
             reading = self.commands_from_items([self._by_name(item, state) for item in items], state, tokens)
         except RefusalError as refusal:
@@ -198,7 +198,7 @@ class PlainReader:
         return replace(self.condition_of_looks(reading, there, state, text), items=tuple(items))
 
     def _by_name(self, item: Item, state: State) -> Item:
-        """Replaces "he" by the last person."""
+        """Replaces "he" by the name of the last person."""
         person = state.memory.person
         if person is None or person.phrase is None or self.knowledge.person(person.name) is None:
             return item
@@ -206,7 +206,7 @@ class PlainReader:
         return replace(item, phrase=person.phrase) if isinstance(item, Chunk) and he else item
 
     def room(self, place: Location | str, state: State) -> str:
-        """Room of a place, given as a location or in words."""
+        """Room that contains a place, which is given as a location or in words."""
         text = place if isinstance(place, str) else place.text
         if isinstance(place, str):
             reading = self.go_to(place, state)
@@ -221,7 +221,7 @@ class PlainReader:
         return self.knowledge.room(goal)
 
     def is_somebody(self, who: str, state: State) -> bool:
-        """Returns whether the words mean a known person, an earlier one, or anybody."""
+        """Returns whether the words mean a known person, an earlier person, or anybody."""
         words = who.lower().removeprefix("a ").removeprefix("any ")
         if words in lexicon().anyone | lexicon().any_person or words in ("guest", "they"):
             return True
@@ -229,7 +229,7 @@ class PlainReader:
         return spoken_of or self.knowledge.person(who) is not None
 
     def condition_of_looks(self, reading: PlainReading, state: State, before: State, text: str) -> SpokenCondition:
-        """Condition that the looks of a reading succeed; `text` is its full text."""
+        """Condition that the looks in a reading succeed; `text` is the full text."""
         looks = tuple(Look.from_command(command) for command in reading.commands if command.task is Task.FIND)
         known = self._state_if_seen(reading, state)
         fails = replace(known, memory=replace(known.memory, where=None, locations=before.memory.locations))
@@ -237,7 +237,7 @@ class PlainReader:
         return SpokenCondition(condition, text, known, fails, reading.trace.notes)
 
     def _state_if_seen(self, reading: PlainReading, state: State) -> State:
-        """State when the look succeeds."""
+        """State if the look succeeds."""
         action = reading.trace.resolved[-1]
         memory = reading.trace.memory
         target, where = action.target, action.source
@@ -282,7 +282,7 @@ ATTACHED = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)
 
 @dataclass
 class StepRow:
-    """Steps built so far, and pending clauses, which are understood together.
+    """Steps built so far, and pending clauses, which will be understood together.
 
     `asked` is the last look or fetch; `begun` is the index of the present sentence's first step.
     """
@@ -296,7 +296,7 @@ class StepRow:
 
 @dataclass(frozen=True)
 class LastCheck:
-    """Condition of the last steps: they check it (`looked`), or need it to succeed; `steps` is their number.
+    """Condition of the last steps: they check it (`looked`) or need it to succeed; `steps` is the number of steps.
 
     `decided` is True if the last step depends on the condition.
     """
@@ -309,17 +309,17 @@ class LastCheck:
 
 @dataclass(frozen=True)
 class Rounds:
-    """Rounds of an action, and the state at the beginning of a round."""
+    """Number or condition of an action's rounds, and the state where a round begins."""
 
     loop: Loop
     state: State
 
 
 def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: bool = False) -> int:
-    """Index after the clauses of a condition or of rounds before `at`.
+    """Index after the clauses, from `at` on, that a condition or rounds apply to.
 
-    `branch` marks a second branch, in which "then" goes on after both branches. Clauses that follow the whole end it;
-    in "first ..., finally ..." they belong to it.
+    `branch` marks a second branch, in which "then" goes on after both branches. A clause that follows the whole block
+    ends it; in "first ..., finally ..." it still belongs to the block.
     """
     first = any(re.search(r"\bfirst\b", one.joint, re.IGNORECASE) for one in clauses[at : at + 1])
     for n, one in enumerate(clauses[at:], at):
@@ -340,14 +340,14 @@ def negate_supposed(supposed: SpokenCondition) -> SpokenCondition:
 
 
 def statement_of(supposed: SpokenCondition) -> str | None:
-    """Words of a condition as a statement; None if they cannot be repeated."""
+    """Words of a condition, rephrased as a statement; None if they cannot be repeated."""
     said = supposed.said
     plain = supposed.quotable and not CLAUSES.deictic.search(said) and not re.match(r"it\b|there is one", said)
     return said if said and plain else None
 
 
 def state_behind_both(one: State, other: State) -> State:
-    """State after two branches."""
+    """State after two branches: what both branches have in common."""
     return replace(
         one,
         held=one.held if one.held == other.held else None,
@@ -357,7 +357,7 @@ def state_behind_both(one: State, other: State) -> State:
 
 
 def one_errand(reading: PlainReading) -> bool:
-    """Returns whether all commands are about one object, or only go somewhere and back."""
+    """Returns whether all commands are about one object, or only go to a place and back."""
     objects = {str(thing) for command in reading.commands for thing in (command.item, command.object) if thing}
     going = [action for action in reading.trace.resolved if action.kind is VerbKind.GO]
     bare = sum(command.item is None and command.task is None for command in reading.commands)
@@ -365,7 +365,7 @@ def one_errand(reading: PlainReading) -> bool:
 
 
 def find_last_check(reading: PlainReading, before: State, reader: PlainReader) -> LastCheck | None:
-    """Look or fetch of the last command."""
+    """Look or fetch that the last command stands for."""
     commands = reading.commands
     if commands and commands[-1].task is Task.FIND:
         looks = sum(command.task is Task.FIND for command in commands)
@@ -382,7 +382,7 @@ def find_last_check(reading: PlainReading, before: State, reader: PlainReader) -
 
 
 def condition_at_source(supposed: SpokenCondition, steps: Steps, text: str) -> SpokenCondition:
-    """Adds the place where the object is taken to a condition without a place ("if there is one")."""
+    """Adds to a condition without a place ("if there is one") the place from which the object is taken."""
     taken = next((c for step in steps for c in step.commands if c.task is Task.GRASP), None)
     condition = supposed.condition
     look = condition.part if isinstance(condition, Not) else condition
@@ -403,13 +403,13 @@ def statement_of_check(text: str) -> str | None:
 
 
 def ambiguous_cue(found: Clause) -> RefusalError:
-    """Refusal of a cue that could belong to several actions."""
+    """Refusal of a cue that several actions could belong to."""
     said = f"{found.cue} {found.text}".strip()
     return RefusalError(f"it is not clear which action '{said}' belongs to; say it first", [said])
 
 
 def missing_action(cue: str, text: str = "") -> RefusalError:
-    """Refusal of a condition without an action."""
+    """Refusal of a condition to which no action belongs."""
     return RefusalError(f"what am I to do {f'{cue.lower()} {text}'.strip()}?", [f"{cue} {text}".strip()])
 
 
@@ -432,7 +432,7 @@ def times_of_cue(cue: str) -> int:
 
 
 def merge_repeats(block: Repeat) -> Repeat:
-    """Merges rounds around endless rounds; the merged rounds end like the outer ones."""
+    """Merges rounds that contain endless rounds; the merged rounds end as the outer rounds do."""
     inner, outer = block.steps[0], block.loop
     if len(block.steps) > 1 or not isinstance(inner, Repeat) or not inner.loop.is_endless:
         return block
@@ -443,7 +443,7 @@ def merge_repeats(block: Repeat) -> Repeat:
 
 
 def rounds_by(kind: Cue | None, supposed: SpokenCondition) -> Rounds:
-    """Rounds until a condition holds, or while it holds."""
+    """Builds rounds that run until or while a condition holds."""
     if kind is Cue.UNTIL:
         return Rounds(Loop(until=supposed.condition), supposed.fails)
     return Rounds(Loop(while_=supposed.condition), supposed.holds)

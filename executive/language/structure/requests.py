@@ -1,4 +1,4 @@
-"""Special requests: waiting, charging, speech, questions, deliveries to everyone, and searches of all rooms."""
+"""Parses special requests: waiting, charging, speech, questions, deliveries to everyone, and searches of all rooms."""
 
 import re
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ Done = tuple[Steps, State, tuple[str, ...]]
 
 
 def parse_wait(text: str, state: State, reader: PlainReader) -> Done | None:
-    """Parses a wait for a condition; None for other texts, and for a wait of some time. Raises RefusalError."""
+    """Parses a wait for a condition; None for other texts, and for a wait of a given duration. Raises RefusalError."""
     match = _WAITING.wait.fullmatch(text)
     if match is None or ACTS.only_span.fullmatch(match["what"]):
         return None
@@ -44,9 +44,9 @@ def parse_wait(text: str, state: State, reader: PlainReader) -> Done | None:
 
 
 def wait_steps(where: str, how: str, what: str, state: State, reader: PlainReader) -> Done:
-    """Builds a wait in a place: until a condition holds, for somebody ("for"), or as long as a condition holds.
+    """Builds a wait in a place: until a condition holds, while it holds, or for a person ("for").
 
-    Raises RefusalError.
+    Raises RefusalError when the place or the condition cannot be understood.
     """
     steps, there = _gone(where, state, reader)
     if how in ("until", "till"):
@@ -76,7 +76,7 @@ def wait_steps(where: str, how: str, what: str, state: State, reader: PlainReade
 
 
 def _gone(where: str, state: State, reader: PlainReader) -> tuple[Steps, State]:
-    """Goes to the place of a wait; returns the state there."""
+    """Adds the drive to the place of a wait; returns the state there."""
     if _WAITING.here.fullmatch(where):
         return (), state
     match = _WAITING.place.fullmatch(where)
@@ -89,7 +89,7 @@ def _gone(where: str, state: State, reader: PlainReader) -> tuple[Steps, State]:
 
 
 def parse_charging(text: str, state: State) -> Done | None:
-    """Parses charging up to a level; None where no level is said."""
+    """Parses charging up to a level; None if the text states no level."""
     match = _WAITING.charge.fullmatch(text)
     if match is None:
         return None
@@ -103,7 +103,7 @@ def parse_charging(text: str, state: State) -> Done | None:
 class Listener:
     """Person to whom the robot speaks: the speaker, or another person in words (`who`), and the place.
 
-    `name` is that of a known person. Without `who` and `where` the robot speaks on the spot.
+    `name` is the name of a known person. Without `who` and `where` the robot speaks where it is.
     """
 
     who: str | None = None
@@ -114,7 +114,7 @@ class Listener:
 
 @dataclass(frozen=True)
 class SpeechRequest:
-    """Speech and its listener; `text` is None if it was not said ("tell Robin")."""
+    """Speech and its listener; `text` is None if the sentence does not say it ("tell Robin")."""
 
     text: str | None
     to: Listener | None
@@ -122,7 +122,7 @@ class SpeechRequest:
 
 @dataclass(frozen=True)
 class QuestionRequest:
-    """Question to somebody, the objects to choose from (with their articles), and whether it is yes or no."""
+    """Question to a person, the objects to choose from (with their articles), and whether its answer is yes or no."""
 
     text: str
     of: Listener
@@ -173,7 +173,7 @@ def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
 
 
 def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser) -> SpeechRequest:
-    """Parses the speech in "tell Robin dinner is ready" or "let Robin know it"."""
+    """Parses what to say in "tell Robin dinner is ready" or "let Robin know it"."""
     if said is not None and re.match(r"(?:and|or)\b", said, re.IGNORECASE):
         raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
     if said is None or re.fullmatch(r"so|it|that|about it|about that", said, re.IGNORECASE):
@@ -185,14 +185,14 @@ def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser
 
 
 def make_speech(who: str, text: str, knowledge: Knowledge) -> SpeechRequest:
-    """Makes a speech to somebody. Raises RefusalError for an unknown person, or when the meaning would change."""
+    """Builds a speech to a listener. Raises RefusalError for an unknown person, or when the meaning would change."""
     if (match := _of_world(knowledge).who.fullmatch(who)) is None:
         raise RefusalError(f"I do not know to whom to say it: '{who}'", [who])
     return SpeechRequest(_told(text), _listener(match))
 
 
 def is_clause(text: str, parser: DependencyParser) -> bool:
-    """Returns whether a text is a statement: a finite verb with its subject before it."""
+    """Returns whether a text is a statement: a finite verb with a subject before it."""
     tokens = parser.parse(text)
     finite = {t.index for t in tokens if t.tag in ("VBZ", "VBP", "VBD", "MD")}
     verbs = finite | {t.index for t in tokens if t.relation == "root"}
@@ -200,7 +200,7 @@ def is_clause(text: str, parser: DependencyParser) -> bool:
 
 
 def _words(text: str, parser: DependencyParser) -> str:
-    """Words to say. Raises RefusalError when they describe the text, or name an unknown person."""
+    """Words to say. Raises RefusalError when they describe a text, or name an unknown person."""
     clause = is_clause(text, parser)
     whom = re.search(r" to (?:the|a|an|my|our|all|every|each|some|any|somebody|someone)\b.*$", text, re.IGNORECASE)
     if whom is not None and (not clause or re.search(r"\b(?:person|guest|visitor)\b", whom[0], re.IGNORECASE)):
@@ -211,14 +211,14 @@ def _words(text: str, parser: DependencyParser) -> str:
 
 
 def _literal(text: str) -> str:
-    """Words to say literally. Raises RefusalError when they only stand for a text."""
+    """Words to say literally. Raises RefusalError when they only describe a text."""
     if ACTS.nothing.fullmatch(text) or ACTS.question.match(text) or re.match(r"to\b", text, re.IGNORECASE):
         raise RefusalError(f"what am I to say? '{text}' says nothing", [text])
     return text.strip(" ,.'\"")
 
 
 def _told(text: str) -> str:
-    """Statement in the speaker's place. Raises RefusalError when another voice changes its meaning."""
+    """Statement as the robot says it for the speaker. Raises RefusalError when this would change the meaning."""
     word = CLAUSES.deictic.search(text) or ACTS.inner.search(text)
     if word is not None:
         raise RefusalError(f"I cannot say '{text}' for you: '{word[0]}' would mean somebody or something else", [text])
@@ -231,7 +231,7 @@ def escape_braces(text: str) -> str:
 
 
 def _of_world(knowledge: Knowledge) -> Patterns:
-    """Patterns of speaking to somebody in a world."""
+    """Patterns for speaking to people in a world."""
     people, places = knowledge.spellings(knowledge.people), knowledge.spellings(knowledge.place_names())
     return _with_names(tuple(people), tuple(places))
 
@@ -254,7 +254,7 @@ def _listener(match: re.Match[str]) -> Listener:
 
 
 def parse_question(text: str, knowledge: Knowledge) -> QuestionRequest | None:
-    """Parses a clause that asks the robot to put a question to somebody; None for other clauses.
+    """Parses a clause that tells the robot to ask somebody a question; None for other clauses.
 
     Raises RefusalError for a question that the robot cannot put.
     """
@@ -279,7 +279,7 @@ def parse_question(text: str, knowledge: Knowledge) -> QuestionRequest | None:
 
 
 def _what(match: re.Match[str], text: str, knowledge: Knowledge) -> QuestionRequest:
-    """Makes the question for "what he wants to drink": a choice among all known objects of that kind."""
+    """Builds the question for "what he wants to drink": a choice among all known objects of that kind."""
     kind = (match["kind"] or ("drink" if "drink" in text.lower() else "")).lower()
     names = knowledge.classes(kind.removesuffix("s")) if kind else ()
     if not names:
@@ -289,9 +289,9 @@ def _what(match: re.Match[str], text: str, knowledge: Knowledge) -> QuestionRequ
 
 
 def steps_for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, State] | None:
-    """Builds a delivery to each person of a group; None for another recipient.
+    """Builds a delivery to each person in a group; None if the recipient is no group.
 
-    Raises RefusalError when no room is said, nobody is known to be there, or there is only one such object.
+    Raises RefusalError when no room is named, no known person is there, or there is only one such object.
     """
     trace = reader.read_actions(text, state)
     goals = [one.goal for one in trace.actions if one.goal is not None and one.goal.phrase is not None]

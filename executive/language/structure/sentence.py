@@ -1,4 +1,4 @@
-"""Builder of the steps of a mission from the clauses of a sentence."""
+"""Builds the steps of a mission from the clauses of a sentence."""
 
 import re
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ from skills.inputs.schema import first_error
 
 
 class SentenceBuilder(DecisionBuilder):
-    """Builder of the steps of one sentence. Its methods raise RefusalError."""
+    """Builder of the steps for one sentence. Its methods raise RefusalError for a clause that they cannot build."""
 
     def sequence(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
         """Builds the steps of clauses, in order."""
@@ -69,7 +69,7 @@ class SentenceBuilder(DecisionBuilder):
         return tuple(row.steps), row.state
 
     def _next(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
-        """Builds the clause at `at` and its dependent clauses; returns the index after them."""
+        """Builds the clause at `at` and the clauses that depend on it; returns the index after these."""
         clause = clauses[at]
         if clause.anyway or clause.ends_anyway:
             return self.put_always(row, clauses, at)
@@ -89,7 +89,7 @@ class SentenceBuilder(DecisionBuilder):
         return self._act(row, clause, clauses, at)
 
     def _act(self, row: StepRow, clause: Clause, clauses: Sequence[Clause], at: int) -> int:
-        """Builds the clause with an action at `at`; returns the index after it."""
+        """Builds the clause at `at`, which contains an action; returns the index after it."""
         text = clause.text
         if ACTS.giving.match(text) is not None:
             self.given = text if (behind := trailing_cue(text)) is None else behind.before
@@ -112,7 +112,7 @@ class SentenceBuilder(DecisionBuilder):
         return at + 1
 
     def _opens(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
-        """Has a door opened."""
+        """Adds the opening of a door, if the clause asks for one."""
         if not ACTS.opens.match(clauses[at].text):
             return None
         done = parse_opening(clauses[at].text, self._known(row), self.reader)
@@ -123,7 +123,7 @@ class SentenceBuilder(DecisionBuilder):
         return at + 1
 
     def _people(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
-        """Follows, guides, meets or greets people."""
+        """Adds following, guiding, meeting or greeting people, if the clause asks for it."""
         try:
             return self._people_at(row, clauses, at)
         except RefusalError as refusal:
@@ -131,7 +131,7 @@ class SentenceBuilder(DecisionBuilder):
             raise
 
     def _people_at(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
-        """Builds a request about people; one to find somebody counts only before another request about them."""
+        """Builds a request about people; finding somebody counts only before another request about the same person."""
         text = clauses[at].text
         found = trailing_cue(text)
         decides = found is not None and found.kind in (Cue.IF, Cue.UNLESS, Cue.EVERY, Cue.TIMES)
@@ -153,7 +153,7 @@ class SentenceBuilder(DecisionBuilder):
         return at + 1
 
     def _flush_reasons(self, row: StepRow) -> None:
-        """Understands the pending clauses; a mere reason ("Robin is lost") is no request."""
+        """Understands the pending clauses; skips a mere reason ("Robin is lost"), which is no request."""
         reasons = " ".join(clause.text for clause in row.plain)
         try:
             self.flush(row)
@@ -167,7 +167,7 @@ class SentenceBuilder(DecisionBuilder):
                 row.state = replace(row.state, memory=replace(row.state.memory, person=person))
 
     def _answered(self, row: StepRow) -> bool:
-        """Returns whether the robot answers the last look anyway."""
+        """Returns whether the robot answers the last look in any case."""
         self.flush(row)
         last = row.steps[-1] if row.steps else None
         found = last is not None and bool(last.commands) and last.commands[-1].task is Task.FIND
@@ -231,7 +231,7 @@ class SentenceBuilder(DecisionBuilder):
         self.put(row, Speak(speak=escape_braces(said.text or statement)), row.state)
 
     def _to(self, row: StepRow, to: Listener | None) -> None:
-        """Goes to the listener."""
+        """Adds the drive to the listener."""
         if to is None or not (to.who or to.where):
             return
         who = with_preposition(self.reader.read_items(to.who), "to") if to.who and not to.speaker else ()
@@ -266,7 +266,7 @@ class SentenceBuilder(DecisionBuilder):
     def _agreed(
         self, asked: QuestionRequest, state: State, clauses: Sequence[Clause], at: int
     ) -> tuple[dict[str, Steps], int]:
-        """Steps for the answers yes and no."""
+        """Steps that follow the answers yes and no."""
         found: dict[str, Steps] = {"yes": (), "no": ()}
         while at < len(clauses):
             clause, rest = clauses[at], clauses[at].text
@@ -292,7 +292,7 @@ class SentenceBuilder(DecisionBuilder):
     def _chosen(
         self, asked: QuestionRequest, state: State, clauses: Sequence[Clause], at: int
     ) -> tuple[dict[str, Steps], int]:
-        """Steps for each of the choices: the robot brings it, if the sentence says so."""
+        """Steps that follow each of the choices: the robot brings the chosen object if the sentence says so."""
         article = r"^(?:a|an|some|the|any|another) "
         names = [re.sub(article, "", choice, flags=re.IGNORECASE) for choice in asked.choices]
         if at >= len(clauses) or clauses[at].kind is not None or not ACTS.brings.match(clauses[at].text):
@@ -301,7 +301,7 @@ class SentenceBuilder(DecisionBuilder):
         return {name: self.nest([clauses[at]], each)[0] for name, each in zip(names, chosen, strict=True)}, at + 1
 
     def _choosing(self, asked: QuestionRequest, number: int, state: State) -> State:
-        """State after the answer: "it" is the chosen object, and the asked person receives it."""
+        """State after the answer: "it" refers to the chosen object, and the asked person receives it."""
         objects = tuple(
             item.phrase for item in self.reader.read_items(asked.choices[number]) if isinstance(item, Chunk)
         )
@@ -310,7 +310,7 @@ class SentenceBuilder(DecisionBuilder):
         return replace(state, memory=memory, recipient=person)
 
     def _checks(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
-        """Builds a check that only blocks can do: "look whether the door is open", "is the battery low"."""
+        """Builds a check that needs a block: "look whether the door is open", "is the battery low"."""
         text = statement_of_check(clauses[at].text)
         if text is None:
             return None
@@ -370,7 +370,7 @@ class SentenceBuilder(DecisionBuilder):
         return end
 
     def _in_each(self, row: StepRow, says: Clause) -> None:
-        """Speaks in every room."""
+        """Adds speech in every room."""
         self.flush(row)
         for room in self.reader.knowledge.places:
             there = Chunk(phrase_of_name(room, NounKind.PLACE), "to", PrepositionRole.GOAL)
@@ -387,8 +387,8 @@ MOST_CLAUSES: Final = 24
 def read_structure(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pipeline, memory: Memory) -> Trace:
     """Reads a sentence with conditions, loops, waits or speech, given the trace of its plain reading.
 
-    Returns the plain trace for a list of plain commands: if the sentence could be one, only certain decisions and
-    rounds count. `clauses` are those of the sentence, if known, and `memory` is that of earlier sentences.
+    Returns the plain trace if the sentence is a list of plain commands; if it could be one, only unambiguous decisions
+    and rounds count. `clauses` are the sentence's clauses, if known; `memory` has the referents from earlier sentences.
     """
     try:
         return _structured(plain, split(plain.text).clauses if clauses is None else clauses, pipeline, memory)
@@ -400,7 +400,7 @@ def read_structure(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pip
 
 
 def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, memory: Memory) -> Trace:
-    """Reads it. Raises RefusalError when anything is uncertain; the message names the words."""
+    """Reads the structured sentence. Raises RefusalError with the words if any part is uncertain."""
     decides = any(one.kind is not None or trailing_cue(one.text) is not None for one in clauses)
     if plain.refusal is None and not decides:
         return plain
@@ -424,12 +424,12 @@ _BACK: Final = "I bring it to the place where you have spoken to me, not to wher
 
 
 def _returns_to_speaker(commands: Sequence[Command]) -> bool:
-    """Returns whether the robot brings an object to the speaker after it has gone elsewhere with the speaker."""
+    """Returns whether the robot brings an object to the speaker after going elsewhere with the speaker."""
     moved = next((n for n, one in enumerate(commands) if str(one.object) == SPEAKER), len(commands))
     return any(one.item is not None and one.goal == START for one in commands[moved:])
 
 
 def _depth(step: Step) -> int:
-    """Depth of nested blocks; steps at the end do not count."""
+    """Depth of nested blocks, without counting steps at the end."""
     inner = max(map(_depth, step.inner_steps), default=0)
     return inner + isinstance(step, Choose | Repeat | Try | Together | Ask)

@@ -240,7 +240,7 @@ class KnowsPlace(Condition):
 
 @dataclass
 class BatteryAtLeast(Condition):
-    """Condition that the battery's charge (0 to 1) is at least `charge`; accepts old readings of the slow charge."""
+    """Condition that the battery's charge is at least `charge` (0 to 1); accepts old readings, as it changes slowly."""
 
     reading = "the battery"
     freshness = Freshness(10.0, StaleData.ACCEPT)

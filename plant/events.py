@@ -211,7 +211,7 @@ class Moves(Stateful, saved=("_done",)):
         self._listeners.append(listener)
 
     def before_step(self, now_s: float, hands_W: Callable[[], Hands], holding: Sequence[str]) -> None:
-        """Makes the due moves; `holding` names the robots with an object in their hand (`hands_W`)."""
+        """Moves the objects whose time has come; `holding` names the robots that hold an object, `hands_W` gives hand poses."""
         for number, move in enumerate(self._world.moves):
             if number not in self._done and now_s >= move.at:
                 self._done |= {number}

@@ -255,7 +255,7 @@ class Sleepers:
 def _objects(
     plant: MultibodyPlant, inspector: SceneGraphInspector, models: Mapping[str, ModelInstanceIndex]
 ) -> Iterator[_Object]:
-    """Yields loose objects with one body each; models with moving parts stay awake."""
+    """Yields the loose objects with one body, which may sleep; a model with joints never sleeps."""
     for name, instance in models.items():
         bodies = [plant.get_body(index) for index in plant.GetBodyIndices(instance)]
         if len(bodies) == 1 and bodies[0].is_floating_base_body():

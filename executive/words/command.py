@@ -111,7 +111,7 @@ def is_attribute(word: str) -> bool:
 
 
 def may_be_attribute(word: str) -> bool:
-    """Returns whether a command may use `word` as an attribute: one word that is no number."""
+    """Returns whether `word` can describe an object, like a colour: a single word that is no number."""
     return _NO_ATTRIBUTE.fullmatch(word) is None
 
 

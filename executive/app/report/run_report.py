@@ -1,4 +1,4 @@
-"""Report of one run: the tree's claim, the referee's verdict, answers and seen objects.
+"""Report of one run: the result that the tree reports, the referee's verdict on the simulation, answers, seen objects.
 
 `--json` prints these dataclasses, and `report.html` shows them.
 """

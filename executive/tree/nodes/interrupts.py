@@ -74,13 +74,13 @@ class Interrupt(ExplainedDecorator):
 
     | case | status |
     |---|---|
-    | never called | INVALID |
+    | never triggered | INVALID |
     | child RUNNING, SUCCESS | as the child |
     | child FAILURE | FAILURE with its cause |
-    | called more than `uses` times | FAILURE with EXECUTION |
+    | triggered more than `uses` times | FAILURE with EXECUTION |
     | halted | INVALID with CANCELLED |
 
-    While the mission runs a skill named in `spares`, the call waits, unless `urgent` is violated too.
+    While the mission runs a skill named in `spares`, the interrupt waits, unless `urgent` is violated too.
     """
 
     kind = "interrupt"

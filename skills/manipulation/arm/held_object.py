@@ -76,7 +76,7 @@ class HeldObject:
 
     @property
     def _level_axes(self) -> tuple[int, int]:
-        """Axes of the hand that were level while the object stood, the one along the object's longer side first."""
+        """Hand axes that were horizontal before the grasp lifted the object; the one along its longer side first."""
         upright = int(np.argmax(np.abs(self.R_BH.matrix()[2])))
         first, second = (axis for axis in range(3) if axis != upright)
         return (first, second) if self._sides_m[first] >= self._sides_m[second] else (second, first)

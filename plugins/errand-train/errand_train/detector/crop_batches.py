@@ -33,7 +33,7 @@ _BOX_SPREAD: Final = 0.04
 class CropBatch:
     """Crops (N, 3, 128, 128) from 0 to 1, with boxes (N, 4) in them, logits (N, K), and targets.
 
-    `wanted` (N, 4) are boxes, `classes` (N,) numbers or -1 for nothing.
+    `wanted` (N, 4) are the target boxes, `classes` (N,) their class indices, -1 for background.
     """
 
     crops: Tensor

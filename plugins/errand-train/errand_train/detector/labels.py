@@ -1,4 +1,4 @@
-"""Labelled pictures of the renderer (COCO), with the outline of each object for rotations."""
+"""Labelled rendered pictures (COCO); the outline of each object gives its box after a rotation of the picture."""
 
 from __future__ import annotations
 

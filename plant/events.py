@@ -211,7 +211,7 @@ class Moves(Stateful, saved=("_done",)):
         self._listeners.append(listener)
 
     def before_step(self, now_s: float, hands_W: Callable[[], Hands], holding: Sequence[str]) -> None:
-        """Moves the objects whose time has come; `holding` names the robots that hold an object, `hands_W` gives hand poses."""
+        """Moves the objects that are due; `holding` names the robots that hold an object, `hands_W` are hand poses."""
         for number, move in enumerate(self._world.moves):
             if number not in self._done and now_s >= move.at:
                 self._done |= {number}

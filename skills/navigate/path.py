@@ -134,7 +134,7 @@ def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m:
 
 @compiled
 def _dearer(space: Space, poses: FloatArray, n: int, x: float, y: float) -> bool:
-    """Returns whether zones raise the cost of the motions to and from a pose of a path once the pose moves to (x, y)."""
+    """Returns whether zones raise the cost of the motions to and from a pose once that pose moves to (x, y)."""
     if space.zones.factor.shape[0] == 0:
         return False
     before, after = 0.0, 0.0

@@ -134,7 +134,7 @@ class ManipulationService(Service):
         self._ids, self._tasks = count(1), OrderedDict[int, _ObjectTask]()
 
     def ManipulationApi(self, request: Any, _call: Call) -> Any:
-        """Starts a manipulation task, which ends all running motions; rejects an impossible task as an invalid request."""
+        """Starts a manipulation task, which ends all motions; refuses an impossible task as invalid."""
         used = self._leases.use(request.lease, WHOLE)
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Api.ManipulationApiResponse(lease_use_result=used)

@@ -343,7 +343,7 @@ def instant_decision(flow: Flow, condition: Condition, builder: PlanBuilder) -> 
 class Check(ExplainedDecorator):
     """Decorator that publishes its child's decision under `ANSWER_TOPIC`, as an answer of the mission.
 
-    Status as the child; `key` holds the child's answer.
+    Has the status of its only child; `key` holds the answer of the child.
     """
 
     kind = "check"

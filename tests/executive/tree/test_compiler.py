@@ -300,7 +300,7 @@ def test_no_code_outside_the_pages_of_nodes_names_a_kind_of_node():
 @pytest.mark.parametrize("node", node_classes().values(), ids=node_classes())
 def test_each_node_with_children_documents_its_truth_table(node):
     with_children = issubclass(node, ExplainedDecorator | MemoryComposite)
-    assert not with_children or "| status |" in node.__doc__ or "status as" in node.__doc__.lower()
+    assert not with_children or "| status |" in node.__doc__ or "status of its only child" in node.__doc__.lower()
 
 
 def test_a_spec_becomes_its_node_on_the_runs_clock(context, clock):

@@ -1,4 +1,7 @@
-"""Builds the node specs in one step's subtree, with the goal conditions that belong to them."""
+"""Builder of the node specs of one step's subtree, with the goal conditions of its parts.
+
+The methods of `PlanBuilder` from `sequence` to `navigate` are the shapes of which all plans are made.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +14,11 @@ from typing import Any, Final
 from executive.mission.gripper import InGripper
 from executive.tree.board import Constant, FromBoard, LastKnown
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.guard import Condition
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.registry import missing_skill
 from executive.words.command import Command, Task
+from executive.words.expression import Value
 from executive.words.goal import GoalCondition
 from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
 from executive.words.slug import slug
@@ -28,6 +33,7 @@ BACK_OFF: Final = "back_off"
 _BLOCKED: Final = Recovery((Trigger(frozenset({Cause.PLANNING, Cause.EXECUTION}), "navigate"),))
 NAVIGATE_RECOVERIES: Final[Mapping[str, Recovery]] = {"clear_costmap": _BLOCKED, BACK_OFF: _BLOCKED}
 """Recoveries of a blocked drive, by their skill before the next attempt."""
+MOMENT_S: Final = 0.5
 PICK_UPS: Final = 2
 """Number of times that a dropped object is picked up again, unless a mission says otherwise."""
 
@@ -128,8 +134,74 @@ class PlanBuilder:
         return NodeSpec(kind, path_id, name, MappingProxyType(options), children, self.source)
 
     def sequence(self, name: str, *steps: NodeSpec, part: str = "") -> NodeSpec:
-        """Builds a sequence at this path id, or at the `part` below it."""
+        """Does one step after the other, until one fails, at this path id or at the `part` below it."""
         return self.node("sequence", name, *steps, part=part)
+
+    def first_of(self, name: str, *candidates: NodeSpec, part: str = "", **options: Any) -> NodeSpec:
+        """Tries the next candidate when one fails, until one succeeds.
+
+        selector
+        ├── candidate
+        └── next candidate, after its failure
+        """
+        return self.node("selector", name, *candidates, part=part, **options)
+
+    def or_stay(self, name: str, attempt: NodeSpec, stay: str, *, pause: str = "stay", part: str = "") -> NodeSpec:
+        """Tries something that need not succeed; `stay` says what follows its failure.
+
+        selector
+        ├── attempt
+        └── pause, after its failure
+        """
+        return self.first_of(name, attempt, self.pause(pause, stay), part=part)
+
+    def guarded(self, name: str, work: NodeSpec, condition: Condition, *, part: str = "") -> NodeSpec:
+        """Does work while a condition holds.
+
+        guard
+        └── work, halted when the condition is violated
+        """
+        return self.node("guard", name, work, part=part, condition=condition)
+
+    def retried(
+        self, name: str, work: NodeSpec, attempts: int, causes: frozenset[Cause], *, part: str = ""
+    ) -> NodeSpec:
+        """Does work again after a failure with one of the causes.
+
+        retry
+        └── work, `attempts` times at most
+        """
+        return self.node("retry", name, work, part=part, attempts=attempts, causes=causes)
+
+    def if_holding(self, name: str, work: NodeSpec, *, part: str = "", **known: tuple[str, ...]) -> NodeSpec:
+        """Does work only with an object in the gripper; a selector passes over it without one.
+
+        only if holding
+        └── work
+        """
+        return self.node("only if holding", name, work, part=part, **known)
+
+    def chosen(
+        self, name: str, decides: NodeSpec, branches: Mapping[Value, NodeSpec], key: str, *, part: str = ""
+    ) -> NodeSpec:
+        """Decides or asks, and goes on by the answer under `key`.
+
+        choose
+        ├── decision or question
+        └── branch of the answer, if it has one
+        """
+        numbers = {answer: number for number, answer in enumerate(branches, start=1)}
+        options = {"branches": MappingProxyType(numbers), "key": key}
+        return self.node("choose", name, decides, *branches.values(), part=part, **options)
+
+    def look_from(self, name: str, pose: Pose2D | FromBoard, to: str, look: NodeSpec) -> NodeSpec:
+        """Drives to a viewpoint, called `to`, and looks.
+
+        sequence
+        ├── drive
+        └── look
+        """
+        return self.sequence(name, self.navigate(pose, to), look)
 
     def skill(
         self,
@@ -166,28 +238,33 @@ class PlanBuilder:
         part: str = "",
         forgets: tuple[str, ...] = (),
     ) -> NodeSpec:
-        """Builds at most `attempts` attempts with recoveries; the first clears the blackboard keys in `forgets`.
+        """Makes at most `attempts` attempts with recoveries; the first clears the blackboard keys in `forgets`.
 
         recover
-        ├── attempt                          again after each successful recovery
-        ├── recovery 1, if its rule fits     one after the other, until one succeeds
-        └── recovery 2, if its rule fits
+        ├── attempt
+        └── recovery for its failure; then the attempt begins again
         """
         nodes, when = tuple(node for node, _ in recoveries), tuple(rule for _, rule in recoveries)
         options = {"recoveries": when, "attempts": attempts, "forgets": forgets}
         return self.node("recover", name, attempt, *nodes, part=part, **options)
 
-    def stow_after(self, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:
-        """Builds work and stows the arm after it, after any result or `only_after_failure`.
+    def tidied(
+        self, name: str, work: NodeSpec, tidying: NodeSpec, *, only_after_failure: bool = False, part: str = ""
+    ) -> NodeSpec:
+        """Does work, and tidies up after any result of it, or `only_after_failure`.
 
-        afterwards        the result of the work
+        afterwards
         ├── work
-        └── stow
+        └── tidying
         """
-        name = "stow the arm if it fails" if only_after_failure else "stow the arm in the end"
-        return self.node("afterwards", name, work, self.skill(STOW), only_after_failure=only_after_failure)
+        return self.node("afterwards", name, work, tidying, part=part, only_after_failure=only_after_failure)
 
-    def pause(self, part: str, name: str, duration_s: float) -> NodeSpec:
+    def stow_after(self, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:
+        """Stows the arm after work, like `tidied`."""
+        name = "stow the arm if it fails" if only_after_failure else "stow the arm in the end"
+        return self.tidied(name, work, self.skill(STOW), only_after_failure=only_after_failure)
+
+    def pause(self, part: str, name: str, duration_s: float = MOMENT_S) -> NodeSpec:
         """Builds a leaf that waits on the robot's clock."""
         return self.node("pause", name, part=part, duration_s=duration_s)
 

@@ -20,7 +20,6 @@ _STEP_M: Final = 0.2
 _FLOOR_HALF_M: Final = 1.2
 _CORNERS: Final = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 Circle = tuple[Coordinate, Coordinate, Length]
-SETTLE_S: Final = 0.5
 
 
 class InTheWay(ExplainedLeaf):
@@ -121,23 +120,21 @@ def move_aside_plan(
     )
     seen = {"observation": FromBoard(obstacle), "surfaces": surfaces}
     before = below.skill("approach", seen, {"observation": obstacle})
-    stay = below.pause("stay", "take it from here", SETTLE_S)
     put = below.skill("place", {"surface": FromBoard(surface), "clear_of": FromBoard(clear)})
     back = below.at("back").skill("place", {"surface": FromBoard(surface)})
-    near = below.node("selector", "stand before it, or stay", before, stay, part="near")
+    near = below.or_stay("stand before it, or stay", before, "take it from here", part="near")
     grasp = below.skill("grasp", {"observation": FromBoard(obstacle)})
-    take = below.node("sequence", "take it", near, grasp, part="take")
+    take = below.sequence("take it", near, grasp, part="take")
     causes = frozenset({Cause.EXECUTION, Cause.POSTCONDITION})
-    twice = below.node("retry", "take it, twice if need be", take, part="twice", attempts=2, causes=causes)
+    twice = below.retried("take it, twice if need be", take, 2, causes, part="twice")
     there = below.navigate(FromBoard(pose), "where it stood", exactly=True)
-    here = below.pause("here", "go on from here", SETTLE_S)
     return below.sequence(
         "move it aside",
         what,
         twice,
         tuck,
-        below.node(
-            "afterwards", "set it down again if there is no room", put, back, part="put", only_after_failure=True
+        below.tidied("set it down again if there is no room", put, back, only_after_failure=True, part="put"),
+        below.or_stay(
+            "go back to where it stood, or go on from here", there, "go on from here", pause="here", part="there"
         ),
-        below.node("selector", "go back to where it stood, or go on from here", there, here, part="there"),
     )

@@ -22,7 +22,7 @@ from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import floor_square
 from executive.tree.nodes.guard import Holds
-from executive.tree.nodes.pick_up import LOOK_AGAIN_S, go_near_plan, held_plan, pick_up_plan
+from executive.tree.nodes.pick_up import go_near_plan, held_plan, pick_up_plan
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.nodes.search import BACK_M, HALF_M, detect_plan, place_phrase
 from executive.tree.plan import PlanBuilder, pose_2d
@@ -77,7 +77,7 @@ def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[N
         )
     to = f"to the {place}"
     each = tuple(_put_on_plan(builder.at(name), item, name, to) for name in surfaces)
-    put = builder.node("selector", f"put the {item} down {place_phrase(builder.knowledge, place)}", *each)
+    put = builder.first_of(f"put the {item} down {place_phrase(builder.knowledge, place)}", *each)
     return put, tuple(guard for plan in each for guard in plan.children)
 
 
@@ -113,7 +113,7 @@ def _holding(
 ) -> NodeSpec:
     """Builds a guard that requires the item in the gripper, or only until the robot puts it down."""
     condition = Holds(str(item), to, until_put_down, builder.search_classes(item.name), item.attributes)
-    return builder.node("guard", f"holding the {item}", below, condition=condition)
+    return builder.guarded(f"holding the {item}", below, condition)
 
 
 def goal_in_words(builder: PlanBuilder, goal: str) -> str:
@@ -322,15 +322,14 @@ def _pick_up_again_plan(builder: PlanBuilder, item: ObjectKind, to: str) -> Node
     )
     first, below, back = builder.at("first"), builder.at("first").at("set-down"), builder.at("back")
     set_down = below.skill("place", {"surface": FromBoard(keys["set-down"])})
-    still_held = below.node("only if holding", f"set the {item} down", set_down)
-    free = first.node("selector", "free the gripper", still_held, first.skill("stow"))
+    still_held = below.if_holding(f"set the {item} down", set_down)
+    free = first.first_of("free the gripper", still_held, first.skill("stow"))
     ports = builder.optional_ports("back_off", {"distance_m": BACK_M})
-    stay = back.pause("stay", "look from here", LOOK_AGAIN_S)
-    stand_back = back.node("selector", "stand back", back.skill("back_off", ports), stay)
+    stand_back = back.or_stay("stand back", back.skill("back_off", ports), "look from here")
     look = _look_plan(builder, item, keys)
     pick_up = pick_up_plan(builder, item, look, keys["detection"], FromBoard(keys["around"]))
     take = builder.at("take").sequence(f"take the {item} from where it lies", stand_back, pick_up)
-    have = builder.node("selector", f"have the {item} again", held_plan(builder, item), take, part="have")
+    have = builder.first_of(f"have the {item} again", held_plan(builder, item), take, part="have")
     return builder.sequence(f"pick the {item} up again", fell, free, have)
 
 
@@ -338,17 +337,17 @@ def _look_plan(builder: PlanBuilder, item: ObjectKind, keys: dict[str, str]) -> 
     """Looks at the spot where the object fell, at the floor around it, at near surfaces, then from either side."""
     floor, detection = FromBoard(keys["floor"]), keys["detection"]
     aside = [
-        below.sequence(
+        below.look_from(
             f"look at the {FLOOR} from aside",
-            below.navigate(BesideBoard(keys["pose"], *offset), f"the side of where the {item} fell"),
+            BesideBoard(keys["pose"], *offset),
+            f"the side of where the {item} fell",
             detect_plan(below, item, floor, detection),
         )
         for below, offset in zip((builder.at("left"), builder.at("right")), ASIDE_M, strict=True)
     ]
     knows_spot = builder.has_ports("detect", ("expected_W",))
     spot = [detect_plan(builder.at("spot"), item, floor, detection, {"expected_W": FromBoard(keys["spot"])})]
-    return builder.node(
-        "selector",
+    return builder.first_of(
         f"find the {item} where it fell",
         *(spot if knows_spot else []),
         detect_plan(builder, item, floor, detection),

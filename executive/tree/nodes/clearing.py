@@ -174,7 +174,7 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     key, missed = builder.key("detection"), builder.key("missed")
     extra = builder.optional_ports("detect", {"avoid": FromBoardOr(missed, ())})
     looks = (look for _, look in look_plans(builder.at("left"), item, surfaces, key, extra))
-    look = builder.at("left").node("selector", f"is anything left {place_phrase(builder.knowledge, place)}?", *looks)
+    look = builder.at("left").first_of(f"is anything left {place_phrase(builder.knowledge, place)}?", *looks)
     again = detect_plan(builder.at("find"), item, surfaces, key, extra)
     around = tuple(map(builder.surface, surfaces))
     carry = replace(builder.at("bring"), command=bring)

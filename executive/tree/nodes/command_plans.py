@@ -141,11 +141,11 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     if not builder.in_gripper:
         held = known_held_plan(builder.at("have"), item)
         alone = HoldsNothingElse(str(item), builder.search_classes(item.name), item.attributes)
-        get = builder.node("guard", f"get the {item} with an empty gripper", get, part="empty-handed", condition=alone)
-        have = builder.node("selector", f"have the {item}, or get it", held, get, part="have")
+        get = builder.guarded(f"get the {item} with an empty gripper", get, alone, part="empty-handed")
+        have = builder.first_of(f"have the {item}, or get it", held, get, part="have")
         return builder.sequence(f"get the {item} {place_phrase(builder.knowledge, place)}", have)
     get = builder.at("get").sequence("get it", get)
-    return builder.node("selector", f"have the {item}", held_plan(builder, item), get)
+    return builder.first_of(f"have the {item}", held_plan(builder, item), get)
 
 
 def go_plan(builder: PlanBuilder) -> NodeSpec:

@@ -5,7 +5,6 @@ The results of finished children stay visible.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
-from types import MappingProxyType
 from typing import ClassVar, Final
 
 from py_trees.behaviour import Behaviour
@@ -175,9 +174,8 @@ def _choose_plan(assembler: Assembler, block: model.Choose, builder: PlanBuilder
     then, after_then = assembler.branch(block.then, builder.at("then"), "then", flow)
     other, after_other = assembler.branch(block.otherwise, builder.at("else"), "else", flow)
     flow.join([after_then, after_other])
-    branches = {True: 1, False: 2} if block.otherwise else {True: 1}
-    nodes = (decide, *then.nodes, *other.nodes)
-    node = builder.node("choose", f"{block.condition}?", *nodes, branches=MappingProxyType(branches), key=key)
+    branches: dict[Value, NodeSpec] = {True: then.node, **({False: other.node} if block.otherwise else {})}
+    node = builder.chosen(f"{block.condition}?", decide, branches, key)
     return Assembled((node,), (*parts, *then.parts, *other.parts))
 
 

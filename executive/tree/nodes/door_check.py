@@ -6,7 +6,6 @@ A closed door may block the path to its viewpoint, so the robot also looks from 
 import math
 from collections.abc import Iterator, Mapping
 from itertools import product
-from types import MappingProxyType
 from typing import ClassVar, Final
 
 from py_trees.common import Status
@@ -32,14 +31,12 @@ _FROM_EITHER: Final = "look from one side, or else from the other"
 _CANNOT_TELL: Final = frozenset({Cause.PRECONDITION, Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION})
 _LOOKS: Final = 1000
 """Limit of inconclusive looks at a door, as while people walk through; the time limit comes first."""
-_IF_CLOSED: Final = MappingProxyType({False: 1})
 _HERE_M: Final = 2.0
 _HERE_RAD: Final = 0.9
 """Largest distance and angle from which a robot looks at a door without driving to a better viewpoint."""
 _BEFORE_M: Final = ((1.5, 1.2, 1.8), (0.9, 0.7))
 """Distances before a door, the better ones first."""
 _ASIDE_RAD: Final = tuple(map(math.radians, (0.0, 20.0, -20.0, 40.0, -40.0)))
-_LOOK_S: Final = 0.5
 _TURNED_RAD: Final = (0.0, math.pi / 2)
 _BODY_M: Final = (1.3, 0.7)
 """Length and width of the body, with a margin."""
@@ -90,7 +87,7 @@ def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str, max_age_
     """
     door = _door(builder, between)
     below = builder.at("look") if max_age_s else builder
-    look = below.node("selector", _FROM_EITHER, *_looks(below, door, key), part="look")
+    look = below.first_of(_FROM_EITHER, *_looks(below, door, key), part="look")
     name, question = f"is the {_name(door)} open?", f"is the {_name(door)} open"
     check = below.node("check", name, look, question=question, key=key)
     return _known_or(builder, door, check, key, max_age_s) if max_age_s else check
@@ -100,7 +97,7 @@ def _known_or(builder: PlanBuilder, door: Door, look: NodeSpec, key: str, max_ag
     """Uses recent knowledge of a door, or else looks."""
     options = {"door": doorway(builder.knowledge, door), "max_age_s": max_age_s, "key": key}
     known = builder.node("known door", "what is known of it", part="known", **options)
-    return builder.node("selector", f"is the {_name(door)} open?", known, look)
+    return builder.first_of(f"is the {_name(door)} open?", known, look)
 
 
 def _looks(builder: PlanBuilder, door: Door, key: str) -> Iterator[NodeSpec]:
@@ -118,10 +115,8 @@ def _looks(builder: PlanBuilder, door: Door, key: str) -> Iterator[NodeSpec]:
     yield here.node("before door", "look from here", look, door=doorway(knowledge, door))
     for room, view in views:
         below = builder.at(f"from-{room}")
-        stay = below.pause("stay", "look from here", _LOOK_S)
-        near = below.node(
-            "selector", "stand before it, or stay", below.navigate(view, f"the {name}"), stay, part="near"
-        )
+        drive = below.navigate(view, f"the {name}")
+        near = below.or_stay("stand before it, or stay", drive, "look from here", part="near")
         yield below.sequence(f"look from the {room}", near, below.skill(CHECK_DOOR, ports, {"open": key}))
 
 
@@ -129,13 +124,13 @@ def _open_plan(_: Assembler, block: OpenDoor, builder: PlanBuilder) -> Assembled
     """Looks at a door; if it is closed, calls the door's plug-in, or asks the people there and waits."""
     door, key, wanted = _door(builder, block.door.between), builder.key("open"), block.door
     look = builder.at("look")
-    first = look.node("selector", _FROM_EITHER, *_looks(look, door, key), part="look")
+    first = look.first_of(_FROM_EITHER, *_looks(look, door, key), part="look")
     first = _known_or(look, door, first, key, wanted.max_age_s)
     if door.opens is None:
         work = _asks(builder, door, key, str(wanted))
     else:
         work = builder.at("open").skill("open_door", _ports(builder.knowledge, door))
-    opened = builder.node("choose", f"{wanted}?", first, work, part="choose", branches=_IF_CLOSED, key=key)
+    opened = builder.chosen(f"{wanted}?", first, {False: work}, key, part="choose")
     late = f"the {_name(door)} was not opened"
     node = builder.node("timeout", wanted.words, opened, limit_s=wanted.within_s, late=late)
     goal = door_goal(builder.knowledge, door.between, GoalKind.DOOR_OPENED)
@@ -145,8 +140,8 @@ def _open_plan(_: Assembler, block: OpenDoor, builder: PlanBuilder) -> Assembled
 def _asks(builder: PlanBuilder, door: Door, key: str, words: str) -> NodeSpec:
     """Asks the people there to open a door, and looks every two seconds until `key` says that it is open."""
     ask, again = builder.at("ask").skill("speak", {"text": f"Please open the {_name(door)}."}), builder.at("again")
-    looks = again.node("selector", _FROM_EITHER, *_looks(again, door, key), part="look")
-    patient = again.node("retry", "look until it can tell", looks, attempts=_LOOKS, causes=_CANNOT_TELL)
+    looks = again.first_of(_FROM_EITHER, *_looks(again, door, key), part="look")
+    patient = again.retried("look until it can tell", looks, _LOOKS, _CANNOT_TELL)
     wait = builder.node("wait for", f"wait until {words}", patient, part="wait", key=key, words=words, every_s=2.0)
     return builder.sequence("ask, and wait", ask, wait, part="ask-and-wait")
 

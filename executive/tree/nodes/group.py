@@ -131,7 +131,7 @@ def frame_plan(
         holds = group.while_.holds
         decision = instant_decision(before, holds, builder.at("while"))
         condition = MustHold(decision, str(holds))
-        node = builder.node("guard", f"while {holds}", node, part="while", condition=condition)
+        node = builder.guarded(f"while {holds}", node, condition, part="while")
         if _is_holding(holds):
             parts = (StepPart(node.path_id, goal=GoalCondition(GoalKind.GRASPED, when=When.ALWAYS)), *parts)
     if group.always:

@@ -233,7 +233,7 @@ def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
 
 
 def _lost_plan(builder: PlanBuilder) -> NodeSpec:
-    settle = builder.pause("settle", "stand still", 0.5)
+    settle = builder.pause("settle", "stand still")
     find_out = builder.at("find-out").sequence("find out where it is", settle, builder.skill("relocalise"))
     return builder.node(
         "interrupt",

@@ -270,8 +270,7 @@ def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> No
     ports = {"area_W": knowledge.places[said].polygon, "place": said}
     there = _in_room(builder.at(said), said, _meet_one_plan(builder.at(said), person, ports))
     elsewhere = (_elsewhere_plan(builder.at("elsewhere"), person, others),) if others else ()
-    return builder.node(
-        "selector",
+    return builder.first_of(
         f"find {person}",
         near,
         there,
@@ -337,7 +336,7 @@ def _to_room(builder: PlanBuilder, pose: Pose2D | FromBoard, area: Constant | Fr
     """Goes to a pose in a room, or near it; if a person stands in the door, as near as possible."""
     once = builder.at("once").skill("navigate", {"goal": pose})
     near = builder.node("near room", f"is {to} near?", part="near", area=area)
-    return builder.node("selector", f"go to {to}", once, near, go_near_plan(builder, pose, to), part="to-room")
+    return builder.first_of(f"go to {to}", once, near, go_near_plan(builder, pose, to), part="to-room")
 
 
 def _each_person(

@@ -20,7 +20,6 @@ from skills.api import Cause, ObjectKind, Surface
 from skills.robot import Pose2D
 
 ATTEMPTS: Final = 4
-LOOK_AGAIN_S: Final = 0.5
 NEARBY_M: Final = ((-0.5, 0.0), (0.0, 0.6), (0.0, -0.6))
 """Alternative poses near a goal, forward and left of it (m)."""
 _ANY: Final = frozenset(Cause) - {Cause.ERROR}
@@ -57,7 +56,7 @@ def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> Nod
     ]
     if not others:
         return direct
-    return builder.node("selector", f"go to {to}, or near it", direct, *others, part="or-near", one_goal=True)
+    return builder.first_of(f"go to {to}, or near it", direct, *others, part="or-near", one_goal=True)
 
 
 def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float, float], Pose2D | FromBoard]:
@@ -114,8 +113,8 @@ def pick_up_plan(
     if seen:
         work["search"] = search
     else:
-        work["look again"] = builder.pause("look-again", "look again", LOOK_AGAIN_S)
-        work["plan again"] = builder.pause("plan-again", "look and plan again", LOOK_AGAIN_S)
+        work["look again"] = builder.pause("look-again", "look again")
+        work["plan again"] = builder.pause("plan-again", "look and plan again")
     paths = {"approach": approach.path_id, "grasp": grasp.path_id, "tuck": tuck.path_id}
     rules = {name: rule.bind(paths) for name, rule in RECOVERIES.items() if name in work}
     if aside:
@@ -142,30 +141,25 @@ def tuck_plan(builder: PlanBuilder) -> NodeSpec:
         └── pause
     """
     causes = frozenset({Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION})
-    twice = builder.node(
-        "retry", "draw in the arm, twice if need be", builder.skill("stow"), part="tuck-in", attempts=2, causes=causes
-    )
+    twice = builder.retried("draw in the arm, twice if need be", builder.skill("stow"), 2, causes, part="tuck-in")
     below = builder.at("carry-as-it-is")
-    settle = below.pause("settle", "hold it still", LOOK_AGAIN_S)
-    as_it_is = below.node("only if holding", "carry it as it is held", settle)
-    return builder.node("selector", "tuck the arm in", twice, as_it_is, part="tucked-in")
+    as_it_is = below.if_holding("carry it as it is held", below.pause("settle", "hold it still"))
+    return builder.first_of("tuck the arm in", twice, as_it_is, part="tucked-in")
 
 
 def held_plan(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
     """Builds a branch that succeeds while the gripper holds the object that an earlier step grasped."""
     below = builder.at("in-gripper")
-    return below.node(
-        "only if holding", f"the {item} is in the gripper", below.pause("settle", "hold it", LOOK_AGAIN_S)
-    )
+    return below.if_holding(f"the {item} is in the gripper", below.pause("settle", "hold it"))
 
 
 def known_held_plan(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
     """Draws the arm in if the gripper holds the object, and no other, after a failed or interrupted grasp."""
     known = {"known_as": builder.search_classes(item.name), "attributes": item.attributes}
     tuck = _tucked(builder, item)
-    return builder.node("only if holding", f"it took hold of the {item}", tuck, part="only-if", **known)
+    return builder.if_holding(f"it took hold of the {item}", tuck, part="only-if", **known)
 
 
 def _tucked(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
-    """Draws the arm in, with a guard that the gripper holds the object."""
-    return builder.node("guard", f"holding the {item}", tuck_plan(builder), part="held", condition=Holds(str(item)))
+    """Draws the arm in under a guard that the gripper holds the object."""
+    return builder.guarded(f"holding the {item}", tuck_plan(builder), Holds(str(item)), part="held")

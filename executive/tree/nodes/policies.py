@@ -318,10 +318,10 @@ def under_policy(
         name = f"within {policy.timeout_s:g} s"
         below = builder.node("timeout", name, below, part="timeout", limit_s=policy.timeout_s)
     if policy.further_attempts:
-        most = {"attempts": policy.further_attempts + 1, "causes": frozenset(Cause) - FINAL_CAUSES}
-        below = builder.node("retry", f"up to {most['attempts']} attempts", below, part="retries", **most)
+        most, causes = policy.further_attempts + 1, frozenset(Cause) - FINAL_CAUSES
+        below = builder.retried(f"up to {most} attempts", below, most, causes, part="retries")
     for part, name, condition in _conditions(policy.guards or Guards()):
-        below = builder.node("guard", name, below, part=part, condition=condition)
+        below = builder.guarded(name, below, condition, part=part)
     match policy.on_failure:
         case OnFailure.SKIP:
             return builder.node("skip", "skip it if it fails", below, part="skip", step=words)

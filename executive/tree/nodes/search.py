@@ -175,9 +175,8 @@ def look_plans(
         for number, view in enumerate(builder.knowledge.surfaces[name].viewpoints, start=1):
             title = f"look at the {name} ({number})".removesuffix(" (1)")
             below = builder.at(f"{name}-{number}")
-            drive = below.navigate(pose_2d(view), f"the {name}")
             look = detect_plan(below, item, (name,), key, extra, tallied=tallied)
-            plans.append((name, below.sequence(title, drive, look)))
+            plans.append((name, below.look_from(title, pose_2d(view), f"the {name}", look)))
     return tuple(plans)
 
 
@@ -206,8 +205,7 @@ def people_looks(
         ports = {"area_W": facts.polygon, "place": room, "person": person, "count": 0 if tallied else 1, **moves}
         tally = {_TALLY: below.key("all")} if tallied else {}
         look = below.skill("find_people", ports, {"observation": key, **tally})
-        drive = below.navigate(pose_2d(facts.pose), f"the {room}")
-        plans.append((room, below.sequence(f"look about the {room}", drive, look)))
+        plans.append((room, below.look_from(f"look about the {room}", pose_2d(facts.pose), f"the {room}", look)))
     return tuple(plans)
 
 
@@ -259,8 +257,7 @@ def search_plan(
     looks = (*look_plans(builder, item, first, key, floor), *look_plans(builder, item, surfaces[len(first) :], key))
     further = look_plans(builder.at("elsewhere"), item, elsewhere, key)
     looked = place_phrase(builder.knowledge, place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
-    return builder.node(
-        "selector",
+    return builder.first_of(
         f"find the {item}",
         find_again_plan(builder.at("again"), item, (*surfaces, *elsewhere), key),
         *_looks_at_last_known(builder.at("last-known"), item, key),
@@ -305,8 +302,7 @@ def _looks_from_aside(
         if aside is not None:
             below = builder.at(f"{name}-aside")
             look = detect_plan(below, item, (name,), key)
-            drive = below.navigate(aside, f"the side of the {name}")
-            yield below.sequence(f"look at the {name} from aside", drive, look)
+            yield below.look_from(f"look at the {name} from aside", aside, f"the side of the {name}", look)
 
 
 def surfaces_first_known(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:

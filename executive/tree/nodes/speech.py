@@ -12,6 +12,7 @@ from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.board import FromBoard
 from executive.tree.context import RunContext
+from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import Keys, View
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.tree.nodes.values import set_plan
@@ -185,18 +186,16 @@ def _ask_plan(assembler: Assembler, block: model.Ask, builder: PlanBuilder) -> A
     )
     if not any(choices.values()):
         return Assembled((leaf,))
-    flow, afters, branches, nodes = assembler.flow, [], {}, [leaf]
+    flow, afters, branches = assembler.flow, [], dict[Value, NodeSpec]()
     parts: tuple[StepPart, ...] = ()
     for choice, steps in choices.items():
         branch, after = assembler.branch(steps, builder.at(f"answer-{slug(choice)}"), f"if {choice}", flow)
         afters.append(after)
         parts += branch.parts
         if branch.nodes:
-            branches[choice] = len(nodes)
-            nodes += branch.nodes
+            branches[choice] = branch.node
     flow.join(afters)
-    node = builder.node("choose", "by the answer", *nodes, branches=MappingProxyType(branches), key=key)
-    return Assembled((node,), parts)
+    return Assembled((builder.chosen("by the answer", leaf, branches, key),), parts)
 
 
 def _spoken(match: str | None, builder: PlanBuilder) -> dict[str, str]:

@@ -15,7 +15,7 @@ LINES = {
     "executive/language": 8239,
     "executive/speech": 1570,
     "executive/mission": 1569,
-    "executive/tree": 8567,
+    "executive/tree": 8621,
     "executive/run": 3260,
     "executive/record": 1291,
     "executive/store": 1598,

@@ -1,12 +1,13 @@
 """Conversation with a robot during a run: address, follow-ups, questions, and missions."""
 
+import enum
 import re
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import Final
 
 from executive.conversation.replies import (
     NEVER_MIND,
@@ -63,8 +64,12 @@ class _Spoken:
     steps: tuple[Step, ...] = ()
 
 
-_When = Literal["first", "instead", "afterwards"]
-"""Time at which a mission runs, in a word for the reply."""
+class _When(enum.Enum):
+    """Time at which a mission runs, in a word for the reply."""
+
+    FIRST = "first"
+    INSTEAD = "instead"
+    AFTERWARDS = "afterwards"
 
 
 class Conversation(RunVisitor):
@@ -208,14 +213,13 @@ class Conversation(RunVisitor):
         meant = self._understood(text, now_s)
         if meant.status is not Status.OK:
             return self._not_ok(meant, text, now_s)
-        when: _When = "first"
-        refers = re.search(_PRONOUN, text, re.IGNORECASE)
+        when, refers = _When.FIRST, re.search(_PRONOUN, text, re.IGNORECASE)
         if re.match(_LATER, text, re.IGNORECASE):
-            when = "afterwards"
+            when = _When.AFTERWARDS
         elif refers and self._can_be_changed(now_s):
             last = () if self._last is None else self._last.commands
             before, now = ({each.object or each.item for each in commands} for commands in (last, meant.commands))
-            when = "instead" if before & now - {None} else when
+            when = _When.INSTEAD if before & now - {None} else when
         return self._begin_meant(meant, when, now_s)
 
     def _not_ok(self, meant: Understanding, text: str, now_s: float) -> Reply:
@@ -229,11 +233,11 @@ class Conversation(RunVisitor):
         last, follow_up = self._remembered(now_s), parse_follow_up(text)
         if follow_up is None or last is None or self._understood(text, now_s).steps:
             return None
-        when: _When = "afterwards"
+        when = _When.AFTERWARDS
         if follow_up.kind is FollowUpKind.AGAIN:
             return self._begin(last.commands, when, now_s, memory=last.memory, steps=last.steps)
         if follow_up.kind is FollowUpKind.CORRECTION:
-            when = "instead" if self._can_be_changed(now_s) else "first"
+            when = _When.INSTEAD if self._can_be_changed(now_s) else _When.FIRST
         whole = self._understood(follow_up.whole, now_s)
         if whole.status is Status.OK:
             return self._begin_meant(whole, when, now_s)
@@ -294,7 +298,7 @@ class Conversation(RunVisitor):
         if state.mode is Mode.ENDED:
             return refusal(OVER)
         todo = tuple(commands)
-        if when == "instead" and not steps:
+        if when is _When.INSTEAD and not steps:
             todo = skip_fetching(todo, self._held(), self._speech.knowledge)
         whole = steps or steps_of_commands(todo)
         try:
@@ -303,12 +307,12 @@ class Conversation(RunVisitor):
             return refusal(str(error))
         before = None if self._last is None else self._last.mission
         instead = partial(self._control.replace, instead_of=before)
-        give = {"first": self._control.preempt, "afterwards": self._control.then}.get(when, instead)
+        give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, instead)
         mode = state.robots.get(self._speech.robot_name, state).mode
         still = "; I stand still until you say 'go on'" if mode in (Mode.PAUSED, Mode.STOPPED) else ""
         shown = [inner for step in whole for inner in (step.steps if isinstance(step, Group) else (step,))]
         listed = "; ".join("; ".join(map(str, step.commands)) or step.words for step in shown)
-        text = "; ".join((*notes, f"{when}: {listed}{still}"))
+        text = "; ".join((*notes, f"{when.value}: {listed}{still}"))
         reply = self._tried(partial(give, tree), text, todo)
         if reply.kind is ReplyKind.DONE:
             self._names |= {tree.mission_name}

@@ -32,7 +32,7 @@ def node_pages() -> tuple[ModuleType, ...]:
 def node_classes() -> Mapping[str, type[ExplainedNode]]:
     """Returns the classes of nodes by the kind that each class defines."""
     found = (node for page in node_pages() for node in vars(page).values() if isinstance(node, type))
-    return {node.kind: node for node in found if issubclass(node, ExplainedNode) and "kind" in vars(node)}
+    return {node.kind: node for node in found if issubclass(node, ExplainedNode) and vars(node).get("kind")}
 
 
 @dataclass(frozen=True)

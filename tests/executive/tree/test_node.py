@@ -3,7 +3,8 @@
 import pytest
 from py_trees.common import Status
 
-from executive.tree.node import Change, NodeState
+from executive.tree import behaviour
+from executive.tree.node import Change, NodeState, node_classes
 
 GOING = NodeState(Status.RUNNING, None, "going, 2.5 m to go")
 
@@ -21,3 +22,8 @@ GOING = NodeState(Status.RUNNING, None, "going, 2.5 m to go")
 )
 def test_a_new_message_is_an_activity_and_new_numbers_are_not(before, after, new):
     assert Change("alice/go", before, after).is_activity is new
+
+
+def test_a_page_that_imports_the_base_of_the_nodes_registers_no_node_by_it(monkeypatch):
+    monkeypatch.setattr("executive.tree.node.node_pages", lambda: (behaviour,))
+    assert dict(node_classes.__wrapped__()) == {}

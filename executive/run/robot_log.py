@@ -10,7 +10,6 @@ from executive.record.schemas import DOORS, JOINTS, NAVIGATION, POSE, SCAN, STAT
 from executive.tree.context import RunContext
 from skills.api import LocalisationEstimate, ObstacleLayerView, ParticleView
 from skills.doorway import Doorway, SeenDoor
-from skills.navigate.cut_off import DoorWatch
 from skills.robot import Pose2D
 
 POSE_PERIOD_S: Final = 0.5
@@ -23,25 +22,17 @@ _NOTHING: Final = np.empty((0, 2))
 
 
 class RobotLog:
-    """Writer of a robot's log: pose, state and navigation twice a second, sensors and doors once a second.
-
-    Once a second the robot also looks at the doors in view. Each new scan match is counted.
-    """
+    """Writer of a robot's log: pose, state and navigation twice a second, sensors and doors once a second."""
 
     def __init__(self, name: str, context: RunContext) -> None:
         self._name, self._context = name, context
         self._pose_due_s = self._sensors_due_s = context.clock.now()
-        self._matched_s = -math.inf
         self._navigation: Mapping[str, object] = {}
-        self._watch = DoorWatch(context)
         self._known_doors: tuple[tuple[str, float], ...] = ()
 
     def write(self) -> None:
         """Writes all messages that are due; call it after the estimators were updated."""
         context, estimate = self._context, self._context.localiser.estimate()
-        if estimate.stamp_s != self._matched_s:
-            self._matched_s = estimate.stamp_s
-            context.work.count("scan_matches")
         if context.clock.now() >= self._pose_due_s - _EPSILON_S:
             self._pose_due_s += POSE_PERIOD_S
             self._publish_pose(estimate)
@@ -50,7 +41,7 @@ class RobotLog:
         if context.clock.now() >= self._sensors_due_s - _EPSILON_S:
             self._sensors_due_s += SENSORS_PERIOD_S
             self._publish_sensors()
-            self._watch_doors()
+            self._publish_doors()
 
     def _publish_pose(self, estimate: LocalisationEstimate) -> None:
         X_WB = self._context.X_WB()
@@ -106,9 +97,8 @@ class RobotLog:
             self._navigation = new
             self._context.publish(NAVIGATION, {"robot": self._name, **new})
 
-    def _watch_doors(self) -> None:
-        """Observes the doors in view; logs the states of all doors when a state has changed."""
-        self._watch.look()
+    def _publish_doors(self) -> None:
+        """Logs the states of all doors when a state has changed, or the age of one by `DOORS_PERIOD_S`."""
         doors, memory = self._context.doors, self._context.door_memory
         seen = [memory.last_seen(door) for door in doors]
         known = tuple((one.state.value, max(one.seen_s, 0.0) // DOORS_PERIOD_S) for one in seen)

@@ -1,5 +1,6 @@
 """Session of one robot in a run: the order of its missions, their ticks, and their orderly end."""
 
+import math
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -24,13 +25,17 @@ from executive.words.slug import slug
 from skills.api import Cause
 from skills.detection import Detector
 from skills.inputs.errors import disk_is_full
+from skills.navigate.cut_off import DoorWatch
 from skills.navigate.footprint import Footprint
 from skills.robot import Lease, Pose2D
 
 HOLDER: Final = "errand"
 _NO_LEASE: Final = Lease("", "", 0)
+LOOK_PERIOD_S: Final = 1.0
+"""Time between two looks at the doors in view."""
 LEASE_PATIENCE_S: Final = 60.0
 SILENT_S: Final = 3.0
+_EPSILON_S: Final = 1e-9
 ResultT = TypeVar("ResultT")
 
 
@@ -163,7 +168,8 @@ class Session(RunRobot):
         self.gone: str | None = None
         self.note: TickNote | None = None
         self._asked_at: Pose2D | None = None
-        self._log = RobotLog(self.name, self.context)
+        self._log, self._doors = RobotLog(self.name, self.context), DoorWatch(self.context)
+        self._matched_s, self._look_due_s = -math.inf, shared.clock.now()
 
     @property
     def tree(self) -> CompiledTree:
@@ -214,9 +220,16 @@ class Session(RunRobot):
         return True
 
     def sense(self) -> None:
-        """Updates the estimators and writes the robot's log."""
+        """Updates the estimators, counts scan matches, looks at the doors once a second, and writes the robot's log."""
         super().sense()
         self._asked_at = self._asked_at or self.pose
+        stamp_s, now_s = self.context.localiser.estimate().stamp_s, self.context.clock.now()
+        if stamp_s != self._matched_s:
+            self._matched_s = stamp_s
+            self.context.work.count("scan_matches")
+        if now_s >= self._look_due_s - _EPSILON_S:
+            self._look_due_s += LOOK_PERIOD_S
+            self._doors.look()
         self._log.write()
 
     def may_move(self) -> bool:

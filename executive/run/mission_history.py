@@ -73,7 +73,8 @@ class Executions:
         self._driving = {path for path, node in self._drivers.items() if node.status is Status.RUNNING}
         self._open = {path for path in self._nodes if (ran := self._executions(path)) and ran[-1].ended_s is None}
         self._resumed = set(self._open)
-        self._moved_s = board.get(self._keys.moved) if self._keys.moved in board else None
+        self.moved_s: float | None = board.get(self._keys.moved, None)
+        """Time (s) when a skill that may drive last ran; None: never."""
         self._paths: Mapping[Behaviour, str] = {node: path for path, node in self._nodes.items()}
         self._running: set[Behaviour] = {node for node in self._paths if node.status is Status.RUNNING}
 
@@ -83,11 +84,6 @@ class Executions:
         found = [one for path in self._parts for one in self._executions(path)]
         last = float("inf")
         return tuple(sorted(found, key=lambda one: (last if one.ended_s is None else one.ended_s, one.began_s)))
-
-    @property
-    def moved_s(self) -> float | None:
-        """Time (s) at which a skill that may drive last ran; None if none has run."""
-        return self._moved_s
 
     def note_visit(self, node: Behaviour, stopped: bool) -> None:
         """Records that a tick has visited a node; with `stopped`, the node was stopped since its last visit."""
@@ -111,9 +107,9 @@ class Executions:
         self._driving -= moving
         self._driving |= {path for path in moving if self._drivers[path].status is Status.RUNNING}
         if self._driving or ended:
-            self._moved_s = self._clock.now()
+            self.moved_s = self._clock.now()
             if moving or self._keys.moved not in self._board:
-                self._board.put(self._keys.moved, self._moved_s)
+                self._board.put(self._keys.moved, self.moved_s)
 
     def _begin(self, path: str) -> None:
         if path in self._resumed:
@@ -129,7 +125,7 @@ class Executions:
         """Ends an execution; if it is not `done`, executions below the node during it do not count as done either."""
         self._open.discard(path)
         *before, one = self._executions(path)
-        again = frozenset(self._board.get(self._keys.ended_before) if self._keys.ended_before in self._board else ())
+        again = frozenset(self._board.get(self._keys.ended_before, ()))
         if path in again:
             self._board.put(self._keys.ended_before, again - {path})
             if done:
@@ -143,19 +139,14 @@ class Executions:
         self._put(path, (*before, over) if path in self._parts else ())
 
     def _executions(self, path: str) -> tuple[Execution, ...]:
-        key = _executions_key(path)
-        stored: tuple[tuple[float, float | None, bool], ...] = self._board.get(key) if key in self._board else ()
+        stored: tuple[tuple[float, float | None, bool], ...] = self._board.get(f"{path}/executions", ())
         return tuple(Execution(path, *one) for one in stored)
 
     def _put(self, path: str, executions: Iterable[Execution]) -> None:
         stored = tuple((one.began_s, one.ended_s, one.done) for one in executions)
-        key = _executions_key(path)
+        key = f"{path}/executions"
         if stored or key in self._board:
             self._board.put(key, stored)
-
-
-def _executions_key(path_id: str) -> str:
-    return f"{path_id}/executions"
 
 
 def _below(node: NodeSpec, parts: frozenset[str]) -> Mapping[str, frozenset[str]]:
@@ -183,7 +174,7 @@ class Findings:
         if topic == ANSWER_TOPIC:
             message = {**message, "robot": self._robot_name, "t": round(self._clock.now(), 6)}
             finding = _finding(message)
-            again = frozenset(self._stored(self._keys.answered_before))
+            again = frozenset(self._board.get(self._keys.answered_before, ()))
             if finding.path_id in again:
                 self._board.put(self._keys.answered_before, again - {finding.path_id})
             before = next((one for one in reversed(self.findings) if one.path_id == finding.path_id), None)
@@ -198,17 +189,15 @@ class Findings:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """All findings so far."""
-        return self._stored(self._keys.findings)
+        """Findings so far."""
+        found: tuple[Finding, ...] = self._board.get(self._keys.findings, ())
+        return found
 
     @property
     def said(self) -> tuple[Said, ...]:
-        """All sentences that the robot has said so far."""
-        return self._stored(self._keys.said)
-
-    def _stored(self, key: str) -> tuple[Any, ...]:
-        stored: tuple[Any, ...] = self._board.get(key) if key in self._board else ()
-        return stored
+        """Sentences that the robot has said so far."""
+        said: tuple[Said, ...] = self._board.get(self._keys.said, ())
+        return said
 
 
 def _finding(message: Mapping[str, Any]) -> Finding:

@@ -419,7 +419,7 @@ class Session(RunRobot):
     def _start_of(self, run: TreeRun) -> Pose2D | None:
         """Pose at which a mission began: as stored by the mission, else the robot's first pose in the run."""
         key = start_key(run.tree.robot_name, run.tree.mission_name)
-        start: Pose2D | None = run.context.board.get(key) if key in run.context.board else self._asked_at
+        start: Pose2D | None = run.context.board.get(key, self._asked_at)
         return start
 
     def _begin(self, tree: CompiledTree, start: Pose2D | None = None) -> None:

@@ -27,11 +27,11 @@ class Board:
         self._values[key] = value
         self._copy = None
 
-    def get(self, key: str) -> Any:
-        """Returns the value under `key`. Raises KeyError with a sentence when nothing was written there yet."""
-        if key not in self._values:
+    def get(self, key: str, *default: Any) -> Any:
+        """Returns the value under `key`, else the default. Raises KeyError with a sentence when there is neither."""
+        if key not in self._values and not default:
             raise KeyError(f"nothing was written to the blackboard under '{key}' yet")
-        return self._values[key]
+        return self._values.get(key, *default)
 
     def forget(self, keys: Iterable[str]) -> None:
         """Removes values, so that another attempt begins without them; ignores keys without a value."""
@@ -86,8 +86,8 @@ class FromBoardOr(FromBoard):
     default: Any
 
     def read(self, board: Board) -> Any:
-        """Returns the value under the key, or the default when nothing was written there."""
-        return board.get(self.key) if self.key in board else self.default
+        """Returns the value under the key, else the default."""
+        return board.get(self.key, self.default)
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,8 @@ class BesideBoard(FromBoard):
     left_m: float
 
     def read(self, board: Board) -> Pose2D:
-        """Returns the shifted pose. Raises KeyError when no pose was written yet."""
-        return pose_beside(board.get(self.key), self.forward_m, self.left_m)
+        """Returns the shifted pose. Raises KeyError when there is none yet."""
+        return compose(board.get(self.key), Pose2D(self.forward_m, self.left_m, 0.0))
 
 
 @dataclass(frozen=True)
@@ -126,11 +126,6 @@ class SurfaceOfDetection(FromBoard):
         """Returns the surfaces. Raises KeyError when no object was detected yet."""
         seen: ObjectObservation = board.get(self.key)
         return tuple(surface for surface in self.surfaces if surface.name == seen.surface) or self.surfaces
-
-
-def pose_beside(pose: Pose2D, forward_m: float, left_m: float) -> Pose2D:
-    """Shifts a pose along its own axes (m); the yaw stays the same."""
-    return compose(pose, Pose2D(forward_m, left_m, 0.0))
 
 
 class Sign(enum.Enum):

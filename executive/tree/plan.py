@@ -48,11 +48,6 @@ def pose_2d(pose: Pose) -> Pose2D:
     return Pose2D(pose.x, pose.y, pose.yaw)
 
 
-def failure_trigger(*causes: Cause, of: NodeSpec | None = None, own: bool = False) -> Trigger:
-    """Trigger for a recovery: a failure of one node (None: of the whole attempt) with one of the causes."""
-    return Trigger(frozenset(causes), None if of is None else of.path_id, own)
-
-
 @dataclass(frozen=True)
 class StepPart:
     """Step of a mission that may have a goal condition: a command, or a single skill.

@@ -144,7 +144,7 @@ class ForEachFound(MemoryComposite):
         return f"{verb} {listing(count_of(count, kind) for kind, count in kinds.items())} {to}"
 
     def _noted(self, key: str) -> Seen:
-        noted: Seen = self.board.get(key) if key in self.board else ()
+        noted: Seen = self.board.get(key, ())
         return noted
 
 

@@ -139,8 +139,8 @@ class Decision:
                 held = [self._holds(part, view, answers) for part in parts]
                 decisive = isinstance(condition, AnyOf)
                 return decisive if decisive in held else None if None in held else not decisive
-        key, board = next(answers), view.context.board
-        return bool(board.get(key)) if key in board else None
+        answer: bool | None = view.context.board.get(next(answers), None)
+        return answer
 
     def __str__(self) -> str:
         return str(self.condition)

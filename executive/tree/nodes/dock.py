@@ -8,8 +8,8 @@ from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.board import FromBoard
 from executive.tree.goals import command_goal
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.recovery import Recovery
-from executive.tree.plan import Assembled, PlanBuilder, StepPart, failure_trigger, pose_2d
+from executive.tree.nodes.recovery import Recovery, Trigger
+from executive.tree.plan import Assembled, PlanBuilder, StepPart, pose_2d
 from executive.words import leaf_steps as model
 from executive.words.command import Command, Task
 from executive.words.knowledge import DOCK
@@ -25,7 +25,7 @@ def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
     """Docks and charges; if the robot does not charge, it backs off and docks again."""
     charge = builder.skill("charge", {"level": level})
     attempt = builder.at("attempt").sequence("dock and charge", *_onto_dock(builder, dock), charge)
-    again = Recovery((failure_trigger(Cause.POSTCONDITION, of=charge),), uses=2)
+    again = Recovery((Trigger(frozenset({Cause.POSTCONDITION}), charge.path_id),), uses=2)
     return builder.recover("charge at the dock", attempt, (builder.at("again").skill("back_off"), again), attempts=3)
 
 

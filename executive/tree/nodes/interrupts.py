@@ -19,9 +19,9 @@ from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.dock import dock_plan
 from executive.tree.nodes.guard import BatteryForWork, Condition, KnowsPlace, NoStopButton, OwnLease, Waiting
-from executive.tree.nodes.recovery import Recovery
+from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.nodes.skill_leaf import SkillLeaf
-from executive.tree.plan import PlanBuilder, failure_trigger, pose_2d
+from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.knowledge import Pose
 from skills.api import Cause, Failed
 
@@ -220,7 +220,7 @@ def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
         dock_plan(builder.at("dock"), dock, facts.charged),
         builder.at("back").navigate(FromBoard(key), "where it was"),
     )
-    below, lost = builder.at("lost"), Recovery((failure_trigger(Cause.PRECONDITION, Cause.EXECUTION),))
+    below, lost = builder.at("lost"), Recovery((Trigger(frozenset({Cause.PRECONDITION, Cause.EXECUTION})),))
     return builder.node(
         "interrupt",
         "battery low: charge",

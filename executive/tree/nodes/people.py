@@ -89,9 +89,8 @@ class AskWhoItIs(AskPeople):
         return {**super().writes(options), options["met"]: ObjectObservation, options["beside"]: Pose2D}
 
     def initialise(self) -> None:
-        """Asks the person, unless there is no doubt."""
-        known = self.context.board
-        self._asks = self.always or (self.observations in known and len(known.get(self.observations)) > 1)
+        """Asks, if there is any doubt."""
+        self._asks = self.always or len(self.context.board.get(self.observations, ())) > 1
         self.clear_explanation()
         if self._asks:
             super().initialise()
@@ -230,7 +229,7 @@ class NextRoom(ExplainedLeaf):
     def update(self) -> Status:
         """Chooses the next room."""
         board, here = self.context.board, self.context.pose()
-        over = board.get(self.over) if self.over in board else ()
+        over = board.get(self.over, ())
         left = {name: pose_2d(place.pose) for name, place in self.places.items() if name not in over}
         if not left:
             return self.fail(Failed(Cause.POSTCONDITION, "there is no other room"))

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from executive.tree.board import BesideBoard, FromBoard, FromBoardOr, pose_beside
+from executive.tree.board import BesideBoard, FromBoard, FromBoardOr
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import can_move_aside, move_aside_plan
 from executive.tree.nodes.guard import Holds
@@ -17,6 +17,7 @@ from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.plan import PlanBuilder
 from executive.words.outlines import inside
 from skills.api import Cause, ObjectKind, Surface
+from skills.geometry import compose
 from skills.robot import Pose2D
 
 ATTEMPTS: Final = 4
@@ -66,7 +67,7 @@ def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float,
     rooms = [
         place.polygon for place in builder.knowledge.places.values() if inside(place.polygon, (pose.x_m, pose.y_m))
     ]
-    poses = {offset: pose_beside(pose, *offset) for offset in NEARBY_M}
+    poses = {offset: compose(pose, Pose2D(*offset, 0.0)) for offset in NEARBY_M}
     return {
         offset: other for offset, other in poses.items() if any(inside(room, (other.x_m, other.y_m)) for room in rooms)
     }

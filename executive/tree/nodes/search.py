@@ -9,7 +9,7 @@ from typing import ClassVar, Final
 from py_trees.common import Status
 
 from executive.tree.behaviour import Explained, ExplainedDecorator
-from executive.tree.board import Board, FromBoard, SurfaceOfDetection, pose_beside
+from executive.tree.board import Board, FromBoard, SurfaceOfDetection
 from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import floor_square
@@ -297,7 +297,7 @@ def _looks_from_aside(
     for name in single[:MOST_ASIDE]:
         room = builder.knowledge.places[facts[name].place].polygon
         view = pose_2d(facts[name].viewpoints[0])
-        poses = (pose_beside(view, 0.0, left_m) for left_m in (ASIDE_M, -ASIDE_M))
+        poses = (compose(view, Pose2D(0.0, left_m, 0.0)) for left_m in (ASIDE_M, -ASIDE_M))
         aside = next((pose for pose in poses if inside(room, (pose.x_m, pose.y_m))), None)
         if aside is not None:
             below = builder.at(f"{name}-aside")

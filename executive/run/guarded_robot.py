@@ -39,8 +39,6 @@ class GarbageError(RuntimeError):
     """Answer of a verb that the Robot protocol does not allow."""
 
 
-_NEVER_CHANGING = frozenset({"capabilities"})
-"""Verbs that a job may call as well, since their answers never change."""
 _NOTHING_YET: Final = object()
 
 
@@ -111,7 +109,7 @@ class GuardedRobot(RobotWrapper):
                 answer = call(*arguments, **options)
             finally:
                 self._watchdog.verb = None
-        if answer is not self._good.get(verb, _NOTHING_YET) and (check := garbage_check(verb)) is not None:
+        if answer is not self._good.get(verb, _NOTHING_YET) and (check := CHECKS.get(verb)) is not None:
             wrong = check(answer)  # sensors give one snapshot many times
             if wrong is not None:
                 raise GarbageError(f"the robot answered '{verb}' with garbage: {wrong}")
@@ -121,15 +119,10 @@ class GuardedRobot(RobotWrapper):
     def _elsewhere(self, verb: str, call: Callable[[], AnswerT], limit_s: float) -> AnswerT:
         """Calls a verb outside the main thread; `image` has no time limit, since a renderer is tied to its thread."""
         if in_lock_step_job():
-            if verb in _NEVER_CHANGING:
-                return call()
+            if verb == "capabilities":
+                return call()  # its answer never changes
             raise RuntimeError(f"'{verb}' was called inside a job: read the robot before, or by `Worker.sense`")
         return call() if verb == "image" else call_aside(call, verb, limit_s)
-
-
-def garbage_check(verb: str) -> Check | None:
-    """Returns the check of a verb's answer, or None for an unknown verb; a check returns the defect, or None."""
-    return _CHECKS.get(verb)
 
 
 def _typed(kind: type[AnswerT], check: Callable[[AnswerT], str | None] = lambda answer: None) -> Check:
@@ -202,7 +195,7 @@ def _status(it: CommandStatus) -> str | None:
 
 _COMMAND: Final = _typed(int)
 _LEASE: Final = _typed(Lease)
-_CHECKS: Final[Mapping[str, Check]] = {
+CHECKS: Final[Mapping[str, Check]] = {
     "capabilities": _typed(Capabilities),
     "odometry": _reading(Odometry),
     "own_localisation": _or_none(_reading(OwnLocalisation)),

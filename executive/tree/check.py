@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -158,9 +158,8 @@ def check_tree(
     abilities: Abilities,
     planner: RoutePlanner,
     estimates: Estimates,
-    held: InGripper | None = None,
 ) -> Checked:
-    """Checks a compiled mission that begins at `start` with `held` in the gripper.
+    """Checks a compiled mission that begins at `start` with an empty gripper.
 
     It checks that the objects exist and can be lifted, that surfaces and places are in reach, and that before each step
     the gripper holds the required object.
@@ -173,7 +172,7 @@ def check_tree(
 
     commands = ((part, part.command) for part in tree.parts if part.command is not None)
     impossible = errors((part, each) for part, it in commands for each in _impossible(it, knowledge, abilities))
-    starts = ((part, held if part.opening else part.held) for part in tree.parts)
+    starts = ((part, None if part.opening else part.held) for part in tree.parts)
     needs = ((part, _objection(part, before, knowledge, abilities)) for part, before in starts)
     grasps = errors((part, each) for part, each in needs if each is not None)
     full = errors(_full_surfaces(tree, knowledge, abilities))
@@ -213,8 +212,10 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
     if command.task not in (Task.GRASP, Task.FIND) or command.object is None:
         return
     item = command.object
-    classes = knowledge.classes(knowledge.object_name(item.name) or item.name)
+    classes = knowledge.classes(item.name)
     masses = [abilities.masses_kg[one] for one in classes if one in abilities.masses_kg]
+    light = [one for one in classes if abilities.masses_kg.get(one, math.inf) <= abilities.lift_kg]
+    narrowest_m = min((abilities.widths_m.get(one, 0.0) for one in light), default=0.0)
     unseen = [one for one in classes if one not in abilities.classes]
     unseen += [word for word in item.attributes if word not in abilities.attributes]
     if command.task is Task.GRASP and not masses:
@@ -223,8 +224,8 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
     elif command.task is Task.GRASP and min(masses) > abilities.lift_kg:
         message = f"'{item.name}' is too heavy: {min(masses):g} kg, and the arm lifts {abilities.lift_kg:g} kg"
         yield message, "ask for something lighter"
-    elif command.task is Task.GRASP and (least_m := _narrowest_m(classes, abilities)) > abilities.opens_m:
-        message = f"'{item.name}' is too wide: {least_m:g} m, and the gripper takes {abilities.opens_m:g} m"
+    elif command.task is Task.GRASP and narrowest_m > abilities.opens_m:
+        message = f"'{item.name}' is too wide: {narrowest_m:g} m, and the gripper takes {abilities.opens_m:g} m"
         yield message, "ask for something narrower"
     elif unseen:
         known = [one for one in knowledge.things if one in abilities.classes]
@@ -257,7 +258,7 @@ def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilitie
         place = None if command is None or command.goal is None else knowledge.place(command.goal)
         if command is None or item is None or place is None or not knowledge.surfaces_in(place):
             continue
-        classes = knowledge.classes(knowledge.object_name(item.name) or item.name)
+        classes = knowledge.classes(item.name)
         width_m = min((abilities.widths_m.get(one, 0.0) for one in classes), default=0.0)
         brought_m2[place] = brought_m2.get(place, 0.0) + max(1, command.item_count) * (width_m + abilities.apart_m) ** 2
         surfaces = knowledge.surfaces_in(place)
@@ -266,12 +267,6 @@ def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilitie
         if width_m and brought_m2[place] > whole_m2 - taken_m2:
             message = f"the {place} is probably full before the {item} is put there"
             yield part, (message, "name another surface, or clear it first")
-
-
-def _narrowest_m(classes: Collection[str], abilities: Abilities) -> float:
-    """Least width (m) of the classes that can be lifted; 0.0 if one is unknown."""
-    light = [one for one in classes if abilities.masses_kg.get(one, math.inf) <= abilities.lift_kg]
-    return min((abilities.widths_m.get(one, 0.0) for one in light), default=0.0)
 
 
 def _out_of_reach(goal: str, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:

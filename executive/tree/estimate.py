@@ -160,33 +160,22 @@ class Walk:
         """Estimates the children, which run one after another."""
         return sum((self.follow(child, first=first) for child in node.behaviour.usual_children(node)), Estimate())
 
-    def first_of(self, node: NodeSpec) -> Estimate:
-        """Estimates the first possible branch. Raises the first branch's error if no branch is possible."""
+    def possible(self, node: NodeSpec, *, most: int | None = 1) -> Estimate:
+        """Estimates the first possible branches. Raises the first branch's error if there is none."""
         reasons: list[InputError] = []
-        for child in node.behaviour.usual_children(node):
-            tried = self._try(child, reasons)
-            if tried is not None:
-                return tried
-        raise CannotError(reasons[0] if reasons else None)
-
-    def all_that_can(self, node: NodeSpec) -> Estimate:
-        """Estimates all possible branches. Raises the first branch's error if no branch is possible."""
-        reasons: list[InputError] = []
-        tried = [self._try(child, reasons) for child in node.behaviour.usual_children(node)]
-        done = [each for each in tried if each is not None]
+        done: list[Estimate] = []
+        for branch in node.behaviour.usual_children(node):
+            here = self.mark()
+            try:
+                done.append(self.follow(branch, first=True))
+            except CannotError as cannot:
+                self.go_to(here)
+                reasons += [] if cannot.error is None else [cannot.error]
+            if len(done) == most:
+                break
         if not done:
             raise CannotError(reasons[0] if reasons else None)
         return sum(done, Estimate())
-
-    def _try(self, branch: NodeSpec, reasons: list[InputError]) -> Estimate | None:
-        """Estimates a branch; if it is impossible, returns None, changes nothing and adds the error to `reasons`."""
-        here = self.mark()
-        try:
-            return self.follow(branch, first=True)
-        except CannotError as cannot:
-            self.go_to(here)
-            reasons += [] if cannot.error is None else [cannot.error]
-            return None
 
     def each_from_here(self, branches: Sequence[NodeSpec], first: bool) -> list[tuple[Estimate, _Mark]]:
         """Estimates each branch from the present state; returns each estimate with the state at the branch's end."""

@@ -64,7 +64,7 @@ def surface_region(knowledge: Knowledge, surface: str) -> Region:
 
 def _classes(item: ObjectKind | None, knowledge: Knowledge) -> tuple[str, ...]:
     assert item is not None
-    return knowledge.classes(knowledge.object_name(item.name) or item.name)
+    return knowledge.classes(item.name)
 
 
 def _regions(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> tuple[Region, ...]:

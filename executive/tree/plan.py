@@ -312,8 +312,8 @@ class PlanBuilder:
         return known
 
     def classes(self, name: str) -> tuple[str, ...]:
-        """Returns the classes that an object's name includes. Raises InputError for an unknown name."""
-        classes = self.knowledge.classes(self.knowledge.object_name(name) or name)
+        """Returns the classes that an object's name stands for. Raises InputError for an unknown name."""
+        classes = self.knowledge.classes(name)
         if not classes:
             raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.object_names()))
         return classes

@@ -113,8 +113,7 @@ def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
     command, knowledge = builder.command, builder.knowledge
     if command.task is not Task.GRASP or command.object is None or command.goal is None or not builder.anywhere:
         return ()
-    name = knowledge.object_name(command.object.name) or command.object.name
-    return surfaces_elsewhere(knowledge, name, builder.place(command.goal), builder.avoided)
+    return surfaces_elsewhere(knowledge, command.object.name, builder.place(command.goal), builder.avoided)
 
 
 def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
@@ -130,8 +129,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     place = None if builder.command.goal is None else builder.place(builder.command.goal)
     surfaces = set(surfaces_first_known(builder, item, place))
     if anywhere and builder.anywhere:
-        name = builder.knowledge.object_name(item.name) or item.name
-        surfaces |= set(surfaces_elsewhere(builder.knowledge, name, place, builder.avoided))
+        surfaces |= set(surfaces_elsewhere(builder.knowledge, item.name, place, builder.avoided))
     around = tuple(builder.surface(name) for name in builder.knowledge.surfaces if name in surfaces)
     if (floor := last_known_floor(builder, item)) is not None:
         around = (*around, floor)

@@ -76,7 +76,7 @@ class MemorySelector(MemoryComposite):
     @classmethod
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
         """Estimates the first possible branch."""
-        return walk.first_of(node)
+        return walk.possible(node)
 
     def _passes_over(self, child: Behaviour) -> bool:
         if self.one_goal and child.status != Status.RUNNING and any(map(failed_for_good, self.children)):
@@ -119,7 +119,7 @@ class MemoryRound(MemorySelector):
     @classmethod
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
         """Estimates all possible branches."""
-        return walk.all_that_can(node)
+        return walk.possible(node, most=None)
 
     def _take_over(self, child: Behaviour) -> None:
         done = [one for one in self.children if one.status == Status.SUCCESS]
@@ -195,7 +195,7 @@ class Try(MemoryComposite):
     @classmethod
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
         """Estimates the first possible branch."""
-        return walk.first_of(node)
+        return walk.possible(node)
 
     def _following(self, child: Behaviour) -> int | None:
         failed = child.status == Status.FAILURE and cause_of(child) not in FINAL_CAUSES

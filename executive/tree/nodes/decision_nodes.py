@@ -55,13 +55,6 @@ class View:
     def __post_init__(self) -> None:
         self.begun_s, self.presses = self.context.clock.now(), self.context.presses()
 
-    def values(self, keys: Keys) -> Mapping[str, Value]:
-        """Returns a mapping of readings and of named values on the blackboard, each of which is read when it is used.
-
-        Names without a value are missing.
-        """
-        return _Values(self, keys)
-
     def reading(self, name: str) -> Value:
         """Returns a reading by its name."""
         context = self.context
@@ -77,18 +70,14 @@ class View:
         minutes = int((context.day_began_s + context.clock.now()) % DAY_S // 60)
         return f"{minutes // 60:02d}:{minutes % 60:02d}"
 
-    def is_pressed(self, button: str) -> bool:
-        """Returns whether a button has been pressed since the tree was built or since `forget_presses`."""
-        return self.context.presses().get(button, 0) > self.presses.get(button, 0)
-
     def forget_presses(self) -> None:
         """Ignores all presses of buttons until now."""
         self.presses = self.context.presses()
 
 
 @dataclass(frozen=True)
-class _Values(Mapping[str, Value]):
-    """Mapping from the names in expressions to their values."""
+class Values(Mapping[str, Value]):
+    """Readings, and values of named blackboard keys, as far as there are any; each is read when it is used."""
 
     view: View
     named: Keys
@@ -129,9 +118,9 @@ class Decision:
     def _holds(self, condition: Condition, view: View, answers: Iterator[str]) -> bool | None:
         match condition:
             case ValueIs(expression=expression):
-                return bool(expression.value(view.values(self.keys)))
+                return bool(expression.value(Values(view, self.keys)))
             case ButtonPressed(button=button):
-                return view.is_pressed(button)
+                return view.context.presses().get(button, 0) > view.presses.get(button, 0)
             case Not(part=part):
                 found = self._holds(part, view, answers)
                 return None if found is None else not found

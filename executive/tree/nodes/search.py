@@ -167,8 +167,8 @@ def look_plans(
 ) -> tuple[tuple[str, NodeSpec], ...]:
     """Builds a drive and a look for each surface and viewpoint; returns them with the names of the surfaces.
 
-    The detected object is written under `key`; `extra` are more inputs of `detect`. With `tallied`, each look writes
-    all objects that it found under a separate key (see `tally_of`).
+    The detected object goes to `key`; `extra` are further ports of `detect`. With `tallied`, all objects of a look go
+    to a key of its own.
     """
     plans = []
     for name in surfaces:
@@ -178,12 +178,6 @@ def look_plans(
             look = detect_plan(below, item, (name,), key, extra, tallied=tallied)
             plans.append((name, below.look_from(title, pose_2d(view), f"the {name}", look)))
     return tuple(plans)
-
-
-def tally_of(leaf: NodeSpec) -> str:
-    """Returns the blackboard key under which a tallied look writes all objects that it found."""
-    key: str = leaf.options["outputs"][_TALLY]
-    return key
 
 
 def people_looks(
@@ -247,9 +241,10 @@ def search_plan(
     because the object may have fallen out of that robot's gripper. Raises InputError when the place has no surfaces.
     """
     surfaces = surfaces_first_known(builder, item, place)
-    name = builder.knowledge.object_name(item.name) or item.name
     elsewhere = (
-        surfaces_elsewhere(builder.knowledge, name, place, builder.avoided) if anywhere and builder.anywhere else ()
+        surfaces_elsewhere(builder.knowledge, item.name, place, builder.avoided)
+        if anywhere and builder.anywhere
+        else ()
     )
     known = builder.last_known_of(item)
     first = tuple(each for each in surfaces if known is not None and each == known.surface)
@@ -313,8 +308,8 @@ def surfaces_first_known(builder: PlanBuilder, item: ObjectKind, place: str | No
 
 
 def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
-    """Returns the surfaces to search. Raises InputError when the place has no surfaces."""
-    surfaces = surfaces_to_search(builder.knowledge, builder.knowledge.object_name(item.name) or item.name, place)
+    """Returns the surfaces to search. Raises InputError when there are none."""
+    surfaces = surfaces_to_search(builder.knowledge, item.name, place)
     if not surfaces:
         raise builder.error(f"'{place}' has no surface to look at", "add one under 'surfaces' in the knowledge file")
     return surfaces
@@ -353,7 +348,9 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
     title = f"look for {what if what == ANYTHING else asked}"
     search = below.node("round" if counting else "selector", title, *(look for _, look in looks))
     leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
-    tallies = {look.children[-1].path_id: tally_of(look.children[-1]) for _, look in looks if counting}
+    tallies = {
+        leaf.path_id: leaf.options["outputs"][_TALLY] for _, look in looks if counting for leaf in look.children[1:]
+    }
     spot = place_phrase(knowledge, place)
     denied = f"{'not' if command.object_count > 1 or person in knowledge.people else 'no'} {absent} {spot}"
     if what == ANYTHING:

@@ -13,7 +13,7 @@ from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.board import FromBoard
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.decision_nodes import Keys, View
+from executive.tree.nodes.decision_nodes import Keys, Values, View
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.tree.nodes.values import set_plan
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
@@ -74,7 +74,7 @@ class AskPeople(ExplainedLeaf):
         self._false_start = None
         self._until_s = self.context.clock.now() + self.limit_s
         try:
-            self._text = self.text.fill(self._view.values(self.keys))
+            self._text = self.text.fill(Values(self._view, self.keys))
         except ExpressionError as error:
             self._false_start = Failed(Cause.PRECONDITION, f"{self.text.text}: {error.message}")
             return

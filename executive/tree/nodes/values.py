@@ -10,7 +10,7 @@ from executive.tree.assembly import PYTHON_TYPES, Assembler, Flow, StepPlans
 from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.decision_nodes import Keys, View
+from executive.tree.nodes.decision_nodes import Keys, Values, View
 from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import leaf_steps as model
 from executive.words.expression import Expression, ExpressionError, Template
@@ -44,7 +44,7 @@ class SetValues(ExplainedLeaf):
         texts = []
         for key, each in self.values.items():
             try:
-                known = self.view.values(self.keys)
+                known = Values(self.view, self.keys)
                 value = each.fill(known) if isinstance(each, Template) else each.value(known)
             except ExpressionError as error:
                 return self.fail(Failed(Cause.PRECONDITION, f"{each.text}: {error.message}"))

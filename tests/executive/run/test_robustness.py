@@ -10,7 +10,7 @@ import pytest
 from mcap.reader import make_reader
 
 from executive.record.event_log import EventLog
-from executive.run.guarded_robot import GarbageError, GuardedRobot, garbage_check
+from executive.run.guarded_robot import CHECKS, GarbageError, GuardedRobot
 from executive.run.outcome import Outcome
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
@@ -263,4 +263,4 @@ def test_garbage_is_named(clock):
 
 
 def test_numpy_truth_and_numbers_are_no_garbage():
-    assert garbage_check("gripper")(Gripper(1.0, np.float64(0.2), np.float32(3.0), np.bool_(True))) is None
+    assert CHECKS["gripper"](Gripper(1.0, np.float64(0.2), np.float32(3.0), np.bool_(True))) is None

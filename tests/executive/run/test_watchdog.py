@@ -71,7 +71,7 @@ def test_an_alarm_of_somebody_else_goes_to_its_handler():
 
 
 def test_taking_an_image_has_its_own_limit(watchdog, monkeypatch):
-    monkeypatch.setattr("executive.run.guarded_robot.garbage_check", lambda verb: None)
+    monkeypatch.setattr("executive.run.guarded_robot.CHECKS", {})
     assert GuardedRobot(Hanging(), watchdog, limit_s=0.02, image_limit_s=2.0).image("hand") == "hand"
 
 

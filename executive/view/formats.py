@@ -252,12 +252,9 @@ def _named(ports: Iterable[Port]) -> Iterator[tuple[str, Port]]:
     """Yields the ports with their names in the file; an output that shares an input's name gets another name."""
     inputs = {port.name for port in ports if not port.output}
     for port in ports:
-        yield f"{_port_name(port)}_out" if port.output and port.name in inputs else _port_name(port), port
-
-
-def _port_name(port: Port) -> str:
-    name = re.sub(r"[^A-Za-z0-9_]", "_", port.name)
-    return f"port_{name}" if name in _RESERVED or not name[:1].isalpha() else name
+        name = re.sub(r"[^A-Za-z0-9_]", "_", port.name)
+        name = f"port_{name}" if name in _RESERVED or not name[:1].isalpha() else name
+        yield f"{name}_out" if port.output and port.name in inputs else name, port
 
 
 def _value(port: Port) -> str:

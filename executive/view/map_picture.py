@@ -169,7 +169,10 @@ def _draw_robot(picture: NDArray[np.uint8], frame: _Frame, events: Sequence[Even
             cv2.rectangle(picture, (column - side, row - side), (column + side, row + side), _OBSTACLE, -1)
     reserved = [event.data for event in events if event.topic == RESERVED_PATH]
     if reserved and reserved[-1]["turn"] is not None:
-        _draw_reserved(picture, frame.pixels(_pairs(reserved[-1], "")), colour or _PLAN)
+        band, ring = frame.pixels(_pairs(reserved[-1], "")), colour or _PLAN
+        pale = tuple(round(0.35 * part + 0.65 * 255) for part in ring)
+        cv2.polylines(picture, [band], False, pale, 15, cv2.LINE_AA)
+        cv2.circle(picture, band[-1].tolist(), 9, ring, 3, cv2.LINE_AA)
     places = [_position(pose) for pose in poses]
     cv2.polylines(picture, [frame.pixels(places)], False, colour or _TRAIL, 2, cv2.LINE_AA)
     if paths:
@@ -185,13 +188,6 @@ def _draw_robot(picture: NDArray[np.uint8], frame: _Frame, events: Sequence[Even
     if views:
         for column, row in frame.pixels(_pairs(views[-1], "particle")).tolist():
             cv2.circle(picture, (column, row), 2, _PARTICLE, -1, cv2.LINE_AA)
-
-
-def _draw_reserved(picture: NDArray[np.uint8], pixels: NDArray[np.int32], colour: Colour) -> None:
-    """Draws the reserved path as a broad pale band with a ring at the end."""
-    pale = tuple(round(0.35 * part + 0.65 * 255) for part in colour)
-    cv2.polylines(picture, [pixels], False, pale, 15, cv2.LINE_AA)
-    cv2.circle(picture, pixels[-1].tolist(), 9, colour, 3, cv2.LINE_AA)
 
 
 def _pairs(data: Mapping[str, Any], name: str) -> list[tuple[float, float]]:

@@ -4,7 +4,7 @@ From the inside: the subtree, its timeout, its retries, its guards, and the acti
 So each attempt has its own time, and a violated guard ends all attempts.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import field
 from typing import ClassVar, Final
 
@@ -23,7 +23,7 @@ from executive.tree.board import FromBoard
 from executive.tree.context import RunContext
 from executive.tree.estimate import Estimate, Walk
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.guard import BatteryAtLeast, Condition, KnowsPlace, NotAfter
+from executive.tree.nodes.guard import BatteryAtLeast, KnowsPlace, NotAfter
 from executive.tree.plan import PlanBuilder
 from executive.words.step import Guards, OnFailure, OperatorQuestion, Policy
 from skills.api import Asked, Cause, Failed, Question
@@ -320,8 +320,16 @@ def under_policy(
     if policy.further_attempts:
         most, causes = policy.further_attempts + 1, frozenset(Cause) - FINAL_CAUSES
         below = builder.retried(f"up to {most} attempts", below, most, causes, part="retries")
-    for part, name, condition in _conditions(policy.guards or Guards()):
-        below = builder.guarded(name, below, condition, part=part)
+    guards = policy.guards or Guards()
+    if guards.localised:
+        knows = KnowsPlace(stale=guards.stale)
+        below = builder.guarded("knows where it is", below, knows, part="guard-localised")
+    if guards.time_s is not None:
+        in_time = NotAfter(guards.time_s)
+        below = builder.guarded(f"not after {guards.time_s:g} s", below, in_time, part="guard-time")
+    if guards.battery is not None:
+        charged = BatteryAtLeast(guards.battery, stale=guards.stale)
+        below = builder.guarded(f"battery at {guards.battery:.0%} or more", below, charged, part="guard-battery")
     match policy.on_failure:
         case OnFailure.SKIP:
             return builder.node("skip", "skip it if it fails", below, part="skip", step=words)
@@ -336,17 +344,3 @@ def under_policy(
                 "go back", "go back if it fails", below, back.navigate(FromBoard(back.start_key), "the start")
             )
     return below
-
-
-def _conditions(guards: Guards) -> Iterator[tuple[str, str, Condition]]:
-    """Yields the guards, the outermost last: end of the path id, name and condition of each."""
-    if guards.localised:
-        yield "guard-localised", "knows where it is", KnowsPlace(stale=guards.stale)
-    if guards.time_s is not None:
-        yield "guard-time", f"not after {guards.time_s:g} s", NotAfter(guards.time_s)
-    if guards.battery is not None:
-        yield (
-            "guard-battery",
-            f"battery at {guards.battery:.0%} or more",
-            BatteryAtLeast(guards.battery, stale=guards.stale),
-        )

@@ -74,7 +74,7 @@ class Executions:
         self._open = {path for path in self._nodes if (ran := self._executions(path)) and ran[-1].ended_s is None}
         self._resumed = set(self._open)
         self.moved_s: float | None = board.get(self._keys.moved, None)
-        """Time (s) when a skill that may drive last ran; None: never."""
+        """Time (s) at which a skill that may drive last ran; None if none has run."""
         self._paths: Mapping[Behaviour, str] = {node: path for path, node in self._nodes.items()}
         self._running: set[Behaviour] = {node for node in self._paths if node.status is Status.RUNNING}
 
@@ -189,13 +189,13 @@ class Findings:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Findings so far."""
+        """All findings so far."""
         found: tuple[Finding, ...] = self._board.get(self._keys.findings, ())
         return found
 
     @property
     def said(self) -> tuple[Said, ...]:
-        """Sentences that the robot has said so far."""
+        """All sentences that the robot has said so far."""
         said: tuple[Said, ...] = self._board.get(self._keys.said, ())
         return said
 

@@ -86,7 +86,7 @@ class FromBoardOr(FromBoard):
     default: Any
 
     def read(self, board: Board) -> Any:
-        """Returns the value under the key, else the default."""
+        """Returns the value under the key, or the default when nothing was written there."""
         return board.get(self.key, self.default)
 
 
@@ -99,7 +99,7 @@ class BesideBoard(FromBoard):
     left_m: float
 
     def read(self, board: Board) -> Pose2D:
-        """Returns the shifted pose. Raises KeyError when there is none yet."""
+        """Returns the shifted pose. Raises KeyError when no pose was written yet."""
         return compose(board.get(self.key), Pose2D(self.forward_m, self.left_m, 0.0))
 
 

@@ -161,7 +161,7 @@ class Walk:
         return sum((self.follow(child, first=first) for child in node.behaviour.usual_children(node)), Estimate())
 
     def possible(self, node: NodeSpec, *, most: int | None = 1) -> Estimate:
-        """Estimates the first possible branches. Raises the first branch's error if there is none."""
+        """Estimates the first possible branches. Raises the first branch's error if no branch is possible."""
         reasons: list[InputError] = []
         done: list[Estimate] = []
         for branch in node.behaviour.usual_children(node):

@@ -312,7 +312,7 @@ class PlanBuilder:
         return known
 
     def classes(self, name: str) -> tuple[str, ...]:
-        """Returns the classes that an object's name stands for. Raises InputError for an unknown name."""
+        """Returns the classes that an object's name includes. Raises InputError for an unknown name."""
         classes = self.knowledge.classes(name)
         if not classes:
             raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.object_names()))

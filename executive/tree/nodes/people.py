@@ -89,7 +89,7 @@ class AskWhoItIs(AskPeople):
         return {**super().writes(options), options["met"]: ObjectObservation, options["beside"]: Pose2D}
 
     def initialise(self) -> None:
-        """Asks, if there is any doubt."""
+        """Asks the person, unless there is no doubt."""
         self._asks = self.always or len(self.context.board.get(self.observations, ())) > 1
         self.clear_explanation()
         if self._asks:

@@ -73,7 +73,7 @@ class Recovery:
         return replace(self, triggers=tuple(replace(each, node=paths[each.node or ""]) for each in self.triggers))
 
     def fits(self, attempt: Behaviour, board: Board) -> bool:
-        """Returns whether it fits the failure of an attempt."""
+        """Returns whether the rule's triggers fit the failure of an attempt."""
         if self.given is not None and not board.get(self.given, None):
             return False
         return any(trigger.fits(attempt) for trigger in self.triggers)

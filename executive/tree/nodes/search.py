@@ -308,7 +308,7 @@ def surfaces_first_known(builder: PlanBuilder, item: ObjectKind, place: str | No
 
 
 def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
-    """Returns the surfaces to search. Raises InputError when there are none."""
+    """Returns the surfaces to search. Raises InputError when the place has no surfaces."""
     surfaces = surfaces_to_search(builder.knowledge, item.name, place)
     if not surfaces:
         raise builder.error(f"'{place}' has no surface to look at", "add one under 'surfaces' in the knowledge file")

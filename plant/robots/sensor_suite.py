@@ -35,7 +35,6 @@ from plant.sensors.proprioception import (
 )
 from skills.robot import Battery, FloatArray, FrameTree, Gripper, Image, Imu, Joints, Odometry, Scan
 
-_FAINT = 4
 _NO_PICTURE = np.zeros((0, 0), dtype=np.uint8)
 _NO_DEPTH = np.zeros((0, 0), dtype=np.float32)
 
@@ -65,7 +64,6 @@ class Camera(NoisySensor):
         picture, depth = spec.intrinsics(), spec.depth_intrinsics()
         self._colour_camera = colour_render_camera(picture, renderer)
         self._depth_camera = depth_render_camera(depth, renderer, spec.depth_range_m)
-        self._faint_camera = colour_render_camera(spec.shrunk(_FAINT * spec.depth_shrink), renderer)
         self._picture = PictureDegrader(
             rng, picture.height, picture.width, picture_noise or PictureNoise(), spec.picture_shrink
         )
@@ -99,14 +97,13 @@ class Camera(NoisySensor):
         )
 
     def _take_depth(self, query_object: QueryObject, grey: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Renders noisy depth; without a picture, first renders a small one to find too dark and too shiny spots."""
+        """Renders noisy depth; too dark and too shiny spots of the picture are lost, if there is one."""
         lens = self.spec.depth_intrinsics()
-        seen = grey if grey.size else _grey(self._render(query_object, self._faint_camera))
-        small = seen if seen.shape == (lens.height, lens.width) else cv2.resize(seen, (lens.width, lens.height))
+        small = cv2.resize(grey, (lens.width, lens.height)) if grey.size else None
         self._work[f"depth_pictures_{lens.width}x{lens.height}"] += 1
         image = query_object.RenderDepthImage(self._depth_camera, self._link_frame, self._X_LC)
         clean_m = np.asarray(image.data[..., 0], dtype=np.float32)  # 0 or infinite out of range
-        return self._depth.depth(clean_m, np.asarray(small, dtype=np.uint8))
+        return self._depth.depth(clean_m, None if small is None else np.asarray(small, dtype=np.uint8))
 
     def _render(self, query_object: QueryObject, camera: ColorRenderCamera) -> NDArray[np.uint8]:
         """Renders the noise-free picture (H, W, 3) RGB."""

@@ -113,7 +113,7 @@ class DepthDegrader:
         self._grain = NoiseTile(rng, intrinsics.height, intrinsics.width)
         self._patches = NoiseTile(rng, intrinsics.height // 8 + 1, intrinsics.width // 8 + 1)
 
-    def depth(self, clean_m: DepthArray, grey: ColourArray) -> DepthArray:
+    def depth(self, clean_m: DepthArray, grey: ColourArray | None) -> DepthArray:
         """Returns noisy depth (H, W) in m, rounded to 1 mm, 0 where lost; `grey` (H, W) shows dark and shiny spots."""
         near, far = self._range
         valid = np.isfinite(clean_m) & (clean_m >= near) & (clean_m <= far)
@@ -123,7 +123,8 @@ class DepthDegrader:
         edge = self._edge(z)
         lost = edge & (self._rng.random(z.shape, dtype=np.float32) < self._noise.edge_loss)
         lost |= ~edge & self._grazing(z)
-        keep = valid & ~lost & ~self._unseen(grey) & (noisy >= near) & (noisy <= far)
+        lost |= False if grey is None else self._unseen(grey)
+        keep = valid & ~lost & (noisy >= near) & (noisy <= far)
         keep &= self._rng.random(z.shape, dtype=np.float32) >= self._noise.speck
         return np.where(keep, np.round(noisy, 3), np.float32(0.0)).astype(np.float32)
 

@@ -136,7 +136,7 @@ class FollowPersonOptions:
     turn_rad: Turn = 0.6
     ahead_m: Length = 4.0
     target: TargetOptions = field(default_factory=TargetOptions)
-    people: PeopleOptions = field(default_factory=lambda: PeopleOptions(period_s=1.0, idle_s=4.0, track_m=7.0))
+    people: PeopleOptions = field(default_factory=lambda: PeopleOptions(period_s=1.0, track_m=7.0))
 
 
 class Target:

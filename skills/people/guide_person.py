@@ -22,7 +22,7 @@ from skills.robot import Pose2D
 from skills.routine import ENDED_EARLY, Patience, Routine, SkillFailure
 from skills.small.speak import ListeningSkill, say
 
-_TRACKING: Final = PeopleOptions(period_s=1.0, idle_s=4.0, track_m=6.0, hidden_s=8.0)
+_TRACKING: Final = PeopleOptions(period_s=1.0, track_m=6.0, hidden_s=8.0)
 _NEAR: Final = MeetPersonOptions(apart_m=(1.3, 1.6, 2.2, 2.7))
 """Distances from a person who fell behind at which the robot stands, larger ones for a person in a doorway."""
 _SLOWEST_M_S = 0.25

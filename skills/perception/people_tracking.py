@@ -188,17 +188,16 @@ class PeopleOptions:
     """Periods of the watch (s), the latency of a detection (s), and conditions for a person to count.
 
     `period_s`: time between pictures of a camera that has, within `near_m` and `view_rad` of its axis, a known person
-    or a costmap cell that the map does not explain. `idle_s`: the same for all other cameras. `same_m` and
-    `least_score`: a person counts when two views this near show them with this score. `again_s`: delay of the second
-    view. `misses`: pictures that should show a person and do not until they are forgotten. `memory_s` and `beside_s`:
-    how long a person out of view is remembered, and how long while the costmap has an obstacle within `beside_m`.
+    or a costmap cell that the map does not explain; all other cameras take none. `same_m` and `least_score`: a person
+    counts when two views this near show them with this score. `again_s`: delay of the second view. `misses`: pictures
+    that should show a person and do not until they are forgotten. `memory_s` and `beside_s`: how long a person out of
+    view is remembered, and how long while the costmap has an obstacle within `beside_m`.
 
     LiDAR scans update known people. `track_m`: up to this distance scans also begin tracks (0: never), which are
     remembered for `hidden_s`, or for `fleeting_s` after fewer than `least_scans` scans.
     """
 
     period_s: Duration = 0.5
-    idle_s: Duration = 2.0
     near_m: Length = 5.0
     view_rad: Turn = 1.0
     again_s: Delay = 0.2
@@ -218,16 +217,12 @@ class PeopleOptions:
 
 @dataclass(frozen=True)
 class _Look:
-    """Detections of people in pictures taken at one time, and these pictures.
-
-    `suspected` pictures have no depth and show a person; the next ones are taken at once, with depth.
-    """
+    """Detections of people in pictures taken at one time, and these pictures."""
 
     found: tuple[Sequence[SeenPerson], ...]
     images: tuple[Image, ...]
     X_WO: RigidTransform
     here_W: Pose2D
-    suspected: bool = False
 
     def shows(self, one: SeenPerson, reach_m: float) -> bool:
         """Returns whether a still person would be visible: from the pose of the last view, or well in a picture."""
@@ -246,8 +241,8 @@ class PeopleWatch:
         self._options = options or PeopleOptions()
         knows = PERSON in context.detector.class_names
         self._cameras = context.robot.capabilities().body_cameras if knows else ()
-        self._looked_s = self._all_looked_s = -math.inf
-        self._soon = self._suspected = False
+        self._looked_s = -math.inf
+        self._soon = False
         self._job: Job[_Look] | None = None
         self._tracker = PeopleTracker(self._options.same_m)
         self._scan_s, costmap = -math.inf, context.costmap
@@ -275,15 +270,16 @@ class PeopleWatch:
                 with contextlib.suppress(NoImageError):
                     self._update(job.result())
             return
-        now_s = self._context.clock.now()
-        cameras, with_depth = self._due(cameras_towards(velocity, self._cameras), now_s)
-        if cameras:
+        now_s, options = self._context.clock.now(), self._options
+        if now_s < self._looked_s + (options.again_s if self._soon else options.period_s):
+            return
+        if cameras := self._may_show_person(cameras_towards(velocity, self._cameras)):
             self._looked_s, self._soon = now_s, False
             X_WO, here_W, robot = self._context.localiser.estimate().X_WO, self._context.pose(), self._context.robot
             self._job = self._context.worker.sense(
-                lambda: [robot.image(camera.source, depth=with_depth) for camera in cameras],
-                lambda images: self._look(images, X_WO, here_W, with_depth),
-                latency_s=self._options.latency_s,
+                lambda: [robot.image(camera.source) for camera in cameras],
+                lambda images: self._look(images, X_WO, here_W),
+                latency_s=options.latency_s,
                 name="look for people",
             )
 
@@ -312,17 +308,6 @@ class PeopleWatch:
         often = one.looks > 1 or one.scans >= options.least_scans
         return age_s <= (options.hidden_s if often else options.fleeting_s) or (one.looks > 1 and self._remembered(one))
 
-    def _due(self, cameras: Sequence[CameraCapabilities], now_s: float) -> tuple[Sequence[CameraCapabilities], bool]:
-        """Cameras whose next picture is due, and whether it needs depth."""
-        options, since_s = self._options, now_s - self._looked_s
-        if self._suspected:
-            return cameras, True
-        if now_s >= self._all_looked_s + options.idle_s:
-            self._all_looked_s = now_s
-            return cameras, bool(self._may_show_person(cameras))
-        period_s = options.again_s if self._soon else options.period_s
-        return (self._may_show_person(cameras) if since_s >= period_s else ()), True
-
     def _may_show_person(self, cameras: Sequence[CameraCapabilities]) -> Sequence[CameraCapabilities]:
         """Cameras with a known person or an unexplained obstacle in view; all cameras without a layered costmap."""
         if self._obstacles is None:
@@ -335,12 +320,10 @@ class PeopleWatch:
         least = math.cos(self._options.view_rad)
         return [each for each in cameras if np.any(np.cos(bearings_rad - each.heading_rad) > least)]
 
-    def _look(self, images: Sequence[Image], X_WO: RigidTransform, here_W: Pose2D, with_depth: bool) -> _Look:
-        """Detects people in one picture of each camera; without depth, only whether a picture shows any."""
-        detector, options = self._context.detector, self._options
-        detected = people_detections(detector, images, options.least_score)
-        if not with_depth:
-            return _Look((), tuple(images), X_WO, here_W, suspected=bool(detected))
+    def _look(self, images: Sequence[Image], X_WO: RigidTransform, here_W: Pose2D) -> _Look:
+        """Detects people in one picture of each camera."""
+        options = self._options
+        detected = people_detections(self._context.detector, images, options.least_score)
         found = tuple(
             located_people([each for each in detected if each[0] is image], X_WO, here_W, options.reach_m)
             for image in images
@@ -356,8 +339,7 @@ class PeopleWatch:
         self._tracker.revise(lambda one: self._count_miss(one, look, stamp_s))
         tracks = self._options.track_m > 0.0
         self._tracker.revise(lambda one: one if self._remembered(one) or (tracks and self._is_tracked(one)) else None)
-        self._suspected = look.suspected
-        self._soon = look.suspected or any(one.looks == 1 for one in self._seen)
+        self._soon = any(one.looks == 1 for one in self._seen)
         if any(look.found) or any(one.looks for one in before):
             self._context.publish(PEOPLE_TOPIC, self._message())
 

@@ -179,11 +179,11 @@ def test_only_the_requested_part_is_rendered():
     assert (depth.grey.shape, depth.colour, depth.depth_m.shape) == ((0, 0), None, (120, 160))
 
 
-def test_depth_alone_is_lost_on_the_same_dark_spots_as_with_a_picture():
+def test_depth_is_lost_on_dark_spots_of_the_picture_taken_with_it():
     scene, dark = Scene(BODY_BOX_CENTRES_B["left"]), DepthNoise(sigma_m=0.0, sigma_per_m=0.0, speck=0.0, dark=75.0)
     camera = scene.camera("left", depth_noise=dark)
-    both = [camera.take(scene.query, 1.0, FrameTree({})).depth_m == 0.0 for _ in range(20)]
-    alone = [camera.take(scene.query, 1.0, FrameTree({}), visual=False).depth_m == 0.0 for _ in range(20)]
-    assert np.mean(np.abs(np.mean(both, axis=0) - np.mean(alone, axis=0)) > 0.4) < 0.02
-    clear = scene.take("left", depth_noise=QUIET).depth_m == 0.0
-    assert np.mean(alone) > 1.02 * np.mean(clear)
+    both, alone = (
+        camera.take(scene.query, 1.0, FrameTree({})),
+        camera.take(scene.query, 1.0, FrameTree({}), visual=False),
+    )
+    assert np.mean(both.depth_m == 0.0) > np.mean(alone.depth_m == 0.0) + 0.1

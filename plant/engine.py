@@ -76,8 +76,8 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         """Names of the sleeping loose objects, which do not move."""
         return self._sleepers.asleep
 
-    def observe(self, observer: Callable[[float], None], *, every: int = 1) -> None:
-        """Calls `observer(now_s)` after every step, or after `every` steps."""
+    def observe(self, observer: Callable[[float], None], *, every: int = CONTROL_STEPS) -> None:
+        """Calls `observer(now_s)` after `every` steps, a multiple of `CONTROL_STEPS`."""
         self._observers.append((every, observer))
 
     def now(self) -> float:
@@ -98,29 +98,23 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
                 self._sleepers.update(self.now())
             if self._steps % CONTROL_STEPS == 0:
                 self._command_robots()
-            self._before_step(0, holding)
-            steps = min(CONTROL_STEPS - self._steps % CONTROL_STEPS, until - self._steps)
-            if steps > 1 and self._only_robots_move(holding):
-                for later in range(1, steps):
-                    self._before_step(later, holding)
-            else:
-                steps = 1
-            self._do_steps(steps, holding)
+            self._before_step(holding)
+            left = min(CONTROL_STEPS - self._steps % CONTROL_STEPS, until - self._steps)
+            self._do_steps(left if self._only_robots_move() else 1, holding)
 
-    def _before_step(self, later: int, holding: Sequence[str]) -> None:
-        """Moves people, doors and objects before the next step; `later` is the number of steps in between."""
-        now_s = (self._steps + later) * TIME_STEP_S
+    def _before_step(self, holding: Sequence[str]) -> None:
+        """Moves people, doors and objects before the next step."""
+        now_s = self.now()
         self.walkers.before_step(TIME_STEP_S, self.receivers.busy, self.doors.barriers)
         self.receivers.before_step(now_s, TIME_STEP_S, holding)
         self.doors.before_step(now_s, TIME_STEP_S)
         if self.moves is not None:
             self.moves.before_step(now_s, self._hands_W, holding)
 
-    def _only_robots_move(self, holding: Sequence[str]) -> bool:
-        """Returns whether only robots move; then one call can do all steps of a control period."""
-        observed = any(every % CONTROL_STEPS for every, _ in self._observers)
+    def _only_robots_move(self) -> bool:
+        """Returns whether only robots and what they carry move; then one call does all steps of a control period."""
         still = self.walkers.still and self.doors.still and self.moves is None and not self.receivers.busy
-        return still and not observed and not holding and self._sleepers.all_asleep
+        return still and (self._sleepers.all_asleep or self._carried.calm)
 
     def _do_steps(self, steps: int, holding: Sequence[str]) -> None:
         """Advances the plant by `steps` steps at once, corrects loose objects, and calls the observers."""
@@ -129,7 +123,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         if not self._sleepers.all_asleep:
             self._carried.limit_spin()
         for name in holding:
-            self._carried.after_step(self._hands[name], TIME_STEP_S)
+            self._carried.after_steps(self._hands[name], TIME_STEP_S, steps)
         self.work["plant_steps"] += steps
         for every, observer in self._observers:
             if self._steps % every == 0:

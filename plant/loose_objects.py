@@ -302,13 +302,18 @@ WITH_HAND_M_S: Final = 0.02
 """Largest relative speed of an object that moves with the hand."""
 FASTEST_SPIN_RAD_S: Final = 25.0
 """A third of a radian in a step of 12.5 ms."""
+CALM_RAD_S: Final = 1.5
 _FASTEST_ALONG_RAD_S: Final = FASTEST_SPIN_RAD_S / 3.0**0.5
 """Rate about each axis below which a body's spin cannot exceed `FASTEST_SPIN_RAD_S`."""
 _AT_HAND_M: Final = 0.5
 
 
 class CarriedObjects:
-    """Corrects the loose bodies that a hand carries; call `after_step` after each step of the plant."""
+    """Corrects the loose bodies that a hand carries; call `limit_spin` and `after_steps` after steps of the plant.
+
+    `calm` is True while no free body spins faster than `CALM_RAD_S`; then a spin that begins in a step is limited soon
+    enough after the next one.
+    """
 
     def __init__(self, plant: MultibodyPlant, context: Context, loose: Sequence[RigidBody]) -> None:
         self._plant, self._context = plant, context
@@ -316,10 +321,11 @@ class CarriedObjects:
         starts = [body.floating_velocities_start_in_v() for body in self._loose]
         places = [body.floating_positions_start() + 4 for body in self._loose]
         self._places = np.array([range(start, start + 3) for start in places], dtype=np.int64).reshape(-1, 3)
-        self._spins = np.array([range(start, start + 3) for start in starts], dtype=np.int64).reshape(-1, 3)
+        self._spins = np.array([range(start, start + 3) for start in starts], dtype=np.int64).ravel()
+        self.calm = False
 
-    def after_step(self, hand: RigidBody, dt_s: float) -> None:
-        """Moves the bodies that the hand carries along their arcs; dt_s is the length of the step."""
+    def after_steps(self, hand: RigidBody, dt_s: float, steps: int = 1) -> None:
+        """Moves the bodies that the hand carries along their arcs, after `steps` steps of dt_s each."""
         plant, context = self._plant, self._context
         p_WH = plant.EvalBodyPoseInWorld(context, hand).translation()
         places_W = plant.GetPositions(context)[self._places]
@@ -333,7 +339,7 @@ class CarriedObjects:
             with_hand = V_WH.translational() + _cross(V_WH.rotational(), p_WO - p_WH)
             if np.linalg.norm(v_WO - with_hand) < WITH_HAND_M_S:
                 q = plant.GetPositions(context)
-                q[self._places[number]] += arc_m(self._bias_m_s2(hand, p_WO), dt_s)
+                q[self._places[number]] += steps * arc_m(self._bias_m_s2(hand, p_WO), dt_s)
                 plant.SetPositions(context, q)
 
     def _bias_m_s2(self, hand: RigidBody, p_WO: FloatArray) -> FloatArray:
@@ -347,10 +353,12 @@ class CarriedObjects:
     def limit_spin(self) -> None:
         """Limits the spin of the free bodies to `FASTEST_SPIN_RAD_S`."""
         velocities = self._plant.GetVelocities(self._context)
-        spins = velocities[self._spins]
-        if spins.size and np.abs(spins).max() > _FASTEST_ALONG_RAD_S:
+        fastest_rad_s = np.abs(velocities[self._spins]).max(initial=0.0)
+        self.calm = bool(fastest_rad_s < CALM_RAD_S)
+        if fastest_rad_s > _FASTEST_ALONG_RAD_S:
+            spins = velocities[self._spins].reshape(-1, 3)
             rates = np.linalg.norm(spins, axis=1, keepdims=True)
-            velocities[self._spins] = spins * np.minimum(1.0, FASTEST_SPIN_RAD_S / np.maximum(rates, 1e-9))
+            velocities[self._spins] = (spins * np.minimum(1.0, FASTEST_SPIN_RAD_S / np.maximum(rates, 1e-9))).ravel()
             self._plant.SetVelocities(self._context, velocities)
 
 

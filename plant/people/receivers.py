@@ -389,7 +389,7 @@ UPDATE_STEPS = 4
 """Steps between two updates of offers and people."""
 
 
-class Receivers(Stateful, saved=("_steps", "_offers", "_people")):
+class Receivers(Stateful, saved=("_offers", "_people")):
     """The people of one plant who receive objects, by name; call `before_step` before each step."""
 
     def __init__(self, world: WorldDiagram, context: Context) -> None:
@@ -401,7 +401,6 @@ class Receivers(Stateful, saved=("_steps", "_offers", "_people")):
             for model in sorted(world.config.models, key=lambda model: model.name)
             if model.receiving is not None
         }
-        self._steps = 0
         self._pulling = False
 
     def __getitem__(self, name: str) -> Receiver:
@@ -415,11 +414,10 @@ class Receivers(Stateful, saved=("_steps", "_offers", "_people")):
 
     def before_step(self, now_s: float, dt_s: float, holding: Sequence[str]) -> None:
         """Updates offers and people, pulls and moves the trays; `holding` names the robots that hold an object."""
-        if self._steps % UPDATE_STEPS == 0:
+        if round(now_s / dt_s) % UPDATE_STEPS == 0:
             self._offers.update(now_s, holding)
             for person in self._people.values():
                 person.update(now_s)
-        self._steps += 1
         pulls = [each for person in self._people.values() if (each := self._pull(person, now_s)) is not None]
         if pulls or self._pulling:
             self._plant.get_applied_spatial_force_input_port().FixValue(self._context, pulls)

@@ -189,7 +189,7 @@ def test_a_carried_object_is_moved_towards_the_axis_of_the_turn(scene, p_W, v_W,
     plant.GetJointByName("along").set_translation_rate(context, along_m_s)
     plant.GetJointByName("turn").set_angular_rate(context, TURN_RAD_S)
     _set(plant, context, thing, p_W, [0.0, 0.0, TURN_RAD_S], v_W)
-    CarriedObjects(plant, context, [thing]).after_step(hand, DT_S)
+    CarriedObjects(plant, context, [thing]).after_steps(hand, DT_S)
     moved = plant.EvalBodyPoseInWorld(context, thing).translation() - p_W
     assert np.allclose(1e3 * moved, [-moved_mm, 0.0, 0.0], atol=1e-9)
 

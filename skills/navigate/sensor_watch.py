@@ -7,19 +7,25 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Job, ReturnsView, SkillContext
-from skills.quantities import Count, Delay, Duration, Height, Length, Share
-from skills.robot import FloatArray, Image, NoImageError, Scan
+from skills.geometry import relative_pose
+from skills.quantities import Count, Delay, Duration, Height, Length, Share, Turn
+from skills.robot import FloatArray, Image, NoImageError, Pose2D, Scan
 
 
 @dataclass(frozen=True)
 class WatchOptions:
     """Low obstacles, from depth images of the front cameras in turn.
 
-    `period_s` and `latency_s`: time between images, and until one arrives. `columns`: about how many pixels of each row
-    are used. `heights_m` and `reach_m`: range of heights above the floor, and largest depth, of the points used.
+    `period_s` and `latency_s`: least time between images, and until one arrives. `step_m`, `step_rad` and `rest_s`: the
+    next image waits until the robot has moved or turned this far, for `rest_s` at most. `columns`: about how many
+    pixels of each row are used. `heights_m` and `reach_m`: range of heights above the floor, and largest depth, of the
+    points used.
     """
 
     period_s: Duration = 0.35
+    step_m: Length = 0.25
+    step_rad: Turn = 0.35
+    rest_s: Delay = 1.0
     latency_s: Delay = 0.1
     columns: Count = 110
     heights_m: tuple[Height, Height] = (0.06, 0.5)
@@ -35,7 +41,7 @@ class LowObstacleWatch:
         cameras = context.robot.capabilities().body_cameras
         self._sources = tuple(camera.source for camera in cameras if camera.looks_towards(0.0))
         self._turn = 0
-        self._next_s = -math.inf
+        self._taken_s, self._taken_at = -math.inf, Pose2D(0.0, 0.0, 0.0)
         self._job: Job[tuple[FloatArray, float]] | None = None
         self._X_WO = RigidTransform()
 
@@ -50,11 +56,11 @@ class LowObstacleWatch:
                     return
                 self._context.costmap.add_points(self._X_WO.multiply(points_O.T).T, stamp_s)
             return
-        if not self._sources or self._context.clock.now() < self._next_s:
+        if not self._sources or not self._is_due():
             return
         source = self._sources[self._turn % len(self._sources)]
         self._turn += 1
-        self._next_s = self._context.clock.now() + self._options.period_s
+        self._taken_s, self._taken_at = self._context.clock.now(), self._context.pose()
         self._X_WO = self._context.localiser.estimate().X_WO
         robot, options = self._context.robot, self._options
         self._job = self._context.worker.sense(
@@ -63,6 +69,14 @@ class LowObstacleWatch:
             latency_s=options.latency_s,
             name=f"look for low obstacles by {source}",
         )
+
+    def _is_due(self) -> bool:
+        """Returns whether it is time for the next image."""
+        options, since_s = self._options, self._context.clock.now() - self._taken_s
+        if not options.period_s <= since_s < options.rest_s:
+            return since_s >= options.rest_s
+        off = relative_pose(self._taken_at, self._context.pose())
+        return math.hypot(off.x_m, off.y_m) >= options.step_m or abs(off.yaw_rad) >= options.step_rad
 
 
 def low_points(image: Image, options: WatchOptions) -> FloatArray:

@@ -241,7 +241,7 @@ class PeopleWatch:
         self._options = options or PeopleOptions()
         knows = PERSON in context.detector.class_names
         self._cameras = context.robot.capabilities().body_cameras if knows else ()
-        self._looked_s = -math.inf
+        self._asked_s = self._looked_s = -math.inf
         self._soon = False
         self._job: Job[_Look] | None = None
         self._tracker = PeopleTracker(self._options.same_m)
@@ -271,8 +271,10 @@ class PeopleWatch:
                     self._update(job.result())
             return
         now_s, options = self._context.clock.now(), self._options
-        if now_s < self._looked_s + (options.again_s if self._soon else options.period_s):
+        due_s = self._looked_s + (options.again_s if self._soon else options.period_s)
+        if now_s < max(due_s, self._asked_s + options.again_s):
             return
+        self._asked_s = now_s
         if cameras := self._may_show_person(cameras_towards(velocity, self._cameras)):
             self._looked_s, self._soon = now_s, False
             X_WO, here_W, robot = self._context.localiser.estimate().X_WO, self._context.pose(), self._context.robot

@@ -187,8 +187,11 @@ class ExcludesRobots(Protocol):
 class ObstacleLayerView(Protocol):
     """Costmap that gives access to its obstacle layer."""
 
-    def obstacle_cells(self) -> NDArray[np.float64]:
-        """Returns the centres (N, 2) of the cells that a perceived obstacle blocks and the map does not explain."""
+    def obstacle_cells(self, within_s: float = math.inf) -> NDArray[np.float64]:
+        """Returns the centres (N, 2) of the cells that a perceived obstacle blocks and the map does not explain.
+
+        With `within_s`, only of the cells in which an obstacle was perceived within this time.
+        """
 
 
 @runtime_checkable

@@ -80,9 +80,11 @@ class LayeredCostmap:
         x0_m, y0_m = self._layer.origin_m
         return np.minimum(clearance, distances(field, self._layer.resolution_m, x0_m, y0_m, points))
 
-    def obstacle_cells(self) -> FloatArray:
-        """Centres (x, y) of the blocked cells of the obstacle layer."""
-        return self._layer.centres(self._active())
+    def obstacle_cells(self, within_s: float = math.inf) -> FloatArray:
+        """Centres (x, y) of the blocked cells of the obstacle layer, or of those hit within a time."""
+        cells = self._active()
+        expires_s = self._now_s + max(0.0, self._options.memory_s - within_s)
+        return self._layer.centres(cells[self._until_s[cells[:, 0], cells[:, 1]] > expires_s])
 
     def unexplained_returns(self) -> tuple[float, FloatArray]:
         """The last scan's stamp, and its returns (N, 3) that the surveyed grid does not explain."""

@@ -181,6 +181,10 @@ SCAN_APART_M: Final = 0.35
 """Distance within which two detections of one scan are one person."""
 _SAME_PLACE_M: Final = 0.05
 _SAME_YAW_RAD: Final = 0.05
+_TRACKED_S: Final = 0.3
+"""Age up to which a person counts as tracked: scans come three times as often."""
+_FRESH_S: Final = 2.0
+"""Age up to which an obstacle counts as seen now: both front cameras have looked for low ones in this time."""
 
 
 @dataclass(frozen=True)
@@ -188,16 +192,18 @@ class PeopleOptions:
     """Periods of the watch (s), the latency of a detection (s), and conditions for a person to count.
 
     `period_s`: time between pictures of a camera that has, within `near_m` and `view_rad` of its axis, a known person
-    or a costmap cell that the map does not explain; all other cameras take none. `same_m` and `least_score`: a person
-    counts when two views this near show them with this score. `again_s`: delay of the second view. `misses`: pictures
-    that should show a person and do not until they are forgotten. `memory_s` and `beside_s`: how long a person out of
-    view is remembered, and how long while the costmap has an obstacle within `beside_m`.
+    or a costmap cell that the map does not explain; all other cameras take none. `known_s`: the same where nothing
+    but known people is in view. `same_m` and `least_score`: a person counts when two views this near show them with
+    this score. `again_s`: delay of the second view. `misses`: pictures that should show a person and do not until
+    they are forgotten. `memory_s` and `beside_s`: how long a person out of view is remembered, and how long while the
+    costmap has an obstacle within `beside_m`.
 
     LiDAR scans update known people. `track_m`: up to this distance scans also begin tracks (0: never), which are
     remembered for `hidden_s`, or for `fleeting_s` after fewer than `least_scans` scans.
     """
 
     period_s: Duration = 0.5
+    known_s: Duration = 1.0
     near_m: Length = 5.0
     view_rad: Turn = 1.0
     again_s: Delay = 0.2
@@ -275,7 +281,8 @@ class PeopleWatch:
         if now_s < max(due_s, self._asked_s + options.again_s):
             return
         self._asked_s = now_s
-        if cameras := self._may_show_person(cameras_towards(velocity, self._cameras)):
+        again = self._soon or now_s >= self._looked_s + options.known_s
+        if cameras := self._may_show_person(cameras_towards(velocity, self._cameras), again=again):
             self._looked_s, self._soon = now_s, False
             X_WO, here_W, robot = self._context.localiser.estimate().X_WO, self._context.pose(), self._context.robot
             self._job = self._context.worker.sense(
@@ -310,12 +317,19 @@ class PeopleWatch:
         often = one.looks > 1 or one.scans >= options.least_scans
         return age_s <= (options.hidden_s if often else options.fleeting_s) or (one.looks > 1 and self._remembered(one))
 
-    def _may_show_person(self, cameras: Sequence[CameraCapabilities]) -> Sequence[CameraCapabilities]:
-        """Cameras with a known person or an unexplained obstacle in view; all cameras without a layered costmap."""
+    def _may_show_person(self, cameras: Sequence[CameraCapabilities], *, again: bool) -> Sequence[CameraCapabilities]:
+        """Cameras with an unexplained obstacle or a person in view; all cameras if no obstacles are known.
+
+        Unless `again`, people whom scans track right now, and the obstacles that they are, do not count.
+        """
         if self._obstacles is None:
             return cameras
-        here, seen_W = self._context.pose(), np.array([one.place_W for one in self._seen]).reshape(-1, 2)
-        places_W = np.vstack([self._obstacles.obstacle_cells(), seen_W])
+        here, tracked_s = self._context.pose(), math.inf if again else self._context.clock.now() - _TRACKED_S
+        seen_W = np.array([one.place_W for one in self._seen]).reshape(-1, 2)
+        places_W = np.vstack([self._obstacles.obstacle_cells(_FRESH_S), seen_W])
+        for one in self.people():
+            if one.stamp_s >= tracked_s:
+                places_W = places_W[np.linalg.norm(places_W - one.place_W, axis=1) > self._options.same_m]
         off_W = places_W - (here.x_m, here.y_m)
         near_W = off_W[np.linalg.norm(off_W, axis=1) < self._options.near_m]
         bearings_rad = np.arctan2(near_W[:, 1], near_W[:, 0]) - here.yaw_rad
@@ -341,7 +355,7 @@ class PeopleWatch:
         self._tracker.revise(lambda one: self._count_miss(one, look, stamp_s))
         tracks = self._options.track_m > 0.0
         self._tracker.revise(lambda one: one if self._remembered(one) or (tracks and self._is_tracked(one)) else None)
-        self._soon = any(one.looks == 1 for one in self._seen)
+        self._soon = any(one.looks == 1 and one.track not in {each.track for each in before} for one in self._seen)
         if any(look.found) or any(one.looks for one in before):
             self._context.publish(PEOPLE_TOPIC, self._message())
 

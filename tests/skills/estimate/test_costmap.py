@@ -20,6 +20,14 @@ def test_without_unmapped_objects_only_the_survey_counts():
     assert bench.costmap.clearance_m(np.array([[3.0, 5.6]]))[0] == pytest.approx(1.4, abs=0.02)
 
 
+def test_an_obstacle_out_of_view_is_remembered_but_not_among_those_just_seen():
+    bench = ticked(Bench(START, unmapped=[PERSON], azimuths=900))
+    assert len(bench.costmap.obstacle_cells(within_s=1.0)) == len(bench.costmap.obstacle_cells()) > 0
+    bench.robot.scan = lambda: None
+    ticked(bench, 30)
+    assert len(bench.costmap.obstacle_cells(within_s=1.0)) == 0 < len(bench.costmap.obstacle_cells())
+
+
 def test_a_person_in_the_path_is_seen():
     bench = ticked(Bench(START, unmapped=[PERSON], azimuths=900))
     assert bench.costmap.clearance_m(AT_PERSON)[0] < 0.05

@@ -68,6 +68,22 @@ def test_cameras_take_pictures_only_while_an_unexplained_obstacle_is_in_view(unm
     assert bench.worker.names.count("look for people") == len(detector.pictures)
 
 
+def test_a_person_whom_scans_track_is_looked_at_every_second():
+    bench, detector, watch = watched(PERSON)
+    before = len(detector.pictures)
+    look(bench, watch, 4.0)
+    assert len(detector.pictures) - before == 4
+    assert len(watch.people()) == 1
+
+
+def test_a_person_whom_no_scan_tracks_is_looked_at_twice_a_second():
+    bench, detector, watch = watched(PERSON)
+    bench.robot.scan = lambda: None
+    before = len(detector.pictures)
+    look(bench, watch, 1.8)
+    assert len(detector.pictures) - before >= 3
+
+
 def test_a_person_counts_when_seen_twice_and_the_second_view_comes_soon():
     bench, _, watch = watched(PERSON, seconds=0.3)
     assert watch.people() == ()

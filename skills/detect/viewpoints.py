@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from skills.api import Surface
 from skills.geometry import grid_inside
 from skills.manipulation.arm.collision import Box
+from skills.perception.point_cloud import distinct_cells
 from skills.perception.surface_segmentation import Cluster
 from skills.robot import FloatArray
 
@@ -89,7 +90,7 @@ def standing_parts(xy: FloatArray, depth: int = _SPLITS) -> list[FloatArray]:
     Splits a mostly empty rectangle in the middle of its longer side, at most `depth` times.
     """
     (x, y), (width, height), angle_deg = cv2.minAreaRect((middled := xy - xy.mean(axis=0)).astype(np.float32))
-    cells = np.unique(np.floor(xy / _CELL_M).astype(int), axis=0)
+    cells = distinct_cells(np.floor(xy / _CELL_M).astype(np.int64))
     filled = len(cells) * _CELL_M**2 >= _LEAST_FILLED * width * height
     if depth == 0 or filled or max(width, height) < _WHOLE_M:
         return [xy]

@@ -48,7 +48,8 @@ class PointCloud:
 
     def where(self, mask: Mask) -> PointCloud:
         """Points that a mask (N,) selects."""
-        return PointCloud(self.p_W[mask], self.pixels[mask], self.colours[mask])
+        rows = np.flatnonzero(mask)  # a mask of rows would be expanded for each array
+        return PointCloud(self.p_W.take(rows, 0), self.pixels.take(rows, 0), self.colours.take(rows, 0))
 
 
 def camera_pose_W(image: Image, X_WO: RigidTransform) -> RigidTransform:
@@ -122,13 +123,22 @@ def cell_labels(cells: NDArray[np.int64], *, fewest: int = 1, reach: int = 0) ->
 
     Cells that occur fewer than `fewest` times are empty; clusters that `reach` cells of dilation connect are joined.
     """
-    cells = cells - cells.min(axis=0) + reach + 1
-    counts = np.zeros(cells.max(axis=0) + reach + 2, dtype=np.int32)
-    np.add.at(counts, (cells[:, 0], cells[:, 1]), 1)
+    rows, columns = (cells - cells.min(axis=0) + reach + 1).T
+    height, width = int(rows.max()) + reach + 2, int(columns.max()) + reach + 2
+    counts = np.bincount(rows * width + columns, minlength=height * width).reshape(height, width)
     occupied = (counts >= fewest).astype(np.uint8)
     joined = cv2.dilate(occupied, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) if reach else occupied
     count, grid = cv2.connectedComponents(joined, connectivity=8)
-    return np.asarray(np.where(occupied > 0, grid, 0)[cells[:, 0], cells[:, 1]]), int(count)
+    return np.asarray(np.where(occupied > 0, grid, 0)[rows, columns]), int(count)
+
+
+def distinct_cells(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Returns the distinct cells among (N, D), sorted."""
+    if len(cells) == 0:
+        return cells
+    low = cells.min(axis=0)
+    keys = np.ravel_multi_index(tuple((cells - low).T), tuple(cells.max(axis=0) - low + 1))
+    return cells[np.unique(keys, return_index=True)[1]]
 
 
 def may_rest(xy: FloatArray, height_m: FloatArray) -> Mask:

@@ -24,7 +24,7 @@ from skills.api import Detection
 from skills.perception.class_forms import ClassForm, class_form
 from skills.perception.fitting import LevelPlane, fit_circle, fit_rectangle, without_strays
 from skills.perception.object_segmentation import ObjectSegment, Window, segment_object, window_about
-from skills.perception.point_cloud import Mask
+from skills.perception.point_cloud import Mask, distinct_cells
 from skills.robot import FloatArray, Image
 
 _UPRIGHT = 1.15
@@ -269,7 +269,7 @@ def _outline(
 
 def _main_yaw(xy: FloatArray) -> float:
     """Direction of the longest straight part, such as a handle: across it most cells fall into few strips."""
-    cells = np.unique(np.floor((xy - xy.min(axis=0)) / _STRIP_M), axis=0) * _STRIP_M
+    cells = distinct_cells(np.floor((xy - xy.min(axis=0)) / _STRIP_M).astype(np.int64)) * _STRIP_M
 
     def gathered(yaw: float) -> int:
         across = cells @ [-math.sin(yaw), math.cos(yaw)]

@@ -16,7 +16,7 @@ from skills.estimate.grid_map import GridMap
 from skills.estimate.scan_points import segment_distance
 from skills.geometry import inside_polygon
 from skills.manipulation.arm.collision import Box
-from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, lens_rays
+from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, distinct_cells, lens_rays
 from skills.robot import FloatArray, Image, Intrinsics
 from skills.world_model import Surface
 
@@ -110,7 +110,9 @@ def add_picture(cells: Cells, image: Image, X_WO: RigidTransform, own: Outline) 
     """
     X_WC, (x_C, y_C) = camera_pose_W(image, X_WO), lens_rays(image.depth_intrinsics)
     eye, body = X_WC.GetAsMatrix34(), own.X_WB.GetAsMatrix34()
-    keys, counts = np.unique(_keys(image.depth_m, x_C, y_C, eye, body, own.low_m, own.high_m), return_counts=True)
+    runs, lengths = _keys(image.depth_m, x_C, y_C, eye, body, own.low_m, own.high_m)
+    keys, at = np.unique(runs, return_inverse=True)
+    counts = np.bincount(at, weights=lengths, minlength=len(keys))
     still = cells[~_seen_past(cells, image, X_WO)]
     solid = np.vstack([still, _cells(keys[counts >= _FEWEST_POINTS])])
     return _cells(np.unique(((solid + _OFFSET) * _STRIDES).sum(axis=1)))
@@ -125,13 +127,14 @@ def _keys(
     X_WB: FloatArray,
     low_B: FloatArray,
     high_B: FloatArray,
-) -> NDArray[np.int64]:
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Keys of the cells that contain points of a depth image, without the robot's own; poses are (3, 4) matrices.
 
-    `x_C` and `y_C` are x/z of each column and y/z of each row.
+    Neighbouring pixels of a row in one cell are a run: returns the key of each run, and its number of pixels. `x_C` and
+    `y_C` are x/z of each column and y/z of each row.
     """
-    keys = np.empty(depth_m.size, dtype=np.int64)
-    found = 0
+    keys, lengths = np.empty(depth_m.size, dtype=np.int64), np.empty(depth_m.size, dtype=np.int64)
+    found, last = 0, -1
     for v in range(depth_m.shape[0]):
         for u in range(depth_m.shape[1]):
             z = np.float64(depth_m[v, u])
@@ -149,9 +152,13 @@ def _keys(
             if low_B[0] < ahead < high_B[0] and low_B[1] < left < high_B[1]:
                 continue
             i, j, k = math.floor(x / CELL_M), math.floor(y / CELL_M), math.floor(height / CELL_M)
-            keys[found] = ((i + _OFFSET) * _SPAN + j + _OFFSET) * _SPAN + k + _OFFSET
+            key = ((i + _OFFSET) * _SPAN + j + _OFFSET) * _SPAN + k + _OFFSET
+            if key == last:
+                lengths[found - 1] += 1
+                continue
+            keys[found], lengths[found], last = key, 1, key
             found += 1
-    return keys[:found]
+    return keys[:found], lengths[:found]
 
 
 def solid_boxes(
@@ -194,7 +201,7 @@ def wall_columns(grids: Sequence[GridMap], surfaces: Iterable[Surface]) -> Cells
         points_W = points_W[grid.distance_m(points_W) < _AGREE_M]
     for surface in surfaces:
         points_W = points_W[~inside_polygon(points_W, surface.polygon_W, _AT_SURFACE_M)]
-    columns = np.unique(np.floor(points_W / CELL_M).astype(np.int64), axis=0)
+    columns = distinct_cells(np.floor(points_W / CELL_M).astype(np.int64))
     if len(columns) == 0:
         return columns
     low = columns.min(axis=0)

@@ -49,7 +49,7 @@ class LevelPlane:
 
     def _refined(self, points: FloatArray, band_m: float) -> LevelPlane | None:
         """The plane through the points (N, 3) within band_m; None for too few points, or a slope beyond 2 degrees."""
-        near = points[np.abs(points[:, 2] - self.z(points[:, :2])) < band_m]
+        near = points.compress(np.abs(points[:, 2] - self.z(points[:, :2])) < band_m, axis=0)
         if len(near) < _PLANE_FEWEST_POINTS:
             return None
         design = np.column_stack([np.ones(len(near)), near[:, :2] - np.array(self.origin)])

@@ -66,6 +66,10 @@ class Window:
     R_OC: FloatArray
     lens: Intrinsics
 
+    def points(self, mask: Mask) -> FloatArray:
+        """Points p_O (N, 3) of the pixels in a mask (H, W)."""
+        return self.p_O.reshape(-1, 3).compress(mask.ravel(), axis=0)
+
     def rays_O(self) -> list[FloatArray]:
         """Rays through the midpoints of the box's left, right, top and bottom side, and through its centre."""
         u0, v0, u1, v1 = self.box
@@ -107,7 +111,7 @@ class ObjectSegment:
     @property
     def points_O(self) -> FloatArray:
         """Points (N, 3) of the object."""
-        return np.asarray(self.window.p_O[self.mask])
+        return self.window.points(self.mask)
 
 
 def window_about(image: Image, box: Box, taken: Mask | None = None) -> Window | None:
@@ -168,15 +172,15 @@ def segment_object(window: Window, form: ClassForm) -> ObjectSegment:
 
 def level_planes(window: Window) -> list[LevelPlane]:
     """Fits level planes near the box, those with the most points first; slopes beyond 2 degrees are clutter."""
-    around = window.p_O[window.valid & ~window.inside]
+    around = window.points(window.valid & ~window.inside)
     if len(around) < _FEWEST_ON_PLANE:
-        around = window.p_O[window.valid]
+        around = window.points(window.valid)
     if len(around) < _FEWEST_ON_PLANE:
         return []
     low, high = float(around[:, 2].min()), float(around[:, 2].max())
     counts, edges = np.histogram(around[:, 2], bins=np.arange(low - 2 * _BIN_M, high + 3 * _BIN_M, _BIN_M))
     smooth = np.convolve(counts, [1.0, 2.0, 3.0, 2.0, 1.0], mode="same") / 3.0
-    planes, points = [], window.p_O[window.valid]
+    planes, points = [], window.points(window.valid)
     for height_m in _peaks(smooth, edges, max(_FEWEST_ON_PLANE, _LEAST_PLANE_SHARE * len(around))):
         near = points[np.abs(points[:, 2] - height_m) < 0.02]
         if len(near) >= _FEWEST_ON_PLANE:
@@ -211,7 +215,7 @@ def _contact(window: Window, mask: Mask, plane: LevelPlane | None) -> float:
     """1 for a segment that begins right above its plane; less for a segment that floats or has no plane."""
     if plane is None or not np.any(mask):
         return _WITHOUT_PLANE
-    points = window.p_O[mask]
+    points = window.points(mask)
     lowest = float(np.percentile(points[:, 2] - plane.z(points[:, :2]), 2))
     return 1.0 if lowest < _FLOATS_M else _FLOATING
 
@@ -269,7 +273,7 @@ def in_plane(window: Window, plane: LevelPlane | None) -> Mask:
 def _groups_from_above(window: Window, standing: Mask) -> tuple[NDArray[np.int32], int]:
     """Clusters points on a grid seen from above: labels (H, W), 0 for none, and the number of labels."""
     labels = np.zeros(standing.shape, dtype=np.int32)
-    points = window.p_O[standing]
+    points = window.points(standing)
     if len(points) < _FEWEST_POINTS:
         return labels, 1
     about = standing & window.inside
@@ -298,7 +302,7 @@ def _fit(window: Window, mask: Mask, form: ClassForm) -> float:
     """Fit of a cluster to the detection's box and to the size of its class, 0 to 1."""
     inside = mask & window.inside
     share = _share_inside(window, mask)
-    return float(_covered(window, inside) * share**_SHARE_POWER * _sized(window.p_O[inside], form) ** 2)
+    return float(_covered(window, inside) * share**_SHARE_POWER * _sized(window.points(inside), form) ** 2)
 
 
 def _covered(window: Window, inside: Mask) -> float:

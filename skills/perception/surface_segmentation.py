@@ -136,14 +136,14 @@ def _segment(
     margin_m, highest_m = within_m
     above = cloud.p_W[:, 2] - surface.height_m
     over = (above > -_PLANE_BAND_M) & (above < highest_m)
-    over[over] = inside_polygon(cloud.p_W[over, :2], surface.polygon_W, margin_m)
+    over[over] = inside_polygon(cloud.p_W.compress(over, axis=0)[:, :2], surface.polygon_W, margin_m)
     cloud = cloud.where(over)
     plane = _fit_plane(cloud.p_W, surface.height_m)
     if plane is None:
         return None
     height = cloud.p_W[:, 2] - plane.z(cloud.p_W[:, :2])
     standing = height > max(_LOWEST_M, 3.0 * plane.noise_m)
-    standing[standing] = may_rest(cloud.p_W[standing, :2], height[standing])
+    standing[standing] = may_rest(cloud.p_W.compress(standing, axis=0)[:, :2], height[standing])
     groups = _split_on_grid(cloud.where(standing), height[standing], p_WC, pixel_rad)
     clusters = tuple(_cluster(points, surface.name, plane, p_WC) for points in groups)
     return SurfaceView(plane, cloud.where(np.abs(height) < max(_LOWEST_M, 3.0 * plane.noise_m)), clusters)
@@ -151,7 +151,7 @@ def _segment(
 
 def _fit_plane(points_W: FloatArray, height_m: float) -> LevelPlane | None:
     """Fits the plane near a surveyed height, robustly against objects on it; None when points are too few."""
-    near = points_W[np.abs(points_W[:, 2] - height_m) < _PLANE_BAND_M]
+    near = points_W.compress(np.abs(points_W[:, 2] - height_m) < _PLANE_BAND_M, axis=0)
     if len(near) < _FEWEST_PLANE_POINTS:
         return None
     near = near[:: max(1, len(near) // _PLANE_POINTS)]

@@ -1,11 +1,33 @@
-"""Rendering for the cameras: the scene at any positions of the plant, and the lights of a world."""
+"""Rendering for the cameras: the scene at any positions of the plant, and the lights of a world.
 
+Drake's renderer keeps Python's lock while it draws, so that the plant and a server's answers would wait. A run draws in
+a process of its own, which is forked before the run has threads. Both draw the same bytes.
+"""
+
+import gc
+import mmap
 import os
+import signal
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, Pipe
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import LightParameter, MakeRenderEngineVtk, QueryObject, RenderEngineVtkParams, Rgba, SceneGraph
+from pydrake.geometry import (
+    ColorRenderCamera,
+    DepthRenderCamera,
+    FrameId,
+    LightParameter,
+    MakeRenderEngineVtk,
+    QueryObject,
+    RenderEngineVtkParams,
+    Rgba,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Diagram
 
@@ -14,6 +36,16 @@ from executive.words.variation import DAY_LIGHT, Light
 RENDERER = "vtk"
 MESA_THREADS: Final = "LP_NUM_THREADS"
 """Environment variable of Mesa's software renderer: the number of its threads."""
+
+
+@dataclass(frozen=True)
+class MountedCamera:
+    """Camera on a link: how its picture and its depth are rendered, and its pose X_FC in the link's geometry frame."""
+
+    colour: ColorRenderCamera
+    depth: DepthRenderCamera
+    frame: FrameId
+    X_FC: RigidTransform
 
 
 class Scene:
@@ -37,6 +69,37 @@ class Scene:
         self._query_port = scene_graph.get_query_output_port()
         self._scene_graph, self._parameters = scene_graph, parameters or RenderEngineVtkParams()
         self._rendering = False
+        self._cameras: list[MountedCamera] = []
+        self._aside: _Renderer | None = None
+
+    def mount(self, camera: MountedCamera) -> int:
+        """Adds a camera, before `render_aside`; returns its number."""
+        self._cameras.append(camera)
+        return len(self._cameras) - 1
+
+    def render_aside(self) -> None:
+        """Forks a process that renders for the cameras from now on. Call it before threads begin."""
+        if self._cameras:
+            self._aside = _Renderer(self, self._cameras)
+
+    def colour(self, positions: NDArray[np.float64], camera: int) -> NDArray[np.uint8]:
+        """Renders the picture (H, W, 3) RGB of a camera with the plant at `positions`.
+
+        Raises RuntimeError when the rendering process has ended.
+        """
+        if self._aside is not None:
+            return self._aside.colour(positions, camera)
+        one = self._cameras[camera]
+        image = self.query_at(positions).RenderColorImage(one.colour, one.frame, one.X_FC)
+        return np.ascontiguousarray(image.data[..., :3])
+
+    def depth(self, positions: NDArray[np.float64], camera: int) -> NDArray[np.float32]:
+        """Renders the depth (H, W) in m of a camera; out of range it is 0 or infinite. Raises as `colour` does."""
+        if self._aside is not None:
+            return self._aside.depth(positions, camera)
+        one = self._cameras[camera]
+        image = self.query_at(positions).RenderDepthImage(one.depth, one.frame, one.X_FC)
+        return np.array(image.data[..., 0], dtype=np.float32)
 
     def query_at(self, positions: NDArray[np.float64]) -> QueryObject:
         """Returns the scene with the plant at `positions`; it is valid until the next call.
@@ -52,6 +115,73 @@ class Scene:
         query = self._query_port.Eval(self._geometry_context)
         assert isinstance(query, QueryObject)
         return query
+
+
+class _Renderer:
+    """A forked process that renders for the cameras of a scene; pictures come back in shared memory."""
+
+    def __init__(self, scene: Scene, cameras: Sequence[MountedCamera]) -> None:
+        """Forks the process, which ends with this object."""
+        infos = [(one.colour.core().intrinsics(), one.depth.core().intrinsics()) for one in cameras]
+        self._shapes = [((c.height(), c.width(), 3), (d.height(), d.width())) for c, d in infos]
+        self._memory = mmap.mmap(-1, 4 * max(c.height() * c.width() + d.height() * d.width() for c, d in infos))
+        self._connection, theirs = Pipe()
+        process = os.fork()
+        if process == 0:
+            self._connection.close()
+            self._serve(scene, theirs)
+        theirs.close()
+        weakref.finalize(self, _end, self._connection, process)
+
+    def colour(self, positions: NDArray[np.float64], camera: int) -> NDArray[np.uint8]:
+        """See `Scene.colour`."""
+        self._ask(b"c", positions, camera)
+        return np.ndarray(self._shapes[camera][0], np.uint8, self._memory).copy()
+
+    def depth(self, positions: NDArray[np.float64], camera: int) -> NDArray[np.float32]:
+        """See `Scene.depth`."""
+        self._ask(b"d", positions, camera)
+        return np.ndarray(self._shapes[camera][1], np.float32, self._memory).copy()
+
+    def _ask(self, what: bytes, positions: NDArray[np.float64], camera: int) -> None:
+        """Waits until a picture lies in the shared memory."""
+        try:
+            self._connection.send_bytes(what + bytes([camera]) + positions.tobytes())
+            trouble = self._connection.recv_bytes()
+        except (EOFError, OSError) as error:
+            raise RuntimeError("the process that renders the cameras' pictures has ended") from error
+        if trouble:
+            raise RuntimeError(f"rendering failed: {trouble.decode()}")
+
+    def _serve(self, scene: Scene, connection: Connection) -> None:
+        """Renders in the forked process until the other end is closed; never returns."""
+        try:
+            for ignored in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):  # the run ends, and then this process
+                signal.signal(ignored, signal.SIG_IGN)
+            gc.disable()
+            while True:
+                request = connection.recv_bytes()
+                connection.send_bytes(self._render(scene, request).encode())
+        finally:
+            os._exit(0)
+
+    def _render(self, scene: Scene, request: bytes) -> str:
+        """Renders what a request asks for into the shared memory; returns what went wrong."""
+        camera, positions = request[1], np.frombuffer(request[2:], dtype=np.float64)
+        try:
+            if request[:1] == b"c":
+                np.ndarray(self._shapes[camera][0], np.uint8, self._memory)[:] = scene.colour(positions, camera)
+            else:
+                np.ndarray(self._shapes[camera][1], np.float32, self._memory)[:] = scene.depth(positions, camera)
+        except Exception as error:  # told to the run, which ends with it
+            return f"{type(error).__name__}: {error}"
+        return ""
+
+
+def _end(connection: Connection, process: int) -> None:
+    """Ends a rendering process and waits for it."""
+    connection.close()
+    os.waitpid(process, 0)
 
 
 SKY = (0.78, 0.87, 0.96)

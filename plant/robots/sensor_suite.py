@@ -13,11 +13,11 @@ from functools import cached_property
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import ColorRenderCamera, FrameId, QueryObject
+from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
 
-from plant.rendering import RENDERER
+from plant.rendering import RENDERER, MountedCamera, Scene
 from plant.robots.robot_kind import RobotBody, SensorOptions
 from plant.robots.servos import ActuatedJoints
 from plant.saved_state import Stateful
@@ -48,22 +48,23 @@ class Camera(NoisySensor):
         link_frame: FrameId,
         rng: np.random.Generator,
         *,
-        renderer: str = "vtk",
+        scene: Scene | None = None,
         work: Counter[str] | None = None,
         picture_noise: PictureNoise | None = None,
         depth_noise: DepthNoise | None = None,
     ) -> None:
         """`link_frame` is the geometry frame of the link (`MultibodyPlant.GetBodyFrameIdOrThrow`).
 
-        `work` counts the rendered pictures by size.
+        Without a `scene`, the camera takes no pictures. `work` counts the rendered pictures by size.
         """
         super().__init__(rng)
         self._work = Counter() if work is None else work
         self.spec = spec
-        self._link_frame, self._X_LC = link_frame, spec.X_link_camera()
         picture, depth = spec.intrinsics(), spec.depth_intrinsics()
-        self._colour_camera = colour_render_camera(picture, renderer)
-        self._depth_camera = depth_render_camera(depth, renderer, spec.depth_range_m)
+        self._scene, self._number = scene, -1
+        if scene is not None:
+            cameras = colour_render_camera(picture, RENDERER), depth_render_camera(depth, RENDERER, spec.depth_range_m)
+            self._number = scene.mount(MountedCamera(*cameras, link_frame, spec.X_link_camera()))
         self._picture = PictureDegrader(
             rng, picture.height, picture.width, picture_noise or PictureNoise(), spec.picture_shrink
         )
@@ -71,46 +72,42 @@ class Camera(NoisySensor):
 
     def take(
         self,
-        query_object: QueryObject,
+        positions: FloatArray,
         stamp_s: float,
         frames: FrameTree,
         *,
         visual: bool = True,
         depth: bool = True,
     ) -> Image:
-        """Takes a picture, its depth, or both; `frames` is the robot's frame tree at the same time.
+        """Takes a picture, its depth, or both, with the plant at `positions`; `frames` are of the same time.
 
-        The array that is not requested is empty.
+        The array that is not requested is empty. Raises LookupError without a scene.
         """
-        colour = self._picture.colour(self._render(query_object, self._colour_camera)) if visual else None
+        if self._scene is None:
+            raise LookupError("there is no scene for cameras: build the Diagram with render=True")
+        lens, colour = self.spec.intrinsics(), None
+        if visual:
+            self._work[f"pictures_{lens.width}x{lens.height}"] += 1
+            colour = self._picture.colour(self._scene.colour(positions, self._number))
         grey = _NO_PICTURE if colour is None else _grey(colour)
         return Image(
             stamp_s=stamp_s,
             source=self.spec.name,
             camera_frame=self.spec.frame,
-            intrinsics=self.spec.intrinsics(),
+            intrinsics=lens,
             depth_intrinsics=self.spec.depth_intrinsics(),
             colour=colour if self.spec.colour else None,
             grey=grey,
-            depth_m=self._take_depth(query_object, grey) if depth else _NO_DEPTH,
+            depth_m=self._take_depth(self._scene, positions, grey) if depth else _NO_DEPTH,
             frames=frames,
         )
 
-    def _take_depth(self, query_object: QueryObject, grey: NDArray[np.uint8]) -> NDArray[np.float32]:
+    def _take_depth(self, scene: Scene, positions: FloatArray, grey: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Renders noisy depth; too dark and too shiny spots of the picture are lost, if there is one."""
         lens = self.spec.depth_intrinsics()
         small = cv2.resize(grey, (lens.width, lens.height)) if grey.size else None
         self._work[f"depth_pictures_{lens.width}x{lens.height}"] += 1
-        image = query_object.RenderDepthImage(self._depth_camera, self._link_frame, self._X_LC)
-        clean_m = np.asarray(image.data[..., 0], dtype=np.float32)  # 0 or infinite out of range
-        return self._depth.depth(clean_m, None if small is None else np.asarray(small, dtype=np.uint8))
-
-    def _render(self, query_object: QueryObject, camera: ColorRenderCamera) -> NDArray[np.uint8]:
-        """Renders the noise-free picture (H, W, 3) RGB."""
-        info = camera.core().intrinsics()
-        self._work[f"pictures_{info.width()}x{info.height()}"] += 1
-        image = query_object.RenderColorImage(camera, self._link_frame, self._X_LC)
-        return np.ascontiguousarray(image.data[..., :3])
+        return self._depth.depth(scene.depth(positions, self._number), None if small is None else np.asarray(small))
 
 
 def _grey(colour: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -154,7 +151,7 @@ class SensorSuite(
     ) -> None:
         """`cameras` are mounted on the links that their specifications name."""
         self._body, self._index = body, joints
-        self._dock, self._scene, self._context = body.robot.dock, options.scene, options.context
+        self._dock, self._context = body.robot.dock, options.context
         self._kinematics = body.plant.CreateDefaultContext()
         rngs = _generators(options.seed, body.name)
         self._odometry_model = OdometryModel(next(rngs))
@@ -174,7 +171,7 @@ class SensorSuite(
             work=options.work,
         )
         self._cameras = {
-            name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER, work=options.work)
+            name: Camera(spec, self._link_frame(spec.link), next(rngs), scene=options.scene, work=options.work)
             for name, spec in cameras.items()
         }
         self.power_up(0.0)
@@ -272,10 +269,7 @@ class SensorSuite(
         """
         if source not in self._cameras:
             raise ValueError(f"{self._body.name} has no camera {source!r}; it has {', '.join(self._cameras)}")
-        if self._scene is None:
-            raise LookupError("there is no scene for cameras: build the Diagram with render=True")
-        query = self._scene.query_at(self._whole)
-        return self._cameras[source].take(query, self._now_s, self._frames(), visual=visual, depth=depth)
+        return self._cameras[source].take(self._whole, self._now_s, self._frames(), visual=visual, depth=depth)
 
     def _frames(self) -> FrameTree:
         """Builds the frame tree from odometry and joint encoders."""

@@ -57,6 +57,7 @@ class SimulatedBackend:
         """Builds the plant; the seed places the objects. Raises InputError if robots or objects do not fit."""
         self._world, self._robots, self._record = world, robots, record
         self._simulation = simulate(world, robots, seed=seed, record=record, variation=variation, spared=spared)
+        self._simulation.render_aside()
         self._steps = WorkThread("errand-plant")
         self._pipeline = Pipeline(self._simulation.engine, self._steps.do)
         self._keep: Callable[[], None] | None = None

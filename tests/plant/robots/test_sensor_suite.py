@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from pydrake.geometry import Box, MakeRenderEngineVtk, RenderEngineVtkParams
+from pydrake.geometry import Box
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
+from plant import rendering
 from plant.robots.sensor_suite import Camera
 from plant.robots.spot.description import CAMERAS
 from plant.sensors.camera_spec import load_cameras
@@ -33,7 +34,6 @@ class Scene:
     def __init__(self, box_centre_B):
         builder = DiagramBuilder()
         self.plant, self.scene_graph = AddMultibodyPlantSceneGraph(builder, 0.01)
-        self.scene_graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
         world = self.plant.world_body()
         X_WG = RigidTransform([0, 0, -0.05])
         self.plant.RegisterVisualGeometry(world, X_WG, Box(20, 20, 0.1), "floor", np.array([0.6, 0.6, 0.5, 1]))
@@ -45,15 +45,15 @@ class Scene:
         self.root = diagram.CreateDefaultContext()
         context, X_WB = self.plant.GetMyContextFromRoot(self.root), RigidTransform([0, 0, HEIGHT_M])
         self.plant.SetFloatingBaseBodyPoseInWorldFrame(context, self.body, X_WB)
-        self.query = self.scene_graph.get_query_output_port().Eval(self.scene_graph.GetMyContextFromRoot(self.root))
-        self.diagram = diagram
+        self.positions = self.plant.GetPositions(context)
+        self.scene = rendering.Scene(diagram, self.plant, self.scene_graph)
 
     def camera(self, name, seed=0, **noise):
         frame = self.plant.GetBodyFrameIdOrThrow(self.body.index())
-        return Camera(load_cameras(CAMERAS)[name], frame, np.random.default_rng(seed), **noise)
+        return Camera(load_cameras(CAMERAS)[name], frame, np.random.default_rng(seed), scene=self.scene, **noise)
 
     def take(self, name, **noise):
-        return self.camera(name, **noise).take(self.query, 2.0, FrameTree({}))
+        return self.camera(name, **noise).take(self.positions, 2.0, FrameTree({}))
 
 
 def points_B(image, spec):
@@ -173,9 +173,9 @@ def test_a_wrong_file_of_cameras_is_refused(tmp_path, old, new, said):
 def test_only_the_requested_part_is_rendered():
     scene = Scene(BODY_BOX_CENTRES_B["left"])
     camera = scene.camera("left")
-    visual = camera.take(scene.query, 1.0, FrameTree({}), depth=False)
+    visual = camera.take(scene.positions, 1.0, FrameTree({}), depth=False)
     assert (visual.grey.shape, visual.depth_m.shape) == ((240, 320), (0, 0))
-    depth = camera.take(scene.query, 1.0, FrameTree({}), visual=False)
+    depth = camera.take(scene.positions, 1.0, FrameTree({}), visual=False)
     assert (depth.grey.shape, depth.colour, depth.depth_m.shape) == ((0, 0), None, (120, 160))
 
 
@@ -183,7 +183,7 @@ def test_depth_is_lost_on_dark_spots_of_the_picture_taken_with_it():
     scene, dark = Scene(BODY_BOX_CENTRES_B["left"]), DepthNoise(sigma_m=0.0, sigma_per_m=0.0, speck=0.0, dark=75.0)
     camera = scene.camera("left", depth_noise=dark)
     both, alone = (
-        camera.take(scene.query, 1.0, FrameTree({})),
-        camera.take(scene.query, 1.0, FrameTree({}), visual=False),
+        camera.take(scene.positions, 1.0, FrameTree({})),
+        camera.take(scene.positions, 1.0, FrameTree({}), visual=False),
     )
     assert np.mean(both.depth_m == 0.0) > np.mean(alone.depth_m == 0.0) + 0.1

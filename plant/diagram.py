@@ -8,6 +8,7 @@ moving part stays a model.
 import logging
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -16,6 +17,7 @@ import numpy as np
 from pydrake.geometry import (
     Box,
     CollisionFilterDeclaration,
+    DefaultProximityProperties,
     GeometryId,
     GeometryInstance,
     GeometrySet,
@@ -27,6 +29,7 @@ from pydrake.geometry import (
     RenderEngineVtkParams,
     RoleAssign,
     SceneGraph,
+    SceneGraphConfig,
     SceneGraphInspector,
 )
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -88,13 +91,9 @@ def add_model(parser: Parser, path: Path) -> ModelInstanceIndex:
         InputError: Drake cannot use the file.
     """
     if path.suffix == ".sdf":
-        text = path.read_text(encoding="utf-8")
-        try:
-            return _only(
-                parser.AddModelsFromString(_RELATIVE_URI.sub(rf"<uri>{path.parent.as_uri()}/\1</uri>", text), "sdf")
-            )
-        except RuntimeError:
-            pass  # parses the file again, for a message that names it
+        text = _RELATIVE_URI.sub(rf"<uri>{path.parent.as_uri()}/\1</uri>", path.read_text(encoding="utf-8"))
+        with suppress(RuntimeError):  # parses the file again, for a message that names it
+            return _only(parser.AddModelsFromString(text, "sdf"))
     try:
         return _only(parser.AddModels(str(path)))
     except (RuntimeError, ValueError) as error:
@@ -134,8 +133,7 @@ def _copy_fixed(
     context, world, pieces = scratch.CreateDefaultContext(), plant.world_body(), {}
     for geometry in inspector.GetAllGeometryIds():
         body = scratch.GetBodyFromFrameId(inspector.GetFrameId(geometry))
-        model = _model_of(scratch, body.index())
-        if model in moving:
+        if (model := _model_of(scratch, body.index())) in moving:
             continue
         X_WG = scratch.EvalBodyPoseInWorld(context, body) @ inspector.GetPoseInFrame(geometry)
         shape, name = inspector.GetShape(geometry), inspector.GetName(geometry)
@@ -202,6 +200,10 @@ TIME_STEP_S = 0.0125
 NEAR_RIGID = 0.1
 """SAP's near-rigid threshold (Castro et al. 2022, section V.B); Drake's default of 1.0 lets 80 N press a fingertip
 3 cm into a cube of 50 g."""
+UNMESHED: Final = SceneGraphConfig(
+    default_proximity_properties=DefaultProximityProperties(hydroelastic_modulus=None, resolution_hint=None)
+)
+"""Point contact needs no meshes; with Drake's defaults each context would mesh every collision shape."""
 FLOOR_TOP_M = 0.01
 TRAY_PATH = Path(__file__).parent / "models" / "tray" / "tray.sdf"
 X_PT_HOME = RigidTransform(
@@ -276,7 +278,7 @@ def build_diagram(config: DiagramConfig, meshcat: Meshcat | None = None) -> Worl
         discrete_contact_approximation="sap",
         use_sampled_output_ports=False,
     )
-    plant, scene_graph = AddMultibodyPlant(plant_config, builder)
+    plant, scene_graph = AddMultibodyPlant(plant_config, UNMESHED, builder)
     plant.set_sap_near_rigid_threshold(NEAR_RIGID)
     parser = parser_of(plant)
     scenery = {} if config.directives is None else add_scenery(plant, config.directives, parser_of)
@@ -384,9 +386,7 @@ def _floor_geometries(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[Ge
     inspector = scene_graph.model_inspector()
     context = plant.CreateDefaultContext()
     floor = []
-    for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
-        if not plant.IsAnchored(body):
-            continue
+    for body in filter(plant.IsAnchored, map(plant.get_body, map(BodyIndex, range(plant.num_bodies())))):
         X_WB = plant.EvalBodyPoseInWorld(context, body)
         for geometry in plant.GetCollisionGeometriesForBody(body):
             shape = inspector.GetShape(geometry)

@@ -22,8 +22,8 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1551,
     "executive/testing": 848,
-    "executive/app": 7835,
-    "executive/cli": 3740,
+    "executive/app": 7834,
+    "executive/cli": 3738,
     "skills": 28025,
     "plant": 11146,
 }

@@ -45,7 +45,7 @@ def newly_compiled() -> int:
     modules = [module for name, module in sys.modules.items() if name.partition(".")[0] in packages]
     values = [value for module in modules for value in vars(module).values()]
     compiled: list[Any] = [
-        each.machine_code for each in values if isinstance(each, CompiledFunction) and each.is_compiled
+        each.machine_code for each in values if isinstance(each, CompiledFunction) and "machine_code" in vars(each)
     ]
     compiled += [each for each in values if isinstance(each, Dispatcher)]
     codes = {id(code): code for code in compiled}

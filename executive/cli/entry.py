@@ -24,7 +24,7 @@ from typer.main import get_command
 
 from skills.inputs.errors import MOST_LETTERS, InputError, listing, one_line
 
-_COLLECTED_AFTER: Final = (30_000, 20, 50)
+_COLLECTED_AFTER: Final = (400_000, 20, 50)
 """Thresholds of the three generations of garbage collection; imports create many objects that all stay."""
 
 

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from executive.app.prepare.prepared import Prepared
     from executive.app.report.run_report import RunReport
+    from executive.app.runs.page_view import PageView
     from executive.record.work import Profile
 
 
@@ -60,10 +61,8 @@ def run(
     """Runs a sentence or a mission file in the simulated world, or with a real robot."""
     refuse_unaddressed(request)
     from executive.app.prepare.from_request import prepare_checked
-    from executive.app.runs.page_view import PageView, queue_function
     from executive.app.runs.queue import MissionRuns
     from executive.app.runs.real_robot import real_runner
-    from executive.cli.listen_command import hear_request
     from executive.cli.screen import ConsoleScreen, voice_for
     from executive.record.work import Profile
     from executive.store.missions import MissionStore, store_in
@@ -74,11 +73,15 @@ def run(
     timing = Profile() if profile else None
 
     def page_of(prepared: Prepared) -> PageView:
+        from executive.app.runs.page_view import PageView, queue_function
+
         later = queue_function(prepared, store=kept_in, out=request.out)
         return PageView(prepared, plain_lines(console), port=view_port, later=later)
 
     with voice_for(aloud) as voice, serve_live(foxglove, plain_lines(console)) as live:
         if listen_to is not None:
+            from executive.cli.listen_command import hear_request
+
             request = replace(request, sentence=hear_request(listen_to, request, console=console))
         prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
         page = page_of if view is not None else None

@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from py_trees.common import Status
 from rich.console import Console, Group
@@ -16,9 +16,7 @@ from rich.live import Live
 from rich.text import Text
 
 from executive.app.prepare.prepared import Prepared
-from executive.app.runs.conversations import Conversations, load_ahead
 from executive.app.runs.one_run import FinishedRun
-from executive.app.runs.page_view import PageView
 from executive.app.runs.queue import RunOptions
 from executive.cli.run_keys import HELP, Keys, prompt_lines, read_keys
 from executive.language.parser import load_parser
@@ -34,20 +32,15 @@ from executive.tree.node_view import NodeView, node_view
 from executive.view.foxglove import LiveServer
 from executive.view.text import Styles, printable, style_of, to_rich
 
+if TYPE_CHECKING:
+    from executive.app.runs.page_view import PageView
+
 SILENCE: Final = Silence()
 
 
-@contextmanager
-def voice_for(aloud: bool) -> Iterator[Voice]:
-    """Yields a voice, silent unless `aloud`; finally waits for its last sentence. Raises InputError without a voice."""
-    if not aloud:
-        yield SILENCE
-        return
-    voice = queued_voice()
-    try:
-        yield voice
-    finally:
-        voice.close()
+def voice_for(aloud: bool) -> AbstractContextManager[Voice]:
+    """Opens a voice, silent unless `aloud`; its end waits for the last sentence. Raises InputError without a voice."""
+    return closing(queued_voice()) if aloud else nullcontext(SILENCE)
 
 
 @dataclass(frozen=True)
@@ -128,6 +121,8 @@ class ConsoleScreen:
             load_parser().release()
             yield RunOptions(control, (speech,), page, self.live, self.profile)
             return
+        from executive.app.runs.conversations import Conversations, load_ahead  # the grammar of sentences
+
         own = None if page is None else page.conversations
         conversations = own or Conversations(prepared, control)
         conversations.set_missions()

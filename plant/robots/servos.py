@@ -95,8 +95,7 @@ class GripperServo(Stateful, saved=("goal", "_before", "_still_s")):
 
     def begin(self, goal: GripperGoal) -> None:
         """Sets a goal."""
-        self._before, self.goal = self.goal, goal
-        self._still_s = 0.0
+        self._before, self.goal, self._still_s = self.goal, goal, 0.0
 
     def follow(self, opening: float, rate: float, dt_s: float) -> Closing:
         """Returns the progress after dt_s, at an opening that changes at `rate`."""

@@ -52,20 +52,21 @@ def cast_rays(
 
     `azimuths` are evenly spaced, increasing, and cover one turn from azimuths[0]; the shapes are in the world frame.
     """
-    shapes = len(kinds)
-    columns, rings = len(azimuths), len(elevations)
+    shapes, columns, rings = len(kinds), len(azimuths), len(elevations)
     ranges = np.full((columns, rings), NO_RETURN_M)
     farthest = np.full(columns, NO_RETURN_M)
     cos_e, sin_e = np.cos(elevations), np.sin(elevations)
     cos_a, sin_a = np.cos(azimuths), np.sin(azimuths)
-    R_LW = R_WL.T.copy()
-    nearest = np.empty(shapes)
+    R_LG, p_LG, origin, nearest = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(shapes)
     for i in range(shapes):
         nearest[i] = _box_distance(rotations_W[i], positions_W[i], half_extents[i], p_WL)
     for i in np.argsort(nearest):
-        R_LG = R_LW @ rotations_W[i].copy()
-        p_LG = R_LW @ (positions_W[i] - p_WL)
-        origin = -(R_LG.T.copy() @ p_LG)
+        R_WG, offset = rotations_W[i], positions_W[i] - p_WL
+        for k in range(3):  # written out, because a call of BLAS takes longer than these products
+            p_LG[k] = R_WL[0, k] * offset[0] + R_WL[1, k] * offset[1] + R_WL[2, k] * offset[2]
+            for j in range(3):
+                R_LG[k, j] = R_WL[0, k] * R_WG[0, j] + R_WL[1, k] * R_WG[1, j] + R_WL[2, k] * R_WG[2, j]
+            origin[k] = -(R_WG[0, k] * offset[0] + R_WG[1, k] * offset[1] + R_WG[2, k] * offset[2])
         first, count = _columns_spanned(R_LG, p_LG, half_extents[i], azimuths)
         for k in range(count):
             column = (first + k) % columns

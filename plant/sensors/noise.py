@@ -89,7 +89,7 @@ class PictureDegrader:
         """`shrink` is the ratio of the sensor's size to the picture's; it divides the blur."""
         self._noise, self._sigma = noise, noise.blur_px / shrink
         self._grain = NoiseTile(rng, height, width, 3)
-        y, x = np.mgrid[0:height, 0:width].astype(np.float32)
+        y, x = (axis.astype(np.float32) for axis in np.ogrid[0:height, 0:width])
         radius2 = ((x - width / 2) ** 2 + (y - height / 2) ** 2) / ((width / 2) ** 2 + (height / 2) ** 2)
         self._gain = np.repeat((1.0 - noise.vignette * radius2)[..., None], 3, axis=2).astype(np.float32)
 

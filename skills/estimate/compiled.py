@@ -2,6 +2,7 @@
 
 import functools
 import math
+import sys
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
@@ -27,22 +28,28 @@ class CompiledFunction:
         """Compiles the function at the first call, and returns its result."""
         return self.machine_code(*arguments)
 
-    @property
-    def is_compiled(self) -> bool:
-        """Returns whether the function has been called and thus compiled."""
-        return "machine_code" in self.__dict__
-
     @functools.cached_property
     def machine_code(self) -> Callable[..., Any]:
         """The compiled function; the functions that it calls are compiled, too."""
-        from numba import njit
-
-        names = self._function.__globals__
+        njit, names = _compiler(), self._function.__globals__
         for name in self._function.__code__.co_names:
             if isinstance(names.get(name), CompiledFunction):
                 names[name] = names[name].machine_code
         code: Callable[..., Any] = njit(cache=True, nogil=True)(self._function)
         return code
+
+
+@functools.cache
+def _compiler() -> Any:
+    """Imports numba and returns njit."""
+    from numba import njit
+
+    # numba imports scipy.linalg, which takes 70 ms, to see whether it offers BLAS, which no loop here calls
+    if sys.modules.setdefault("scipy.linalg", None) is None:  # type: ignore[arg-type]
+        import numba.np.arraymath  # noqa: F401
+
+        del sys.modules["scipy.linalg"]
+    return njit
 
 
 @compiled

@@ -86,8 +86,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         """Sample poses of the particles; see `skills.api.ParticleView`."""
         weights = np.cumsum(self.particles.weights)
         ends = (np.arange(most) + 0.5) / most * weights[-1]
-        chosen = np.unique(np.searchsorted(weights, ends))
-        return np.asarray(self.particles.poses[chosen])
+        return np.asarray(self.particles.poses[np.unique(np.searchsorted(weights, ends))])
 
     def estimate(self) -> LocalisationEstimate:
         """The latest estimate; while the pose is unknown its covariance is that of all particles."""

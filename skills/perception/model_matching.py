@@ -332,8 +332,7 @@ def _colour_difference(seen: NDArray[np.uint8], of_model: NDArray[np.uint8]) -> 
         return 100.0
     a, b = (lab_of(colours) for colours in (seen, of_model))
     gain = float(np.clip(a[:, 0].mean() / max(b[:, 0].mean(), 1.0), 0.6, 1.4))
-    b = b * [gain, 1.0, 1.0]
-    return float(np.minimum(np.linalg.norm(a - b, axis=1), 60.0).mean())
+    return float(np.minimum(np.linalg.norm(a - b * [gain, 1.0, 1.0], axis=1), 60.0).mean())
 
 
 def quality(fit: Fit) -> float:

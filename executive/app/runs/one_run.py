@@ -8,7 +8,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from py_trees.behaviour import Behaviour
 
@@ -18,7 +18,6 @@ from executive.app.report.report_page import EndedTree, with_findings, write_rep
 from executive.app.report.run_report import RobotReport, RunReport
 from executive.app.runs.backend import Backend, Durable
 from executive.app.runs.goal_conditions import Share
-from executive.app.runs.page_view import PageView
 from executive.app.runs.signals import ended_by_signals
 from executive.app.runs.simulated import SimulatedBackend, compile_first
 from executive.mission.request import Request
@@ -47,6 +46,9 @@ from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path
 from skills.robot import Pose2D, Robot
 
+if TYPE_CHECKING:
+    from executive.app.runs.page_view import PageView  # understands sentences
+
 _MOST_STARTS: Final = 1000
 
 
@@ -65,7 +67,7 @@ def run_request(
     *,
     visitors: Sequence[RunVisitor] = (),
     control: Control | None = None,
-    page: PageView | None = None,
+    page: "PageView | None" = None,
     live: LiveServer | None = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
@@ -345,9 +347,6 @@ class DisturbanceLog(RunVisitor):
         self._publish(CONTROL, {"t": round(now_s, 6), "what": what, "message": message})
 
 
-_LIBRARY: Final = ctypes.CDLL(None)
-
-
 def return_memory() -> None:
     """Returns freed memory to the system.
 
@@ -356,4 +355,4 @@ def return_memory() -> None:
     """
     gc.collect()
     with suppress(AttributeError):
-        _LIBRARY.malloc_trim(0)
+        ctypes.CDLL(None).malloc_trim(0)

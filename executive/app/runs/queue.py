@@ -7,14 +7,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from executive.app.prepare.from_request import Setting, prepare
 from executive.app.prepare.prepared import Prepared
 from executive.app.report.run_report import RunReport
 from executive.app.runs.backend import Durable
 from executive.app.runs.one_run import FinishedRun, log_name, return_memory, run_request
-from executive.app.runs.page_view import PageView
 from executive.language.questions import Answerer
 from executive.record.work import Profile
 from executive.run.control import Control
@@ -27,6 +26,9 @@ from executive.store.resuming import ended_tree, resumed_tree
 from executive.view.foxglove import LiveServer
 from executive.words.slug import slug
 from skills.inputs.errors import InputError, disk_is_full
+
+if TYPE_CHECKING:
+    from executive.app.runs.page_view import PageView
 
 _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCELLED, MissionState.ERROR)
 

@@ -125,8 +125,7 @@ class SimulatedBackend:
 
     def work(self) -> Mapping[str, int]:
         """The plant's work counters by name."""
-        counts: Mapping[str, int] = self._settled().work()
-        return counts
+        return self._settled().work()
 
     def attach(self, profile: Profile) -> None:
         """Times the plant's steps, the referee, and each robot's control, sensors and cameras."""
@@ -139,8 +138,7 @@ class SimulatedBackend:
 
     def show_live(self) -> Scene:
         """Starts the plant's live picture."""
-        scene: Scene = self._simulation.show_live()
-        return scene
+        return self._simulation.show_live()
 
     def judge(
         self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0

@@ -300,5 +300,4 @@ def _well_placed(p_BP: FloatArray, range_m: tuple[float, float]) -> bool:
 
 def _same(people: list[SeenPerson], other: SeenPerson) -> list[SeenPerson]:
     """Returns the person at the position of an earlier detection, as a list; empty when nobody is there."""
-    near = [p for p in people if math.dist(p.place_W, other.place_W) < _SAME_PERSON_M]
-    return near[:1]
+    return [p for p in people if math.dist(p.place_W, other.place_W) < _SAME_PERSON_M][:1]

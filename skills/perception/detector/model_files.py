@@ -74,11 +74,7 @@ def _box_outputs(classes: int) -> Outputs:
 
 
 def _crop_inputs(classes: int) -> Inputs:
-    return {
-        "chips": ("uint8", (CROP_PX, CROP_PX, 3)),
-        "regions": ("float", (4,)),
-        "logits": ("float", (classes,)),
-    }
+    return {"chips": ("uint8", (CROP_PX, CROP_PX, 3)), "regions": ("float", (4,)), "logits": ("float", (classes,))}
 
 
 PROPOSAL: Final = NetworkKind(

@@ -12,7 +12,7 @@ import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +88,7 @@ class Scene:
         Raises RuntimeError when the rendering process has ended.
         """
         if self._aside is not None:
-            return self._aside.colour(positions, camera)
+            return self._aside.picture(positions, camera, depth=False)
         one = self._cameras[camera]
         image = self.query_at(positions).RenderColorImage(one.colour, one.frame, one.X_FC)
         return np.ascontiguousarray(image.data[..., :3])
@@ -96,7 +96,7 @@ class Scene:
     def depth(self, positions: NDArray[np.float64], camera: int) -> NDArray[np.float32]:
         """Renders the depth (H, W) in m of a camera; out of range it is 0 or infinite. Raises as `colour` does."""
         if self._aside is not None:
-            return self._aside.depth(positions, camera)
+            return self._aside.picture(positions, camera, depth=True)
         one = self._cameras[camera]
         image = self.query_at(positions).RenderDepthImage(one.depth, one.frame, one.X_FC)
         return np.array(image.data[..., 0], dtype=np.float32)
@@ -122,9 +122,9 @@ class _Renderer:
 
     def __init__(self, scene: Scene, cameras: Sequence[MountedCamera]) -> None:
         """Forks the process, which ends with this object."""
-        infos = [(one.colour.core().intrinsics(), one.depth.core().intrinsics()) for one in cameras]
-        self._shapes = [((c.height(), c.width(), 3), (d.height(), d.width())) for c, d in infos]
-        self._memory = mmap.mmap(-1, 4 * max(c.height() * c.width() + d.height() * d.width() for c, d in infos))
+        lenses = [(one.colour.core().intrinsics(), one.depth.core().intrinsics()) for one in cameras]
+        self._shapes = [((c.height(), c.width(), 3), (d.height(), d.width())) for c, d in lenses]
+        self._memory = mmap.mmap(-1, 4 * max(lens.height() * lens.width() for both in lenses for lens in both))
         self._connection, theirs = Pipe()
         process = os.fork()
         if process == 0:
@@ -133,25 +133,20 @@ class _Renderer:
         theirs.close()
         weakref.finalize(self, _end, self._connection, process)
 
-    def colour(self, positions: NDArray[np.float64], camera: int) -> NDArray[np.uint8]:
-        """See `Scene.colour`."""
-        self._ask(b"c", positions, camera)
-        return np.ndarray(self._shapes[camera][0], np.uint8, self._memory).copy()
-
-    def depth(self, positions: NDArray[np.float64], camera: int) -> NDArray[np.float32]:
-        """See `Scene.depth`."""
-        self._ask(b"d", positions, camera)
-        return np.ndarray(self._shapes[camera][1], np.float32, self._memory).copy()
-
-    def _ask(self, what: bytes, positions: NDArray[np.float64], camera: int) -> None:
-        """Waits until a picture lies in the shared memory."""
+    def picture(self, positions: NDArray[np.float64], camera: int, *, depth: bool) -> NDArray[Any]:
+        """Returns the picture or the depth of a camera; see `Scene`."""
         try:
-            self._connection.send_bytes(what + bytes([camera]) + positions.tobytes())
+            self._connection.send_bytes(bytes([depth, camera]) + positions.tobytes())
             trouble = self._connection.recv_bytes()
         except (EOFError, OSError) as error:
             raise RuntimeError("the process that renders the cameras' pictures has ended") from error
         if trouble:
             raise RuntimeError(f"rendering failed: {trouble.decode()}")
+        return self._shared(camera, depth=depth).copy()
+
+    def _shared(self, camera: int, *, depth: bool) -> NDArray[Any]:
+        """The shared memory as a picture or the depth of a camera."""
+        return np.ndarray(self._shapes[camera][depth], np.float32 if depth else np.uint8, self._memory)
 
     def _serve(self, scene: Scene, connection: Connection) -> None:
         """Renders in the forked process until the other end is closed; never returns."""
@@ -160,19 +155,16 @@ class _Renderer:
                 signal.signal(ignored, signal.SIG_IGN)
             gc.disable()
             while True:
-                request = connection.recv_bytes()
-                connection.send_bytes(self._render(scene, request).encode())
+                connection.send_bytes(self._render(scene, connection.recv_bytes()).encode())
         finally:
             os._exit(0)
 
     def _render(self, scene: Scene, request: bytes) -> str:
         """Renders what a request asks for into the shared memory; returns what went wrong."""
-        camera, positions = request[1], np.frombuffer(request[2:], dtype=np.float64)
+        depth, camera, positions = bool(request[0]), request[1], np.frombuffer(request[2:])
         try:
-            if request[:1] == b"c":
-                np.ndarray(self._shapes[camera][0], np.uint8, self._memory)[:] = scene.colour(positions, camera)
-            else:
-                np.ndarray(self._shapes[camera][1], np.float32, self._memory)[:] = scene.depth(positions, camera)
+            shown = (scene.depth if depth else scene.colour)(positions, camera)
+            self._shared(camera, depth=depth)[:] = shown
         except Exception as error:  # told to the run, which ends with it
             return f"{type(error).__name__}: {error}"
         return ""

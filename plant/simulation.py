@@ -85,11 +85,6 @@ class Simulation:
         if self.recorder is not None:
             self.engine.observe(self.recorder)
 
-    def render_aside(self) -> None:
-        """Renders the robots' pictures in a process of its own from now on; call it before threads begin."""
-        if self.engine.world.scene is not None:
-            self.engine.world.scene.render_aside()
-
     def _referee_observes(self, now_s: float) -> None:
         self.referee.observe(self.engine.context, now_s, asleep=self.engine.asleep)
 

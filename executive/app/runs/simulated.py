@@ -57,7 +57,8 @@ class SimulatedBackend:
         """Builds the plant; the seed places the objects. Raises InputError if robots or objects do not fit."""
         self._world, self._robots, self._record = world, robots, record
         self._simulation = simulate(world, robots, seed=seed, record=record, variation=variation, spared=spared)
-        self._simulation.render_aside()
+        if (scene := self._simulation.engine.world.scene) is not None:
+            scene.render_aside()  # before there are threads
         self._steps = WorkThread("errand-plant")
         self._pipeline = Pipeline(self._simulation.engine, self._steps.do)
         self._keep: Callable[[], None] | None = None

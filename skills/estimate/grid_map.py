@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Annotated, Any, Final, Literal
 
@@ -33,10 +33,9 @@ class GridMap:
     """An occupancy grid fixed in the world frame, axes parallel to the world's.
 
     `occupied` and `unknown` are (rows, columns) with row 0 at the smallest y. `origin_m` is the world (x, y) of the
-    outer corner of cell [0, 0]. `distance` is the signed distance (m) from each cell centre to the boundary of the
-    occupied cells: positive outside, negative inside. `height_band_m` is the band of heights above the floor that the
-    grid covers; None when its file does not name one. `notes` are remarks on the file for the user. The constructor
-    raises ValueError for a grid of fewer than 2 x 2 cells.
+    outer corner of cell [0, 0]. `height_band_m` is the band of heights above the floor that the grid covers; None when
+    its file does not name one. `notes` are remarks on the file for the user. The constructor raises ValueError for a
+    grid of fewer than 2 x 2 cells.
     """
 
     occupied: BoolGrid
@@ -45,12 +44,15 @@ class GridMap:
     unknown: BoolGrid | None = None
     height_band_m: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
-    distance: NDArray[np.float32] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.occupied.ndim != 2 or min(self.occupied.shape) < 2:
             raise ValueError("GridMap: occupied must be a grid of at least 2 x 2 cells")
-        object.__setattr__(self, "distance", signed_distance(self.occupied, self.resolution_m))
+
+    @cached_property
+    def distance(self) -> NDArray[np.float32]:
+        """Signed distance (m) from each cell centre to the boundary of the occupied cells; see `signed_distance`."""
+        return signed_distance(self.occupied, self.resolution_m)
 
     @property
     def size_m(self) -> tuple[float, float]:

@@ -216,9 +216,7 @@ class Regions:
         while grown:
             more = {side for sides in joins.values() if sides & reached for side in sides} - reached
             reached, grown = reached | more, bool(more)
-        if not reached & ends:
-            return ()
-        return tuple(_on_a_path(joins, begin | (ends & reached)))
+        return tuple(_on_a_path(joins, begin | (ends & reached))) if reached & ends else ()
 
     def _sides(self, door: Doorway) -> frozenset[int]:
         """The regions on both sides of a door."""

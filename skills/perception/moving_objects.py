@@ -155,7 +155,7 @@ def clusters(points_W: FloatArray, options: MovingOptions, cell_m: float = 0.05)
     """Clusters points (N, 2): cell centres (N, 2) of each cluster that is neither too small nor too wide."""
     if len(points_W) == 0:
         return []
-    cells = np.unique(np.floor(points_W / cell_m).astype(np.int64), axis=0)
+    cells = np.array(sorted(set(map(tuple, np.floor(points_W / cell_m).astype(np.int64).tolist()))))
     reach = max(1, math.ceil(options.join_m / cell_m / 2.0))
     labels, count = cell_labels(cells, reach=reach)
     found = [(cells[labels == label] + 0.5) * cell_m for label in range(1, count)]

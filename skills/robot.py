@@ -16,6 +16,7 @@ import enum
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NewType, Protocol
 
 import numpy as np
@@ -93,7 +94,7 @@ class Odometry:
     X_OB: RigidTransform
     velocity: tuple[float, float, float]
 
-    @property
+    @cached_property
     def pose(self) -> Pose2D:
         """Planar part of X_OB."""
         return Pose2D.from_transform(self.X_OB)
@@ -127,14 +128,24 @@ class Scan:
     X_BL: RigidTransform
     X_OB: RigidTransform
 
+    @cached_property
+    def pose(self) -> Pose2D:
+        """Planar part of X_OB."""
+        return Pose2D.from_transform(self.X_OB)
+
+    @cached_property
+    def sensor_pose(self) -> tuple[FloatArray, FloatArray]:
+        """Rotation (3, 3) and position (3,) of the LiDAR in the levelled body frame, on the floor below the body."""
+        import pydrake.math as drake
+
+        R_FB = drake.RotationMatrix.MakeZRotation(-self.pose.yaw_rad) @ self.X_OB.rotation()
+        p_FL = R_FB.multiply(self.X_BL.translation()) + np.array([0.0, 0.0, self.X_OB.translation()[2]])
+        return np.ascontiguousarray((R_FB @ self.X_BL.rotation()).matrix()), p_FL
+
     def repeats(self, other: Scan) -> bool:
         """Returns whether all ranges, noise included, equal those of another scan, as from a frozen sensor."""
-        ranges, others = self.ranges_m, other.ranges_m
-        if ranges is others:
-            return True
         first = slice(0, 1)  # as a rule noise differs in the first ring already
-        equal = (np.array_equal(ranges[part], others[part], equal_nan=True) for part in (first, slice(None)))
-        return all(equal)
+        return all(self.ranges_m[part].tobytes() == other.ranges_m[part].tobytes() for part in (first, slice(None)))
 
     def points_B(self) -> FloatArray:
         """Returns the points (N, 3) of all valid returns in the body frame."""

@@ -202,7 +202,7 @@ class SensorSuite(
         efforts = self._efforts(positions, rates)
         self.joints: Joints = self._joint_model.update(now_s, positions, rates, efforts)
         self.gripper: Gripper = self._gripper_model.update(now_s, *self._gripper_feels(positions, rates, efforts))
-        load = min(1.0, float(np.linalg.norm(v_WB)) + float(np.abs(rates[self._index.arm]).sum()) / 4.0)
+        load = min(1.0, math.sqrt(v_WB @ v_WB) + float(np.abs(rates[self._index.arm]).sum()) / 4.0)
         self.battery: Battery = self._battery_model.update(now_s, load, docked=self._docked(X_WB, v_WB))
         if now_s - self._scanned_s >= self._lidar_period_s - 1e-6:
             self._scanned_s = now_s
@@ -258,7 +258,7 @@ class SensorSuite(
             return False
         p_WB = X_WB.translation()
         off_m = math.hypot(p_WB[0] - self._dock.x_m, p_WB[1] - self._dock.y_m)
-        return off_m < _DOCKED_WITHIN_M and float(np.linalg.norm(v_WB[:2])) < _STILL_M_S
+        return off_m < _DOCKED_WITHIN_M and math.hypot(v_WB[0], v_WB[1]) < _STILL_M_S
 
     def image(self, source: str, *, visual: bool, depth: bool) -> Image:
         """Renders a picture, its depth, or both, at the state of the last `update`.

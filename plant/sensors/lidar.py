@@ -9,6 +9,7 @@ arithmetic).
 from collections import Counter
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar, cast
 
 import numba
@@ -21,117 +22,142 @@ from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
 from pydrake.systems.framework import Context
 
 from plant.sensors.noise import NoiseTile, NoisySensor
-from plant.sensors.ray_shapes import RayScene, ShapeArrays
+from plant.sensors.ray_shapes import RayScene
 from skills.robot import FloatArray, Scan
 
-Rays = tuple[FloatArray, FloatArray, FloatArray]
-"""Of one column, in a shape's frame: origin, the horizontal direction and up, (3,) each."""
+Triple = tuple[float, float, float]
+Rays = tuple[Triple, Triple, Triple]
+"""Of one column, in a shape's frame: origin, the horizontal direction and up."""
 FunctionT = TypeVar("FunctionT", bound=Callable[..., object])
 
 NO_RETURN_M = 1.0e6
 _EPS = 1.0e-9
 
 
-def _compiled(function: FunctionT) -> FunctionT:
+def _compiled(function: FunctionT, *, fastmath: bool = True) -> FunctionT:
     """Compiles a function with numba: disk cache, fast arithmetic, no GIL; keeps the function's type."""
-    return cast(FunctionT, numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")(function))
+    return cast(FunctionT, numba.njit(cache=True, nogil=True, fastmath=fastmath, error_model="numpy")(function))
 
 
 @_compiled
 def cast_rays(
     kinds: NDArray[np.int64],
     half_extents: FloatArray,
-    rotations_W: FloatArray,
-    positions_W: FloatArray,
-    R_WL: FloatArray,
-    p_WL: FloatArray,
+    poses_BG: FloatArray,
+    bodies: NDArray[np.int64],
+    poses_WB: FloatArray,
+    X_WL: FloatArray,
     elevations: FloatArray,
     azimuths: FloatArray,
 ) -> FloatArray:
     """Casts rays from the lidar frame L to the shapes; returns ranges (azimuths, rings) in metres.
 
-    `azimuths` are evenly spaced, increasing, and cover one turn from azimuths[0]; the shapes are in the world frame.
+    Poses are (3, 4) matrices; `bodies` has the row in `poses_WB` of each shape's body. `azimuths` are evenly spaced,
+    increasing, and cover one turn from azimuths[0].
     """
-    shapes, columns, rings = len(kinds), len(azimuths), len(elevations)
+    shapes = len(kinds)
+    columns, rings = len(azimuths), len(elevations)
     ranges = np.full((columns, rings), NO_RETURN_M)
     farthest = np.full(columns, NO_RETURN_M)
     cos_e, sin_e = np.cos(elevations), np.sin(elevations)
     cos_a, sin_a = np.cos(azimuths), np.sin(azimuths)
-    R_LG, p_LG, origin, nearest = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(shapes)
+    poses_LG, origins, nearest = np.empty((shapes, 3, 4)), np.empty((shapes, 3)), np.empty(shapes)
     for i in range(shapes):
-        nearest[i] = _box_distance(rotations_W[i], positions_W[i], half_extents[i], p_WL)
+        _place(poses_BG[i], poses_WB[bodies[i]], X_WL, poses_LG[i])
+        nearest[i] = _box_distance(poses_LG[i], half_extents[i], origins[i])
     for i in np.argsort(nearest):
-        R_WG, offset = rotations_W[i], positions_W[i] - p_WL
-        for k in range(3):  # written out, because a call of BLAS takes longer than these products
-            p_LG[k] = R_WL[0, k] * offset[0] + R_WL[1, k] * offset[1] + R_WL[2, k] * offset[2]
-            for j in range(3):
-                R_LG[k, j] = R_WL[0, k] * R_WG[0, j] + R_WL[1, k] * R_WG[1, j] + R_WL[2, k] * R_WG[2, j]
-            origin[k] = -(R_WG[0, k] * offset[0] + R_WG[1, k] * offset[1] + R_WG[2, k] * offset[2])
-        first, count = _columns_spanned(R_LG, p_LG, half_extents[i], azimuths)
-        for k in range(count):
-            column = (first + k) % columns
+        X_LG = poses_LG[i]
+        half = (half_extents[i, 0], half_extents[i, 1], half_extents[i, 2])
+        first, count = _columns_spanned(X_LG, half, azimuths)
+        for k in range(first, first + count):
+            column = k % columns
             if farthest[column] <= nearest[i]:
                 continue
-            across = R_LG[0] * cos_a[column] + R_LG[1] * sin_a[column]
-            row = ranges[column]
-            rays = (origin, across, R_LG[2])
+            c, s = cos_a[column], sin_a[column]
+            across = (
+                X_LG[0, 0] * c + X_LG[1, 0] * s,
+                X_LG[0, 1] * c + X_LG[1, 1] * s,
+                X_LG[0, 2] * c + X_LG[1, 2] * s,
+            )
+            origin, up = (origins[i, 0], origins[i, 1], origins[i, 2]), (X_LG[2, 0], X_LG[2, 1], X_LG[2, 2])
+            rays, row = (origin, across, up), ranges[column]
             if kinds[i] == 0:
-                _cast_box(row, rays, cos_e, sin_e, half_extents[i])
+                _cast_box(row, rays, cos_e, sin_e, half)
             elif kinds[i] == 1:
-                _cast_cylinder(row, rays, cos_e, sin_e, half_extents[i])
+                _cast_cylinder(row, rays, cos_e, sin_e, half)
             elif kinds[i] == 2:
-                _cast_capsule(row, rays, cos_e, sin_e, half_extents[i])
+                _cast_capsule(row, rays, cos_e, sin_e, half)
             else:
-                _cast_ellipsoid(row, rays, cos_e, sin_e, half_extents[i])
-            farthest[column] = row.max()
+                _cast_ellipsoid(row, rays, cos_e, sin_e, half)
+            longest = 0.0
+            for ring in range(rings):
+                longest = max(longest, row[ring])
+            farthest[column] = longest
     return ranges
 
 
 @_compiled
-def _box_distance(R_WG: FloatArray, p_WG: FloatArray, half: FloatArray, p_W: FloatArray) -> float:
-    """Distance from a point to an oriented box, 0 inside."""
+def _place(X_BG: FloatArray, X_WB: FloatArray, X_WL: FloatArray, X_LG: FloatArray) -> None:
+    """Computes the pose of a shape in the lidar frame, in place."""
+    for column in range(4):
+        x, y, z = 0.0, 0.0, 0.0
+        if column == 3:
+            x, y, z = X_WB[0, 3] - X_WL[0, 3], X_WB[1, 3] - X_WL[1, 3], X_WB[2, 3] - X_WL[2, 3]
+        for k in range(3):
+            x += X_WB[0, k] * X_BG[k, column]
+            y += X_WB[1, k] * X_BG[k, column]
+            z += X_WB[2, k] * X_BG[k, column]
+        for row in range(3):
+            X_LG[row, column] = X_WL[0, row] * x + X_WL[1, row] * y + X_WL[2, row] * z
+
+
+@_compiled
+def _box_distance(X_LG: FloatArray, half: FloatArray, origin: FloatArray) -> float:
+    """Distance from the lidar to an oriented box, 0 inside; writes its position in the box's frame to `origin`."""
     total = 0.0
     for axis in range(3):
-        along = 0.0
-        for j in range(3):
-            along += R_WG[j, axis] * (p_W[j] - p_WG[j])
-        outside = max(abs(along) - half[axis], 0.0)
+        origin[axis] = -(X_LG[0, axis] * X_LG[0, 3] + X_LG[1, axis] * X_LG[1, 3] + X_LG[2, axis] * X_LG[2, 3])
+        outside = max(abs(origin[axis]) - half[axis], 0.0)
         total += outside * outside
     return float(np.sqrt(total))
 
 
 @_compiled
-def _columns_spanned(R_LG: FloatArray, p_LG: FloatArray, half: FloatArray, azimuths: FloatArray) -> tuple[int, int]:
+def _columns_spanned(X_LG: FloatArray, half: Triple, azimuths: FloatArray) -> tuple[int, int]:
     """First column and number of columns whose vertical plane may meet the box; all columns around the axis."""
     columns = len(azimuths)
-    centre = np.arctan2(p_LG[1], p_LG[0])
+    cx, cy = (X_LG[0, 3], X_LG[1, 3]) if np.hypot(X_LG[0, 3], X_LG[1, 3]) > _EPS else (1.0, 0.0)
     low, high = 0.0, 0.0
+    left, right = (1.0, 0.0), (1.0, 0.0)
     for corner in range(8):
         sx = half[0] if corner & 1 else -half[0]
         sy = half[1] if corner & 2 else -half[1]
         sz = half[2] if corner & 4 else -half[2]
-        x = p_LG[0] + R_LG[0, 0] * sx + R_LG[0, 1] * sy + R_LG[0, 2] * sz
-        y = p_LG[1] + R_LG[1, 0] * sx + R_LG[1, 1] * sy + R_LG[1, 2] * sz
-        angle = np.arctan2(y, x) - centre
-        if angle > np.pi:
-            angle -= 2.0 * np.pi
-        elif angle < -np.pi:
-            angle += 2.0 * np.pi
-        low, high = min(low, angle), max(high, angle)
+        x = X_LG[0, 3] + X_LG[0, 0] * sx + X_LG[0, 1] * sy + X_LG[0, 2] * sz
+        y = X_LG[1, 3] + X_LG[1, 0] * sx + X_LG[1, 1] * sy + X_LG[1, 2] * sz
+        ahead, aside = cx * x + cy * y, cx * y - cy * x
+        turned = aside / max(abs(ahead) + abs(aside), _EPS * _EPS)
+        if ahead < 0.0:
+            turned = (2.0 if aside >= 0.0 else -2.0) - turned
+        if turned > high:
+            high, left = turned, (ahead, aside)
+        elif turned < low:
+            low, right = turned, (ahead, aside)
+    low, high = np.arctan2(right[1], right[0]), np.arctan2(left[1], left[0])
     if high - low >= np.pi - 1e-6:
         return 0, columns
-    step = 2.0 * np.pi / columns
+    step, centre = 2.0 * np.pi / columns, np.arctan2(cy, cx)
     first = int(np.ceil((centre + low - azimuths[0]) / step - 1e-6))
     last = int(np.floor((centre + high - azimuths[0]) / step + 1e-6))
     return first, max(0, last - first + 1)
 
 
 @_compiled
-def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
+def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Triple) -> None:
     """Shortens one column's ranges to a box; the loop has no branches, so that it is vectorised."""
     origin, across, up = rays
-    ox, oy, oz = origin[0], origin[1], origin[2]
-    hx, hy, hz = half[0], half[1], half[2]
+    ox, oy, oz = origin
+    hx, hy, hz = half
     for ring in range(len(cos_e)):
         dx = cos_e[ring] * across[0] + sin_e[ring] * up[0]
         dy = cos_e[ring] * across[1] + sin_e[ring] * up[1]
@@ -149,10 +175,10 @@ def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray,
 
 
 @_compiled
-def _cast_cylinder(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
+def _cast_cylinder(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Triple) -> None:
     """Shortens one column's ranges to a cylinder along its z axis: its wall, cut by the slab between the caps."""
     origin, across, up = rays
-    ox, oy, oz = origin[0], origin[1], origin[2]
+    ox, oy, oz = origin
     c = ox * ox + oy * oy - half[0] * half[0]
     for ring in range(len(cos_e)):
         dx = cos_e[ring] * across[0] + sin_e[ring] * up[0]
@@ -171,7 +197,7 @@ def _cast_cylinder(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatA
 
 
 @_compiled
-def _cast_ellipsoid(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
+def _cast_ellipsoid(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Triple) -> None:
     """Shortens one column's ranges to an ellipsoid, by scaling space until it is the unit ball."""
     origin, across, up = rays
     ox, oy, oz = origin[0] / half[0], origin[1] / half[1], origin[2] / half[2]
@@ -189,16 +215,14 @@ def _cast_ellipsoid(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: Float
 
 
 @_compiled
-def _cast_capsule(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
+def _cast_capsule(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Triple) -> None:
     """Shortens one column's ranges to a capsule along its z axis: a cylinder and two spheres (half[2] includes one)."""
     origin, across, up = rays
     straight = half[2] - half[0]
-    barrel = np.array([half[0], half[0], straight])
-    ball = np.array([half[0], half[0], half[0]])
-    end = np.array([0.0, 0.0, straight])
-    _cast_cylinder(row, rays, cos_e, sin_e, barrel)
-    _cast_ellipsoid(row, (origin - end, across, up), cos_e, sin_e, ball)
-    _cast_ellipsoid(row, (origin + end, across, up), cos_e, sin_e, ball)
+    ball = (half[0], half[0], half[0])
+    _cast_cylinder(row, rays, cos_e, sin_e, (half[0], half[0], straight))
+    _cast_ellipsoid(row, ((origin[0], origin[1], origin[2] - straight), across, up), cos_e, sin_e, ball)
+    _cast_ellipsoid(row, ((origin[0], origin[1], origin[2] + straight), across, up), cos_e, sin_e, ball)
 
 
 @dataclass(frozen=True)
@@ -260,53 +284,50 @@ class Lidar(NoisySensor):
         self._azimuths = self._turn[self.spec.visible_columns()]
         self._grain = NoiseTile(rng, len(self._elevations), len(self._azimuths))
 
-    def scan(
-        self, plant_context: Context, stamp_s: float, X_OB: RigidTransform, X_BL: RigidTransform | None = None
-    ) -> Scan:
-        """Takes one revolution at the context's state. `X_OB` is the odometry at the same time.
-
-        `X_BL` is the LiDAR's pose in the body frame according to the robot, by default the mounted pose.
-        """
-        return self.revolution(plant_context, stamp_s, X_OB, X_BL)()
-
     def revolution(
         self, plant_context: Context, stamp_s: float, X_OB: RigidTransform, X_BL: RigidTransform | None = None
     ) -> Callable[[], Scan]:
-        """Returns a function that computes a scan for the context's present state; call it once."""
+        """Returns a function that computes a scan for the context's present state; call it once.
+
+        `X_OB` is the odometry at the same time, `X_BL` the LiDAR's pose in the body frame according to the robot (None:
+        the mounted pose).
+        """
         X_WL = self._plant.EvalBodyPoseInWorld(plant_context, self._body) @ self._X_BL
-        shapes = self._scene.world_shapes(plant_context)
+        poses_WB = self._scene.body_poses(plant_context)
         return lambda: Scan(
             stamp_s=stamp_s,
-            ranges_m=self._measured(self._ranges(shapes, X_WL)),
+            ranges_m=self._measured(self._ranges(poses_WB, X_WL)),
             elevations_rad=self._elevations,
             azimuths_rad=self._azimuths,
             X_BL=self._X_BL if X_BL is None else X_BL,
             X_OB=X_OB,
         )
 
-    def true_ranges(self, plant_context: Context, X_WL: RigidTransform) -> NDArray[np.float32]:
-        """Noise-free ranges (rings, azimuths) from a pose; `NO_RETURN_M` where a ray hits nothing."""
-        return self._ranges(self._scene.world_shapes(plant_context), X_WL)
-
-    def _ranges(self, shapes: ShapeArrays, X_WL: RigidTransform) -> NDArray[np.float32]:
-        """Casts all rays of a revolution; returns ranges (rings, azimuths) in metres."""
+    def _ranges(self, poses_WB: FloatArray, X_WL: RigidTransform) -> FloatArray:
+        """Casts all rays of a whole turn; returns ranges (azimuths, rings) in metres."""
         self._work["lidar_rays"] += len(self._elevations) * len(self._turn)
-        ranges = cast_rays(
-            shapes.kinds,
-            shapes.half_extents_m,
-            shapes.rotations,
-            shapes.positions_m,
-            np.ascontiguousarray(X_WL.rotation().matrix()),
-            np.ascontiguousarray(X_WL.translation()),
-            self._elevations,
-            self._turn,
-        )
-        return np.ascontiguousarray(ranges.T[:, self.spec.visible_columns()], dtype=np.float32)
+        scene = self._scene
+        pose, rays = np.ascontiguousarray(X_WL.GetAsMatrix34()), (self._elevations, self._turn)
+        return cast_rays(scene.kinds, scene.half_extents_m, scene.poses_BG, scene.bodies, poses_WB, pose, *rays)
 
-    def _measured(self, ranges_m: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Adds noise to ranges; lost returns and returns out of range become NaN."""
+    def _measured(self, ranges_m: FloatArray) -> NDArray[np.float32]:
+        """Ranges (rings, azimuths) with noise; lost returns and returns out of range become NaN."""
         spec = self.spec
-        noisy = ranges_m + np.float32(spec.sigma_m) * self._grain.crop()[..., 0]
-        lost = (noisy < spec.min_range_m) | (noisy > min(spec.max_range_m, NO_RETURN_M / 2.0))
-        lost.reshape(-1)[self._rng.integers(0, lost.size, self._rng.binomial(lost.size, spec.dropout))] = True
-        return np.where(lost, np.float32(np.nan), noisy)
+        limits = np.float32(spec.min_range_m), np.float32(min(spec.max_range_m, NO_RETURN_M / 2.0))
+        noisy = _with_noise(ranges_m[spec.visible_columns()], self._grain.crop()[..., 0], spec.sigma_m, limits)
+        noisy.reshape(-1)[self._rng.integers(0, noisy.size, self._rng.binomial(noisy.size, spec.dropout))] = np.nan
+        return noisy
+
+
+@partial(_compiled, fastmath=False)
+def _with_noise(
+    ranges_m: FloatArray, grain: NDArray[np.float32], sigma_m: float, limits_m: tuple[np.float32, np.float32]
+) -> NDArray[np.float32]:
+    """Adds grain (rings, azimuths) to ranges (azimuths, rings), in single precision; NaN outside the limits."""
+    columns, rings = ranges_m.shape
+    noisy = np.empty((rings, columns), np.float32)
+    for ring in range(rings):
+        for column in range(columns):
+            r = np.float32(ranges_m[column, ring]) + np.float32(sigma_m) * grain[ring, column]
+            noisy[ring, column] = r if limits_m[0] <= r <= limits_m[1] else np.float32(np.nan)
+    return noisy

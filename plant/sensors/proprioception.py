@@ -1,5 +1,6 @@
 """Proprioceptive sensors with bias and noise: joints, inertial measurement unit, battery, odometry, gripper."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -72,14 +73,11 @@ class ImuModel(NoisySensor, saved=("_last",)):
         """Measures at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in W."""
         acceleration_W = self._acceleration(stamp_s, np.asarray(v_WB_W, dtype=np.float64))
         R_BW = X_WB.rotation().matrix().T
-        rates = R_BW @ w_WB_W + self._gyro_bias + self._rng.normal(0.0, self._noise.gyro_rad_s, 3)
+        noise = self._rng.standard_normal((2, 3))
+        wx, wy, wz = (R_BW @ w_WB_W + self._gyro_bias + self._noise.gyro_rad_s * noise[0]).tolist()
         force = R_BW @ (acceleration_W - GRAVITY_W) + self._force_bias
-        force = force + self._rng.normal(0.0, self._noise.accelerometer_m_s2, 3)
-        return Imu(
-            stamp_s,
-            (float(rates[0]), float(rates[1]), float(rates[2])),
-            (float(force[0]), float(force[1]), float(force[2])),
-        )
+        fx, fy, fz = (force + self._noise.accelerometer_m_s2 * noise[1]).tolist()
+        return Imu(stamp_s, (wx, wy, wz), (fx, fy, fz))
 
     def _acceleration(self, stamp_s: float, v_WB_W: FloatArray) -> FloatArray:
         """Mean acceleration since the last update; zero at the first one."""
@@ -187,7 +185,9 @@ class OdometryModel(NoisySensor, saved=("_last",)):
         else:
             estimate = self._last.estimate
         self._last = _Last(stamp_s, true, estimate)
-        return Odometry(stamp_s, self._lifted(estimate, X_WB), self._velocity(true.yaw_rad, w_WB_W, v_WB_W))
+        noise = self._rng.standard_normal(6).tolist()
+        X_OB = self._lifted(estimate, X_WB, noise[:3])
+        return Odometry(stamp_s, X_OB, self._velocity(true.yaw_rad, w_WB_W, v_WB_W, noise[3:]))
 
     def _step(self, last: _Last, true: Pose2D, dt_s: float) -> Pose2D:
         """Next estimate: the true motion since the last update, in the body frame, with errors."""
@@ -195,40 +195,42 @@ class OdometryModel(NoisySensor, saved=("_last",)):
         turn = _wrapped(true.yaw_rad - last.true.yaw_rad)
         distance = float(np.hypot(forward, left))
         moving = distance / dt_s > self._noise.still_m_s or abs(turn) / dt_s > self._noise.still_rad_s
-        walk = self._rng.standard_normal(3) * np.sqrt(distance) * moving
-        forward = forward * self._scale + self._noise.wander_m * float(walk[0])
-        left = left * self._scale + self._noise.wander_m * float(walk[1])
-        turn = turn * self._turn_scale + self._noise.wander_rad * float(walk[2])
+        root = math.sqrt(distance) * moving
+        along, across, about = self._rng.standard_normal(3).tolist()
+        forward = forward * self._scale + self._noise.wander_m * (along * root)
+        left = left * self._scale + self._noise.wander_m * (across * root)
+        turn = turn * self._turn_scale + self._noise.wander_rad * (about * root)
         turn += self._drift_rad_per_m * distance * moving
         dx, dy = _turned(forward, left, last.estimate.yaw_rad)
         estimate = last.estimate
         return Pose2D(estimate.x_m + dx, estimate.y_m + dy, _wrapped(estimate.yaw_rad + turn))
 
-    def _lifted(self, estimate: Pose2D, X_WB: RigidTransform) -> RigidTransform:
-        """Pose X_OB: the planar estimate with the true height, roll and pitch, and noise on these."""
-        rpy, noise = RollPitchYaw(X_WB.rotation()), self._noise
-        roll = rpy.roll_angle() + float(self._rng.normal(0.0, noise.tilt_rad))
-        pitch = rpy.pitch_angle() + float(self._rng.normal(0.0, noise.tilt_rad))
-        height = float(X_WB.translation()[2]) + float(self._rng.normal(0.0, noise.height_m))
-        return RigidTransform(RollPitchYaw(roll, pitch, estimate.yaw_rad), [estimate.x_m, estimate.y_m, height])
+    def _lifted(self, estimate: Pose2D, X_WB: RigidTransform, noise: Sequence[float]) -> RigidTransform:
+        """Pose X_OB: the planar estimate with the true height, roll and pitch, and standard normal `noise` on these."""
+        rpy, (roll, pitch, height) = RollPitchYaw(R=X_WB.rotation()), noise
+        tilt_rad, height_m = self._noise.tilt_rad, float(X_WB.translation()[2]) + self._noise.height_m * height
+        roll_rad, pitch_rad = rpy.roll_angle() + tilt_rad * roll, rpy.pitch_angle() + tilt_rad * pitch
+        place = np.array([estimate.x_m, estimate.y_m, height_m])
+        return RigidTransform(RollPitchYaw(roll_rad, pitch_rad, estimate.yaw_rad), place)
 
-    def _velocity(self, yaw_rad: float, w_WB_W: FloatArray, v_WB_W: FloatArray) -> tuple[float, float, float]:
-        """Velocity (vx, vy, wz) in the levelled body frame, with noise."""
+    def _velocity(
+        self, yaw_rad: float, w_WB_W: FloatArray, v_WB_W: FloatArray, noise: Sequence[float]
+    ) -> tuple[float, float, float]:
+        """Velocity (vx, vy, wz) in the levelled body frame, with standard normal `noise`."""
         vx, vy = _turned(float(v_WB_W[0]), float(v_WB_W[1]), -yaw_rad)
         speed_m_s, turn_rad_s = self._noise.velocity_m_s, self._noise.turn_rate_rad_s
-        noise = self._rng.standard_normal(3) * (speed_m_s, speed_m_s, turn_rad_s)
-        return vx + float(noise[0]), vy + float(noise[1]), float(w_WB_W[2]) + float(noise[2])
+        return vx + speed_m_s * noise[0], vy + speed_m_s * noise[1], float(w_WB_W[2]) + turn_rad_s * noise[2]
 
 
 def _turned(x: float, y: float, angle_rad: float) -> tuple[float, float]:
     """Rotates (x, y) counter-clockwise."""
-    c, s = float(np.cos(angle_rad)), float(np.sin(angle_rad))
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
     return c * x - s * y, s * x + c * y
 
 
 def _wrapped(angle_rad: float) -> float:
     """Angle, wrapped to [-pi, pi)."""
-    return float((angle_rad + np.pi) % (2.0 * np.pi) - np.pi)
+    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
 
 
 _TOLERANCE_S = 1e-6

@@ -27,7 +27,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
+from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
 from pydrake.systems.framework import Context
 
 from skills.robot import FloatArray
@@ -55,9 +55,6 @@ class ShapeArrays:
     rotations: FloatArray
     positions_m: FloatArray
 
-    def __len__(self) -> int:
-        return len(self.kinds)
-
     @staticmethod
     def from_rows(rows: list[Row]) -> ShapeArrays:
         """Stacks rows of (kind, half extents, X_FG)."""
@@ -70,9 +67,10 @@ class ShapeArrays:
 
 
 class RayScene:
-    """Proximity shapes of a plant, without those of excluded model instances, at the poses in a context.
+    """Proximity shapes of a plant, without those of excluded model instances, for `cast_rays`.
 
-    Shapes on anchored bodies are placed once; the others follow their bodies.
+    `poses_BG` are poses (N, 3, 4) in the frames of the shapes' bodies, `bodies` the rows (N,) of these in `body_poses`.
+    Row 0 is the world, to which anchored bodies belong.
     """
 
     def __init__(
@@ -82,51 +80,29 @@ class RayScene:
         exclude_instances: Collection[ModelInstanceIndex] = (),
     ) -> None:
         """Reads the shapes of a finalized plant that is registered with the inspector's scene graph."""
-        self._plant = plant
         excluded = {int(instance) for instance in exclude_instances}
         default_context = plant.CreateDefaultContext()
-        anchored: list[Row] = []
-        moving: list[Row] = []
-        self._bodies: list[RigidBody] = []
-        body_slots: list[int] = []
+        rows: list[Row] = []
+        bodies: list[int] = []
+        row_of = {int(plant.world_body().index()): 0}
         for geometry in inspector.GetGeometryIds(GeometrySet(inspector.GetAllGeometryIds()), Role.kProximity):
             body = plant.GetBodyFromFrameId(inspector.GetFrameId(geometry))
             if body is None or int(body.model_instance()) in excluded:
                 continue
-            row = shape_row(inspector, geometry)
+            kind, half, X_BG = shape_row(inspector, geometry)
             if plant.IsAnchored(body):
-                X_WF = plant.EvalBodyPoseInWorld(default_context, body)
-                anchored.append((row[0], row[1], X_WF @ row[2]))
-            else:
-                body_slots.append(self._slot(body))
-                moving.append(row)
-        self._anchored = ShapeArrays.from_rows(anchored)
-        self._moving = ShapeArrays.from_rows(moving)
-        self._body_slots = np.array(body_slots, dtype=np.int64)
-        self._kinds = np.concatenate([self._anchored.kinds, self._moving.kinds])
-        self._half_extents_m = np.concatenate([self._anchored.half_extents_m, self._moving.half_extents_m])
+                X_BG, body = plant.EvalBodyPoseInWorld(default_context, body) @ X_BG, plant.world_body()
+            rows.append((kind, half, X_BG))
+            bodies.append(row_of.setdefault(int(body.index()), len(row_of)))
+        shapes = ShapeArrays.from_rows(rows)
+        self.kinds, self.half_extents_m = shapes.kinds, shapes.half_extents_m
+        self.poses_BG = np.concatenate([shapes.rotations, shapes.positions_m[..., None]], axis=2)
+        self.bodies = np.array(bodies, dtype=np.int64)
+        self._plant, self._bodies = plant, [plant.get_body(BodyIndex(index)) for index in row_of]
 
-    def world_shapes(self, plant_context: Context) -> ShapeArrays:
-        """Returns all shapes in the world frame at the context's state."""
-        if not len(self._moving):
-            return self._anchored
-        poses = [self._plant.EvalBodyPoseInWorld(plant_context, body).GetAsMatrix34() for body in self._bodies]
-        R_WF, p_WF = (np.array(poses)[:, :, part][self._body_slots] for part in (slice(3), 3))
-        moved_p = np.einsum("nij,nj->ni", R_WF, self._moving.positions_m) + p_WF
-        return ShapeArrays(
-            self._kinds,
-            self._half_extents_m,
-            np.concatenate([self._anchored.rotations, R_WF @ self._moving.rotations]),
-            np.concatenate([self._anchored.positions_m, moved_p]),
-        )
-
-    def _slot(self, body: RigidBody) -> int:
-        """Index of a moving body in the list of bodies; adds a new body to the list."""
-        for slot, known in enumerate(self._bodies):
-            if known.index() == body.index():
-                return slot
-        self._bodies.append(body)
-        return len(self._bodies) - 1
+    def body_poses(self, plant_context: Context) -> FloatArray:
+        """Poses (bodies, 3, 4) in the world of the bodies with shapes, at the context's state."""
+        return np.array([self._plant.EvalBodyPoseInWorld(plant_context, each).GetAsMatrix34() for each in self._bodies])
 
 
 def shape_row(inspector: SceneGraphInspector, geometry: GeometryId) -> Row:

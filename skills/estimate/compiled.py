@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
+Triple = tuple[float, float, float]
+"""A pose (x, y, yaw), or the frame of a grid (cell size, and x and y of its corner)."""
 
 
 def compiled(function: FunctionT) -> FunctionT:
@@ -66,17 +68,24 @@ def bilinear(field: NDArray[np.float32], u: float, v: float) -> float:
 
 
 @compiled
+def distance_at(
+    field: NDArray[np.float32], resolution_m: float, x0_m: float, y0_m: float, x_m: float, y_m: float
+) -> float:
+    """Distance (m) at a point, from a distance field; outside the field, minus the distance to its edge."""
+    rows, columns = field.shape
+    u, v = (x_m - x0_m) / resolution_m, (y_m - y0_m) / resolution_m
+    du, dv = max(-u, u - columns, 0.0), max(-v, v - rows, 0.0)
+    if du > 0.0 or dv > 0.0:
+        return -math.hypot(du, dv) * resolution_m
+    return bilinear(field, u - 0.5, v - 0.5)
+
+
+@compiled
 def distances(
     field: NDArray[np.float32], resolution_m: float, x0_m: float, y0_m: float, points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Distances (m) at points (N, 2), from a distance field; outside the field, minus the distance to its edge."""
-    rows, columns = field.shape
+    """Distances (m) at points (N, 2), as `distance_at`."""
     values = np.empty(points.shape[0])
     for n in range(points.shape[0]):
-        u, v = (points[n, 0] - x0_m) / resolution_m, (points[n, 1] - y0_m) / resolution_m
-        du, dv = max(-u, u - columns, 0.0), max(-v, v - rows, 0.0)
-        if du > 0.0 or dv > 0.0:
-            values[n] = -math.hypot(du, dv) * resolution_m
-        else:
-            values[n] = bilinear(field, u - 0.5, v - 0.5)
+        values[n] = distance_at(field, resolution_m, x0_m, y0_m, points[n, 0], points[n, 1])
     return values

@@ -10,16 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import LocalisationEstimate
-from skills.estimate.compiled import compiled, distances
+from skills.estimate.compiled import Triple, compiled, distance_at, distances
 from skills.estimate.grid_map import GridMap
-from skills.estimate.scan_points import (
-    SelfFilter,
-    outside_discs,
-    placed_points,
-    points_in_body_axes,
-    scan_points,
-    sensor_pose,
-)
+from skills.estimate.scan_points import SelfFilter, outside_discs, points_in_body_axes, scan_points
 from skills.geometry import compose
 from skills.quantities import Count, Delay, Height, Length, Margin
 from skills.robot import FloatArray, Pose2D, Robot, Scan
@@ -60,6 +53,7 @@ class LayeredCostmap:
         self._until_s = np.full(self._layer.occupied.shape, -math.inf)
         self._candidate_s = np.full(self._layer.occupied.shape, -math.inf)
         self._height_m = np.zeros(self._layer.occupied.shape)
+        self._cells: NDArray[np.int64] = np.empty((0, 2), dtype=np.int64)
         self._field: NDArray[np.float32] | None = None
         self._changed = False
         self._next_expiry_s = math.inf
@@ -77,14 +71,13 @@ class LayeredCostmap:
         field = self._layer_field()
         if field is None:
             return clearance
-        x0_m, y0_m = self._layer.origin_m
-        return np.minimum(clearance, distances(field, self._layer.resolution_m, x0_m, y0_m, points))
+        return np.minimum(clearance, distances(field, *self._layer.frame, points))
 
     def obstacle_cells(self, within_s: float = math.inf) -> FloatArray:
         """Centres (x, y) of the blocked cells of the obstacle layer, or of those hit within a time."""
-        cells = self._active()
         expires_s = self._now_s + max(0.0, self._options.memory_s - within_s)
-        return self._layer.centres(cells[self._until_s[cells[:, 0], cells[:, 1]] > expires_s])
+        rows, columns = self._cells.T
+        return self._layer.centres(self._cells[self._until_s[rows, columns] > expires_s])
 
     def unexplained_returns(self) -> tuple[float, FloatArray]:
         """The last scan's stamp, and its returns (N, 3) that the surveyed grid does not explain."""
@@ -92,7 +85,7 @@ class LayeredCostmap:
 
     def clear_obstacles(self, within_W: FloatArray | None = None) -> int:
         """Clears the obstacle layer, or only its cells within discs; returns the number of blocked cells cleared."""
-        cells = self._active()
+        cells = self._cells
         if within_W is None:
             self._candidate_s.fill(-math.inf)
         else:
@@ -128,71 +121,46 @@ class LayeredCostmap:
         if self._X_WB is None or self._filter is None or len(points_W) == 0:
             return
         own = self._filter.foreign(points_in_body_axes(points_W, self._X_WB), np.empty((0, 3)))
-        points = self._outside_robots(self._unexplained(points_W[own]))
+        points = points_W[own & self.is_unexplained(points_W) & outside_discs(points_W, self._left_out_W)]
         if len(points) == 0:
             return
-        cells, first, counts = np.unique(self._layer.cells(points), axis=0, return_index=True, return_counts=True)
+        hit = np.ravel_multi_index(tuple(self._layer.cells(points).T), self._until_s.shape)
+        cells, first, counts = np.unique(hit, return_index=True, return_counts=True)
         enough = counts >= self._options.min_points_per_cell
-        rows, columns = cells[enough].T
+        rows, columns = np.unravel_index(cells[enough], self._until_s.shape)
         self._until_s[rows, columns] = np.maximum(self._until_s[rows, columns], stamp_s + self._options.memory_s)
         self._height_m[rows, columns] = points[first[enough], 2]
         self._note_change()
 
     def _note_change(self) -> None:
-        """Notes that the set of blocked cells has changed."""
-        blocked = self._until_s[self._until_s > self._now_s]
-        self._next_expiry_s = float(blocked.min()) if len(blocked) else math.inf
+        """Notes that the set of blocked cells, by (row, column), has changed."""
+        blocked = np.flatnonzero(self._until_s > self._now_s)
+        self._cells = np.column_stack(np.unravel_index(blocked, self._until_s.shape))
+        self._next_expiry_s = float(self._until_s.flat[blocked].min(initial=math.inf))
         self._changed = True
-
-    def _active(self) -> NDArray[np.int64]:
-        """The (row, column) of the blocked cells."""
-        if math.isinf(self._next_expiry_s):
-            return np.empty((0, 2), dtype=np.int64)
-        return np.argwhere(self._until_s > self._now_s)
 
     def _take_scan(self, scan: Scan, X_WO: Pose2D, own: SelfFilter, robot: Robot) -> None:
         """Clears cells beyond which beams pass, then marks cells with returns that neither map nor robot explains."""
-        options = self._options
-        X_WF = compose(X_WO, Pose2D.from_transform(scan.X_OB))
-        changed = self._clear(scan, X_WF)
-        points_F = scan_points(
+        options, X_WF = self._options, compose(X_WO, scan.pose)
+        pose = (X_WF.x_m, X_WF.y_m, X_WF.yaw_rad)
+        layer, heights_m = self._layer.frame, self._height_m
+        beams = np.ascontiguousarray(scan.ranges_m), scan.elevations_rad, scan.azimuths_rad
+        changed = clear_cells(beams, scan.sensor_pose, pose, layer, self._cells, self._until_s, heights_m)
+        seen_F = scan_points(
             scan, azimuths=options.azimuths, heights_m=options.heights_m, max_range_m=options.max_range_m
         )
-        points = self._unexplained(placed_points(points_F, X_WF))
+        points_F, points = _unexplained(seen_F, pose, self.keepout.distance, self.keepout.frame, options.explained_m)
         if len(points):
-            holding = robot.gripper().holding
-            points = points[own.foreign(points_in_body_axes(points, X_WF), own.arm_F(robot, scan), holding=holding)]
+            points = points[own.foreign(points_F, own.arm_F(robot, scan), holding=robot.gripper().holding)]
         self._returns_W = points
-        points = self._outside_robots(points)
         times = (scan.stamp_s, options.confirm_s, options.memory_s)
-        cells = self._layer.cells(points)
-        changed |= mark_cells(cells, points[:, 2].copy(), times, self._candidate_s, self._until_s, self._height_m)
-        if changed:
+        points = points[outside_discs(points, self._left_out_W)]
+        if mark_cells(points, layer, times, self._candidate_s, self._until_s, heights_m) or changed:
             self._note_change()
-
-    def _clear(self, scan: Scan, X_WF: Pose2D) -> bool:
-        """Clears the cells beyond which the scan's beams pass; returns whether there were any."""
-        active = self._active()
-        if len(active) == 0:
-            return False
-        heights = self._height_m[active[:, 0], active[:, 1]]
-        centres_F = points_in_body_axes(np.column_stack([self._layer.centres(active), heights]), X_WF)
-        gone = active[clear_cells(scan, centres_F, self._layer.resolution_m)]
-        self._until_s[gone[:, 0], gone[:, 1]] = -math.inf
-        return len(gone) > 0
 
     def is_unexplained(self, points_W: FloatArray) -> NDArray[np.bool_]:
         """Returns whether each (x, y, z) row lies on the grid and away from its occupied cells."""
         return np.asarray(self.keepout.distance_m(points_W) > self._options.explained_m)
-
-    def _unexplained(self, points_W: FloatArray) -> FloatArray:
-        return np.ascontiguousarray(points_W[self.is_unexplained(points_W)])
-
-    def _outside_robots(self, points_W: FloatArray) -> FloatArray:
-        """The (x, y, z) rows outside the discs of other robots."""
-        if not len(self._left_out_W) or not len(points_W):
-            return points_W
-        return np.ascontiguousarray(points_W[outside_discs(points_W, self._left_out_W)])
 
     def _layer_field(self) -> NDArray[np.float32] | None:
         """Distance (m) from each cell of the obstacle layer to the nearest blocked cell; None when none is blocked."""
@@ -205,22 +173,62 @@ class LayeredCostmap:
         return self._field
 
 
-def clear_cells(scan: Scan, centres_F: FloatArray, cell_m: float) -> NDArray[np.bool_]:
-    """Returns whether the beams of a whole revolution pass beyond each point (N, 3) in the levelled body frame F.
+@compiled
+def _unexplained(
+    points_F: FloatArray, X_WF: Triple, distance: NDArray[np.float32], frame: Triple, explained_m: float
+) -> tuple[FloatArray, FloatArray]:
+    """The points farther than explained_m from the occupied cells of a grid, (N, 3) in frame F and in the world."""
+    kept_F, kept_W, count = np.empty((points_F.shape[0], 3)), np.empty((points_F.shape[0], 3)), 0
+    c, s = math.cos(X_WF[2]), math.sin(X_WF[2])
+    for n in range(points_F.shape[0]):
+        x, y = points_F[n, 0], points_F[n, 1]
+        x, y = X_WF[0] + c * x - s * y, X_WF[1] + s * x + c * y
+        if distance_at(distance, frame[0], frame[1], frame[2], x, y) > explained_m:
+            kept_F[count] = points_F[n, :3]
+            kept_W[count, 0], kept_W[count, 1], kept_W[count, 2] = x, y, points_F[n, 2]
+            count += 1
+    return kept_F[:count], kept_W[:count]
 
-    A point is free when all beams that could have hit it continue for 0.3 m at least. A point that no beam can hit (too
-    low, too near) is free when a free one lies beside it, since both were seen on one object.
-    """
-    rotation, translation = sensor_pose(scan)
-    places_L = np.ascontiguousarray((centres_F - translation) @ rotation)
-    return _clear(np.ascontiguousarray(scan.ranges_m), scan.elevations_rad, scan.azimuths_rad, places_L, cell_m)
+
+Beams = tuple[NDArray[np.float32], FloatArray, FloatArray]
+"""Ranges (rings, azimuths), elevations and azimuths of a whole revolution."""
 
 
 @compiled
-def _clear(
-    ranges: NDArray[np.float32], elevations: FloatArray, azimuths: FloatArray, places: FloatArray, cell_m: float
-) -> NDArray[np.bool_]:
-    """Compiled loop of `clear_cells`."""
+def clear_cells(
+    beams: Beams,
+    sensor_pose: tuple[FloatArray, FloatArray],
+    X_WF: Triple,
+    frame: Triple,
+    cells: NDArray[np.int64],
+    until_s: FloatArray,
+    height_m: FloatArray,
+) -> bool:
+    """Clears, in place, those of the blocked `cells` that beams pass beyond; returns whether there were any.
+
+    A cell is free when all beams that could have hit it continue for 0.3 m at least. A cell that no beam can hit (too
+    low, too near) is free when a free one lies beside it, since both were seen on one object.
+    """
+    rotation, translation = sensor_pose
+    c, s = math.cos(X_WF[2]), math.sin(X_WF[2])
+    places = np.empty((cells.shape[0], 3))
+    for n in range(cells.shape[0]):
+        dx = (cells[n, 1] + 0.5) * frame[0] + frame[1] - X_WF[0]
+        dy = (cells[n, 0] + 0.5) * frame[0] + frame[2] - X_WF[1]
+        x, y = c * dx + s * dy - translation[0], -s * dx + c * dy - translation[1]
+        z = height_m[cells[n, 0], cells[n, 1]] - translation[2]
+        for axis in range(3):
+            places[n, axis] = x * rotation[0, axis] + y * rotation[1, axis] + z * rotation[2, axis]
+    gone = _passed(beams, places, frame[0])
+    for k in np.flatnonzero(gone):
+        until_s[cells[k, 0], cells[k, 1]] = -math.inf
+    return bool(gone.any())
+
+
+@compiled
+def _passed(beams: Beams, places: FloatArray, cell_m: float) -> NDArray[np.bool_]:
+    """Returns whether each position (N, 3), in the LiDAR's frame, is free as in `clear_cells`."""
+    ranges, elevations, azimuths = beams
     count = azimuths.shape[0]
     spacing = azimuths[1] - azimuths[0]
     ring_gap = abs(elevations[1] - elevations[0])
@@ -265,30 +273,27 @@ def _spread(
 
 @compiled
 def mark_cells(
-    cells: NDArray[np.int64],
-    heights: FloatArray,
-    times: tuple[float, float, float],
-    candidate_s: FloatArray,
-    until_s: FloatArray,
-    height_m: FloatArray,
+    points: FloatArray, frame: Triple, times: Triple, candidate_s: FloatArray, until_s: FloatArray, height_m: FloatArray
 ) -> bool:
-    """Marks hit cells in place; returns whether a cell became blocked.
+    """Marks the cells of points (N, 3) in place; returns whether a cell became blocked.
 
     `times` (s) are the scan's stamp, the time within which another scan must have hit the cell or a neighbour, and the
     time for which a blocked cell is remembered.
     """
     stamp, confirm, memory = times
     rows, columns = until_s.shape
+    cells = np.empty((points.shape[0], 2), dtype=np.int64)
     changed = False
     for n in range(cells.shape[0]):
-        i, j = cells[n, 0], cells[n, 1]
+        i, j = math.floor((points[n, 1] - frame[2]) / frame[0]), math.floor((points[n, 0] - frame[1]) / frame[0])
+        cells[n, 0], cells[n, 1] = i, j
         for a in range(max(0, i - 1), min(rows, i + 2)):
             for b in range(max(0, j - 1), min(columns, j + 2)):
                 if stamp - confirm <= candidate_s[a, b] < stamp:
                     fresh = until_s[i, j] <= stamp
                     changed |= fresh
                     until_s[i, j] = stamp + memory
-                    height_m[i, j] = heights[n] if fresh else max(height_m[i, j], heights[n])
+                    height_m[i, j] = points[n, 2] if fresh else max(height_m[i, j], points[n, 2])
     for n in range(cells.shape[0]):
         candidate_s[cells[n, 0], cells[n, 1]] = stamp
     return changed

@@ -55,6 +55,11 @@ class GridMap:
         return signed_distance(self.occupied, self.resolution_m)
 
     @property
+    def frame(self) -> tuple[float, float, float]:
+        """Cell size and x, y of the outer corner of cell [0, 0], in metres."""
+        return (self.resolution_m, *self.origin_m)
+
+    @property
     def size_m(self) -> tuple[float, float]:
         """Extent along x and y, in metres."""
         rows, columns = self.occupied.shape
@@ -75,7 +80,7 @@ class GridMap:
         Off the grid it is minus the distance to the grid, because unsurveyed ground counts as blocked.
         """
         points = np.ascontiguousarray(points_W, dtype=np.float64)
-        return distances(self.distance, self.resolution_m, self.origin_m[0], self.origin_m[1], points)
+        return distances(self.distance, *self.frame, points)
 
     def grey(self, *, free: int, unknown: int, occupied: int) -> NDArray[np.uint8]:
         """The grid as a grey picture (rows, columns), row 0 at the smallest y."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
@@ -69,7 +69,10 @@ class ScanMatchingLocaliser:
     def __init__(self, grid: GridMap, initial: Pose2D | None, options: LocaliserOptions | None = None) -> None:
         self.grid, self._surfaces = grid, grid_surfaces(grid)
         self._options = options or LocaliserOptions()
-        self._heights_m = self._options.height_band_m or grid.height_band_m or _HEIGHTS_M
+        heights_m = self._options.height_band_m or grid.height_band_m or _HEIGHTS_M
+        beams, most = self._options.azimuths, self._options.max_points
+        within_m = self._options.max_range_m
+        self._points = partial(scan_points, azimuths=beams, heights_m=heights_m, max_range_m=within_m, most=most)
         self._initial = initial
         self._placed = initial is not None
         (x, y), (width, height) = grid.origin_m, grid.size_m
@@ -82,26 +85,26 @@ class ScanMatchingLocaliser:
         self._scan: Scan | None = None
         self._poor_scans = 0
         self._localised = False
-        self._transformed: tuple[Pose2D, RigidTransform] | None = None
+        self._estimate: LocalisationEstimate | None = None
         self._left_out_W: FloatArray = np.empty((0, 3))
 
     def estimate(self) -> LocalisationEstimate:
         """The latest estimate, with the stamp of the last scan used (minus infinity before the first)."""
-        if self._transformed is None or self._transformed[0] is not self._X_WO:
-            self._transformed = self._X_WO, self._X_WO.transform()
-        covariance = self._covariance.copy()
-        return LocalisationEstimate(self._stamp_s, self._transformed[1], covariance, self._localised, self._health())
+        if self._estimate is None:
+            X_WO, covariance = self._X_WO.transform(), self._spread().copy()
+            self._estimate = LocalisationEstimate(self._stamp_s, X_WO, covariance, self._localised, self._health())
+        return self._estimate
 
     def update(self, robot: Robot) -> None:
         """Updates with the newest scan, when it is new."""
         if self._initial is not None:
             self._X_WO = compose(self._initial, inverse(robot.odometry().pose))
-            self._initial = None
+            self._initial = self._estimate = None
         scan = robot.scan()
         if scan is None or scan.stamp_s <= self._stamp_s or self._frozen(scan):
             return
-        self._stamp_s = scan.stamp_s
-        self._predict(Pose2D.from_transform(scan.X_OB))
+        self._stamp_s, self._estimate = scan.stamp_s, None
+        self._predict(scan.pose)
         points_F = self._points(scan)
         if len(points_F) < self._options.min_points:
             self._note_poor(0.0)
@@ -123,11 +126,11 @@ class ScanMatchingLocaliser:
 
         Changes nothing. Takes a few milliseconds for a small radius and some hundred for a whole flat.
         """
-        X_OB = Pose2D.from_transform(scan.X_OB)
-        found = self._best_match(self._points(scan), compose(Pose2D.from_transform(belief.X_WO), X_OB), radius_m)
+        here = compose(Pose2D.from_transform(belief.X_WO), scan.pose)
+        found = self._best_match(self._points(scan), here, radius_m)
         if found is None:
             return None
-        X_WO = compose(found.pose, inverse(X_OB))
+        X_WO = compose(found.pose, inverse(scan.pose))
         return LocalisationEstimate(scan.stamp_s, X_WO.transform(), found.covariance, True)
 
     def accept(self, estimate: LocalisationEstimate) -> None:
@@ -135,6 +138,7 @@ class ScanMatchingLocaliser:
         self._X_WO = Pose2D.from_transform(estimate.X_WO)
         self._covariance = estimate.covariance.copy()
         self._poor_scans, self._localised, self._placed = 0, True, True
+        self._estimate = None
 
     def _take_in(self, points_F: FloatArray) -> None:
         """Corrects the belief by a scan; searches around the belief once scans no longer agree."""
@@ -144,19 +148,13 @@ class ScanMatchingLocaliser:
         if not self._localised and self._poor_scans > 0 and self._poor_scans % self._options.search_every_scans == 0:
             self._search(points_F, self._options.search_radius_m)
 
+    def _spread(self) -> FloatArray:
+        """Covariance of the estimate."""
+        return self._covariance
+
     def _health(self) -> float:
         """Confidence in the estimate, 0 to 1."""
         return self._inlier_share if self._localised else 0.0
-
-    def _points(self, scan: Scan) -> FloatArray:
-        """At most max_points returns from a scan, evenly sampled, in the levelled body frame."""
-        options = self._options
-        points = scan_points(
-            scan, azimuths=options.azimuths, heights_m=self._heights_m, max_range_m=options.max_range_m
-        )
-        if len(points) <= options.max_points:
-            return points
-        return np.ascontiguousarray(points[np.linspace(0, len(points) - 1, options.max_points).astype(np.int64)])
 
     def _outside_robots(self, points_F: FloatArray) -> FloatArray:
         """The points outside the discs of other robots."""

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import bilinear, compiled
+from skills.estimate.compiled import Triple, bilinear, compiled
 from skills.estimate.grid_map import GridMap
 from skills.geometry import wrap
 from skills.quantities import Count, Factor, Length
@@ -56,7 +56,7 @@ Parameters are the points (N, 2 or more columns), the pose (3,), the weight of a
 
 def grid_surfaces(grid: GridMap) -> Linearise:
     """Returns the `Linearise` function for a surveyed grid, which uses the grid's distance field."""
-    return partial(_linearise, grid.distance, _frame(grid))
+    return partial(_linearise, grid.distance, grid.frame)
 
 
 def match(
@@ -70,11 +70,7 @@ def match(
     for iteration in range(options.iterations):
         outlier_m = options.coarse_outlier_m if iteration < coarse else options.outlier_m
         hessian, gradient, inliers = surfaces(points_F, pose, weight, outlier_m, options.inlier_m)
-        hessian += information
-        gradient += information @ (pose - mean)
-        step = np.linalg.solve(hessian, gradient)
-        pose -= step
-        if iteration > coarse and abs(step[0]) + abs(step[1]) + abs(step[2]) < _CONVERGED:
+        if _newton_step(hessian, gradient, information, mean, pose) < _CONVERGED and iteration > coarse:
             break
     matched = Pose2D(float(pose[0]), float(pose[1]), wrap(float(pose[2])))
     return Match(matched, np.asarray(np.linalg.inv(hessian), dtype=np.float64), inliers / max(1, len(points_F)))
@@ -82,12 +78,19 @@ def match(
 
 def score_poses(grid: GridMap, points_F: FloatArray, poses: FloatArray, reach_m: float = 0.3) -> FloatArray:
     """Scores of poses (K, 3) x, y, yaw: 1 when all points lie on surfaces, 0 when none lies within reach_m of one."""
-    return _score(grid.distance, _frame(grid), points_F, poses, reach_m)
+    return _score(grid.distance, grid.frame, points_F, poses, reach_m)
 
 
-def _frame(grid: GridMap) -> tuple[float, float, float]:
-    """Cell size and x, y of the grid's corner, in metres."""
-    return (grid.resolution_m, grid.origin_m[0], grid.origin_m[1])
+@compiled
+def _newton_step(
+    hessian: FloatArray, gradient: FloatArray, information: FloatArray, mean: FloatArray, pose: FloatArray
+) -> float:
+    """Adds the prior to the hessian and gradient, and moves the pose, all in place; returns the size of the step."""
+    hessian += information
+    gradient += information @ (pose - mean)
+    step = np.linalg.solve(hessian, gradient)
+    pose -= step
+    return float(np.abs(step).sum())
 
 
 @compiled
@@ -116,7 +119,7 @@ def add_residual(
 @compiled
 def _linearise(
     distance: NDArray[np.float32],
-    frame: tuple[float, float, float],
+    frame: Triple,
     points: FloatArray,
     pose: FloatArray,
     weight: float,
@@ -148,11 +151,7 @@ def _linearise(
 
 @compiled
 def _score(
-    distance: NDArray[np.float32],
-    frame: tuple[float, float, float],
-    points: FloatArray,
-    poses: FloatArray,
-    reach: float,
+    distance: NDArray[np.float32], frame: Triple, points: FloatArray, poses: FloatArray, reach: float
 ) -> FloatArray:
     """Compiled loop of `score_poses`; nearest cell, no interpolation."""
     scores = np.zeros(poses.shape[0])

@@ -88,11 +88,6 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         ends = (np.arange(most) + 0.5) / most * weights[-1]
         return np.asarray(self.particles.poses[np.unique(np.searchsorted(weights, ends))])
 
-    def estimate(self) -> LocalisationEstimate:
-        """The latest estimate; while the pose is unknown its covariance is that of all particles."""
-        estimate = super().estimate()
-        return estimate if self._localised else replace(estimate, covariance=self._lost_covariance.copy())
-
     def accept(self, estimate: LocalisationEstimate) -> None:
         """Replaces the belief by an estimate; all particles move there."""
         super().accept(estimate)
@@ -106,8 +101,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
 
         Before the first fix, the expected pose wins among poses that fit equally well.
         """
-        X_OB = Pose2D.from_transform(scan.X_OB)
-        here = compose(Pose2D.from_transform(belief.X_WO), X_OB)
+        here = compose(Pose2D.from_transform(belief.X_WO), scan.pose)
         found = self._matches(self._points(scan), here, radius_m)
         best = max(found, key=lambda each: each.inlier_share, default=None)
         if best is not None and self._expected and _same_place(here, best.pose):
@@ -117,7 +111,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         competing = (each for each in found if each.inlier_share > best.inlier_share - self._own.alike_share)
         if not all(_same_place(each.pose, best.pose) for each in competing):
             return None
-        X_WO: RigidTransform = compose(best.pose, inverse(X_OB)).transform()
+        X_WO: RigidTransform = compose(best.pose, inverse(scan.pose)).transform()
         return LocalisationEstimate(scan.stamp_s, X_WO, best.covariance, True, best.inlier_share)
 
     def _take_in(self, points_F: FloatArray) -> None:
@@ -131,6 +125,10 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         self._scans += 1
         if self._due():
             self._weigh(points_F)
+
+    def _spread(self) -> FloatArray:
+        """Covariance of the estimate; that of all particles while the pose is unknown."""
+        return self._covariance if self._localised else self._lost_covariance
 
     def _health(self) -> float:
         return self._mass * self._inlier_share if self._placed else 0.0
@@ -154,7 +152,8 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         self._at_rest += 1
         particles.move(relative_pose(self._weighed_at or self._X_OB, self._X_OB))
         self._weighed_at = self._X_OB
-        beams = _thinned(points_F, self._own.particles.beams)
+        count = min(self._own.particles.beams, len(points_F))
+        beams = points_F[np.linspace(0, len(points_F) - 1, count).astype(np.int64)]
         particles.weigh(beams)
         self._judge(points_F)
         particles.resample(self._injected(points_F, beams))
@@ -201,12 +200,6 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         surfaces, options = self._surfaces, self._options.matching
         found = [match(surfaces, points_F, Pose2D(*pose), _BASIN, options) for pose in best.tolist()]
         return [each for each in found if each.inlier_share >= self._options.lost_share]
-
-
-def _thinned(points_F: FloatArray, count: int) -> FloatArray:
-    """At most `count` of the points, evenly sampled."""
-    chosen = np.linspace(0, len(points_F) - 1, min(count, len(points_F))).astype(np.int64)
-    return np.ascontiguousarray(points_F[chosen])
 
 
 def _same_place(a: Pose2D, b: Pose2D) -> bool:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import compiled
+from skills.estimate.compiled import Triple, compiled
 from skills.estimate.grid_map import GridMap
 from skills.geometry import wrap
 from skills.inputs.errors import InputError
@@ -83,7 +83,6 @@ class ParticleFilter:
         self._grid, self._options = grid, options
         self._rng = np.random.default_rng(options.seed)
         self._field = _likelihood_field(grid, options)
-        self._geometry = (grid.resolution_m, grid.origin_m[0], grid.origin_m[1])
         self._standable = _standable(grid)
         if not self._standable.any():
             raise InputError(
@@ -164,20 +163,15 @@ class ParticleFilter:
 
     def log_likelihoods(self, poses: FloatArray, points_F: FloatArray) -> FloatArray:
         """The mean log likelihood (N,) of the beams at each pose."""
-        points = np.ascontiguousarray(points_F[:, :2])
-        return _log_likelihoods(self._field, self._standable, self._geometry, poses, points)
-
-    def forget(self) -> None:
-        """Resets the averages of the likelihood."""
-        self._slow = self._fast = 0.0
+        return _log_likelihoods(self._field, self._standable, self._grid.frame, poses, points_F)
 
     def resample(self, injected: FloatArray | None = None) -> None:
         """Draws as many particles as the KL divergence requires; adds the `injected` ones (K, 3) with equal weights."""
-        options, joining = self._options, 0 if injected is None else len(injected)
+        options = self._options
         drawn = self._draw(min(options.max_particles, 4 * max(len(self.poses), options.min_particles)))
-        count = self._enough(self.poses[drawn])
-        poses = self.poses[drawn[:count]]
-        self._replace(poses if injected is None or not joining else np.concatenate([poses, injected]), keep=True)
+        poses, bins = self.poses[drawn], (options.bin_m, options.bin_m, options.bin_rad)
+        poses = poses[: _enough(poses, bins, options.min_particles, options.kld_error, options.kld_quantile)]
+        self._replace(poses if injected is None else np.concatenate([poses, injected]), keep=True)
 
     def mass_near(self, pose: Pose2D) -> float:
         """Fraction of the weight in the mode at a pose."""
@@ -207,9 +201,7 @@ class ParticleFilter:
         options = self._options
         stride = max(1, len(self.poses) // _AGREEMENT_PARTICLES)
         poses = np.ascontiguousarray(self.poses[::stride])
-        share = _agreement(
-            self._grid.distance, self._geometry, poses, np.ascontiguousarray(points_F[:, :2]), options.skip_m
-        )
+        share = _agreement(self._grid.distance, self._grid.frame, poses, points_F, options.skip_m)
         used = share >= options.skip_share
         return used if 1.0 - used.mean() <= options.skip_most else np.ones_like(used)
 
@@ -219,20 +211,10 @@ class ParticleFilter:
         drawn = np.searchsorted(np.cumsum(self.weights), steps).clip(max=len(self.weights) - 1)
         return self._rng.permutation(drawn)
 
-    def _enough(self, poses: FloatArray) -> int:
-        """Sufficient number of drawn poses by KLD sampling: the more bins are filled, the more poses."""
-        options = self._options
-        _, first = np.unique(_bins(poses, options.bin_m, options.bin_rad), return_index=True)
-        new = np.zeros(len(poses))
-        new[first] = 1.0
-        wanted = _kld_bound(np.cumsum(new), options.kld_error, options.kld_quantile)
-        reached = np.flatnonzero(np.arange(1, len(poses) + 1) >= np.maximum(wanted, options.min_particles))
-        return int(reached[0]) + 1 if len(reached) else len(poses)
-
     def _replace(self, poses: FloatArray, *, keep: bool = False) -> None:
         self.poses, self.weights = poses, np.full(len(poses), 1.0 / len(poses))
         if not keep:
-            self.forget()
+            self._slow = self._fast = 0.0  # averages of the likelihood
 
 
 def _likelihood_field(grid: GridMap, options: FilterOptions) -> NDArray[np.float32]:
@@ -256,11 +238,18 @@ def _bins(poses: FloatArray, size_m: float, size_rad: float) -> NDArray[np.int64
     return np.asarray((cells[:, 0] * rows + cells[:, 1]) * turns + cells[:, 2])
 
 
-def _kld_bound(bins: FloatArray, error: float, quantile: float) -> FloatArray:
-    """The number of particles that keeps the KL divergence below `error` with so many bins filled (Fox, 2003)."""
-    degrees = np.maximum(bins - 1.0, 1.0)
-    part = 2.0 / (9.0 * degrees)
-    return np.asarray(degrees / (2.0 * error) * (1.0 - part + np.sqrt(part) * quantile) ** 3)
+@compiled
+def _enough(poses: FloatArray, bins: Triple, least: int, error: float, quantile: float) -> int:
+    """Sufficient number of drawn poses by KLD sampling (Fox, 2003): the more bins are filled, the more poses."""
+    filled = set()
+    for n in range(poses.shape[0]):
+        x, y, yaw = poses[n, 0] / bins[0], poses[n, 1] / bins[1], poses[n, 2] / bins[2]
+        filled.add((math.floor(x), math.floor(y), math.floor(yaw)))
+        degrees = max(len(filled) - 1.0, 1.0)
+        part = 2.0 / (9.0 * degrees)
+        if n + 1 >= max(least, degrees / (2.0 * error) * (1.0 - part + math.sqrt(part) * quantile) ** 3):
+            return n + 1
+    return len(poses)
 
 
 def _spread(poses: FloatArray, weights: FloatArray) -> tuple[Pose2D, FloatArray]:
@@ -276,11 +265,7 @@ def _spread(poses: FloatArray, weights: FloatArray) -> tuple[Pose2D, FloatArray]
 
 @compiled
 def _log_likelihoods(
-    field: NDArray[np.float32],
-    standable: NDArray[np.bool_],
-    geometry: tuple[float, float, float],
-    poses: FloatArray,
-    points: FloatArray,
+    field: NDArray[np.float32], standable: NDArray[np.bool_], geometry: Triple, poses: FloatArray, points: FloatArray
 ) -> FloatArray:
     """Compiled loop of `log_likelihoods`. A pose where no robot can stand loses _IN_WALL."""
     rows, columns = field.shape
@@ -304,11 +289,7 @@ def _log_likelihoods(
 
 @compiled
 def _agreement(
-    distance: NDArray[np.float32],
-    geometry: tuple[float, float, float],
-    poses: FloatArray,
-    points: FloatArray,
-    near_m: float,
+    distance: NDArray[np.float32], geometry: Triple, poses: FloatArray, points: FloatArray, near_m: float
 ) -> FloatArray:
     """Fraction (M,) of the poses at which each beam ends near a surface."""
     rows, columns = distance.shape

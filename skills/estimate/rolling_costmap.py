@@ -11,16 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import LocalisationEstimate
-from skills.estimate.compiled import bilinear, compiled
+from skills.estimate.compiled import Triple, bilinear, compiled
 from skills.estimate.grid_map import GridMap
-from skills.estimate.scan_points import (
-    SelfFilter,
-    outside_discs,
-    placed_points,
-    points_in_body_axes,
-    scan_points,
-    sensor_pose,
-)
+from skills.estimate.scan_points import SelfFilter, outside_discs, placed_points, points_in_body_axes, scan_points
 from skills.geometry import compose
 from skills.quantities import Count, Factor, Height, Length, Margin
 from skills.robot import FloatArray, Pose2D, Robot, Scan
@@ -119,7 +112,7 @@ class RollingCostmap:
         if scan is None or scan.stamp_s <= self._stamp_s or not localisation.localised:
             return
         self._stamp_s = scan.stamp_s
-        X_WF = compose(X_WO, Pose2D.from_transform(scan.X_OB))
+        X_WF = compose(X_WO, scan.pose)
         self._follow(X_WF)
         self._take(robot, scan, X_WF)
         self._changed()
@@ -169,31 +162,21 @@ class RollingCostmap:
         points = scan_points(
             scan, azimuths=options.azimuths, heights_m=options.heights_m, max_range_m=options.max_range_m
         )
-        foreign = self._filter.foreign(points[:, :3], self._filter.arm_F(robot, scan))
+        foreign = self._filter.foreign(points, self._filter.arm_F(robot, scan))
         stride = max(1, len(scan.azimuths_rad) // options.azimuths)
         seen_past = np.asarray(np.all(np.isfinite(scan.ranges_m[scan.elevations_rad < 0.0, ::stride]), axis=0))
         seen_past[points[~foreign, 4].astype(np.int64) // stride] = False
         points = np.ascontiguousarray(points[foreign])
         placed = placed_points(points, X_WF)
         self._returns_W = placed[self.clearance_m(placed) > _NEW_M]
-        _, origin_F = sensor_pose(scan)
+        _, origin_F = scan.sensor_pose
         nearest = _nearest(points, origin_F, np.zeros(len(seen_past)), stride)
         directions = np.ascontiguousarray(scan.azimuths_rad[::stride])
-        own = self._filter.outline_m
-        _trace(
-            self._odds,
-            self._known,
-            self._height_m,
-            (options.cell_m, *self._corner_m),
-            (X_WF.x_m, X_WF.y_m, X_WF.yaw_rad),
-            origin_F,
-            nearest,
-            seen_past,
-            directions,
-            math.tan(float(np.min(scan.elevations_rad))),
-            _Gains(options.hit, options.miss, options.max_range_m),
-            own,
-        )
+        slope = math.tan(float(np.min(scan.elevations_rad)))
+        gains = _Gains(options.hit, options.miss, options.max_range_m)
+        frames = (options.cell_m, *self._corner_m), (X_WF.x_m, X_WF.y_m, X_WF.yaw_rad)
+        grids, own = (self._odds, self._known, self._height_m), self._filter.outline_m
+        _trace(*grids, *frames, origin_F, nearest, seen_past, directions, slope, gains, own)
 
     def _near_field(self) -> tuple[NDArray[np.float32], float, float]:
         """The distance field around the robot, and the x and y of its corner (m)."""
@@ -275,8 +258,8 @@ def _trace(
     odds: NDArray[np.float32],
     known: NDArray[np.bool_],
     heights: NDArray[np.float32],
-    frame: tuple[float, float, float],
-    pose: tuple[float, float, float],
+    frame: Triple,
+    pose: Triple,
     origin: FloatArray,
     nearest: FloatArray,
     seen_past: NDArray[np.bool_],

@@ -7,17 +7,17 @@ frame by height, roll and pitch.
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RotationMatrix
 
-from skills.estimate.compiled import compiled
+from skills.estimate.compiled import Triple, compiled
 from skills.geometry import relative_pose
 from skills.robot import Capabilities, FloatArray, Joints, Pose2D, Robot, Scan
 
+Outline = tuple[float, float, float, float]
 _MOVED_M = 0.02
 _MOVED_RAD = 0.02
 
@@ -38,15 +38,16 @@ class ArmShape:
         self._plant.Finalize()
         self._context = self._plant.CreateDefaultContext()
         self._body = self._plant.GetFrameByName("body")
-        self._joints = [self._plant.GetJointByName(name) for name in self._names]
+        joints = [self._plant.GetJointByName(name) for name in self._names]
+        self._numbers = [joint.position_start() for joint in joints]
+        self._links = [joint.frame_on_child() for joint in joints]
+        self._q = self._plant.GetPositions(self._context)
 
     def points_B(self, joints: Joints) -> FloatArray:
         """The arm's joints in order and the tip of the hand, (joints + 1, 3) in the body frame."""
-        q = self._plant.GetPositions(self._context)
-        for name, joint in zip(self._names, self._joints, strict=True):
-            q[joint.position_start()] = joints.position_rad[name]
-        self._plant.SetPositions(self._context, q)
-        poses = [joint.frame_on_child().CalcPose(self._context, self._body) for joint in self._joints]
+        self._q[self._numbers] = [joints.position_rad[name] for name in self._names]
+        self._plant.SetPositions(self._context, self._q)
+        poses = [link.CalcPose(self._context, self._body) for link in self._links]
         tip = poses[-1] @ np.array([self._hand_m, 0.0, 0.0])
         return np.array([*(pose.translation() for pose in poses), tip])
 
@@ -55,7 +56,7 @@ class ArmShape:
 class SelfFilter:
     """Removes the robot's own points. `outline_m` is (x_min, x_max, y_min, y_max) of the body."""
 
-    outline_m: tuple[float, float, float, float]
+    outline_m: Outline
     arm: ArmShape | None = None
     body_margin_m: float = 0.08
     arm_radius_m: float = 0.2
@@ -73,7 +74,7 @@ class SelfFilter:
         """The arm's points (N, 3) at its present angles, in a scan's levelled body frame; empty without an arm."""
         if self.arm is None:
             return np.empty((0, 3))
-        rotation, translation = sensor_pose(scan)
+        rotation, translation = scan.sensor_pose
         points_L = scan.X_BL.inverse().multiply(self.arm.points_B(robot.joints()).T)
         return np.asarray((rotation @ points_L).T + translation)
 
@@ -84,24 +85,22 @@ class SelfFilter:
         the body only the body's margin counts, so that a person right in front of the stowed arm is seen. While
         `holding`, points near the hand count as the held object.
         """
-        x0, x1, y0, y1 = self.outline_m
-        m = self.body_margin_m
-        x, y = points_F[:, 0], points_F[:, 1]
-        own = (x > x0 - m) & (x < x1 + m) & (y > y0 - m) & (y < y1 + m)
-        segments = list(pairwise(arm_F))
-        for index, (start, end) in enumerate(segments, start=1):
-            is_stowed = max(start[0], end[0]) < x1 + m and abs(start[1]) < y1 and abs(end[1]) < y1
-            radius_m = m if is_stowed else self.arm_radius_m
-            radius_m = self.held_radius_m if holding and index == len(segments) else radius_m
-            own |= segment_distance(points_F[:, :3], start, end) < radius_m
-        return np.asarray(~own)
+        points, arm = (np.ascontiguousarray(each, dtype=np.float64) for each in (points_F, arm_F))
+        margins = (self.body_margin_m, self.arm_radius_m, self.held_radius_m if holding else 0.0)
+        return _foreign(points, arm, self.outline_m, margins)
 
 
+@compiled
 def segment_distance(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Distance from points (N, 3) to the segment start-end."""
-    along = end - start
-    share = np.clip((points - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(points - start - share[:, None] * along, axis=1))
+    """Distance from points (N, 3 or more columns) to the segment start-end."""
+    along, distances = end - start, np.empty(points.shape[0])
+    squared = max(along[0] * along[0] + along[1] * along[1] + along[2] * along[2], 1e-12)
+    for n in range(points.shape[0]):
+        x, y, z = points[n, 0] - start[0], points[n, 1] - start[1], points[n, 2] - start[2]
+        share = min(max((x * along[0] + y * along[1] + z * along[2]) / squared, 0.0), 1.0)
+        x, y, z = x - share * along[0], y - share * along[1], z - share * along[2]
+        distances[n] = math.sqrt(x * x + y * y + z * z)
+    return distances
 
 
 def points_in_body_axes(points_W: FloatArray, X_WB: Pose2D) -> FloatArray:
@@ -111,17 +110,17 @@ def points_in_body_axes(points_W: FloatArray, X_WB: Pose2D) -> FloatArray:
     return np.column_stack([c * dx + s * dy, -s * dx + c * dy, points_W[:, 2]])
 
 
-def scan_points(scan: Scan, *, azimuths: int, heights_m: tuple[float, float], max_range_m: float) -> FloatArray:
+def scan_points(
+    scan: Scan, *, azimuths: int, heights_m: tuple[float, float], max_range_m: float, most: int = sys.maxsize
+) -> FloatArray:
     """Points (N, 5) from a scan in frame F: x, y, height above the floor (m), ring and azimuth index in the scan.
 
-    Uses about `azimuths` evenly spaced columns of the scan, and returns within max_range_m at heights in heights_m.
+    Uses about `azimuths` evenly spaced columns of the scan, and returns within max_range_m at heights in heights_m; of
+    these at most `most`, evenly sampled.
     """
-    stride = max(1, len(scan.azimuths_rad) // azimuths)
-    ranges = np.ascontiguousarray(scan.ranges_m[:, ::stride])
-    angles = np.ascontiguousarray(scan.azimuths_rad[::stride])
-    rotation, translation = sensor_pose(scan)
-    limits = (heights_m[0], heights_m[1], max_range_m)
-    return _select(ranges, scan.elevations_rad, angles, rotation, translation, limits, stride)
+    stride, limits = max(1, len(scan.azimuths_rad) // azimuths), (*heights_m, max_range_m)
+    ranges_m = np.ascontiguousarray(scan.ranges_m)
+    return _select(ranges_m, scan.elevations_rad, scan.azimuths_rad, *scan.sensor_pose, limits, stride, most)
 
 
 def placed_points(points_F: FloatArray, X_WF: Pose2D) -> FloatArray:
@@ -133,6 +132,8 @@ def placed_points(points_F: FloatArray, X_WF: Pose2D) -> FloatArray:
 
 def outside_discs(points_W: FloatArray, discs_W: FloatArray) -> NDArray[np.bool_]:
     """Mask of the points (N, 2 or more columns) outside all discs, rows of x, y and radius (m)."""
+    if not len(discs_W):
+        return np.ones(len(points_W), dtype=np.bool_)
     offsets = np.linalg.norm(points_W[:, None, :2] - discs_W[None, :, :2], axis=2)
     outside: NDArray[np.bool_] = (offsets > discs_W[:, 2]).all(axis=1)
     return outside
@@ -140,16 +141,28 @@ def outside_discs(points_W: FloatArray, discs_W: FloatArray) -> NDArray[np.bool_
 
 def has_moved(before: Scan, scan: Scan) -> bool:
     """Returns whether the robot moved between two scans, by odometry; if so, equal scans reveal a frozen LiDAR."""
-    step = relative_pose(Pose2D.from_transform(before.X_OB), Pose2D.from_transform(scan.X_OB))
+    step = relative_pose(before.pose, scan.pose)
     return math.hypot(step.x_m, step.y_m) > _MOVED_M or abs(step.yaw_rad) > _MOVED_RAD
 
 
-def sensor_pose(scan: Scan) -> tuple[FloatArray, FloatArray]:
-    """Rotation (3, 3) and position (3,) of the LiDAR in frame F."""
-    yaw = Pose2D.from_transform(scan.X_OB).yaw_rad
-    R_FB = RotationMatrix.MakeZRotation(-yaw) @ scan.X_OB.rotation()
-    p_FL = R_FB.multiply(scan.X_BL.translation()) + np.array([0.0, 0.0, scan.X_OB.translation()[2]])
-    return np.ascontiguousarray((R_FB @ scan.X_BL.rotation()).matrix()), p_FL
+@compiled
+def _foreign(points: FloatArray, arm: FloatArray, outline: Outline, margins: Triple) -> NDArray[np.bool_]:
+    """Compiled loop of `SelfFilter.foreign`; `margins` are those of the body, the arm and a held object, if any."""
+    x0, x1, y0, y1 = outline
+    margin, arm_radius, held_radius = margins
+    foreign = np.empty(points.shape[0], dtype=np.bool_)
+    for n in range(points.shape[0]):
+        x, y = points[n, 0], points[n, 1]
+        foreign[n] = not (x0 - margin < x < x1 + margin and y0 - margin < y < y1 + margin)
+    segments = arm.shape[0] - 1
+    for k in range(segments):
+        start, end = arm[k], arm[k + 1]
+        stowed = max(start[0], end[0]) < x1 + margin and abs(start[1]) < y1 and abs(end[1]) < y1
+        radius = margin if stowed else arm_radius
+        if k == segments - 1 and held_radius > 0.0:
+            radius = held_radius
+        foreign &= segment_distance(points, start, end) >= radius
+    return foreign
 
 
 @compiled
@@ -159,14 +172,15 @@ def _select(
     azimuths: FloatArray,
     rotation: FloatArray,
     translation: FloatArray,
-    limits: tuple[float, float, float],
+    limits: Triple,
     stride: int,
+    most: int,
 ) -> FloatArray:
     """Compiled loop of `scan_points`."""
-    points = np.empty((ranges.size, 5))
+    points = np.empty((elevations.shape[0] * (azimuths.shape[0] // stride + 1), 5))
     count = 0
     cosines, sines = np.cos(elevations), np.sin(elevations)
-    for j in range(azimuths.shape[0]):
+    for j in range(0, azimuths.shape[0], stride):
         ca, sa = math.cos(azimuths[j]), math.sin(azimuths[j])
         for i in range(elevations.shape[0]):
             r = float(ranges[i, j])
@@ -180,6 +194,12 @@ def _select(
                 points[count, 1] = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]
                 points[count, 2] = height
                 points[count, 3] = i
-                points[count, 4] = j * stride
+                points[count, 4] = j
                 count += 1
-    return points[:count].copy()
+    if count <= most:
+        return points[:count].copy()
+    step = (count - 1) / max(1, most - 1)
+    for n in range(most - 1):
+        points[n] = points[int(n * step)]
+    points[most - 1] = points[count - 1]
+    return points[:most].copy()

@@ -73,16 +73,16 @@ class CollisionGuard:
         The speed is that of the outline's fastest point, so that a robot that turns on the spot stops too.
         """
         velocity, options = self._velocity_W(here), self._options
-        speed = float(np.linalg.norm(velocity[:2])) + abs(float(velocity[2])) * self.footprint.circumscribed_m
-        if len(returns_W) < options.least_points or speed < 0.05:
+        speed = math.hypot(velocity[0], velocity[1]) + abs(float(velocity[2])) * self.footprint.circumscribed_m
+        near = returns_W[np.hypot(returns_W[:, 0] - here.x_m, returns_W[:, 1] - here.y_m) < 1.5 + speed, :2]
+        if len(near) < options.least_points or speed < 0.05:
             return None
         until_s = options.reaction_s + 0.5 * speed / options.stop_m_s2
         times = np.linspace(0.0, until_s, 1 + math.ceil(speed * until_s / 0.05))[1:]
-        near = returns_W[np.linalg.norm(returns_W[:, :2] - (here.x_m, here.y_m), axis=1) < 1.5 + speed, :2]
         then_m = self._apart_m(_coasting(here, velocity, times), near).min(axis=0, initial=math.inf)
         now_m = self._apart_m(_coasting(here, velocity, np.zeros(1)), near)[0]
         hit = near[(then_m < options.touch_m) & (then_m < now_m - 0.02)]
-        return None if len(hit) < options.least_points else _place(hit.mean(axis=0))
+        return None if len(hit) < options.least_points else tuple(hit.mean(axis=0).tolist())
 
     def _crossing(
         self, here: Pose2D, follower: LocalController, most_m_s: float, moving: tuple[Moving, ...], now_s: float
@@ -138,7 +138,3 @@ class CollisionGuard:
 def _coasting(here: Pose2D, velocity_W: FloatArray, times: FloatArray) -> FloatArray:
     """Poses (N, 3) of a body that keeps its velocity."""
     return np.array([here.x_m, here.y_m, here.yaw_rad]) + times[:, None] * velocity_W
-
-
-def _place(point: FloatArray) -> Place:
-    return float(point[0]), float(point[1])

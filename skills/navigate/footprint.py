@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -76,7 +77,7 @@ class Footprint:
         """Radius (m) of the largest inscribed disc."""
         return min(self.length_m, self.width_m) / 2.0
 
-    @property
+    @cached_property
     def circumscribed_m(self) -> float:
         """Distance (m) from the body's origin to the farthest corner."""
         return float(np.max(np.hypot(self.discs[:, 0], self.discs[:, 1]) + self.discs[:, 2]))

@@ -1,6 +1,7 @@
 """Monitors of the sensors for driving: health of the LiDAR, and low obstacles from depth cameras."""
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,11 +51,9 @@ class LowObstacleWatch:
         if self._job is not None:
             if self._job.done():
                 job, self._job = self._job, None
-                try:
+                with suppress(NoImageError):
                     points_O, stamp_s = job.result()
-                except NoImageError:
-                    return
-                self._context.costmap.add_points(self._X_WO.multiply(points_O.T).T, stamp_s)
+                    self._context.costmap.add_points(self._X_WO.multiply(points_O.T).T, stamp_s)
             return
         if not self._sources or not self._is_due():
             return
@@ -120,7 +119,7 @@ class ScanHealth:
         if scan is None:
             return "The LiDAR gives no scans."
         if scan is not self._last:
-            if np.mean(np.isfinite(scan.ranges_m)) < self._options.least_valid:
+            if np.count_nonzero(np.isfinite(scan.ranges_m)) < self._options.least_valid * scan.ranges_m.size:
                 return "The LiDAR measures nothing: its ranges are invalid."
             if self._last is None or not scan.repeats(self._last):
                 self._last = scan

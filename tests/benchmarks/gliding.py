@@ -38,7 +38,7 @@ class GlidingBase:
         moved = np.array([c * vx - s * vy, s * vx + c * vy, 0.0])
         X_WB = RigidTransform(RollPitchYaw(0.0, 0.0, here.yaw_rad), [here.x_m, here.y_m, height_m])
         self._reading = self._odometry.update(self.now_s, X_WB, np.array([0.0, 0.0, wz]), moved)
-        self._scan = self._lidar.scan(self._context, self.now_s, self._reading.X_OB)
+        self._scan = self._lidar.revolution(self._context, self.now_s, self._reading.X_OB)()
 
     def odometry(self):
         return self._reading

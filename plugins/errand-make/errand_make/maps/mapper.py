@@ -153,7 +153,7 @@ class Mapper:
         options, before, self._scan = self._options, self._scan, scan
         frozen = before is not None and scan.repeats(before) and has_moved(before, scan)
         step = Pose2D(0.0, 0.0, 0.0)
-        X_OF, self._X_OF = self._X_OF, Pose2D.from_transform(scan.X_OB)
+        X_OF, self._X_OF = self._X_OF, scan.pose
         if before is not None:
             step = relative_pose(X_OF, self._X_OF)
         self._predict(step)

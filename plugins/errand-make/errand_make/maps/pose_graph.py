@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
-from skills.estimate.scan_points import SelfFilter, scan_points, sensor_pose
+from skills.estimate.scan_points import SelfFilter, scan_points
 from skills.geometry import relative_pose
 from skills.robot import FloatArray, Pose2D, Robot, Scan, unit_rays
 
@@ -42,7 +42,7 @@ class Keyframe:
     @staticmethod
     def of(scan: Scan, points_F: FloatArray, own: SelfFilter, robot: Robot, *, stride: int = 2) -> Keyframe:
         """Creates a keyframe of every `stride`-th column of a scan, without returns from the robot itself."""
-        rotation, translation = sensor_pose(scan)
+        rotation, translation = scan.sensor_pose
         ranges, azimuths = scan.ranges_m[:, ::stride].copy(), scan.azimuths_rad[::stride]
         rays = unit_rays(scan.elevations_rad, azimuths) * np.nan_to_num(ranges, nan=0.0)[..., None]
         hits_F = rays.reshape(-1, 3) @ rotation.T + translation
@@ -50,7 +50,7 @@ class Keyframe:
         ranges.reshape(-1)[near[~own.foreign(hits_F[near], own.arm_F(robot, scan))]] = np.nan
         return Keyframe(
             stamp_s=scan.stamp_s,
-            X_OF=Pose2D.from_transform(scan.X_OB),
+            X_OF=scan.pose,
             ranges_m=ranges,
             elevations_rad=scan.elevations_rad,
             azimuths_rad=azimuths,

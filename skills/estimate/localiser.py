@@ -13,9 +13,10 @@ from skills.estimate.grid_map import GridMap
 from skills.estimate.matching import Match, MatchOptions, grid_surfaces, match, score_poses
 from skills.estimate.scan_points import has_moved, outside_discs, placed_points, scan_points
 from skills.geometry import compose, inverse, relative_pose
-from skills.quantities import Count, Height, Length, Share, Turn
+from skills.quantities import Count, Duration, Height, Length, Share, Turn
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
+_EXACT_S = 1e-6
 _HEIGHTS_M = (0.7, 1.3)
 """The band of a grid that does not name its own."""
 
@@ -28,7 +29,8 @@ class LocaliserOptions:
     `unsure_radius_m` replace it when the robot may have been moved. `drift_per_m`, `yaw_drift_rad_per_m` and
     `yaw_drift_per_rad`: expected odometry error, as a fraction of the distance, per metre and per turn. `lost_share`,
     `lost_scans` and `found_share`: the robot is lost when the map explains a smaller fraction of the points for so many
-    scans in a row, and found at `found_share`. `alike_share`: poses whose fractions differ by less compete.
+    scans in a row, and found at `found_share`. `alike_share`: poses whose fractions differ by less compete. `rest_m`,
+    `rest_rad` and `rest_s`: a localised robot that has moved less since the last match uses no scan before this time.
     """
 
     height_band_m: tuple[Height, Height] | None = None
@@ -48,6 +50,9 @@ class LocaliserOptions:
     lost_scans: Count = 5
     search_radius_m: Length = 1.5
     search_every_scans: Count = 10
+    rest_m: Length = 0.005
+    rest_rad: Turn = 0.005
+    rest_s: Duration = 0.3
     matching: MatchOptions = field(default_factory=MatchOptions)
 
     def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> ScanMatchingLocaliser:
@@ -81,7 +86,7 @@ class ScanMatchingLocaliser:
         anywhere_sigma = (width / math.sqrt(12.0), height / math.sqrt(12.0), math.pi / math.sqrt(3.0))
         self._covariance = np.diag(np.square(self._options.initial_sigma if initial else anywhere_sigma))
         self._inlier_share = 0.0
-        self._stamp_s = -math.inf
+        self._stamp_s = self._looked_at_s = -math.inf
         self._scan: Scan | None = None
         self._poor_scans = 0
         self._localised = False
@@ -101,7 +106,10 @@ class ScanMatchingLocaliser:
             self._X_WO = compose(self._initial, inverse(robot.odometry().pose))
             self._initial = self._estimate = None
         scan = robot.scan()
-        if scan is None or scan.stamp_s <= self._stamp_s or self._frozen(scan):
+        if scan is None or scan.stamp_s <= self._looked_at_s or self._frozen(scan):
+            return
+        self._looked_at_s = scan.stamp_s
+        if self._rests(scan):
             return
         self._stamp_s, self._estimate = scan.stamp_s, None
         self._predict(scan.pose)
@@ -196,6 +204,14 @@ class ScanMatchingLocaliser:
         self._inlier_share = inlier_share
         self._poor_scans += 1
         self._localised = self._localised and self._poor_scans < self._options.lost_scans
+
+    def _rests(self, scan: Scan) -> bool:
+        """Returns whether a localised robot has hardly moved since the last match, and this is not long ago."""
+        due_s = self._stamp_s + self._options.rest_s - _EXACT_S
+        if self._X_OB is None or not self._localised or self._poor_scans or scan.stamp_s >= due_s:
+            return False
+        step = relative_pose(self._X_OB, scan.pose)
+        return math.hypot(step.x_m, step.y_m) < self._options.rest_m and abs(step.yaw_rad) < self._options.rest_rad
 
     def _frozen(self, scan: Scan) -> bool:
         """Returns whether a scan repeats an earlier one, noise included, although the robot has moved since."""

@@ -193,3 +193,16 @@ def test_covariance_grows_with_the_distance():
 def test_an_unknown_start_is_the_origin():
     pose = reckoning_bench(start_known=False).context().pose()
     assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+
+
+# speed (m/s)   scans used in 3 s, of 30
+@pytest.mark.parametrize(("speed_m_s", "least", "most"), [(0.0, 9, 12), (0.3, 29, 31)])
+def test_a_localised_robot_at_rest_uses_every_third_scan(speed_m_s, least, most):
+    bench, used = Bench(ALONG), set()
+    bench.tick(20)
+    for _ in range(60):
+        bench.robot.drive(speed_m_s, 0.0, 0.0, until_s=bench.clock.now() + 0.3, lease=bench.lease)
+        bench.tick()
+        used.add(bench.localiser.estimate().stamp_s)
+    assert least <= len(used) <= most
+    assert bench.pose_error()[0] < 0.03

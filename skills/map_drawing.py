@@ -52,20 +52,20 @@ class Names:
         """Writes a label as near to a pixel (column, row) as other labels and lines allow."""
         size = np.array(text_size(name, self._picture), dtype=np.float64) + 2 * _PAD_PX
         most = np.maximum(np.array(self._picture.shape[1::-1]) - size, 0.0)
-        shifts = (np.array(shift) * (0.6 * size[0], size[1]) for shift in product(_SHIFTS, _SHIFTS))
-        corners = (np.clip(np.array(centre) + shift - size / 2.0, 0.0, most) for shift in shifts)
-        boxes = [np.concatenate([corner, corner + size]) for corner in corners]
-        best = min(boxes, key=lambda box: self._cost(box, np.array(centre), size[1]))
+        shifts = np.array([*product(_SHIFTS, _SHIFTS)]) * (0.6 * size[0], size[1])
+        corners = np.clip(np.array(centre) + shifts - size / 2.0, 0.0, most)
+        boxes = np.hstack([corners, corners + size])
+        best = boxes[np.argmin(self._costs(boxes, np.array(centre), size[1]))]
         self._taken.append(best)
         label(self._picture, name, (round(best[0]) + _PAD_PX, round(best[3]) - _PAD_PX), ground=ground)
 
-    def _cost(self, box: NDArray[np.float64], centre: NDArray[np.float64], height: float) -> float:
-        """Cost of a label's box: the area that it covers, and its distance from the label's point."""
-        overlaps = (np.maximum(np.minimum(box[2:], one[2:]) - np.maximum(box[:2], one[:2]), 0.0) for one in self._taken)
-        covered = sum(float(np.prod(overlap)) for overlap in overlaps)
-        on_lines = np.all((self._lines >= box[:2]) & (self._lines <= box[2:]), axis=1).sum() if len(self._lines) else 0
-        away = float(np.linalg.norm((box[:2] + box[2:]) / 2.0 - centre))
-        return 100.0 * covered + 0.3 * float(min(on_lines, 20)) * height + away
+    def _costs(self, boxes: FloatArray, centre: FloatArray, height: float) -> FloatArray:
+        """Costs of boxes (N, 4) for a label: the area that each covers, and its distance from the label's point."""
+        low, high, taken = boxes[:, None, :2], boxes[:, None, 2:], np.reshape(self._taken, (-1, 4))
+        overlaps = np.maximum(np.minimum(high, taken[:, 2:]) - np.maximum(low, taken[:, :2]), 0.0)
+        on_lines = np.all((self._lines >= low) & (self._lines <= high), axis=2).sum(axis=1)
+        away = np.linalg.norm((boxes[:, :2] + boxes[:, 2:]) / 2.0 - centre, axis=1)
+        return np.asarray(100.0 * overlaps.prod(axis=2).sum(axis=1) + 0.3 * np.minimum(on_lines, 20) * height + away)
 
 
 def _dense(line: FloatArray) -> FloatArray:

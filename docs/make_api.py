@@ -10,6 +10,7 @@ import itertools
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -85,7 +86,7 @@ def _members(kind: type[Any]) -> Iterator[str]:
 
 
 def _fields(kind: type[Any]) -> Iterator[str]:
-    for field in (each for each in dataclasses.fields(kind) if each.init):
+    for field in (each for each in dataclasses.fields(kind) if each.init and not each.name.startswith("_")):
         default = "" if field.default is dataclasses.MISSING else f"`{_plain(field.default)}`"
         if field.default_factory is not dataclasses.MISSING:
             default = "new object"
@@ -110,14 +111,15 @@ def members_of(kind: type[Any]) -> Iterator[Member]:
     """The public methods and properties that a class itself defines."""
     fields = {field.name for field in dataclasses.fields(kind)} if dataclasses.is_dataclass(kind) else set()
     for name, value in tuple(vars(kind).items()):
-        inner = getattr(value, "__func__", getattr(value, "fget", value))
+        inner = value.func if isinstance(value, cached_property) else value
+        inner = getattr(inner, "__func__", getattr(inner, "fget", inner))
         if (
             not name.startswith("_")
             and name not in fields
             and inspect.isfunction(inner)
             and inner.__module__ == kind.__module__
         ):
-            yield Member(name, inner, isinstance(value, property))
+            yield Member(name, inner, isinstance(value, property | cached_property))
 
 
 def _methods(kind: type[Any]) -> Iterator[str]:

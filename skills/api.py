@@ -297,7 +297,7 @@ class SkillContext:
     tags: tuple[Tag, ...] = ()
     zones: tuple[Zone, ...] = ()
     walls: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
-    _last_pose: _LastPose = field(default_factory=_LastPose, init=False, repr=False, compare=False)
+    _last_pose: _LastPose = field(default_factory=_LastPose, repr=False, compare=False)
 
     def zone_map(self) -> ZoneMap:
         """Returns the zones as layers on the ground. Raises InputError when a mask cannot be read."""

@@ -94,5 +94,5 @@ class RunContext(SkillContext):
 
     def for_skill(self, path_id: str) -> SkillContext:
         """Returns those parts of the context that a skill may use, with a seed of the skill's own."""
-        lent = {each.name: getattr(self, each.name) for each in fields(SkillContext) if each.init}
+        lent = {each.name: getattr(self, each.name) for each in fields(SkillContext)}
         return SkillContext(**{**lent, "seed": leaf_seed(self.seed, path_id)})

@@ -296,25 +296,21 @@ class Lidar(NoisySensor):
         poses_WB = self._scene.body_poses(plant_context)
         return lambda: Scan(
             stamp_s=stamp_s,
-            ranges_m=self._measured(self._ranges(poses_WB, X_WL)),
+            ranges_m=self._measured(poses_WB, X_WL),
             elevations_rad=self._elevations,
             azimuths_rad=self._azimuths,
             X_BL=self._X_BL if X_BL is None else X_BL,
             X_OB=X_OB,
         )
 
-    def _ranges(self, poses_WB: FloatArray, X_WL: RigidTransform) -> FloatArray:
-        """Casts all rays of a whole turn; returns ranges (azimuths, rings) in metres."""
-        self._work["lidar_rays"] += len(self._elevations) * len(self._turn)
-        scene = self._scene
-        pose, rays = np.ascontiguousarray(X_WL.GetAsMatrix34()), (self._elevations, self._turn)
-        return cast_rays(scene.kinds, scene.half_extents_m, scene.poses_BG, scene.bodies, poses_WB, pose, *rays)
-
-    def _measured(self, ranges_m: FloatArray) -> NDArray[np.float32]:
+    def _measured(self, poses_WB: FloatArray, X_WL: RigidTransform) -> NDArray[np.float32]:
         """Ranges (rings, azimuths) with noise; lost returns and returns out of range become NaN."""
-        spec = self.spec
+        spec, scene, pose = self.spec, self._scene, np.ascontiguousarray(X_WL.GetAsMatrix34())
+        self._work["lidar_rays"] += len(self._elevations) * len(self._turn)
+        shapes, rays = (scene.kinds, scene.half_extents_m, scene.poses_BG, scene.bodies), (self._elevations, self._turn)
+        ranges_m = cast_rays(*shapes, poses_WB, pose, *rays)[spec.visible_columns()]
         limits = np.float32(spec.min_range_m), np.float32(min(spec.max_range_m, NO_RETURN_M / 2.0))
-        noisy = _with_noise(ranges_m[spec.visible_columns()], self._grain.crop()[..., 0], spec.sigma_m, limits)
+        noisy = _with_noise(ranges_m, self._grain.crop()[..., 0], spec.sigma_m, limits)
         noisy.reshape(-1)[self._rng.integers(0, noisy.size, self._rng.binomial(noisy.size, spec.dropout))] = np.nan
         return noisy
 

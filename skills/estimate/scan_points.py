@@ -7,7 +7,6 @@ frame by height, roll and pitch.
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +16,6 @@ from skills.estimate.compiled import Triple, compiled
 from skills.geometry import relative_pose
 from skills.robot import Capabilities, FloatArray, Joints, Pose2D, Robot, Scan
 
-Outline = tuple[float, float, float, float]
 _MOVED_M = 0.02
 _MOVED_RAD = 0.02
 
@@ -56,7 +54,7 @@ class ArmShape:
 class SelfFilter:
     """Removes the robot's own points. `outline_m` is (x_min, x_max, y_min, y_max) of the body."""
 
-    outline_m: Outline
+    outline_m: tuple[float, float, float, float]
     arm: ArmShape | None = None
     body_margin_m: float = 0.08
     arm_radius_m: float = 0.2
@@ -111,7 +109,7 @@ def points_in_body_axes(points_W: FloatArray, X_WB: Pose2D) -> FloatArray:
 
 
 def scan_points(
-    scan: Scan, *, azimuths: int, heights_m: tuple[float, float], max_range_m: float, most: int = sys.maxsize
+    scan: Scan, *, azimuths: int, heights_m: tuple[float, float], max_range_m: float, most: int = 1_000_000
 ) -> FloatArray:
     """Points (N, 5) from a scan in frame F: x, y, height above the floor (m), ring and azimuth index in the scan.
 
@@ -146,7 +144,9 @@ def has_moved(before: Scan, scan: Scan) -> bool:
 
 
 @compiled
-def _foreign(points: FloatArray, arm: FloatArray, outline: Outline, margins: Triple) -> NDArray[np.bool_]:
+def _foreign(
+    points: FloatArray, arm: FloatArray, outline: tuple[float, float, float, float], margins: Triple
+) -> NDArray[np.bool_]:
     """Compiled loop of `SelfFilter.foreign`; `margins` are those of the body, the arm and a held object, if any."""
     x0, x1, y0, y1 = outline
     margin, arm_radius, held_radius = margins

@@ -40,7 +40,7 @@ MESA_THREADS: Final = "LP_NUM_THREADS"
 
 @dataclass(frozen=True)
 class MountedCamera:
-    """Camera on a link: how its picture and its depth are rendered, and its pose X_FC in the link's geometry frame."""
+    """Camera on a link: how picture and depth are rendered, and its pose X_FC in the link's geometry frame."""
 
     colour: ColorRenderCamera
     depth: DepthRenderCamera
@@ -82,24 +82,17 @@ class Scene:
         if self._cameras:
             self._aside = _Renderer(self, self._cameras)
 
-    def colour(self, positions: NDArray[np.float64], camera: int) -> NDArray[np.uint8]:
-        """Renders the picture (H, W, 3) RGB of a camera with the plant at `positions`.
+    def picture(self, positions: NDArray[np.float64], camera: int, *, depth: bool) -> NDArray[Any]:
+        """Renders a camera's picture (H, W, 3) RGB, or its depth (H, W) in m, 0 or infinite out of range.
 
         Raises RuntimeError when the rendering process has ended.
         """
         if self._aside is not None:
-            return self._aside.picture(positions, camera, depth=False)
-        one = self._cameras[camera]
-        image = self.query_at(positions).RenderColorImage(one.colour, one.frame, one.X_FC)
-        return np.ascontiguousarray(image.data[..., :3])
-
-    def depth(self, positions: NDArray[np.float64], camera: int) -> NDArray[np.float32]:
-        """Renders the depth (H, W) in m of a camera; out of range it is 0 or infinite. Raises as `colour` does."""
-        if self._aside is not None:
-            return self._aside.picture(positions, camera, depth=True)
-        one = self._cameras[camera]
-        image = self.query_at(positions).RenderDepthImage(one.depth, one.frame, one.X_FC)
-        return np.array(image.data[..., 0], dtype=np.float32)
+            return self._aside.picture(positions, camera, depth=depth)
+        query, one = self.query_at(positions), self._cameras[camera]
+        if depth:
+            return np.array(query.RenderDepthImage(one.depth, one.frame, one.X_FC).data[..., 0])
+        return np.ascontiguousarray(query.RenderColorImage(one.colour, one.frame, one.X_FC).data[..., :3])
 
     def query_at(self, positions: NDArray[np.float64]) -> QueryObject:
         """Returns the scene with the plant at `positions`; it is valid until the next call.
@@ -134,7 +127,7 @@ class _Renderer:
         weakref.finalize(self, _end, self._connection, process)
 
     def picture(self, positions: NDArray[np.float64], camera: int, *, depth: bool) -> NDArray[Any]:
-        """Returns the picture or the depth of a camera; see `Scene`."""
+        """See `Scene.picture`."""
         try:
             self._connection.send_bytes(bytes([depth, camera]) + positions.tobytes())
             trouble = self._connection.recv_bytes()
@@ -155,19 +148,15 @@ class _Renderer:
                 signal.signal(ignored, signal.SIG_IGN)
             gc.disable()
             while True:
-                connection.send_bytes(self._render(scene, connection.recv_bytes()).encode())
+                depth, camera, *_ = request = connection.recv_bytes()
+                try:
+                    shown = scene.picture(np.frombuffer(request[2:]), camera, depth=bool(depth))
+                    self._shared(camera, depth=bool(depth))[:] = shown
+                    connection.send_bytes(b"")
+                except Exception as error:
+                    connection.send_bytes(f"{type(error).__name__}: {error}".encode())
         finally:
             os._exit(0)
-
-    def _render(self, scene: Scene, request: bytes) -> str:
-        """Renders what a request asks for into the shared memory; returns what went wrong."""
-        depth, camera, positions = bool(request[0]), request[1], np.frombuffer(request[2:])
-        try:
-            shown = (scene.depth if depth else scene.colour)(positions, camera)
-            self._shared(camera, depth=depth)[:] = shown
-        except Exception as error:  # told to the run, which ends with it
-            return f"{type(error).__name__}: {error}"
-        return ""
 
 
 def _end(connection: Connection, process: int) -> None:

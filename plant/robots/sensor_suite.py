@@ -88,7 +88,7 @@ class Camera(NoisySensor):
         lens, colour = self.spec.intrinsics(), None
         if visual:
             self._work[f"pictures_{lens.width}x{lens.height}"] += 1
-            colour = self._picture.colour(self._scene.colour(positions, self._number))
+            colour = self._picture.colour(self._scene.picture(positions, self._number, depth=False))
         grey = _NO_PICTURE if colour is None else _grey(colour)
         return Image(
             stamp_s=stamp_s,
@@ -105,9 +105,9 @@ class Camera(NoisySensor):
     def _take_depth(self, scene: Scene, positions: FloatArray, grey: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Renders noisy depth; too dark and too shiny spots of the picture are lost, if there is one."""
         lens = self.spec.depth_intrinsics()
-        small = cv2.resize(grey, (lens.width, lens.height)) if grey.size else None
+        small = np.asarray(cv2.resize(grey, (lens.width, lens.height)), dtype=np.uint8) if grey.size else None
         self._work[f"depth_pictures_{lens.width}x{lens.height}"] += 1
-        return self._depth.depth(scene.depth(positions, self._number), None if small is None else np.asarray(small))
+        return self._depth.depth(scene.picture(positions, self._number, depth=True), small)
 
 
 def _grey(colour: NDArray[np.uint8]) -> NDArray[np.uint8]:

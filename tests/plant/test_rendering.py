@@ -64,7 +64,7 @@ def box_scene():
 
 
 def pictures(scene, camera):
-    return scene.colour(NOWHERE, camera), scene.depth(NOWHERE, camera)
+    return [scene.picture(NOWHERE, camera, depth=depth) for depth in (False, True)]
 
 
 def children():
@@ -104,7 +104,7 @@ def test_a_run_is_told_why_rendering_failed():
     scene, camera = box_scene()
     scene.render_aside()
     with pytest.raises(RuntimeError, match="rendering failed: IndexError"):
-        scene.colour(NOWHERE, camera + 1)
+        scene.picture(NOWHERE, camera + 1, depth=False)
     assert pictures(scene, camera)[0].shape == (48, 64, 3)
 
 

@@ -57,8 +57,6 @@ class SimulatedBackend:
         """Builds the plant; the seed places the objects. Raises InputError if robots or objects do not fit."""
         self._world, self._robots, self._record = world, robots, record
         self._simulation = simulate(world, robots, seed=seed, record=record, variation=variation, spared=spared)
-        if (scene := self._simulation.engine.world.scene) is not None:
-            scene.render_aside()  # before there are threads
         self._steps = WorkThread("errand-plant")
         self._pipeline = Pipeline(self._simulation.engine, self._steps.do)
         self._keep: Callable[[], None] | None = None
@@ -178,10 +176,13 @@ def simulate(
     variation: Variation = NO_VARIATION,
     spared: Collection[str] = (),
 ) -> Simulation:
-    """Builds the plant of a world; the seed places the objects. Raises InputError if robots or objects do not fit."""
+    """Builds the plant of a world, whose cameras are rendered in a forked process; the seed places the objects.
+
+    Raises InputError if robots or objects do not fit.
+    """
     logging.getLogger("drake").setLevel(logging.WARNING)  # Drake sets its own level when it is imported
     try:
-        return Simulation(
+        simulation = Simulation(
             world,
             seed=seed,
             robots=[replace(robot, locomotion=robot_stack(robot).locomotion) for robot in robots.values()],
@@ -191,6 +192,9 @@ def simulate(
         )
     except WorldError as error:
         raise InputError(str(error)) from error
+    if (scene := simulation.engine.world.scene) is not None:
+        scene.render_aside()
+    return simulation
 
 
 def run_entry(

@@ -348,11 +348,11 @@ class DisturbanceLog(RunVisitor):
 
 
 def return_memory() -> None:
-    """Returns freed memory to the system.
+    """Frees the objects of an ended run, which `preload` has frozen, and returns their memory to the system.
 
-    The C library keeps freed memory in small pieces; a worker would grow by some hundred megabytes with each mission.
-    Does nothing if the C library has no `malloc_trim`.
+    Without this they stay until the next run is built, and the C library keeps small pieces of freed memory.
     """
+    gc.unfreeze()
     gc.collect()
     with suppress(AttributeError):
         ctypes.CDLL(None).malloc_trim(0)

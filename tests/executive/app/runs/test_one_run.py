@@ -1,6 +1,7 @@
-"""A run: memory that was freed goes back to the system, and clutter spares what the mission names."""
+"""A run: its memory is freed and goes back to the system, and clutter spares what the mission names."""
 
 import ctypes
+import subprocess
 import sys
 from pathlib import Path
 
@@ -27,6 +28,24 @@ def test_memory_that_was_freed_in_pieces_is_returned():
     return_memory()
     assert before_mb - resident_mb() > 100
     assert len(some) == 60
+
+
+FROZEN = """
+import gc, weakref
+from executive.app.runs.one_run import return_memory
+class Plant: pass
+plant = Plant()
+plant.itself, freed = plant, weakref.ref(plant)
+gc.freeze()
+del plant
+return_memory()
+assert freed() is None
+"""
+
+
+def test_objects_that_an_ended_run_has_frozen_are_freed():
+    """In a process of its own, because the tests must not thaw what they hold."""
+    subprocess.run([sys.executable, "-c", FROZEN], check=True)
 
 
 def test_clutter_spares_the_classes_that_are_asked_for(tmp_path):

@@ -160,8 +160,9 @@ class _Renderer:
 
 
 def _end(connection: Connection, process: int) -> None:
-    """Ends a rendering process and waits for it."""
+    """Ends a rendering process: closing its connection is not enough, because later processes have copies of it."""
     connection.close()
+    os.kill(process, signal.SIGKILL)
     os.waitpid(process, 0)
 
 

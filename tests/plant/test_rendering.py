@@ -90,6 +90,17 @@ def test_the_process_ends_with_the_scene():
     assert children() == before
 
 
+def test_scenes_may_end_in_any_order():
+    before = children()
+    (first, camera), (second, _) = box_scene(), box_scene()
+    first.render_aside()
+    second.render_aside()
+    del first
+    assert pictures(second, camera)[0].shape == (48, 64, 3)
+    del second
+    assert children() == before
+
+
 def test_a_run_is_told_when_the_process_has_died():
     before = children()
     scene, camera = box_scene()

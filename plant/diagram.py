@@ -71,7 +71,8 @@ def add_scenery(
         parser.package_map().Add(OWN_PACKAGE, directives.parent)
         return parser
 
-    scratch, scene_graph = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
+    scratch, scene_graph = MultibodyPlant(TIME_STEP_S), SceneGraph()  # pydrake never frees an unbuilt builder
+    scratch.RegisterAsSourceForSceneGraph(scene_graph)
     parser = parser_in(scratch)
     try:
         flat = FlattenModelDirectives(LoadModelDirectives(directives), parser.package_map()).directives
@@ -284,8 +285,7 @@ def build_diagram(config: DiagramConfig, meshcat: Meshcat | None = None) -> Worl
     scenery = {} if config.directives is None else add_scenery(plant, config.directives, parser_of)
     instances = {model.name: _add_model(plant, parser, model) for model in config.models}
     panels = {door.name: add_panel(plant, door) for door in config.doors}
-    receivers = [model for model in config.models if model.receiving is not None]
-    trays = {model.name: _add_tray(plant, parser, model) for model in receivers}
+    trays = {model.name: _add_tray(plant, parser, model) for model in config.models if model.receiving is not None}
     placed = sorted(config.robots, key=lambda robot: robot.name)
     robots = {robot.name: robot_kind(robot.kind).add(plant, robot, config.visuals) for robot in placed}
     plant.Finalize()

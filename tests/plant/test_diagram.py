@@ -1,5 +1,6 @@
 """Scenery belongs to the world body, shape for shape, and keeps its names."""
 
+import gc
 import shutil
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 from pydrake.geometry import Role
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import LoadModelDirectives, ProcessModelDirectives
-from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.framework import DiagramBuilder
 
 from plant.diagram import DiagramConfig, build_diagram, parser_of
@@ -58,6 +59,16 @@ def test_a_model_with_a_part_that_moves_stays_a_model(directives):
     frame = built.plant.GetBodyByName("frame")
     X_WF = built.plant.EvalBodyPoseInWorld(built.plant.CreateDefaultContext(), frame)
     assert X_WF.IsNearlyEqualTo(RigidTransform([-3, 0, 0.5]), 1e-9)
+
+
+def test_a_world_that_is_no_longer_used_leaves_no_plant_behind(directives):
+    def plants():
+        gc.collect()
+        return sum(isinstance(each, MultibodyPlant) for each in gc.get_objects())
+
+    before = plants()
+    build_diagram(DiagramConfig(directives=directives, render=False))
+    assert plants() == before
 
 
 def test_a_bump_into_scenery_names_the_piece(directives):

@@ -113,7 +113,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
 
     def _only_robots_move(self) -> bool:
         """Returns whether only robots and what they carry move; then one call does all steps of a control period."""
-        still = self.walkers.still and self.doors.still and self.moves is None and not self.receivers.busy
+        still = self.walkers.still and self.doors.still and self.moves is None and self.receivers.still
         return still and (self._sleepers.all_asleep or self._carried.calm)
 
     def _do_steps(self, steps: int, holding: Sequence[str]) -> None:

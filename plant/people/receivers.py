@@ -243,6 +243,11 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
         """Returns whether the person receives an object, or the tray is not hidden in the torso."""
         return self.phase is not Phase.IDLE or not self._home
 
+    @property
+    def still(self) -> bool:
+        """Returns whether the tray stays where it is, and the person does not pull."""
+        return self.phase is Phase.RECEIVING or not self.busy
+
     def update(self, now_s: float) -> None:
         """Decides the next phase."""
         if self.offer is None:
@@ -306,6 +311,9 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
                 self._X_WT = self._home_W()
                 self._set(self._X_WT, SpatialVelocity.Zero())
             return
+        if self.phase is Phase.RECEIVING:
+            self._set(self._X_WT, SpatialVelocity.Zero())
+            return
         here, goal = self._X_WT, self._goal()
         self._X_WT, velocity = _towards(here, goal, dt_s)
         self._set(here, velocity)
@@ -317,8 +325,6 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
         """Goal pose of the tray."""
         if self.phase is Phase.IDLE or self.offer is None:
             return self._goal_home()
-        if self.phase is Phase.RECEIVING:
-            return self._X_WT
         under = self._under(self.offer)
         aside_m = float(np.linalg.norm((under.translation() - self._X_WT.translation())[:2]))
         if self.phase is Phase.BRINGING and aside_m > _ASIDE_M:
@@ -411,6 +417,11 @@ class Receivers(Stateful, saved=("_offers", "_people")):
     def busy(self) -> Collection[str]:
         """Names of the people who receive an object or have one on their tray."""
         return [name for name, person in self._people.items() if person.busy]
+
+    @property
+    def still(self) -> bool:
+        """Returns whether all trays stay where they are, and nobody pulls."""
+        return all(person.still for person in self._people.values())
 
     def before_step(self, now_s: float, dt_s: float, holding: Sequence[str]) -> None:
         """Updates offers and people, pulls and moves the trays; `holding` names the robots that hold an object."""

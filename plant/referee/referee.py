@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from types import MappingProxyType
@@ -187,7 +188,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         speeds: dict[str, float] = {}
         for name, body in (*self._entities.bases.items(), *self._entities.hands.items()):
             v_W = self._plant.EvalBodySpatialVelocityInWorld(plant_context, body).translational()
-            speeds[name] = max(speeds.get(name, 0.0), float(np.linalg.norm(v_W)))
+            speeds[name] = max(speeds.get(name, 0.0), math.hypot(*v_W.tolist()))
         return speeds
 
     def _position(self, plant_context: Context, body: object) -> FloatArray:

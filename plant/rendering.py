@@ -34,6 +34,7 @@ from pydrake.systems.framework import Diagram
 from executive.words.variation import DAY_LIGHT, Light
 
 RENDERER = "vtk"
+_MOST_FILES: Final = 65_536
 MESA_THREADS: Final = "LP_NUM_THREADS"
 """Environment variable of Mesa's software renderer: the number of its threads."""
 
@@ -121,7 +122,6 @@ class _Renderer:
         self._connection, theirs = Pipe()
         process = os.fork()
         if process == 0:
-            self._connection.close()
             self._serve(scene, theirs)
         theirs.close()
         weakref.finalize(self, _end, self._connection, process)
@@ -147,6 +147,8 @@ class _Renderer:
             for ignored in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):  # the run ends, and then this process
                 signal.signal(ignored, signal.SIG_IGN)
             gc.disable()
+            for first, end in ((3, connection.fileno()), (connection.fileno() + 1, _MOST_FILES)):
+                os.closerange(first, end)  # locks, sockets and connections of the run, which end with it
             while True:
                 depth, camera, *_ = request = connection.recv_bytes()
                 try:
@@ -160,7 +162,7 @@ class _Renderer:
 
 
 def _end(connection: Connection, process: int) -> None:
-    """Ends a rendering process: closing its connection is not enough, because later processes have copies of it."""
+    """Ends a rendering process and waits for it."""
     connection.close()
     os.kill(process, signal.SIGKILL)
     os.waitpid(process, 0)

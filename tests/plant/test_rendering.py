@@ -128,3 +128,14 @@ def test_a_terminal_that_interrupts_the_run_leaves_the_process_to_the_run():
     for each in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
         os.kill(process, each)
     assert pictures(scene, camera)[0].shape == (48, 64, 3)
+
+
+def test_the_process_holds_no_file_of_the_run(tmp_path):
+    before = children()
+    with (tmp_path / "lock").open("w") as file:
+        scene, camera = box_scene()
+        scene.render_aside()
+        (process,) = children() - before
+        pictures(scene, camera)
+        held = {each.resolve() for each in Path(f"/proc/{process}/fd").iterdir()}
+        assert Path(file.name).resolve() not in held

@@ -14,7 +14,7 @@ from skills.estimate.matching import Match, MatchOptions, grid_surfaces, match, 
 from skills.estimate.scan_points import has_moved, outside_discs, placed_points, scan_points
 from skills.geometry import compose, inverse, relative_pose
 from skills.quantities import Count, Duration, Height, Length, Share, Turn
-from skills.robot import FloatArray, Pose2D, Robot, Scan
+from skills.robot import FloatArray, Odometry, Pose2D, Robot, Scan
 
 _EXACT_S = 1e-6
 _HEIGHTS_M = (0.7, 1.3)
@@ -86,7 +86,7 @@ class ScanMatchingLocaliser:
         anywhere_sigma = (width / math.sqrt(12.0), height / math.sqrt(12.0), math.pi / math.sqrt(3.0))
         self._covariance = np.diag(np.square(self._options.initial_sigma if initial else anywhere_sigma))
         self._inlier_share = 0.0
-        self._stamp_s = self._looked_at_s = -math.inf
+        self._stamp_s = -math.inf
         self._scan: Scan | None = None
         self._poor_scans = 0
         self._localised = False
@@ -105,11 +105,10 @@ class ScanMatchingLocaliser:
         if self._initial is not None:
             self._X_WO = compose(self._initial, inverse(robot.odometry().pose))
             self._initial = self._estimate = None
+        if self._rests(robot.odometry()):
+            return  # nor is a simulated scan cast, unless others read it
         scan = robot.scan()
-        if scan is None or scan.stamp_s <= self._looked_at_s or self._frozen(scan):
-            return
-        self._looked_at_s = scan.stamp_s
-        if self._rests(scan):
+        if scan is None or scan.stamp_s <= self._stamp_s or self._frozen(scan):
             return
         self._stamp_s, self._estimate = scan.stamp_s, None
         self._predict(scan.pose)
@@ -205,12 +204,12 @@ class ScanMatchingLocaliser:
         self._poor_scans += 1
         self._localised = self._localised and self._poor_scans < self._options.lost_scans
 
-    def _rests(self, scan: Scan) -> bool:
+    def _rests(self, odometry: Odometry) -> bool:
         """Returns whether a localised robot has hardly moved since the last match, and this is not long ago."""
         due_s = self._stamp_s + self._options.rest_s - _EXACT_S
-        if self._X_OB is None or not self._localised or self._poor_scans or scan.stamp_s >= due_s:
+        if self._X_OB is None or not self._localised or self._poor_scans or odometry.stamp_s >= due_s:
             return False
-        step = relative_pose(self._X_OB, scan.pose)
+        step = relative_pose(self._X_OB, odometry.pose)
         return math.hypot(step.x_m, step.y_m) < self._options.rest_m and abs(step.yaw_rad) < self._options.rest_rad
 
     def _frozen(self, scan: Scan) -> bool:

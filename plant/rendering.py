@@ -79,7 +79,7 @@ class Scene:
         return len(self._cameras) - 1
 
     def render_aside(self) -> None:
-        """Forks a process that renders for the cameras from now on. Call it before threads begin."""
+        """Forks a process that renders for the cameras from now on. Call it while no other thread works."""
         if self._cameras:
             self._aside = _Renderer(self, self._cameras)
 

@@ -111,10 +111,8 @@ class LayeredCostmap:
             self._note_change()
         self._X_WB = compose(X_WO, odometry.pose)
         self._filter = self._filter or SelfFilter.of(robot.capabilities())
-        if not localisation.localised or localisation.stamp_s <= self._scan_stamp_s:
-            return  # at rest, the localiser uses every third scan, which is enough here, too
         scan = robot.scan()
-        if scan is not None and scan.stamp_s > self._scan_stamp_s:
+        if scan is not None and scan.stamp_s > self._scan_stamp_s and localisation.localised:
             self._scan_stamp_s = scan.stamp_s
             self._take_scan(scan, X_WO, self._filter, robot)
 

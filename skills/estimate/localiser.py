@@ -106,7 +106,7 @@ class ScanMatchingLocaliser:
             self._X_WO = compose(self._initial, inverse(robot.odometry().pose))
             self._initial = self._estimate = None
         if self._rests(robot.odometry()):
-            return  # nor is a simulated scan cast, unless others read it
+            return
         scan = robot.scan()
         if scan is None or scan.stamp_s <= self._stamp_s or self._frozen(scan):
             return

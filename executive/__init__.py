@@ -13,6 +13,7 @@ A mission is a sentence, a mission file, the name of a shipped mission, or a `Re
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -29,6 +30,10 @@ if TYPE_CHECKING:
     from plant.worlds.world import World
 
 __all__ = ["Request", "check", "evaluate", "load_world", "parse", "run_mission"]
+
+for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"):
+    os.environ.setdefault(_variable, "1")  # the same results on any number of cores, which missions share
+os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", "64000000")  # a small file may decompress to more than the memory
 
 
 def __getattr__(name: str) -> Any:

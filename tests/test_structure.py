@@ -23,8 +23,8 @@ LINES = {
     "executive/view": 1551,
     "executive/testing": 848,
     "executive/app": 7840,
-    "executive/cli": 3738,
-    "skills": 28081,
+    "executive/cli": 3732,
+    "skills": 28079,
     "plant": 11259,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 416, 59, 7

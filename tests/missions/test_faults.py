@@ -1,11 +1,16 @@
 """Faults by name in the plant: no kind of fault is a defect of the run, and no claim becomes false by one."""
 
 import math
+import os
+import signal
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import pytest
 
+from executive import run_mission
 from executive.run.outcome import Outcome
+from plant.robots.sensor_suite import Camera
 from skills.faults.fault_kinds import STANDARD_FAULTS
 from skills.faults.faulty_robot import parse_fault
 from tests.missions.flat_mission import FETCH, FlatMission, honest
@@ -83,3 +88,19 @@ def test_no_fault_of_a_skill_is_a_defect_of_the_run_or_makes_a_claim_false(words
     assert fault.effects
     assert (result.outcome is Outcome.ERROR) == (words in RAISING), result.message
     honest(result, verdict)
+
+
+def test_a_run_whose_rendering_process_dies_ends_with_an_error_that_says_so(tmp_path, monkeypatch):
+    take, taken = Camera.take, []
+
+    def third_kills(self, *asked, **options):
+        taken.append(self.spec.name)
+        if len(taken) == 3:
+            (process,) = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+            os.kill(int(process), signal.SIGKILL)
+        return take(self, *asked, **options)
+
+    monkeypatch.setattr(Camera, "take", third_kills)
+    report = run_mission("go to the kitchen", seed=1, out=tmp_path, record=False)
+    assert (report.achieved, report.outcome) == (False, Outcome.ERROR.value)
+    assert "the process that renders the cameras' pictures has ended" in report.message

@@ -9,14 +9,14 @@ no proximity role either: its rubber is a grid of spheres, which overlap each ot
 
 **Carrying.** The plant steps a free body along its velocity, but the joints of a robot along their arcs. While a robot
 turns at w, a body at a distance r from the axis would creep outwards by w^2 r dt^2 / 2 in each step: 3 mm/s at 0.75
-rad/s, out of the gripper within a minute of walking. So after each step an object that moves with a hand is shifted by
+rad/s, out of the gripper within a minute of walking. So for each step an object that moves with a hand is shifted by
 a dt^2 / 2, where a is the acceleration of the hand's point there at the present rates of all joints. The approximation
 w x v of the hand was off by 6 mm/s in an arm's motion: it pressed the object into one finger, and the other finger lost
 contact. Forces, velocities and contacts stay those of the plant.
 
 **Spin.** The plant's steps cannot follow a fast spin: the gyroscopic torque at the beginning of a step makes a flat
 wrench spin ever faster, and a can that turns by radians in a step penetrates a table and leaves it at 90 m/s. So the
-spin of free bodies is limited after each step to a rate that the next step can follow.
+spin of free bodies is limited to a rate that the next step can follow.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence

@@ -25,8 +25,8 @@ from plant.sensors.noise import NoiseTile, NoisySensor
 from plant.sensors.ray_shapes import RayScene
 from skills.robot import FloatArray, Scan
 
-Triple = tuple[float, float, float]
-Rays = tuple[Triple, Triple, Triple]
+Vector = tuple[float, float, float]
+Rays = tuple[Vector, Vector, Vector]
 """Of one column, in a shape's frame: origin, the horizontal direction and up."""
 FunctionT = TypeVar("FunctionT", bound=Callable[..., object])
 
@@ -123,7 +123,7 @@ def _box_distance(X_LG: FloatArray, half: FloatArray, origin: FloatArray) -> flo
 
 
 @_compiled
-def _columns_spanned(X_LG: FloatArray, half: Triple, azimuths: FloatArray) -> tuple[int, int]:
+def _columns_spanned(X_LG: FloatArray, half: Vector, azimuths: FloatArray) -> tuple[int, int]:
     """First column and number of columns whose vertical plane may meet the box; all columns around the axis."""
     columns = len(azimuths)
     cx, cy = (X_LG[0, 3], X_LG[1, 3]) if np.hypot(X_LG[0, 3], X_LG[1, 3]) > _EPS else (1.0, 0.0)
@@ -153,7 +153,7 @@ def _columns_spanned(X_LG: FloatArray, half: Triple, azimuths: FloatArray) -> tu
 
 
 @_compiled
-def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Triple) -> None:
+def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Vector) -> None:
     """Shortens one column's ranges to a box; the loop has no branches, so that it is vectorised."""
     origin, across, up = rays
     ox, oy, oz = origin
@@ -175,7 +175,7 @@ def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray,
 
 
 @_compiled
-def _cast_cylinder(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Triple) -> None:
+def _cast_cylinder(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Vector) -> None:
     """Shortens one column's ranges to a cylinder along its z axis: its wall, cut by the slab between the caps."""
     origin, across, up = rays
     ox, oy, oz = origin
@@ -197,7 +197,7 @@ def _cast_cylinder(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatA
 
 
 @_compiled
-def _cast_ellipsoid(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Triple) -> None:
+def _cast_ellipsoid(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Vector) -> None:
     """Shortens one column's ranges to an ellipsoid, by scaling space until it is the unit ball."""
     origin, across, up = rays
     ox, oy, oz = origin[0] / half[0], origin[1] / half[1], origin[2] / half[2]
@@ -215,7 +215,7 @@ def _cast_ellipsoid(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: Float
 
 
 @_compiled
-def _cast_capsule(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Triple) -> None:
+def _cast_capsule(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: Vector) -> None:
     """Shortens one column's ranges to a capsule along its z axis: a cylinder and two spheres (half[2] includes one)."""
     origin, across, up = rays
     straight = half[2] - half[0]

@@ -5,8 +5,7 @@
 The client reads the state at 30 Hz and drives at 10 Hz, for half of the time; then it reads the point cloud at 10 Hz
 and a picture of the hand with depth at 2 Hz as well. Prints JSON for both: median and 99th percentile of the answers'
 times (ms); of the time from a command's answer to the step of the plant that has its set point (ms); the robot's time
-over wall time, and the most that it was behind (s). Python does not answer while Drake renders, about 60 ms for a
-picture. A machine that does other work gives higher numbers.
+over wall time, and the most that it was behind (s). A machine that does other work gives higher numbers.
 """
 
 import multiprocessing

@@ -90,14 +90,19 @@ def test_no_fault_of_a_skill_is_a_defect_of_the_run_or_makes_a_claim_false(words
     honest(result, verdict)
 
 
+def children():
+    """Process ids of this process's children."""
+    return {int(each) for each in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()}
+
+
 def test_a_run_whose_rendering_process_dies_ends_with_an_error_that_says_so(tmp_path, monkeypatch):
-    take, taken = Camera.take, []
+    take, taken, before = Camera.take, [], children()
 
     def third_kills(self, *asked, **options):
         taken.append(self.spec.name)
         if len(taken) == 3:
-            (process,) = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
-            os.kill(int(process), signal.SIGKILL)
+            (process,) = children() - before
+            os.kill(process, signal.SIGKILL)
         return take(self, *asked, **options)
 
     monkeypatch.setattr(Camera, "take", third_kills)

@@ -32,7 +32,7 @@ def begins_with_a_clause(line: str) -> bool:
 @pytest.mark.parametrize("package", PACKAGES)
 def test_public_docstrings_begin_with_a_verb_or_a_noun(package: str) -> None:
     lines = {f"{path} {name}": line for path, text in modules(package).items() for name, line in read(text).docstrings}
-    assert len(lines) > 100
+    assert 0 < len(modules(package)) <= len(lines)
     assert {name: line for name, line in lines.items() if begins_with_a_clause(line)} == {}
 
 

@@ -93,6 +93,7 @@ PLUGIN_COMMANDS: Final[Mapping[str, _PluginCommand]] = {
     "object": _PluginCommand("errand-make", "Objects of your own: import any mesh as a model."),
     "new.robot": _PluginCommand("errand-make", "Write a package with a robot from a URDF."),
     "dataset": _PluginCommand("errand-train", "Labelled pictures for the detector; training and scores."),
+    "ros2": _PluginCommand("errand-ros2", "Logs as ROS 2 bags."),
 }
 """Commands of this project's plug-ins by name, listed by the help also where they are not installed."""
 

@@ -16,7 +16,7 @@ from rich.text import Text
 
 from executive.cli.number_options import quantity_option
 from executive.cli.options import takes_request
-from executive.cli.output import console_for, new_folder, show_table, terminal_answerer
+from executive.cli.output import console_for, show_table, terminal_answerer
 from executive.mission.request import Request
 from executive.record.history import Entry, History, read_history, timeline
 from executive.record.schemas import ERRORS
@@ -35,12 +35,9 @@ def log(
     file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
     as_json: Annotated[bool, typer.Option("--json", help="All transitions as one JSON list.")] = False,
     form: Annotated[
-        Literal["text", "map", "ros2"],
-        typer.Option("--format", help="map draws map, trajectory, path and particles as PNG; ros2 writes a bag."),
+        Literal["text", "map"], typer.Option("--format", help="map draws map, trajectory, path and particles as PNG.")
     ] = "text",
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="The picture; the folder of the bag, or its file *.mcap.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="The picture.")] = None,
     at: Annotated[float, quantity_option(Delay, help="Time of the map (s); by default the end.")] = math.inf,
     robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes, and ticks that took too long.")] = False,
@@ -49,11 +46,8 @@ def log(
     history = read_history(file)
     history = history if robot is None else history.of_robot(robot)
     if (form == "text") != (out is None):
-        what = "--out is for --format map and ros2" if out is not None else f"--format {form} writes a file"
+        what = "--out is for --format map" if out is not None else "--format map writes a file"
         raise InputError(what, hint="name both: --format map --out map.png")
-    if form == "ros2" and out is not None:
-        typer.echo(f"{_to_ros2(history, out)} messages in {out}", err=True)
-        return
     if out is not None:
         import cv2
 
@@ -68,16 +62,6 @@ def log(
         sys.stdout.write(json.dumps(list(history.transitions()), ensure_ascii=False) + "\n")
         return
     _show(history, console_for(as_json=False), every_node=every_node)
-
-
-def _to_ros2(history: History, out: Path) -> int:
-    """Writes a bag, or one file; returns the number of messages."""
-    from executive.record.ros2 import write_bag, write_ros2
-
-    if out.suffix == LOG_SUFFIX:
-        return write_ros2(history.events, out)
-    with new_folder(out) as folder:
-        return write_bag(history.events, folder, out.resolve().name)
 
 
 def _show(history: History, console: Console, *, every_node: bool) -> None:

@@ -72,7 +72,7 @@ def test_the_log_of_a_recorded_mission_of_two_robots_is_read_in_every_form(tmp_p
     assert report.achieved and report.referee.collisions == 0, report.message
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {"map.png", "recording.html", "report.html"}
     log = tmp_path / "out" / "log.mcap"
-    for arguments in (("log", log, "--format", "ros2", "--out", tmp_path / "ros2.mcap"),
+    for arguments in (("ros2", "bag", log, "--out", tmp_path / "ros2.mcap"),
                       ("replay", log, "--out", tmp_path / "replay.html")):  # fmt: skip
         done = CliRunner().invoke(app, [*map(str, arguments)])
         assert done.exit_code == 0, done.output

@@ -124,6 +124,7 @@ def nothing_installed(monkeypatch):
         ("map build", "map", "errand-make"),
         ("object import", "object", "errand-make"),
         ("new robot x", "new robot", "errand-make"),
+        ("ros2 bag", "ros2", "errand-ros2"),
         ("sdk", "sdk", "errand-spot"),
     ],
 )

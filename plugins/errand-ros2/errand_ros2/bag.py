@@ -22,10 +22,18 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_typestore
 
 from executive.record.history import Event
-from executive.record.other_tools import body_frame, grey_map, occupancies, origin_pose, ros_name
-from executive.record.schemas import DERIVED, JOINTS, MAP, PATH, POSE, SCAN, WALL, stamp
+from executive.record.other_tools import body_frame, ros_name
 from skills.inputs.outside import writing
 
+MAP: Final = "map"
+GRID: Final = "map/grid"
+POSE: Final = "pose"
+PATH: Final = "path"
+SCAN: Final = "scan"
+JOINTS: Final = "joints"
+WALL: Final = "wall"
+VIEWER_COPIES: Final = frozenset({"detections/boxes", "map/zones", "transform"})
+"""Topics of the log whose messages repeat others in a form that Foxglove draws."""
 TF: Final = "/tf"
 TF_STATIC: Final = "/tf_static"
 _ROOT: Final = "map"
@@ -67,7 +75,7 @@ def write_bag(events: Iterable[Event], folder: Path, name: str) -> int:
     return count
 
 
-def write_ros2(events: Iterable[Event], path: Path) -> int:
+def write_bag_file(events: Iterable[Event], path: Path) -> int:
     """Writes the events as one MCAP file of ROS 2; returns the number of messages.
 
     Raises InputError when it cannot be written.
@@ -111,7 +119,7 @@ class _Converter:
         space = f"/{ros_name(robot)}" if robot else "/errand"
         when, frame = self._stamp(data, event.stamp_s), str(data.get("frame_id", "world"))
         header = ros.std_msgs__msg__Header(when, frame)
-        if event.topic in DERIVED:
+        if event.topic in VIEWER_COPIES or (event.topic == MAP and "data" in data):  # the grid has the same map
             return
         if not self.statics:
             yield self._static(_transform(when, _ROOT, "world", _IDENTITY))
@@ -129,7 +137,7 @@ class _Converter:
             if lidar not in self.statics:
                 yield self._static(_transform(when, body_frame(robot), lidar, _moved(_pose(data["pose"]))))
             yield f"{space}/{SCAN}", _laser_scan(ros.std_msgs__msg__Header(when, lidar), data)
-        elif event.topic == MAP and "data" in data:
+        elif event.topic == GRID:
             yield f"/{MAP}", _occupancy_grid(header, data)
         elif data.get("format") == "jpeg" and "data" in data:
             content = np.frombuffer(base64.b64decode(data["data"]), np.uint8)
@@ -140,8 +148,8 @@ class _Converter:
 
     def _stamp(self, data: Data, stamp_s: float) -> ros.builtin_interfaces__msg__Time:
         own = data.get("timestamp")
-        when = stamp(self.start_s + (stamp_s if own is None else own["sec"] + own["nsec"] * 1e-9))
-        return ros.builtin_interfaces__msg__Time(when["sec"], when["nsec"])
+        time_s = self.start_s + (stamp_s if own is None else own["sec"] + own["nsec"] * 1e-9)
+        return ros.builtin_interfaces__msg__Time(*divmod(round(time_s * 1e9), 10**9))
 
     def _static(self, transform: ros.geometry_msgs__msg__TransformStamped) -> Message:
         """All static transforms, with a new one; listeners that come late get the last message alone."""
@@ -167,10 +175,11 @@ def _transform(
 
 
 def _occupancy_grid(header: ros.std_msgs__msg__Header, data: Data) -> ros.nav_msgs__msg__OccupancyGrid:
-    cells = occupancies(grey_map(data))
-    (height, width), origin = cells.shape, _pose(origin_pose(data))
-    info = ros.nav_msgs__msg__MapMetaData(header.stamp, data["resolution_m"], width, height, origin)
-    return ros.nav_msgs__msg__OccupancyGrid(header, info, cells.ravel())
+    cells = np.frombuffer(base64.b64decode(data["data"]), np.int8)  # an unknown cell, 255 in the log, is -1
+    width, size_m = data["column_count"], data["cell_size"]["x"]
+    height, origin = len(cells) // width, _pose(data["pose"])
+    info = ros.nav_msgs__msg__MapMetaData(header.stamp, size_m, width, height, origin)
+    return ros.nav_msgs__msg__OccupancyGrid(header, info, cells)
 
 
 def _laser_scan(header: ros.std_msgs__msg__Header, data: Data) -> ros.sensor_msgs__msg__LaserScan:

@@ -9,37 +9,18 @@ import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.reader import read_ros2_messages
-from pydrake.math import RigidTransform
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from executive.record.announce import map_message
-from executive.record.event_log import EventLog
-from executive.record.history import read_events
-from executive.record.ros2 import write_bag, write_ros2
+from errand_ros2.bag import GRID, VIEWER_COPIES, write_bag, write_bag_file
+from executive.record.history import read_history
 from executive.record.schemas import DERIVED
-from skills.estimate.grid_map import GridMap
 from skills.inputs.errors import InputError
-from skills.robot import Joints, Scan
 
 
 @pytest.fixture
-def events(tmp_path, compiled, run_tree, make, clock, knowledge, robot):
-    """Events of a mission with a map, a picture and a path; walls stand 2 m away on all sides but straight behind."""
-    ranges, azimuths = np.full((2, 8), 2.0, np.float32), np.linspace(-np.pi, np.pi, 8, endpoint=False)
-    ranges[:, 0] = np.nan
-    where = RigidTransform([0.1, 0.0, 0.4]), RigidTransform()
-    robot.scan = lambda: Scan(clock.now(), ranges, np.array([-0.3, 0.0]), azimuths, *where)
-    robot.joints = lambda: Joints(clock.now(), {"elbow": 0.5}, {"elbow": 0.1}, {"elbow": 2.0})
-    log = EventLog(tmp_path / "log.mcap", clock)
-    occupied, unknown = np.zeros((4, 6), bool), np.zeros((4, 6), bool)
-    occupied[0, 0] = unknown[3, 5] = True
-    log("map", map_message(GridMap(occupied, 0.5, (-1.0, -2.0), unknown), knowledge, world="flat"))
-    log("detections", {"image": np.full((24, 32, 3), 200, np.uint8), "source": "hand", "detections": []})
-    log("path", {"robot": "Alice", "frame": "world", "poses": [[1.0, 2.0, 0.0], [3.0, 4.0, 0.5]]})
-    run_tree(compiled(*make.FETCH), log=log)
-    log.close()
-    return read_events(log.path)
+def events(log_file):
+    return read_history(log_file).events
 
 
 @pytest.fixture
@@ -110,6 +91,10 @@ def test_other_messages_become_text_with_their_values(events, decoded):
     assert not {topic.removeprefix("/errand/") for _, topic, _, _ in decoded} & DERIVED
 
 
+def test_of_what_the_log_repeats_for_viewers_only_the_grid_is_read():
+    assert VIEWER_COPIES | {GRID} == DERIVED
+
+
 def test_times_are_those_of_the_wall_clock(events, decoded):
     start_s = next(event.data["start_s"] for event in events if event.topic == "wall")
     times = [time for _, _, time, _ in decoded]
@@ -150,11 +135,11 @@ def test_rosbags_reads_the_folder_as_a_bag(bag, decoded):
 
 
 def test_a_bag_may_be_one_file(tmp_path, events, decoded):
-    count = write_ros2(events, tmp_path / "one.mcap")
+    count = write_bag_file(events, tmp_path / "one.mcap")
     topics = [message.channel.topic for message in read_ros2_messages(str(tmp_path / "one.mcap"))]
     assert count == len(topics) == len(decoded)
 
 
 def test_a_bag_that_cannot_be_written_is_refused(tmp_path):
     with pytest.raises(InputError, match="cannot write"):
-        write_ros2((), tmp_path / "absent" / "bag.mcap")
+        write_bag_file((), tmp_path / "absent" / "bag.mcap")

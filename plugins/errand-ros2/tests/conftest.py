@@ -1,0 +1,48 @@
+"""The log of a mission of the scripted robot, with messages of every kind that has a type in ROS 2."""
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from executive.record.announce import map_message
+from executive.record.event_log import EventLog
+from executive.run.runner import run
+from executive.run.visitor import RunEntry
+from executive.run.worker import LockStepWorker
+from executive.testing.bench import room_knowledge
+from executive.tree.compiler import compile_mission
+from executive.tree.registry import installed_skills
+from executive.words.mission import Mission
+from skills.estimate.grid_map import GridMap
+from skills.robot import Joints, Pose2D, Scan
+from skills.testing.clock import VirtualClock
+from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.robot import ScriptedRobot, Start
+
+START = Pose2D(1.0, -0.5, 0.3)
+
+
+@pytest.fixture
+def log_file(tmp_path):
+    """Alice speaks; walls stand 2 m away on all sides but straight behind. There are a map, a picture and two paths."""
+    clock, knowledge = VirtualClock(), room_knowledge()
+    robot = ScriptedRobot(clock, start=Start(START))
+    ranges, azimuths = np.full((2, 8), 2.0, np.float32), np.linspace(-np.pi, np.pi, 8, endpoint=False)
+    ranges[:, 0] = np.nan
+    where = RigidTransform([0.1, 0.0, 0.4]), RigidTransform()
+    robot.scan = lambda: Scan(clock.now(), ranges, np.array([-0.3, 0.0]), azimuths, *where)
+    robot.joints = lambda: Joints(clock.now(), {"elbow": 0.5}, {"elbow": 0.1}, {"elbow": 2.0})
+    mission = Mission.model_validate({"name": "greet", "robot": "Alice", "steps": [{"speak": "Hello"}]})
+    tree = compile_mission(mission, knowledge=knowledge, registry=installed_skills())
+    occupied, unknown = np.zeros((4, 6), bool), np.zeros((4, 6), bool)
+    occupied[0, 0] = unknown[3, 5] = True
+    with closing(EventLog(tmp_path / "log.mcap", clock)) as log:
+        log("map", map_message(GridMap(occupied, 0.5, (-1.0, -2.0), unknown), knowledge, world="room"))
+        log("detections", {"image": np.full((24, 32, 3), 200, np.uint8), "source": "hand", "detections": []})
+        log("path", {"robot": "Alice", "frame": "world", "poses": [[1.0, 2.0, 0.0], [3.0, 4.0, 0.5]]})
+        log("path", {"robot": "Bob", "frame": "world", "poses": [[0.0, 0.0, 0.0]]})
+        entry = RunEntry(tree, robot, KnownPlace(START), BlockCostmap())
+        run([entry], clock=clock, worker=LockStepWorker(clock), visitors=[log])
+    return tmp_path / "log.mcap"

@@ -17,7 +17,7 @@ LINES = {
     "executive/mission": 1569,
     "executive/tree": 8573,
     "executive/run": 3245,
-    "executive/record": 1097,
+    "executive/record": 1081,
     "executive/store": 1598,
     "executive/conversation": 595,
     "executive/view": 1551,

@@ -84,14 +84,15 @@ def transform_of(pose: Message) -> Message:
 
 
 def grid_of(data: Message, now_s: float) -> Message:
-    """Map as an occupancy grid with values from 0 to 100, and 255 for unknown; row 0 is at the smallest y."""
-    grey = grey_map(data)
-    cells = occupancies(grey).astype(np.uint8)
-    cell = data["resolution_m"]
+    """Map as an occupancy grid: 0 free, 100 occupied, 255 unknown; row 0 is at the smallest y."""
+    content = np.frombuffer(base64.b64decode(data["data"]), np.uint8)
+    grey = np.asarray(cv2.imdecode(content, cv2.IMREAD_GRAYSCALE))[::-1]
+    cells = np.select([grey == 0, grey == 255], [100, 0], 255).astype(np.uint8)
+    cell, corner = data["resolution_m"], {**data["origin_m"], "z": 0.0}
     return {
         "timestamp": stamp(now_s),
         "frame_id": data["frame_id"],
-        "pose": origin_pose(data),
+        "pose": {"position": corner, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}},
         "column_count": grey.shape[1],
         "cell_size": {"x": cell, "y": cell},
         "row_stride": grey.shape[1],
@@ -119,20 +120,3 @@ def scene_of(zones: Sequence[Message], now_s: float) -> Message:
         head = {"timestamp": when, "frame_id": "world", "id": zone["rule"], "lifetime": stamp(0.0), "metadata": []}
         entities.append({**head, "frame_locked": False, **{name: [] for name in _OTHER_SHAPES}, **shapes})
     return {"deletions": [{"timestamp": when, "type": _ALL, "id": ""}], "entities": entities}
-
-
-def grey_map(data: Message) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """Grey picture from a map message, with row 0 at the smallest y."""
-    content = np.frombuffer(base64.b64decode(data["data"]), np.uint8)
-    return np.asarray(cv2.imdecode(content, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)[::-1]
-
-
-def occupancies(grey: np.ndarray[Any, np.dtype[np.uint8]]) -> np.ndarray[Any, np.dtype[np.int8]]:
-    """Occupancies of a map's picture in the convention of ROS: 0 free, 100 occupied, -1 unknown."""
-    return np.select([grey == 0, grey == 255], [100, 0], -1).astype(np.int8)
-
-
-def origin_pose(data: Message) -> Message:
-    """Pose of the outer corner of the map's first cell."""
-    origin = data["origin_m"]
-    return {"position": {"x": origin["x"], "y": origin["y"], "z": 0.0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}

@@ -186,8 +186,10 @@ class Sleepers:
         disturbed = moved | self._reached(centres_W)
         for places_W in (last_centres_W, centres_W) if moved.any() else ():
             disturbed |= self._near(centres_W, places_W[moved], radii_m[moved], margin_m)
-        for _ in range(len(self._objects) - 1) if disturbed.any() else ():
-            disturbed |= self._near(centres_W, centres_W[disturbed], radii_m[disturbed], self._limits.beside_m)
+        spread = disturbed
+        while spread.any():
+            beside = self._near(centres_W, centres_W[spread], radii_m[spread], self._limits.beside_m)
+            spread, disturbed = beside & ~disturbed, disturbed | beside
         self._still_s = np.where(disturbed, 0.0, self._still_s + elapsed_s)
         tired = self._still_s > self._limits.still_s
         for number in np.flatnonzero((self._asleep & disturbed) | (~self._asleep & tired)):

@@ -1,5 +1,5 @@
 # make env    the virtual environment .venv with all but torch
-# make demo   one mission, end to end; look into out/ (sets up what missions need, and no more)
+# make demo   one mission, end to end; look into out/last/ (sets up what missions need, and no more)
 # make test   a test of everything, and one mission of each kind; those that train networks only after `make train`
 # make affected  the tests that the changes since HEAD touch (since another revision: make affected SINCE=main)
 # make fast   in a minute or two: all tests but missions and the files of tests/slow.txt

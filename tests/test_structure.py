@@ -17,17 +17,17 @@ LINES = {
     "executive/mission": 1569,
     "executive/tree": 8573,
     "executive/run": 3245,
-    "executive/record": 1081,
-    "executive/store": 1598,
+    "executive/record": 1089,
+    "executive/store": 1599,
     "executive/conversation": 595,
     "executive/view": 1551,
     "executive/testing": 848,
-    "executive/app": 7840,
-    "executive/cli": 3717,
+    "executive/app": 7943,
+    "executive/cli": 3832,
     "skills": 28079,
-    "plant": 11259,
+    "plant": 11261,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 415, 59, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 417, 59, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

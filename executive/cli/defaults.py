@@ -18,11 +18,12 @@ FILE: Final = "errand.toml"
 _SECTION: Final = "[tool.errand]"
 _OF_REQUESTS: Final = (("run",), ("check",), ("evaluate",), ("queue", "add"))
 _OF_STORES: Final = (("run",), *(("queue", name) for name in ("add", "list", "remove", "run", "serve")), ("resume",))
+_OF_RUNS: Final = (*_OF_STORES, ("runs",), ("runs", "clean"))
 _COMMANDS: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
     "world": (*_OF_REQUESTS, ("tree",), ("parse",), ("listen",), ("teleop",), ("fleet", "run"), ("map", "build")),
     "robots": (*_OF_REQUESTS, ("fleet", "run")),
     "stack": (*_OF_REQUESTS, ("stack", "show")),
-    "out": _OF_STORES,
+    "out": _OF_RUNS,
     "store": _OF_STORES,
 }
 """Keys of the file, with the commands that have an option of this name."""
@@ -46,6 +47,11 @@ def default_map(folder: Path) -> dict[str, Any]:
                 options = options.setdefault(word, {})
             options[key] = value if key == "robots" else _path(file.parent, value, is_name=key in _NAMES)
     return found
+
+
+def runs_folder() -> Path:
+    """Returns the folder of the runs where a command has no option for it. Raises InputError."""
+    return Path(default_map(Path()).get("run", {}).get("out", "out"))
 
 
 def _nearest(folder: Path) -> tuple[Path, Mapping[str, Any]]:

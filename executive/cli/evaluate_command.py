@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shlex
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -12,13 +14,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from executive.cli.defaults import typed_options, yielding
+from executive.cli.defaults import runs_folder, typed_options, yielding
 from executive.cli.number_options import quantity_option
 from executive.cli.options import ANYWAY, AS_JSON, REQUEST_OPTIONS, request_arguments, takes_request
 from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer
 from executive.mission.request import Request
 from skills.inputs.errors import InputError
-from skills.inputs.outside import writing
+from skills.inputs.outside import is_folder, writing
 from skills.quantities import Count
 
 if TYPE_CHECKING:
@@ -242,19 +244,30 @@ def command_of(run: RunSpec) -> str:
 
 
 def report(
-    results: Annotated[Path, typer.Argument(metavar="RESULTS", help="A results file of `errand evaluate`.")],
+    run: Annotated[
+        Path | None,
+        typer.Argument(metavar="[RUN|RESULTS]", help="Folder of a run, or a results file.", show_default=False),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Write an HTML page that needs no other file.")
     ] = None,
     against: Annotated[Path | None, typer.Option(metavar="RESULTS", help="Compare with another results file.")] = None,
     as_json: AS_JSON = False,
 ) -> None:
-    """Reports the results of an evaluation: success rates, causes, run time by skill, and each failure."""
+    """Opens the report of a run, by default the last, or reports the results of an evaluation.
+
+    Of an evaluation: success rates, causes, run time by skill, and each failure.
+    """
+    if run is None or is_folder(run):
+        if out is not None or against is not None:
+            raise InputError("--out and --against are for an evaluation", hint="name its results.sqlite")
+        _open_report(run or runs_folder() / "last", as_json=as_json)
+        return
     from executive.app.evaluate.results import ResultsFile
     from executive.app.evaluate.summary import summary_json, to_page
 
     console = console_for(as_json)
-    with ResultsFile(results) as stored:
+    with ResultsFile(run) as stored:
         found, other = _results(stored), None
         if against is not None:
             with ResultsFile(against) as compared_with:
@@ -266,6 +279,21 @@ def report(
                 out.write_text(page, encoding="utf-8")
             console.print(f"Written: {out}", markup=False)
         finish(summary_json(found, command_of, other), as_json)
+
+
+def _open_report(folder: Path, *, as_json: bool) -> None:
+    """Names the report of a run, and opens it where there is a screen. Raises InputError if there is none."""
+    from executive.app.runs.folders import kept_run
+
+    kept = kept_run(folder)
+    page = kept.request.out / "report.html"
+    if not page.is_file():
+        what, hint = "the run has no report yet", "it is written when the run ends; `errand resume` goes on with it"
+        raise InputError(what, hint=hint, file=folder)
+    console_for(as_json).print(str(page), markup=False)
+    finish(dict(kept.report or {}), as_json)
+    if not as_json and sys.stdout.isatty() and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        typer.launch(str(page))
 
 
 def _results(stored: ResultsFile) -> Results:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -30,9 +31,7 @@ Queue = Annotated[Path, typer.Argument(metavar="QUEUE", help="The store of `erra
 def run(
     request: Request,
     queue: Queue,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for log, report and recording; by default `fleet` beside the store.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the run's folder; by default that of the store.")] = None,
     quiet: QUIET = False,
     view: VIEW = None,
     view_port: VIEW_PORT = 0,
@@ -49,6 +48,7 @@ def run(
         from executive.app.fleet.dispatch import silence
         from executive.app.fleet.fleet_mission import missions_json
         from executive.app.fleet.fleet_run import run_fleet, simulated_fleet
+        from executive.app.runs.folders import new_run
         from executive.app.runs.page_view import PageView
         from executive.view.foxglove import serve_live
 
@@ -66,18 +66,19 @@ def run(
             tell=silence if quiet else tell,
             record=request.record,
         )
-        folder = out or (queue if is_folder(queue) else store.parent) / "fleet"
+        asked = replace(request, name="fleet", out=out or (queue if is_folder(queue) else store.parent))
+        kept = new_run(asked, missions.now())
         first = next(iter(next(iter(dispatch.missions.values())).options.values()))
         page = PageView(None, tell, port=view_port) if view is not None else None
-        limit_s, bar = request.time_limit_s, progress_bar(console, "missions", len(dispatch.missions))
-        run_in = partial(run_fleet, dispatch, out=folder, seed=request.seed, time_limit_s=limit_s)
-        with serve_live(foxglove, tell) as live, bar as ended:
-            run_in(page=page, live=live, first=first, ended=ended)
+        run_in = partial(run_fleet, dispatch, out=kept.request.out, seed=request.seed, first=first, page=page)
+        with serve_live(foxglove, tell) as live, progress_bar(console, "missions", len(dispatch.missions)) as ended:
+            run_in(live=live, ended=ended, time_limit_s=request.time_limit_s)
         results = missions_json(missions, [each.id for each in queued])
         left = resumable_lines(missions, queue)
     achieved = [_achieved(each) for each in results if each["part_of"] is None]
-    console.print(f"{sum(achieved)} of {len(achieved)} missions achieved")
-    for line in left:
+    told = f"{sum(achieved)} of {len(achieved)} missions achieved"
+    kept.end({"outcome": "success" if all(achieved) else "failure", "message": told, "missions": results})
+    for line in (told, *left, f"Written to {kept.request.out}"):
         console.print(line, markup=False)
     if as_json:
         print_json({"missions": results})

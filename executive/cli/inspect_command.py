@@ -14,6 +14,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from executive.cli.defaults import runs_folder
 from executive.cli.number_options import quantity_option
 from executive.cli.options import takes_request
 from executive.cli.output import console_for, show_table, terminal_answerer
@@ -24,15 +25,18 @@ from executive.tree.node_view import NodeView, node_view, to_json
 from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, printable, readable, style_of, to_text
 from skills.inputs.errors import InputError
-from skills.inputs.outside import is_file, writing
+from skills.inputs.outside import is_file, is_folder, writing
 from skills.quantities import Count, Delay, Port, Tries, Wait
 
 RECORDING: Final = "recording.html"
 LOG_SUFFIX: Final = ".mcap"
 
 
+RUN: Final = typer.Argument(metavar="[RUN]", help="Folder or log.mcap; by default the last run.", show_default=False)
+
+
 def log(
-    file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
+    run: Annotated[Path | None, RUN] = None,
     as_json: Annotated[bool, typer.Option("--json", help="All transitions as one JSON list.")] = False,
     form: Annotated[
         Literal["text", "map"], typer.Option("--format", help="map draws map, trajectory, path and particles as PNG.")
@@ -43,7 +47,7 @@ def log(
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes, and ticks that took too long.")] = False,
 ) -> None:
     """Prints the timeline of a run: nodes with causes, detections, outcome, tracebacks of defects."""
-    history = read_history(file)
+    history = _history(run)
     history = history if robot is None else history.of_robot(robot)
     if (form == "text") != (out is None):
         what = "--out is for --format map" if out is not None else "--format map writes a file"
@@ -93,8 +97,16 @@ def _row(entry: Entry, prefix: str) -> tuple[str | Text, ...]:
     return f"{entry.t:.2f}", symbol, Text(printable(about)), Text(printable(entry.text), style=style.rich)
 
 
+def _history(run: Path | None) -> History:
+    """Returns the history of a run, by default of the last one. Raises InputError."""
+    last = runs_folder() / "last"
+    if run is None and not last.exists():
+        raise InputError("no run has written there yet", hint="name a run's folder, or its log.mcap", file=last)
+    return read_history(run or last)
+
+
 def replay(
-    file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
+    run: Annotated[Path | None, RUN] = None,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Write one HTML file that needs no server, and end.")
     ] = None,
@@ -103,9 +115,9 @@ def replay(
     view_for: Annotated[float | None, quantity_option(Wait, help="End after this time, s.")] = None,
 ) -> None:
     """Shows a run at any time of it: tree, map, pictures, events, 3D recording."""
-    history = read_history(file)
+    history = _history(run)
     history.trees()
-    beside = file.parent / RECORDING
+    beside = history.file.parent / RECORDING
     recording = beside if scene and beside.is_file() else None
     if out is not None:
         from executive.view.html import log_page
@@ -136,7 +148,7 @@ _MOST: Final[Mapping[TreeFormat, int]] = {"text": MANY_NODES, "svg": DRAWN_NODES
 @takes_request("sentence", "world")
 def tree(
     request: Request,
-    file: Annotated[str | None, typer.Argument(metavar="FILE|SENTENCE|LOG", show_default=False)] = None,
+    file: Annotated[str | None, typer.Argument(metavar="[FILE|SENTENCE|RUN]", show_default=False)] = None,
     form: Annotated[TreeFormat, typer.Option("--format", help="Output format.")] = "text",
     depth: Annotated[int | None, quantity_option(Tries, help="Number of levels below the root to show.")] = None,
     most: Annotated[
@@ -151,7 +163,10 @@ def tree(
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Write the tree to this file.")] = None,
     ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,
 ) -> None:
-    """Shows the tree of a sentence or a mission file before it runs, or the last state of the tree in a log."""
+    """Shows the tree of a sentence or a mission file before it runs, or the last state of the tree of a run.
+
+    Without an argument, of the last run.
+    """
     whole = _view(file, request, at, robot)
     shown = whole if depth is None else fold_below(whole, depth)
     if most is not None:
@@ -167,9 +182,10 @@ def tree(
 
 
 def _view(text: str | None, request: Request, at_s: float | None, robot: str | None) -> NodeView:
-    """Returns the tree from a log (.mcap), a mission file (.yaml, a file, or a shipped one), or a sentence."""
-    if text is not None and text.endswith(LOG_SUFFIX):
-        history = read_history(Path(text))
+    """Returns the tree of a run, a mission file (.yaml, a file, or a shipped one), or a sentence."""
+    nothing = text is None and request.sentence is None
+    if nothing or (text is not None and (text.endswith(LOG_SUFFIX) or is_folder(Path(text)))):
+        history = _history(None if text is None else Path(text))
         if robot is None and len(history.robots) > 1:
             known = ", ".join(history.robots)
             raise InputError("the log has several robots", hint=f"add --robot with one of: {known}", file=history.file)
@@ -188,11 +204,9 @@ def _view(text: str | None, request: Request, at_s: float | None, robot: str | N
 
 
 def _request(text: str | None, request: Request) -> Request:
-    """Returns the request whose tree is shown. Raises InputError unless exactly one is given."""
+    """Returns the request whose tree is shown. Raises InputError if two are given."""
     from executive.app.prepare.mission_files import shipped_missions
 
-    if text is None and request.sentence is None:
-        raise InputError("a mission file, a sentence or a log is needed", hint='try: errand tree "go to the kitchen"')
     if text is None:
         return request
     if request.sentence is not None:

@@ -161,6 +161,7 @@ WRITTEN: Final[Mapping[str, str]] = {
     "place.png": "putting it down",
     "hand_over.png": "the hand-over",
     "log.mcap": "the event log, for `errand log`, `errand replay` and Foxglove",
+    "run.json": "what was asked, when, and the report's values, for scripts and `errand runs`",
 }
 """Files of a run, with their content, in the order in which to look at them."""
 REFRESH_S = 0.2

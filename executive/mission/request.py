@@ -164,7 +164,7 @@ class Request:
         ),
     ] = None
     seed: Annotated[Seed, Option("Sets the objects in the world and all noise.", group=Heading.WORLD)] = 1
-    out: Annotated[Path, Option("Folder for log, tree, recording and pictures.", group=Heading.OUTPUT)] = Path("out")
+    out: Annotated[Path, Option("Folder in which each run gets its own folder.", group=Heading.OUTPUT)] = Path("out")
     record: Annotated[
         bool,
         Option(

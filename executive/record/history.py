@@ -158,7 +158,15 @@ def robot_of(event: Event) -> str:
 
 
 def read_history(path: Path) -> History:
-    """Reads the history of a run from its log, even a truncated one. Raises InputError for a file that is no log."""
+    """Reads the history of a run from its log, even a truncated one, or from its folder.
+
+    The folder of a resumed run has several logs; this reads the last. Raises InputError where there is no log.
+    """
+    if path.is_dir():
+        logs = sorted(path.resolve().glob("log*.mcap"), key=lambda log: (len(log.name), log.name))
+        if not logs:
+            raise InputError("it holds no log", hint="`errand runs` lists the runs", file=path)
+        path = logs[-1]
     return History(path, read_events(path))
 
 

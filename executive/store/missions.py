@@ -106,14 +106,15 @@ class MissionStore(Database):
         with self.writing() as connection:
             connection.execute("DELETE FROM mission WHERE id = ?", (number,))
 
-    def begin(self, number: int) -> None:
-        """Stores that the mission was started."""
-        self._change("state = 'running', starts = starts + 1", number)
+    def begin(self, number: int, request: Request | None = None) -> None:
+        """Stores that the mission was started, perhaps with another request: one with the run's own folder."""
+        changed = None if request is None else request.to_json()
+        self._change("state = 'running', starts = starts + 1, request = coalesce(?, request)", number, changed)
 
     def undo_begin(self, before: StoredMission) -> None:
         """Restores the earlier state of a mission that could not begin."""
-        values = (before.state.value, before.message, before.starts)
-        self._change("state = ?, message = ?, starts = ?", before.id, *values)
+        values = (before.state.value, before.message, before.starts, before.request.to_json())
+        self._change("state = ?, message = ?, starts = ?, request = ?", before.id, *values)
 
     def finish(self, number: int, state: MissionState, message: str) -> None:
         """Stores how the mission ended."""

@@ -59,8 +59,8 @@ def run_case(name, out):
         ended = run_errand("queue", "add", "--store", out / "missions.sqlite", "--say", sentence)
         if ended.returncode != 0:
             raise RuntimeError(ended.stderr)
-    fixed, own = ("--quiet", "--json", "--no-record"), out / "fleet" if name == "fleet" else out
-    run = (*(word.format(out=out) for word in shlex.split(CASES[name])), *fixed, "--out", own)
+    fixed = ("--quiet", "--json", "--no-record")
+    run = (*(word.format(out=out) for word in shlex.split(CASES[name])), *fixed, "--out", out)
     if name != "resume":
         ended = run_errand(*run)
     else:
@@ -71,7 +71,7 @@ def run_case(name, out):
     return {
         "exit": ended.returncode,
         "result": steady(json.loads(ended.stdout.splitlines()[-1])) if ended.stdout.strip() else ended.stderr,
-        "logs": [list(lines(read_events(log), str(out))) for log in sorted(out.rglob("log*.mcap"))],
+        "logs": [list(lines(read_events(log), str(log.parent))) for log in sorted(out.rglob("log*.mcap"))],
     }
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from executive.app.prepare.from_request import prepare
 from executive.app.runs.one_run import run_request
-from executive.app.runs.queue import new_run
+from executive.app.runs.queue import durable_run
 from executive.mission.request import Request
 from executive.run.visitor import RunVisitor
 from executive.store.missions import STORE, MissionStore
@@ -98,7 +98,7 @@ def measure(
         with MissionStore(out / STORE) as store:
             mission = store.add(prepared.request.from_anywhere(), queued=False)
             store.begin(mission.id)
-            finished = run_request(prepared, visitors=[watch], durable=new_run(store, mission, prepared))
+            finished = run_request(prepared, visitors=[watch], durable=durable_run(store, mission, prepared))
         show(summary(watch.reports, finished.report.outcome, out))
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.record.history import read_events
+from executive.record.history import read_history
 from executive.record.schemas import WALL
 from tests.missions.conftest import REPEATED_S
 
@@ -28,12 +28,12 @@ def test_the_run_is_told_in_a_line_for_each_skill(recorded):
 
 def test_the_run_leaves_tree_log_recording_and_pictures(recorded):
     out, _, _ = recorded
-    assert {path.name for path in out.iterdir()} >= ARTIFACTS
-    assert all((out / name).stat().st_size > 1000 for name in ARTIFACTS)
+    assert {path.name for path in (out / "last").iterdir()} >= ARTIFACTS
+    assert all((out / "last" / name).stat().st_size > 1000 for name in ARTIFACTS)
 
 
 def test_the_same_seed_gives_the_same_events(recorded, repeated):
-    logs = (read_events(recorded[0] / "log.mcap"), read_events(repeated / "log.mcap"))
+    logs = (read_history(recorded[0] / "last").events, read_history(repeated / "last").events)
     first, second = ([event for event in log if event.topic != WALL and event.stamp_s < REPEATED_S] for log in logs)
     assert any(event.data.get("node", "").endswith("/grasp") for event in first)
     assert first == second

@@ -40,7 +40,7 @@ def clock_s(out):
 
 
 def began_s(leaf, out):
-    log = out / "log.mcap"
+    log = out / "last" / "log.mcap"
     events = read_events(log) if log.is_file() and log.stat().st_size > 2000 else ()
     for event in events:
         if event.topic == "transitions" and event.data["node"].endswith(f"/{leaf}") and event.data["to"] == "RUNNING":
@@ -50,7 +50,12 @@ def began_s(leaf, out):
 
 def done_leaves(out):
     """The leaves that came to a good end by their own work, in both lives."""
-    events = [event.data for log in sorted(out.glob("log*.mcap")) for event in read_events(log) if "node" in event.data]
+    events = [
+        event.data
+        for log in sorted((out / "last").glob("log*.mcap"))
+        for event in read_events(log)
+        if "node" in event.data
+    ]
     good = [event for event in events if event.get("to") == "SUCCESS" and not event.get("restored", False)]
     return [event["node"].rsplit("/", 1)[-1] for event in good]
 

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from executive.cli.entry import app
-from executive.record.history import read_events
+from executive.record.history import read_history
 
 pytestmark = pytest.mark.mission
 
@@ -21,8 +21,7 @@ def errand_run(out, sentence, *arguments):
 
 def told(out):
     """What was logged of faults and events."""
-    events = read_events(out / "log.mcap")
-    return [event.data["message"] for event in events if event.topic == "control"]
+    return [event.data["message"] for event in read_history(out / "last").events if event.topic == "control"]
 
 
 def test_a_robot_takes_another_door_when_one_closes(tmp_path):
@@ -33,7 +32,7 @@ def test_a_robot_takes_another_door_when_one_closes(tmp_path):
     assert (report["outcome"], report["referee"]["success"]) == ("success", True), report
     assert report["referee"]["collisions"] == 0
     assert "the door between kitchen and living room closes" in told(out)
-    poses = [event.data["pose"]["position"] for event in read_events(out / "log.mcap") if event.topic == "pose"]
+    poses = [event.data["pose"]["position"] for event in read_history(out / "last").events if event.topic == "pose"]
     assert min(pose["x"] for pose in poses) < 7.4  # through the hall
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.record.history import read_events
+from executive.record.history import read_history
 from tests.tables import yaml_beside
 
 BUDGETS = yaml_beside(__file__, "test_work.yaml")
@@ -12,7 +12,7 @@ BUDGETS = yaml_beside(__file__, "test_work.yaml")
 def test_a_fetch_keeps_its_budgets(recorded):
     out, report, _ = recorded
     work = report["work"]
-    logged = [event.data for event in read_events(out / "log.mcap") if event.topic == "work"]
+    logged = [event.data for event in read_history(out / "last").events if event.topic == "work"]
     assert logged == [work]
     assert {name: work.get(name) for name in BUDGETS if work.get(name, 0) > BUDGETS[name]} == {}
     assert set(work) == set(BUDGETS), "a counter has no budget, or a budget no counter"

@@ -13,6 +13,7 @@ from executive.app.prepare.from_request import Setting, prepare
 from executive.app.prepare.prepared import Prepared
 from executive.app.report.run_report import RunReport
 from executive.app.runs.backend import Durable
+from executive.app.runs.folders import KeptRun, holds_run, kept_run, new_run
 from executive.app.runs.one_run import FinishedRun, log_name, return_memory, run_request
 from executive.language.questions import Answerer
 from executive.record.work import Profile
@@ -24,7 +25,6 @@ from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.recollection import Recollection
 from executive.store.resuming import ended_tree, resumed_tree
 from executive.view.foxglove import LiveServer
-from executive.words.slug import slug
 from skills.inputs.errors import InputError, disk_is_full
 
 if TYPE_CHECKING:
@@ -200,15 +200,18 @@ class MissionRuns:
         if begun and self._missions.has_steps(mission.id):
             resumed = resume_mission(self._missions, mission, ask=self._ask)
             self._screen.tell(f"Mission {mission.id} ({name}) goes on.")
-            prepared = _in_its_folder(mission, resumed.prepared)
+            prepared = resumed.prepared
         elif begun:
             self._screen.tell(f"Mission {mission.id} ({name}) had not begun; it begins now.")
         if prepared is None:
-            prepared = _in_its_folder(mission, prepare(mission.request, ask=self._ask))
+            prepared = prepare(mission.request, ask=self._ask)
             self._screen.tell(f"Mission {mission.id}: {name}", title=True)
-        with note_run(self._missions, mission) as ended:
+        known = begun and holds_run(mission.request.out)
+        kept = kept_run(mission.request.out) if known else new_run(prepared.request, self._missions.now())
+        prepared = replace(prepared, request=replace(prepared.request, out=kept.request.out))
+        with note_run(self._missions, mission, kept) as ended:
             before = self._before(mission) if mission.queued and resumed is None else None
-            durable = new_run(self._missions, mission, prepared, before) if resumed is None else resumed.durable
+            durable = durable_run(self._missions, mission, prepared, before) if resumed is None else resumed.durable
             with self._screen.watch(prepared) as options, self._cancelling(options.control):
                 finished = self._run_prepared(prepared, durable=durable, **vars(options))
             self._screen.conclude(finished)
@@ -241,18 +244,19 @@ class MissionRuns:
 
 
 @contextmanager
-def note_run(missions: MissionStore, mission: StoredMission) -> Iterator[Callable[[RunReport], None]]:
-    """Stores that a mission runs, and its end when the yielded function gets the report.
+def note_run(missions: MissionStore, mission: StoredMission, kept: KeptRun) -> Iterator[Callable[[RunReport], None]]:
+    """Stores that a mission runs, and its end when the yielded function gets the report; so does the run's folder.
 
     If the run raises InputError before it begins, the store is restored. Raises InputError if the disk is full.
     """
-    missions.begin(mission.id)
+    missions.begin(mission.id, replace(mission.request, out=kept.request.out.resolve()))
     over = False
 
     def ended(report: RunReport) -> None:
         nonlocal over
         over = True
         missions.finish(mission.id, MissionState(report.outcome), report.message)
+        kept.end(report.to_json())
 
     try:
         yield ended
@@ -261,6 +265,7 @@ def note_run(missions: MissionStore, mission: StoredMission) -> Iterator[Callabl
     except InputError:
         if over:
             raise
+        kept.undo()
         if mission.queued or mission.starts:
             missions.undo_begin(mission)
         else:
@@ -268,19 +273,12 @@ def note_run(missions: MissionStore, mission: StoredMission) -> Iterator[Callabl
         raise
 
 
-def _in_its_folder(mission: StoredMission, prepared: Prepared) -> Prepared:
-    """Returns the mission with the folder for its files; each mission of a queue has its own folder."""
-    asked = mission.request
-    out = asked.out / f"{mission.id:03d}-{slug(asked.name)}" if mission.queued else asked.out
-    return replace(prepared, request=replace(prepared.request, out=out))
-
-
 def plant_file(store: MissionStore) -> Path:
     """Returns the file in which the plant stores the state of a store's missions."""
     return store.path.with_suffix(".plant")
 
 
-def new_run(
+def durable_run(
     store: MissionStore, mission: StoredMission, prepared: Prepared, before: StoredMission | None = None
 ) -> Durable:
     """Returns the stored state for a mission in a new world, or in the world that the mission `before` left."""

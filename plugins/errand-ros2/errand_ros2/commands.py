@@ -22,7 +22,7 @@ def _group() -> None:
 
 @ros2.command()
 def bag(
-    file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
+    file: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, or its log.mcap.", show_default=False)],
     out: Annotated[Path, typer.Option("-o", "--out", help="New folder for the bag, or its file *.mcap.")],
     robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
 ) -> None:

@@ -13,7 +13,7 @@ import time
 
 import pytest
 
-from executive.record.history import read_events
+from executive.record.history import read_history
 from tests.executive.cli.calls import done, errand, refusal
 
 PROGRAM = """
@@ -121,7 +121,7 @@ def test_the_password_stands_in_no_file_and_no_output(served, tmp_path):
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert {"log.mcap", "report.html", "missions.db"} <= {path.name for path in files}
     assert [path for path in files if SECRET.encode() in path.read_bytes()] == []
-    assert not any(SECRET in repr(event) for event in read_events(tmp_path / "out" / "log.mcap"))
+    assert not any(SECRET in repr(event) for event in read_history(tmp_path / "out" / "last").events)
 
 
 def test_a_password_that_is_missing_is_named_where_nobody_can_type_it(served, monkeypatch):

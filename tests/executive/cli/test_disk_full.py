@@ -6,6 +6,7 @@ import os
 import pytest
 
 from executive.app.prepare.from_request import prepare
+from executive.app.runs.folders import KeptRun
 from executive.app.runs.one_run import run_request
 from executive.app.runs.queue import note_run
 from executive.mission.request import Request
@@ -39,8 +40,8 @@ def filling(monkeypatch):
 
 
 def run_kept(prepared, store, backend, ending=None):
-    mission = store.add(prepared.request, queued=False)
-    with note_run(store, mission) as ended:
+    mission, kept = store.add(prepared.request, queued=False), KeptRun(prepared.request, store.now(), "1")
+    with note_run(store, mission, kept) as ended:
         finished = run_request(prepared, backend)
         if ending is not None:
             ending()

@@ -128,7 +128,7 @@ def test_a_world_may_ask_for_the_wake_phrase(no_plant, tmp_path):
 def test_the_whole_tree_is_shown_on_demand(no_plant, tmp_path):
     asked = ("run", "--say", "go to the bedroom", "--out", str(tmp_path))
     short, long = (errand(*asked, *more).stdout.splitlines() for more in ((), ("--tree",)))
-    assert len(short) <= 5 < len(long)
+    assert len(short) <= 6 < len(long)
 
 
 def test_run_shows_commands_and_both_verdicts(no_plant, tmp_path):

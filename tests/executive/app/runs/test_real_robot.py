@@ -15,7 +15,7 @@ from importlib.metadata import entry_points
 
 import pytest
 
-from executive.record.history import read_events
+from executive.record.history import read_history
 from skills import stack
 from tests.docs.documents import ROOT, blocks
 from tests.executive.cli.calls import done, errand, refusal
@@ -42,9 +42,9 @@ def run(tmp_path, monkeypatch):
 def test_a_plug_in_of_two_files_drives_a_robot(run, tmp_path):
     ended = done(*run, "turtle://pond?speed=100&wake")
     assert "success" in ended.stdout
-    events = read_events(tmp_path / "out" / "log.mcap")
+    events = read_history(tmp_path / "out" / "last").events
     assert any("hello" in str(event.data) for event in events if event.topic == "speech")
-    assert "The turtle has no LiDAR." in (tmp_path / "out" / "report.html").read_text()
+    assert "The turtle has no LiDAR." in (tmp_path / "out" / "last" / "report.html").read_text()
 
 
 @pytest.mark.parametrize(

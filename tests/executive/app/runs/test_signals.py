@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from executive.app.runs.signals import ended_by_signals, interrupted_by_hang_up
-from executive.record.history import read_events
+from executive.record.history import read_history
 from executive.run.control import Control
 from executive.store.missions import MissionState, MissionStore
 
@@ -120,5 +120,5 @@ def test_closing_the_terminal_stops_the_robot_closes_the_log_and_leaves_the_miss
     with MissionStore(tmp_path / "missions.sqlite", create=False) as store:
         (mission,) = store.missions()
         assert (mission.state, mission.message) == (MissionState.CANCELLED, "cancelled by SIGHUP")
-    (end,) = [event.data for event in read_events(tmp_path / "log.mcap") if event.topic == "outcome"]
+    (end,) = [event.data for event in read_history(tmp_path / "last").events if event.topic == "outcome"]
     assert end["outcome"] == "cancelled"

@@ -1,0 +1,105 @@
+"""Folders of runs: each run has one of its own below a common folder, where the link `last` leads to the newest.
+
+The file `run.json` of a folder says what was asked, when, and by which version; at the end it holds the report.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from importlib.metadata import version
+from itertools import count
+from pathlib import Path
+from typing import Any, Final
+
+from executive.mission.request import Request
+from executive.store.database import form
+from executive.words.slug import slug
+from skills.inputs.errors import InputError
+from skills.inputs.outside import writing
+
+LAST: Final = "last"
+FACTS: Final = "run.json"
+
+
+@dataclass(frozen=True)
+class KeptRun:
+    """Run whose files are kept: its request, whose `out` is the run's folder, and its beginning (local time).
+
+    The `report` has JSON values, and is None while the run goes on, or when its process was killed.
+    """
+
+    request: Request
+    begun: datetime
+    version: str
+    report: Mapping[str, Any] | None = None
+
+    def end(self, report: Mapping[str, Any]) -> None:
+        """Writes the report."""
+        _write(replace(self, report=report))
+
+    def undo(self) -> None:
+        """Removes the folder of a run that could not begin; files of the run stay."""
+        if {path.name for path in self.request.out.iterdir()} == {FACTS}:
+            shutil.rmtree(self.request.out)
+
+
+def new_run(request: Request, now: datetime) -> KeptRun:
+    """Creates the folder of a run below the folder `out` of its request, and the link `last`.
+
+    Raises InputError if the folder cannot be written.
+    """
+    begun = now.astimezone().replace(microsecond=0)
+    name = f"{begun:%Y-%m-%d-%H%M}-{slug(request.name)}"
+    with writing(request.out, "name another --out"):
+        for number in count(1):
+            folder = request.out / (name if number == 1 else f"{name}-{number}")
+            if not folder.exists():
+                break
+        folder.mkdir(parents=True)
+        kept = KeptRun(replace(request, out=folder), begun, version("spot-errand"))
+        _write(kept)
+        last = request.out / LAST
+        if last.is_symlink() or not last.exists():
+            (link := request.out / f".{LAST}").unlink(missing_ok=True)
+            link.symlink_to(folder.name)
+            link.replace(last)
+    return kept
+
+
+def holds_run(folder: Path) -> bool:
+    """Returns whether a folder is that of a run."""
+    return (folder / FACTS).is_file()
+
+
+def kept_run(folder: Path) -> KeptRun:
+    """Reads the run of a folder, or of the folder that a link leads to. Raises InputError if it holds none."""
+    file = folder.resolve() / FACTS
+    try:
+        kept: KeptRun = form(KeptRun).validate_json(file.read_bytes())
+    except OSError as error:
+        raise InputError("it holds no run", hint="`errand runs` lists the runs", file=folder) from error
+    except ValueError as error:
+        raise InputError(f"it is damaged ({type(error).__name__})", hint="remove its folder", file=file) from error
+    return replace(kept, request=replace(kept.request, out=folder.resolve()))
+
+
+def kept_runs(out: Path) -> list[KeptRun]:
+    """Returns the runs below a folder, the oldest first. Raises InputError if a folder's run cannot be read."""
+    found = [kept_run(file.parent) for file in out.glob(f"*/{FACTS}") if not file.parent.is_symlink()]
+    return sorted(found, key=lambda kept: (kept.begun, kept.request.out.name))
+
+
+def remove_runs(out: Path, older_than: timedelta, now: datetime) -> list[Path]:
+    """Removes the folders of runs that began before a time; returns these folders."""
+    removed = [kept.request.out for kept in kept_runs(out) if now - kept.begun > older_than]
+    for folder in removed:
+        shutil.rmtree(folder)
+    return removed
+
+
+def _write(kept: KeptRun) -> None:
+    text = form(KeptRun).dump_json(kept, exclude_defaults=True, indent=1).decode()
+    (kept.request.out / FACTS).write_text(text + "\n", encoding="utf-8")

@@ -14,6 +14,9 @@ A mission is a sentence, a mission file, the name of a shipped mission, or a `Re
 from __future__ import annotations
 
 import os
+import sys
+from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -34,6 +37,32 @@ __all__ = ["Request", "check", "evaluate", "load_world", "parse", "run_mission"]
 for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"):
     os.environ.setdefault(_variable, "1")  # the same results on any number of cores, which missions share
 os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", "64000000")  # a small file may decompress to more than the memory
+
+
+def _load_own(name: str) -> None:
+    """Loads a package of Errand where a folder of the user's project has its name; that folder extends the package.
+
+    Raises ImportError if the user's program has imported the folder before.
+    """
+    root = os.path.dirname(os.path.dirname(__file__))  # noqa: PTH120 - pathlib takes a while to load
+    found = find_spec(name)
+    if found is not None and str(found.origin).startswith(os.path.join(root, name)):  # noqa: PTH118
+        return
+    if name in sys.modules:
+        folder = sys.modules[name].__path__[0]
+        raise ImportError(
+            f"{folder} stands for Errand's package '{name}': import executive first, or rename the folder"
+        )
+    sys.path.insert(0, root)
+    try:
+        package = import_module(name)
+    finally:
+        sys.path.remove(root)
+    package.__path__ += found.submodule_search_locations or () if found is not None else ()
+
+
+for _name in ("skills", "plant"):
+    _load_own(_name)
 
 
 def __getattr__(name: str) -> Any:

@@ -18,7 +18,6 @@ from executive.cli.defaults import yielding
 from executive.cli.options import takes_request
 from executive.cli.output import BAD_INPUT, console_for, finish, progress_bar
 from executive.mission.request import Request
-from executive.tree.estimate import Estimate
 from executive.tree.node_view import node_view
 from executive.view.text import readable, to_rich
 from skills.inputs.errors import InputError, count_text, one_line
@@ -26,23 +25,27 @@ from skills.inputs.errors import InputError, count_text, one_line
 SHOWN_NODES: Final = 40
 
 
-@takes_request("world", "given", "stack", "start", "robots")
+@takes_request("sentence", "answers", "world", "given", "stack", "start", "robots")
 def check(
     request: Request,
     context: typer.Context,
     files: Annotated[
-        list[Path],
-        typer.Argument(metavar="MISSION...", help="Files, or names of `errand missions`.", show_default=False),
-    ],
+        list[Path] | None,
+        typer.Argument(metavar="[MISSION...]", help="Files, or names of `errand missions`.", show_default=False),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object for all files on standard output.")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Show commands and trees, too.")] = False,
 ) -> None:
-    """Checks mission files without running them: commands, tree, paths on the map, time and battery."""
+    """Checks mission files or a sentence without running them: commands, tree, paths on the map, time and battery."""
     checker, console = Checker(), console_for(as_json)
-    with progress_bar(console, "files", len(files)) as advance:
-        checked = [_check(checker, replace(request, file=file), context, advance) for file in files]
+    if (request.sentence is None) == (not files):
+        what = "a mission file or a sentence is needed" if not files else "both mission files and a sentence are given"
+        raise InputError(what, hint='name files, or give a sentence: errand check --say "go to the kitchen"')
+    missions = [replace(request, file=file) for file in files or ()] or [request]
+    with progress_bar(console, "files", len(missions)) as advance:
+        checked = [_check(checker, each, context, advance) for each in missions]
     for one in () if as_json else checked:
-        _show(one, console_for(as_json=False), verbose=verbose)
+        _show(one, request.sentence or str(one.file), console_for(as_json=False), verbose=verbose)
     finish(to_json(checked), as_json, good=all(one.ok for one in checked), otherwise=BAD_INPUT)
 
 
@@ -72,7 +75,7 @@ def _estimate_json(one: Checked) -> dict[str, Any]:
     """Returns the estimate of a file; `most_s` is null if it has no upper limit."""
     taken = one.estimate
     return {
-        "file": str(one.file),
+        "file": None if one.file is None else str(one.file),
         "least_s": round(taken.duration_s, 1),
         "most_s": None if math.isinf(taken.most_s) else round(taken.most_s, 1),
         "reasons": list(taken.reasons),
@@ -86,11 +89,11 @@ def _error_json(error: InputError) -> dict[str, Any]:
     return {"file": file, "line": error.line, "message": error.message, "hint": error.hint}
 
 
-def _show(one: Checked, console: Console, *, verbose: bool) -> None:
-    """Prints a line on the file, and its errors; with `verbose` also the commands and the tree."""
+def _show(one: Checked, name: str, console: Console, *, verbose: bool) -> None:
+    """Prints a line on the file or sentence, and its errors; with `verbose` also the commands and the tree."""
     mark = "[green]✓[/green]" if one.ok else "[red]✗[/red]"
-    found = _in_words(one.estimate) if one.ok else count_text(len(one.errors), "error")
-    console.print(f"{mark} [bold]{escape(one_line(str(one.file)))}[/bold]: {found}")
+    found = str(one.estimate) if one.ok else count_text(len(one.errors), "error")
+    console.print(f"{mark} [bold]{escape(one_line(name))}[/bold]: {found}")
     for error in one.errors:
         typer.echo(f"errand: {error}", err=True)
     for warning in one.warnings:
@@ -99,21 +102,3 @@ def _show(one: Checked, console: Console, *, verbose: bool) -> None:
         for command in tree.commands:
             console.print(f"  {command}", markup=False)
         console.print(to_rich(readable(node_view(tree.root), SHOWN_NODES), collapsed=False))
-
-
-def _in_words(estimate: Estimate) -> str:
-    """Formats an estimate; its time is "about 2 min 05 s" or "2 min 05 s to 5 min 10 s (1 to 3 rounds)"."""
-    least = _minutes(estimate.duration_s)
-    if round(estimate.spare_s if math.isfinite(estimate.spare_s) else 1.0) == 0:
-        time = f"about {least}"
-    else:
-        most = "or more" if math.isinf(estimate.spare_s) else f"to {_minutes(estimate.most_s)}"
-        time = f"{least} {most} ({'; '.join(estimate.reasons)})"
-    charge = f"{estimate.charge:.1%} of the battery" if estimate.charge <= 1.0 else "more than one charge"
-    return f"{time}, {estimate.distance_m:.0f} m of driving and {charge} when all goes well"
-
-
-def _minutes(duration_s: float) -> str:
-    minutes, seconds = divmod(round(duration_s), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {seconds:02d} s"

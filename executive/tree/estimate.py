@@ -6,6 +6,7 @@ A walk follows the tree's nodes in the order in which they run; of alternatives 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -85,6 +86,17 @@ class Estimate:
     spare_s: float = 0.0
     reasons: tuple[str, ...] = ()
 
+    def __str__(self) -> str:
+        """Formats the estimate; its time is "about 2 min 05 s" or "2 min 05 s to 5 min 10 s (1 to 3 rounds)"."""
+        least = _minutes(self.duration_s)
+        if round(self.spare_s if math.isfinite(self.spare_s) else 1.0) == 0:
+            time = f"about {least}"
+        else:
+            most = "or more" if math.isinf(self.spare_s) else f"to {_minutes(self.most_s)}"
+            time = f"{least} {most} ({'; '.join(self.reasons)})"
+        charge = f"{self.charge:.1%} of the battery" if self.charge <= 1.0 else "more than one charge"
+        return f"{time}, {self.distance_m:.0f} m of driving and {charge} when all goes well"
+
     @property
     def most_s(self) -> float:
         """Longest duration (s) without failures."""
@@ -103,6 +115,14 @@ class Estimate:
         """Returns the estimate with `most_s` as the longest duration, and puts these reasons before the others."""
         all_reasons = tuple(dict.fromkeys((*reasons, *self.reasons)))
         return replace(self, spare_s=max(0.0, most_s - self.duration_s), reasons=all_reasons)
+
+
+def _minutes(duration_s: float) -> str:
+    minutes, seconds = divmod(round(duration_s), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes:02d} min"
+    return f"{minutes} min {seconds:02d} s" if minutes else f"{seconds} s"
 
 
 class CannotError(Exception):

@@ -116,10 +116,19 @@ def test_a_keyword_argument_that_cannot_be_used_is_refused_by_name(field, value)
         request_of("go", **{field: value})
 
 
+def test_a_printed_check_is_a_few_lines_also_of_a_long_mission():
+    checked = executive.check("patrol")
+    lines = str(checked).splitlines()
+    assert (len(lines), lines[2]) == (4, f"and {sum(len(tree.commands) for tree in checked.trees) - 2} more")
+    assert lines[-1] == str(checked.estimate)
+    assert str(executive.check("go to the moon")).startswith("error: I do not understand 'go to the moon'")
+
+
 def test_results_show_themselves_in_a_notebook():
     checked = executive.check("go to the kitchen", world="flat")
     assert all(each in checked._repr_html_() for each in ("Take [Nothing] to [kitchen]", "m of driving", "<svg"))
-    assert "STEP" in checked._repr_html_() and "battery" not in checked._repr_html_()
+    drawn = checked._repr_html_().partition("<svg")[2]
+    assert "STEP" in drawn and "battery" not in drawn
     assert "error: " in executive.check("go to the moon")._repr_html_()
     assert GO in executive.parse("go to the kitchen")._repr_html_()
     assert "moon" in executive.parse("go to the moon")._repr_html_()

@@ -19,6 +19,8 @@ from executive.view.text import DRAWN_NODES, readable
 from skills.inputs.errors import InputError
 
 MOST_LETTERS: Final = 300
+_SHOWN: Final = 2
+"""Lines of one kind in the text of a result, before the others are counted."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +41,26 @@ class Checked:
         """True if the mission has no errors."""
         return not self.errors
 
+    @property
+    def _lines(self) -> list[str]:
+        """Errors, warnings and commands, of each the first and the number of the others, and the estimate."""
+        errors, warnings = ([*map(str, each)] for each in (self.errors, self.warnings))
+        commands = [str(command) for tree in self.trees for command in tree.commands]
+        lines = list[str]()
+        for what, found in (("error: ", errors), ("warning: ", warnings), ("", commands)):
+            most = _SHOWN if len(found) > _SHOWN + 1 else len(found)
+            lines += [what + each for each in found[:most]]
+            lines += [f"{what}and {len(found) - most} more"] if found[most:] else []
+        return [*lines, str(self.estimate)] if self.ok else lines
+
+    def __str__(self) -> str:
+        return "\n".join(self._lines)
+
     def _repr_html_(self) -> str:
         """Returns the errors, warnings and commands, or the estimate, and the tree of each robot."""
         from executive.view.formats import to_svg  # only notebooks show it
 
-        taken = self.estimate
-        lines = [f"error: {error}" for error in self.errors] + [f"warning: {warning}" for warning in self.warnings]
-        lines += [str(command) for tree in self.trees for command in tree.commands]
-        lines += [f"about {taken.duration_s:.0f} s, {taken.distance_m:.0f} m of driving"] if self.ok else []
+        lines = self._lines
         pictures = (to_svg(readable(node_view(tree.root), DRAWN_NODES)) for tree in self.trees)
         return "".join(f"<p>{escape(line)}</p>" for line in lines) + "".join(pictures)
 

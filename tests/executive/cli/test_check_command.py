@@ -165,3 +165,16 @@ def test_an_if_takes_as_long_as_one_of_its_branches(write, otherwise, least_s, m
     (estimate,) = json_of(check(file, "--json"))["estimates"]
     assert (estimate["least_s"], estimate["most_s"]) == (least_s, most_s)
     assert estimate["reasons"] == ["battery > 0.5?"]
+
+
+def test_a_sentence_is_checked_as_a_file_is():
+    good = check("--say", "Hey Alice, go to the kitchen")
+    assert (good.exit_code, good.stdout[:32]) == (0, "✓ Hey Alice, go to the kitchen: ")
+    values = json_of(check("--say", "go to the kitchen", "--json"))
+    assert (values["ok"], values["estimates"][0]["file"], len(values["commands"])) == (True, None, 1)
+    assert check("--say", "go to the moon").exit_code == 2
+
+
+@pytest.mark.parametrize("words", [(), (GOOD, "--say", "go to the kitchen")])
+def test_either_files_or_a_sentence_is_checked(words):
+    assert "name files, or give a sentence" in check(*words).stderr

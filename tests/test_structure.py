@@ -22,12 +22,12 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1551,
     "executive/testing": 848,
-    "executive/app": 7957,
-    "executive/cli": 3818,
+    "executive/app": 7959,
+    "executive/cli": 4009,
     "skills": 28079,
     "plant": 11261,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 417, 59, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 418, 59, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -66,7 +66,9 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "teleop": _Command("robot_command", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
     "detect": _Command("detect_command", "Find objects of the nine classes in pictures."),
     "stack": _Command("plugins_command", "What a robot uses: localiser, planners, controller, detector."),
+    "skills": _Command("plugins_command", "List the skills for mission files, with their inputs."),
     "plugins": _Command("plugins_command", "List the installed plug-ins, what each registers, and errors in them."),
+    "doctor": _Command("doctor_command", "Look at what a run needs on this machine; names the mend of each fault."),
     "warm-up": _Command("robot_command", "Compile the numeric code for this machine, so that runs begin at once."),
     "new": _Command("new_command", "Write an installable package with a skill, or with a robot."),
 }

@@ -1,4 +1,4 @@
-"""`errand plugins` lists what distributions register; `errand stack show` prints a stack with its options."""
+"""`errand plugins` and `skills` list what is registered; `errand stack show` prints a stack with its options."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ import typer
 
 from executive.cli.entry import COMMANDS, COMMANDS_GROUP, PLUGIN_COMMANDS, as_command, shipped_command
 from executive.cli.number_options import quantity_option
-from executive.cli.options import takes_request
+from executive.cli.options import AS_JSON, takes_request
 from executive.cli.output import console_for, finish, progress_bar, show_table
 from executive.mission.load import load_stack
 from executive.mission.request import Request
 from executive.store import trigger_source
 from executive.tree import registry
+from executive.tree.port_values import describe_type, field_types
 from plant.models.catalogue import load_catalogue
 from plant.robots import robot_kind as kinds
 from skills.inputs.errors import InputError
@@ -66,6 +67,20 @@ def plugins(
             advance()
     show_table(console, ("distribution", "version", "group", "name", "value", ""), list(_rows(found)))
     finish({"plugins": [asdict(each) for each in found]}, as_json, good=not any(each.broken for each in found))
+
+
+def skills(as_json: AS_JSON = False) -> None:
+    """Lists the installed skills: what each does, and the inputs that a step of a mission file gives it by `with`."""
+    found = registry.installed_skills()
+    rows, values = list[tuple[str, ...]](), list[dict[str, object]]()
+    for name, kind in found.items():
+        about = (kind.__doc__ or "").partition("\n")[0]
+        inputs = {port: describe_type(hint) for port, hint in field_types(kind.Inputs).items()}
+        rows.append((name, about, ", ".join(f"{port} ({what})" for port, what in inputs.items())))
+        values.append({"skill": name, "about": about, "inputs": inputs, "module": kind.__module__})
+    rows += [(name, f"broken: {error.message}", "") for name, error in found.broken.items()]
+    show_table(console_for(as_json), ("skill", "what it does", "inputs"), rows)
+    finish({"skills": values}, as_json, good=not found.broken)
 
 
 def _rows(found: Sequence[Plugin]) -> Iterator[tuple[str, ...]]:

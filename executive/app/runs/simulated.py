@@ -155,13 +155,15 @@ class SimulatedBackend:
         return out / "recording.html"
 
 
-def compile_first(cache: Path | None = None) -> None:
-    """Runs `errand warm-up` with a warning if the numeric code is not compiled for this machine.
-
-    `cache` is by default numba's folder for the planner's search.
-    """
+def kernels_folder(cache: Path | None = None) -> tuple[Path, bool]:
+    """Returns the folder of compiled code, and whether it has the planner's search; `cache` is by default numba's."""
     folder = cache or Path(search.machine_code.stats.cache_path)  # type: ignore[attr-defined]
-    if any(folder.glob("lattice.search-*.nbi")):
+    return folder, any(folder.glob("lattice.search-*.nbi"))
+
+
+def compile_first(cache: Path | None = None) -> None:
+    """Runs `errand warm-up` with a warning if the numeric code is not compiled for this machine."""
+    if kernels_folder(cache)[1]:
         return
     _LOG.warning("errand: compiles its numeric code for this machine, once; that takes about half a minute")
     subprocess.run([sys.executable, "-m", "executive.cli", "warm-up"], stdout=subprocess.DEVNULL, check=False)

@@ -23,7 +23,7 @@ LINES = {
     "executive/view": 1551,
     "executive/testing": 848,
     "executive/app": 7959,
-    "executive/cli": 4009,
+    "executive/cli": 4044,
     "skills": 28079,
     "plant": 11261,
 }

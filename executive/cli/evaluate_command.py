@@ -74,7 +74,7 @@ def evaluate(
     has_own = each_fault or bool(typed_options(context) & REQUEST_OPTIONS)
     of_file = file is not None and is_evaluation(file)
     pool, stored_in = Pool(jobs, workers, scheduler), results or out / RESULTS
-    bar = partial(progress_bar, console, "runs")
+    bar = partial(progress_bar, console, "runs", lines=True)
     run = partial(evaluate_runs, pool=pool, out=out, tell=plain_lines(console), progress=bar)
     if random_missions is not None:
         _refuse_options(has_own or file is not None, "--random-missions chooses the runs itself", _FOR_RANDOM)

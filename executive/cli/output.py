@@ -61,13 +61,20 @@ def finish(
 
 
 @contextmanager
-def progress_bar(console: Console, what: str, total: int) -> Iterator[Callable[..., None]]:
+def progress_bar(console: Console, what: str, total: int, *, lines: bool = False) -> Iterator[Callable[..., None]]:
     """Shows a bar over `total` steps with the time left; nothing without a terminal, or for a single step.
 
-    Call the yielded function at the end of each step, perhaps with the name of the next step.
+    Call the yielded function at the end of each step, perhaps with the name of the next step. Without a terminal,
+    `lines` shows what it is called with.
     """
     if not console.is_terminal or total < 2:
-        yield lambda *_: None
+        numbers = iter(range(1, total + 1))
+
+        def tell(line: str | None = None) -> None:
+            if lines and line is not None:
+                console.print(f"{next(numbers)} of {total} {what}: {line}", markup=False)
+
+        yield tell
         return
     from rich.progress import (
         BarColumn,

@@ -13,7 +13,7 @@ import typer
 
 from executive.app.runs.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
-from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, STORE, StartCommand, takes_request
+from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, STORE, VIEW, VIEW_PORT, StartCommand, takes_request
 from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer
 from executive.cli.run_command import refuse_unaddressed
 from executive.mission.load import load_stack
@@ -118,6 +118,8 @@ def run(
     out: Out = Path("out"),
     store: STORE = None,
     quiet: QUIET = False,
+    view: VIEW = None,
+    view_port: VIEW_PORT = 0,
     foxglove: FOXGLOVE = None,
     as_json: AS_JSON = False,
 ) -> None:
@@ -125,7 +127,7 @@ def run(
     from executive.app.runs.queue import resumable_line
 
     console = console_for(as_json)
-    with _runs(store or store_in(out), console, quiet, foxglove) as (missions, runs):
+    with _runs(store or store_in(out), out, console, quiet, view, view_port, foxglove) as (missions, runs):
         ended = _in_turn(missions, runs, console)
         resumable = resumable_line(missions)
     if ended:
@@ -139,17 +141,28 @@ def run(
 
 @contextmanager
 def _runs(
-    store: Path, console: Console, quiet: bool, foxglove: str | None
+    store: Path,
+    out: Path,
+    console: Console,
+    quiet: bool,
+    view: float | None,
+    view_port: int,
+    foxglove: str | None,
 ) -> Iterator[tuple[MissionStore, MissionRuns]]:
-    """Claims a store while the block runs; yields the store with the runner for its missions."""
+    """Claims a store while the block runs; yields the store with the runner for its missions.
+
+    With `view` each mission has a live page, and the last page stays as `errand run --view` says.
+    """
     with MissionStore(store, create=False) as missions, missions.claim():
         from executive.app.runs.queue import MissionRuns
-        from executive.cli.screen import ConsoleScreen
+        from executive.cli.screen import ConsoleScreen, page_of
         from executive.view.foxglove import serve_live
 
+        page = None if view is None else page_of(console, view_port, store, out)
         with serve_live(foxglove, plain_lines(console)) as live:
-            screen = ConsoleScreen(console, quiet=quiet, live=live)
+            screen = ConsoleScreen(console, quiet=quiet, page=page, live=live)
             yield missions, MissionRuns(missions, screen, ask=terminal_answerer())
+    screen.stay(view)
 
 
 def _in_turn(
@@ -233,6 +246,8 @@ def serve(
         float | None, quantity_option(Wait, "--for", help="Begin no mission after this time, and end.")
     ] = None,
     quiet: QUIET = False,
+    view: VIEW = None,
+    view_port: VIEW_PORT = 0,
     foxglove: FOXGLOVE = None,
     as_json: AS_JSON = False,
 ) -> None:
@@ -242,7 +257,7 @@ def serve(
 
     console = console_for(as_json)
     tell = plain_lines(console)
-    with _runs(store or store_in(out), console, quiet, foxglove) as (missions, runs):
+    with _runs(store or store_in(out), out, console, quiet, view, view_port, foxglove) as (missions, runs):
         end = None if for_s is None else missions.now() + timedelta(seconds=min(for_s, _LONGEST_S))
         address = CallAddress(host, port, token)
         with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
@@ -267,11 +282,13 @@ def resume(
     ] = None,
     as_json: AS_JSON = False,
     quiet: QUIET = False,
+    view: VIEW = None,
+    view_port: VIEW_PORT = 0,
     foxglove: FOXGLOVE = None,
 ) -> None:
     """Resumes an interrupted or cancelled mission from its last finished step; then runs its queue."""
     console = console_for(as_json)
-    with _runs(store or store_in(out), console, quiet, foxglove) as (missions, runs):
+    with _runs(store or store_in(out), out, console, quiet, view, view_port, foxglove) as (missions, runs):
         ended = _in_turn(missions, runs, console, _interrupted(missions, mission))
     values = {**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]}
     finish(values, as_json, good=all(each.achieved for each in ended))

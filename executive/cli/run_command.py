@@ -21,7 +21,6 @@ from executive.cli.options import (
     VIEW,
     VIEW_PORT,
     grouped,
-    stay_s,
     takes_request,
 )
 from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, terminal_answerer
@@ -34,9 +33,7 @@ from skills.inputs.yaml_source import read_yaml
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from executive.app.prepare.prepared import Prepared
     from executive.app.report.run_report import RunReport
-    from executive.app.runs.page_view import PageView
     from executive.record.work import Profile
 
 
@@ -63,7 +60,7 @@ def run(
     from executive.app.prepare.from_request import prepare_checked
     from executive.app.runs.queue import MissionRuns
     from executive.app.runs.real_robot import real_runner
-    from executive.cli.screen import ConsoleScreen, voice_for
+    from executive.cli.screen import ConsoleScreen, page_of, voice_for
     from executive.record.work import Profile
     from executive.store.missions import MissionStore, store_in
     from executive.view.foxglove import serve_live
@@ -72,27 +69,20 @@ def run(
     kept_in = store or store_in(request.out)
     timing = Profile() if profile else None
 
-    def page_of(prepared: Prepared) -> PageView:
-        from executive.app.runs.page_view import PageView, queue_function
-
-        later = queue_function(prepared, store=kept_in, out=request.out)
-        return PageView(prepared, plain_lines(console), port=view_port, later=later)
-
     with voice_for(aloud) as voice, serve_live(foxglove, plain_lines(console)) as live:
         if listen_to is not None:
             from executive.cli.listen_command import hear_request
 
             request = replace(request, sentence=hear_request(listen_to, request, console=console))
         prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
-        page = page_of if view is not None else None
+        page = None if view is None else page_of(console, view_port, kept_in, request.out)
         screen = ConsoleScreen(console, quiet, whole_tree, voice, page, live, timing)
         connection = real_runner(prepared, robot) if robot is not None else nullcontext()
         with MissionStore(kept_in) as missions, missions.claim(), connection as runner:
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
             ended = MissionRuns(missions, screen, run=runner).run(mission, prepared)
     _tell(console, timing, ended.report if as_json else None)
-    if screen.shown_page is not None and view is not None:
-        screen.shown_page.stay(0.0 if ended.hung_up else stay_s(view))
+    screen.stay(view, hung_up=ended.hung_up)
     if not ended.achieved:
         raise typer.Exit(NOT_ACHIEVED)
 

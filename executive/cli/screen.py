@@ -18,6 +18,8 @@ from rich.text import Text
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.one_run import FinishedRun
 from executive.app.runs.queue import RunOptions
+from executive.cli.options import stay_s
+from executive.cli.output import plain_lines
 from executive.cli.run_keys import HELP, Keys, prompt_lines, read_keys
 from executive.language.parser import load_parser
 from executive.record.schemas import SPEECH
@@ -81,6 +83,18 @@ class SpeechOutput(RunVisitor):
         self._said.clear()
 
 
+def page_of(console: Console, port: int, store: Path, out: Path) -> Callable[[Prepared], PageView]:
+    """Returns the function that builds the live page of a run, on which more missions are queued in the store."""
+
+    def build(prepared: Prepared) -> PageView:
+        from executive.app.runs.page_view import PageView, queue_function
+
+        later = queue_function(prepared, store=store, out=out)
+        return PageView(prepared, plain_lines(console), port=port, later=later)
+
+    return build
+
+
 @dataclass
 class ConsoleScreen:
     """Display and control of runs on the console.
@@ -113,6 +127,8 @@ class ConsoleScreen:
             to = f"{each.mission.robot_name}: " if prepared.request.robots else ""
             for command in each.mission.commands:
                 self.tell(f"{to}{command}")
+        if self.shown_page is not None:
+            self.shown_page.close()
         page = self.shown_page = None if self.page is None else self.page(prepared)
         attended = self.console.is_terminal and sys.stdin.isatty() and not self.quiet
         control = Control(attended=attended, pace=1.0 if attended else None) if page is None else page.control
@@ -139,6 +155,11 @@ class ConsoleScreen:
             self.console.print(to_rich(finished.tree, collapsed=False))
         for line in finished.report.lines():
             self.console.print(line)
+
+    def stay(self, view: float | None, *, hung_up: bool = False) -> None:
+        """Shows the last page for as long as the option `--view` says; not at all once the terminal was closed."""
+        if self.shown_page is not None and view is not None:
+            self.shown_page.stay(0.0 if hung_up else stay_s(view))
 
     def name_files(self, out: Path) -> None:
         """Names the files in a folder with their content, the most important first; omits hidden files."""

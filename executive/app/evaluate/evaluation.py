@@ -33,8 +33,8 @@ from executive.words.goal import RefereeReport
 from executive.words.variation import NO_VARIATION
 from skills.inputs.errors import InputError, Problems
 
-Progress = Callable[[int], AbstractContextManager[Callable[[], None]]]
-"""Shows progress over a number of runs; the yielded function is called after each run."""
+Progress = Callable[[int], AbstractContextManager[Callable[[str], None]]]
+"""Shows progress over a number of runs; the yielded function is called after each run with a line about it."""
 LOGS: Final = "logs"
 REFUSED: Final = "REFUSED"
 MOST_ENTRIES: Final = 60
@@ -52,7 +52,7 @@ def evaluate_runs(
     *,
     out: Path,
     tell: Callable[[str], None] = lambda line: None,
-    progress: Progress = lambda total: nullcontext(lambda: None),
+    progress: Progress = lambda total: nullcontext(lambda line: None),
     before: Callable[[Sequence[RunSpec]], None] | None = None,
     checked: bool = False,
 ) -> Results:
@@ -96,7 +96,7 @@ def _execute(
             case = finished.result or Case(run, _report(run, "error", "ERROR", finished.lost))
             if case.report.outcome != _CANCELLED:
                 stored.add(_write_files(case, out / (run.folder or f"{LOGS}/{run.id}")))
-                advance()
+                advance(f"seed {run.request.seed}, {run.mission}: {case.label}")
         hours = (time.monotonic() - began) / 3600.0
     stored.note(workers=str(count), missions_per_hour=f"{len(missing) / hours:.1f}")
 

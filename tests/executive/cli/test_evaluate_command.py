@@ -31,7 +31,9 @@ def test_the_runs_come_in_the_order_of_the_seeds_with_claims_and_verdicts_counte
     assert [run["seed"] for run in values["runs"]] == [1, 2, 3]
     assert (values["successes"], values["referee_successes"], values["false_claims"]) == (2, 1, 1)
     rows = [line.split() for line in result.stderr.splitlines() if line[:1].isdigit()]
-    assert [row[:5] for row in rows[:3]] == [
+    told = [line for line in result.stderr.splitlines() if " of 3 runs: " in line]  # as they end: the last first
+    assert [line.partition(", ")[0] for line in told] == [f"{n} of 3 runs: seed {4 - n}" for n in (1, 2, 3)]
+    assert [row[:5] for row in rows[3:6]] == [
         ["1", "success", "fulfilled", "0", "0"],
         ["2", "success", "not", "fulfilled", "1"],
         ["3", "failure", "not", "fulfilled", "1"],

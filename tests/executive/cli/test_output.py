@@ -58,3 +58,13 @@ def test_a_file_gets_no_bar():
     with progress_bar(plain, "runs", 5) as advance:
         advance()
     assert plain.file.getvalue() == ""
+
+
+# lines wanted, the lines without a terminal
+@pytest.mark.parametrize(("lines", "told"), [(True, "1 of 3 runs: seed 1\n2 of 3 runs: seed 2\n"), (False, "")])
+def test_without_a_terminal_a_line_for_each_step_is_shown_where_it_is_wanted(lines, told):
+    console = Console(file=io.StringIO(), force_terminal=False)
+    with progress_bar(console, "runs", 3, lines=lines) as advance:
+        advance("seed 1")
+        advance("seed 2")
+    assert console.file.getvalue() == told

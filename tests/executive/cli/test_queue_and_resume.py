@@ -50,9 +50,10 @@ class Plant:
     """Stands in for `run_request`: notes one finished leaf, then ends as the test says."""
 
     def __init__(self):
-        self.runs, self.commands, self.outcomes = [], [], []
+        self.runs, self.commands, self.outcomes, self.pages = [], [], [], []
 
-    def __call__(self, prepared, *, durable, **_):
+    def __call__(self, prepared, *, durable, page=None, **_):
+        self.pages.append(page)
         outcome = self.outcomes.pop(0) if self.outcomes else "success"
         if outcome == "refused":
             raise InputError("the world is full")
@@ -398,3 +399,24 @@ def test_a_defect_in_a_run_sets_its_mission_aside_and_keeps_the_traceback(plant)
     assert (errand(RUN).exit_code, states()) == (1, ["error", "success"])
     assert "(ZeroDivisionError: by a plug-in)" in listed()[0]["message"]
     assert "raise ZeroDivisionError" in Path("out/mission-1-traceback.txt").read_text()
+
+
+@pytest.mark.parametrize("command", ["queue run --quiet", "queue serve --quiet --until-idle --port 0"])
+def test_each_mission_of_a_queue_has_its_page_and_the_one_before_is_closed(plant, command, monkeypatch):
+    closed = []
+    monkeypatch.setattr("executive.app.runs.page_view.PageView.close", lambda page: closed.append(page))
+    errand("queue add first.yaml")
+    errand("queue add second.yaml")
+    result = errand(f"{command} --view 0")
+    assert result.exit_code == 0, result.output
+    assert len(plant.pages) == 2
+    assert None not in plant.pages
+    assert closed == plant.pages
+
+
+def test_a_resumed_mission_has_a_page(plant):
+    plant.outcomes = ["killed"]
+    with pytest.raises(GoneError):
+        errand("run first.yaml --quiet")
+    assert errand("resume --quiet --view 0").exit_code == 0
+    assert [page is not None for page in plant.pages] == [False, True]

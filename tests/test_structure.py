@@ -23,11 +23,11 @@ LINES = {
     "executive/view": 1551,
     "executive/testing": 848,
     "executive/app": 7959,
-    "executive/cli": 4044,
+    "executive/cli": 4114,
     "skills": 28079,
     "plant": 11261,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 418, 59, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 419, 59, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -68,6 +68,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "stack": _Command("plugins_command", "What a robot uses: localiser, planners, controller, detector."),
     "skills": _Command("plugins_command", "List the skills for mission files, with their inputs."),
     "plugins": _Command("plugins_command", "List the installed plug-ins, what each registers, and errors in them."),
+    "shell": _Command("shell_command", "Take one command after another in one process, which starts them faster."),
     "doctor": _Command("doctor_command", "Look at what a run needs on this machine; names the mend of each fault."),
     "warm-up": _Command("robot_command", "Compile the numeric code for this machine, so that runs begin at once."),
     "new": _Command("new_command", "Write an installable package with a skill, or with a robot."),

@@ -1,0 +1,45 @@
+"""`errand shell` takes one command after another, and goes on after those that it refuses."""
+
+import pytest
+
+from tests.executive.cli.calls import errand
+
+
+@pytest.fixture
+def shell(tmp_path, monkeypatch):
+    """Gives the shell lines in an empty folder; returns what it says."""
+    monkeypatch.chdir(tmp_path)
+
+    def take(*lines):
+        result = errand("shell", input="\n".join(lines) + "\n")
+        assert result.exit_code == 0, result.output
+        return result
+
+    return take
+
+
+def test_commands_are_run_in_turn(shell):
+    said = shell('parse "go to the kitchen"', "# a note", "", "missions").stdout
+    assert said.startswith("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]\n")
+    assert "fetch_drink" in said
+
+
+# a line that is refused, what the shell says of it
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("dance", "No such command 'dance'"),
+        ("parse 'go", "errand: 'parse 'go' cannot be read (No closing quotation); quote it anew"),
+        ("check absent.yaml", "absent"),
+        ("say sing it's a song", "errand: I do not understand"),
+        ("shell", "errand: this is the shell already"),
+    ],
+)
+def test_after_a_line_that_is_refused_the_next_one_is_taken(shell, line, said):
+    result = shell(line, "parse 'go to the kitchen'")
+    assert said in result.stderr
+    assert "[kitchen]" in result.stdout
+
+
+def test_exit_ends_it(shell):
+    assert shell("exit", "missions").stdout == ""

@@ -31,7 +31,7 @@ def shell() -> None:
         try:
             words = ["run", "--say", rest.strip().strip("'\"")] if first == "say" else shlex.split(line, comments=True)
         except ValueError as error:
-            typer.echo(f"errand: '{line.strip()[:60]}' cannot be read ({error}); quote it anew", err=True)
+            typer.echo(f"errand: '{line.strip()[:60]}' cannot be read ({error}); close the quotation mark", err=True)
             continue
         if words[:1] in (["exit"], ["quit"]):
             return

@@ -29,7 +29,7 @@ def test_commands_are_run_in_turn(shell):
     ("line", "said"),
     [
         ("dance", "No such command 'dance'"),
-        ("parse 'go", "errand: 'parse 'go' cannot be read (No closing quotation); quote it anew"),
+        ("parse 'go", "errand: 'parse 'go' cannot be read (No closing quotation); close the quotation mark"),
         ("check absent.yaml", "absent"),
         ("say sing it's a song", "errand: I do not understand"),
         ("shell", "errand: this is the shell already"),

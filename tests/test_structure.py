@@ -16,18 +16,18 @@ LINES = {
     "executive/speech": 1570,
     "executive/mission": 1569,
     "executive/tree": 8593,
-    "executive/run": 3245,
-    "executive/record": 1089,
+    "executive/run": 3247,
+    "executive/record": 1093,
     "executive/store": 1599,
     "executive/conversation": 595,
-    "executive/view": 1551,
+    "executive/view": 1646,
     "executive/testing": 848,
-    "executive/app": 7959,
+    "executive/app": 7962,
     "executive/cli": 4114,
     "skills": 28079,
     "plant": 11261,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 419, 59, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 420, 60, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -138,7 +138,11 @@ class EventLog(RunVisitor):
 
     def _log_ticks(self, more: Mapping[str, float]) -> None:
         ticks, self._ticks_s = [round(tick_s, 6) for tick_s in self._ticks_s], []
-        self(WALL, {"start_s": self._start_s, "tick_s": ticks, "limit_s": self._tick_limit_s, **more})
+        lasted_s = round(time.time() - self._start_s, 3)
+        self(
+            WALL,
+            {"start_s": self._start_s, "lasted_s": lasted_s, "tick_s": ticks, "limit_s": self._tick_limit_s, **more},
+        )
 
     def listen(self, listener: Listener) -> None:
         """Passes every later message to `listener`."""

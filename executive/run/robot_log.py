@@ -65,11 +65,13 @@ class RobotLog:
     def _publish_state(self, estimate: LocalisationEstimate) -> None:
         """Logs the gripper, the battery, the speed, and the quality of the localisation."""
         robot = self._context.robot
+        gripper = robot.gripper()
         self._context.publish(
             STATE,
             {
                 "robot": self._name,
-                "holding": robot.gripper().holding,
+                "holding": gripper.holding,
+                "grip_n": round(gripper.force_n, 1),
                 "charge": round(robot.battery().charge, 4),
                 "speed_m_s": round(math.hypot(*robot.odometry().velocity[:2]), 3),
                 "localised": estimate.localised,

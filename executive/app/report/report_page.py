@@ -23,6 +23,7 @@ from executive.tree.plan import StepPart
 from executive.view.formats import to_svg
 from executive.view.html import render
 from executive.view.map_picture import map_picture
+from executive.view.plots import curves_of, to_plot
 from executive.view.text import DRAWN_NODES, ROBOT_COLOURS, NodeStyle, Styles, executed_tree, readable, style_of
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import inside
@@ -106,6 +107,7 @@ class ReportPage:
     seen: Sequence[ReportedObject] = ()
     events: Sequence[str] = ()
     map: Picture | None = None
+    plots: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -157,6 +159,7 @@ def write_report(
         seen=report.seen_objects,
         events=report.seen.events,
         map=map_of(artifacts, events, several=several),
+        plots=[to_plot(each) for each in curves_of(events)],
     )
     return save_report(out, page)
 

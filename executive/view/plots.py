@@ -1,0 +1,95 @@
+"""Plots of a run over time, from its log: speed, battery, force of the gripper, position, and real-time factor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.record.history import Event
+from executive.record.schemas import STATE, WALL
+from executive.view.html import render
+from executive.view.text import ROBOT_COLOURS
+
+_STATES: Final[Mapping[str, tuple[str, str, float]]] = {
+    "speed_m_s": ("Speed", "m/s", 1.0),
+    "charge": ("Battery", "%", 100.0),
+    "grip_n": ("Force of the gripper", "N", 1.0),
+    "position_sigma_m": ("Uncertainty of the position (robot's own)", "cm", 100.0),
+}
+"""Values of a robot's state with the title and unit of their plot, and the factor into this unit."""
+_W, _H, _LEFT, _RIGHT, _TOP, _BOTTOM = 360.0, 190.0, 46.0, 346.0, 32.0, 160.0
+_MOST_POINTS: Final = 400
+"""Most points of a line, to bound the size of the report of a long run."""
+
+Line = NDArray[np.float64]
+"""Points (N, 2): time (s) and value."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Values over time: the title and unit of the plot, and a line for each robot by its name."""
+
+    title: str
+    unit: str
+    lines: Mapping[str, Line]
+
+
+def curves_of(events: Iterable[Event]) -> tuple[Curve, ...]:
+    """Returns the curves of a run's events; omits those without values, or of a value that is always 0."""
+    found: dict[str, dict[str, list[tuple[float, float]]]] = {name: {} for name in (*_STATES, "pace")}
+    before: tuple[float, float] | None = None
+    for event in events:
+        if event.topic == STATE:
+            for name in _STATES.keys() & event.data.keys():
+                own = found[name].setdefault(str(event.data.get("robot", "")), [])
+                own.append((event.stamp_s, _STATES[name][2] * float(event.data[name])))
+        elif event.topic == WALL and "lasted_s" in event.data:
+            now = event.stamp_s, float(event.data["lasted_s"])
+            if before is not None and now[1] > before[1]:
+                pace = (now[0] - before[0]) / (now[1] - before[1])
+                found["pace"].setdefault("", []).append((now[0], pace))
+            before = now
+    titles = {**{name: each[:2] for name, each in _STATES.items()}, "pace": ("Real-time factor", "")}
+    curves = (
+        Curve(*titles[name], {one: np.array(line) for one, line in lines.items()}) for name, lines in found.items()
+    )
+    return tuple(each for each in curves if any(np.any(line[:, 1]) for line in each.lines.values()))
+
+
+def to_plot(curve: Curve) -> str:
+    """Draws a curve as SVG, with the colours of the robots."""
+    every = np.vstack([*curve.lines.values()])
+    end_s, most = max(float(every[:, 0].max()), 1e-9), _round_up(float(every[:, 1].max()))
+    scale = np.array([(_RIGHT - _LEFT) / end_s, (_TOP - _BOTTOM) / most])
+    values: dict[str, Any] = {
+        "lines": [
+            (ROBOT_COLOURS[number % len(ROBOT_COLOURS)], _points(_thinned(line) * scale + (_LEFT, _BOTTOM)))
+            for number, (_, line) in enumerate(sorted(curve.lines.items()))
+        ],
+        "rows": [(_BOTTOM + share * (_TOP - _BOTTOM), f"{share * most:g}") for share in (0.0, 0.5, 1.0)],
+        "columns": [
+            (_LEFT + share * (_RIGHT - _LEFT), f"{share * end_s:.0f} s", anchor)
+            for share, anchor in ((0.0, "start"), (0.5, "middle"), (1.0, "end"))
+        ],
+    }
+    return render("plot.svg", curve=curve, w=_W, h=_H, left=_LEFT, right=_RIGHT, **values)
+
+
+def _points(line: Line) -> str:
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in line.tolist())
+
+
+def _thinned(line: Line) -> Line:
+    """Returns at most `_MOST_POINTS` points, with the largest value of each stretch."""
+    stretches: Sequence[Line] = np.array_split(line, min(len(line), _MOST_POINTS))
+    return np.array([each[int(np.argmax(each[:, 1]))] for each in stretches])
+
+
+def _round_up(value: float) -> float:
+    """Smallest of 1, 2 and 5 times a power of ten that is not less than a positive value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next(power * factor for factor in (1.0, 2.0, 5.0, 10.0) if power * factor >= value * (1.0 - 1e-9)))

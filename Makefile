@@ -40,7 +40,7 @@ endef
 env: $(VENV)/.ready
 
 $(VENV)/.ready: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,cluster,foxglove,test,browser,bench,dev]' $(EDITABLE:%=--editable '%')
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,cluster,test,browser,bench,dev]' $(EDITABLE:%=--editable '%')
 	$(BIN)/errand warm-up
 	@touch $@
 

@@ -121,7 +121,7 @@ def set_camera(meshcat: Meshcat, view: View) -> None:
 
 def save_html(world: WorldDiagram, frames: Sequence[Frame], path: Path, view: View | None = None) -> None:
     """Writes an animation of `frames` as one HTML file without a server, which opens on `view`."""
-    meshcat = Meshcat()
+    meshcat = Meshcat(MeshcatParams(host=HOST, port=0, show_stats_plot=False))  # it cannot do without a port
     prepare_view(meshcat, view)
     shown = build_diagram(replace(world.config, render=False), meshcat)
     root_context = shown.diagram.CreateDefaultContext()

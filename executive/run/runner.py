@@ -28,7 +28,7 @@ from executive.run.visitor import (
 from executive.run.watchdog import VerbHung
 from executive.tree.behaviour import StoppableTime
 from skills.api import Cause, Worker
-from skills.inputs.errors import disk_is_full
+from skills.inputs.errors import shortage
 from skills.robot import Clock
 
 _PATHS_PERIOD_S: Final = 0.5
@@ -58,7 +58,8 @@ def run(
     mission, or none yet: their trees are not run. Like robots that have finished, they clear paths that others reserve.
 
     Raises ValueError when there are no missions, two robots have one name, a robot waits for a robot that is not in the
-    run, or a breakpoint is at an unknown node. Raises OSError, after all is stopped, when the disk is full.
+    run, or a breakpoint is at an unknown node. Raises the error, after all is stopped, when this
+    machine lacks disk, files or memory.
     """
     assigner = missions if isinstance(missions, Assigner) else _AllAtOnce(missions)
     entries = () if isinstance(missions, Assigner) else missions
@@ -126,7 +127,7 @@ class _Run:
             except (Exception, VerbHung, KeyboardInterrupt) as stop:
                 self._visitors.ending = True
                 ending = ending_of(stop, self._visitors.publish)
-                full = stop if disk_is_full(stop) else None
+                full = stop if shortage(stop) else None
             finally:
                 self._end(ending)
         if full is not None:
@@ -155,18 +156,18 @@ class _Run:
         try:
             self._resting.rest(RunRobot(entry, self._shared))
         except (Exception, VerbHung) as stop:
-            if disk_is_full(stop):
+            if shortage(stop):
                 raise
             ending_of(stop, self._visitors.publish)
 
     def _begin(self, entry: RunEntry) -> None:
-        """Begins a robot's mission, even if the robot is resting. Raises OSError when the disk is full."""
+        """Begins a robot's mission, even if the robot is resting. Raises what a shortage caused."""
         name = entry.robot.name
         self._resting.leave(name)
         try:
             session = Session(entry, self._shared)
         except (Exception, VerbHung) as stop:
-            if disk_is_full(stop):
+            if shortage(stop):
                 raise
             ending = ending_of(stop, self._visitors.publish)
             self._note_end(_never_began(entry, ending), ending.message)

@@ -24,7 +24,7 @@ from executive.tree.plan import start_key
 from executive.words.slug import slug
 from skills.api import Cause
 from skills.detection import Detector
-from skills.inputs.errors import disk_is_full
+from skills.inputs.errors import shortage
 from skills.navigate.cut_off import DoorWatch
 from skills.navigate.footprint import Footprint
 from skills.robot import Lease, Pose2D
@@ -197,11 +197,11 @@ class Session(RunRobot):
         return self._top.waiting_at
 
     def call_guarded(self, call: Callable[[], ResultT]) -> ResultT | None:
-        """Returns the call's result; if it fails, ends the mission and returns None. Raises OSError for a full disk."""
+        """Returns the call's result; if it fails, ends the mission and returns None. Raises what a shortage caused."""
         try:
             return call()
         except (Exception, VerbHung) as stop:
-            if disk_is_full(stop):
+            if shortage(stop):
                 raise
             ending = ending_of(stop, self._visitors.publish)
             self.gone = ending.message

@@ -15,7 +15,7 @@ from typing import Any, Final, Self
 
 from pydantic import TypeAdapter
 
-from skills.inputs.errors import InputError, disk_is_full
+from skills.inputs.errors import InputError, shortage, shortage_of_files
 
 BUSY_S: Final = 2.0
 
@@ -26,8 +26,8 @@ class FileKind:
 
     `name` is the kind's name in messages, `option` the option to name another file. The other fields are parts of
     messages: `absent` names the command that writes the file, `lost` the data in it, `older` the action for a file of
-    another version, `claimed` the work of the process that has claimed it. `go_on` says how to continue after the disk
-    was full; "{path}" in it stands for the file.
+    another version, `claimed` the work of the process that has claimed it. `go_on` says how to continue after a lack of
+    disk, files or memory; "{path}" in it stands for the file.
     """
 
     name: str
@@ -41,10 +41,10 @@ class FileKind:
     claimed: str
     go_on: str
 
-    def full_disk_error(self, path: Path) -> StoreError:
-        """Returns the error for a disk that became full while the file was written."""
+    def shortage_error(self, path: Path, lack: str) -> StoreError:
+        """Returns the error for what this machine lacks, as in "the disk is full"."""
         go_on = self.go_on.format(path=path)
-        return StoreError("the disk is full", hint=f"what was written is kept: free space, then {go_on}")
+        return StoreError(lack, hint=f"what was written is kept: make room, then {go_on}")
 
     def damage_error(self, path: Path, why: object) -> StoreError:
         """Returns the error for a file that cannot be read."""
@@ -58,8 +58,9 @@ class FileKind:
         try:
             yield
         except sqlite3.OperationalError as error:
-            if (code := getattr(error, "sqlite_errorcode", 0) & 0xFF) == sqlite3.SQLITE_FULL:
-                raise self.full_disk_error(path) from error
+            code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+            if lack := shortage(error) or (shortage_of_files(1) if code == sqlite3.SQLITE_CANTOPEN else None):
+                raise self.shortage_error(path, lack) from error
             if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
                 hint = "end the program that keeps it open, then try again"
                 raise StoreError(f"another program has locked the {self.name}", hint=hint, file=path) from error
@@ -67,8 +68,8 @@ class FileKind:
         except sqlite3.DatabaseError as error:
             raise self.damage_error(path, error) from error
         except OSError as error:
-            if disk_is_full(error):
-                raise self.full_disk_error(path) from error
+            if lack := shortage(error):
+                raise self.shortage_error(path, lack) from error
             raise StoreError(f"{what} ({error.strerror})", hint=hint, file=path) from error
 
 

@@ -27,7 +27,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from executive.view.feed import Feed
 from executive.view.html import PAGE_FOLDER
 from executive.view.page_control import Action, RefusedError
-from executive.view.serving import MAX_BODY, Server, body_of
+from executive.view.serving import BODY_LIMITS, Server, body_of, trust
 from skills.inputs.errors import InputError
 from skills.inputs.outside import json_object
 
@@ -59,7 +59,7 @@ class PageServer(Server):
         self.port: int = opened.getsockname()[1]
         self._closing = False
         self._wakers: set[asyncio.Event] = set()
-        super().__init__(self._routes(), opened, ws_max_size=MAX_BODY, ws="websockets-sansio")
+        super().__init__(self._routes(), opened)
         content.feed.listen(self._wake)
 
     def offer_recording(self, recording: Path) -> None:
@@ -99,14 +99,17 @@ class PageServer(Server):
         ]
 
     def _allowed(self, connection: HTTPConnection) -> bool:
-        """Returns whether host, origin and token are right; browsers always send an origin with an action."""
+        """Trusts a connection if host, origin and token are right; browsers always send an origin with an action."""
         here = {f"{HOST}:{self.port}", f"localhost:{self.port}"}
         headers = connection.headers
         origin = headers.get("origin")
         given = headers.get(TOKEN_HEADER) or connection.query_params.get("token") or ""
         own_origin = origin is None or origin in {f"http://{host}" for host in here}
         own_host = headers.get("host", "") in here
-        return own_host and own_origin and secrets.compare_digest(given.encode(), self._token.encode())
+        allowed = own_host and own_origin and secrets.compare_digest(given.encode(), self._token.encode())
+        if allowed:
+            trust(connection)
+        return allowed
 
     def _guarded(self, handler: Callable[[Request], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
         async def endpoint(request: Request) -> Response:
@@ -196,7 +199,7 @@ class PageServer(Server):
 def _values(body: bytes | None) -> Mapping[str, Any]:
     """Reads the values for an action. Raises RefusedError unless the body is a JSON object."""
     if body is None:
-        raise RefusedError(f"the action's values are larger than {MAX_BODY} bytes")
+        raise RefusedError(f"the action's values are too large or come too slowly: send {BODY_LIMITS}")
     try:
         return json_object(body, what="the action's values", hint="send an object")
     except InputError as error:

@@ -3,46 +3,101 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import secrets
 import socket
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from http import HTTPStatus
 from typing import Any, Final, Self
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import ClientDisconnect, HTTPConnection, Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 START_LIMIT_S: Final = 10.0
 MAX_BODY: Final = 20_000
+MOST_CONNECTIONS: Final = 256
+BACKLOG: Final = 64
+"""Connections that wait to be accepted; so many more than `MOST_CONNECTIONS` may be open for a moment."""
+STRANGER_S: Final = 10.0
+BODY_S: Final = 10.0
+CLOSE_S: Final = 2.0
+MOST_ERRORS: Final = 20
+_LOG: Final = logging.getLogger("uvicorn.error")
+
+
+class _Connection(H11Protocol):
+    """Connection to a server with a bounded number of connections, and with time limits for strangers.
+
+    A stranger is a connection that has sent no allowed request. It is closed after `STRANGER_S`, or when there are too
+    many connections and it is the oldest stranger. `every` has all connections, with the timers of strangers.
+    """
+
+    def __init__(self, every: dict[_Connection, asyncio.TimerHandle | None], **settings: Any) -> None:
+        super().__init__(**settings | {"app_state": {"connection": self}})
+        self._every = every
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._every[self] = self.loop.call_later(STRANGER_S, transport.abort)
+        if len(self._every) > MOST_CONNECTIONS:
+            self._forget_closed()
+        if len(self._every) > MOST_CONNECTIONS:
+            next(each for each, timer in self._every.items() if timer is not None).transport.abort()
+            self._forget_closed()
+
+    def trust(self) -> None:
+        if (timer := self._every.get(self)) is not None:
+            timer.cancel()
+            self._every[self] = None
+
+    def _forget_closed(self) -> None:
+        for each in [each for each in self._every if each.transport.is_closing()]:
+            if (timer := self._every.pop(each)) is not None:
+                timer.cancel()
+
+
+def trust(connection: HTTPConnection) -> None:
+    """Keeps the connection of an allowed request open as long as its client wants."""
+    connection.scope["state"]["connection"].trust()
 
 
 class Server:
-    """Running server of routes in a thread of its own. Use it as a context manager, or call `close`."""
+    """Running server of routes in a thread of its own. Use it as a context manager, or call `close`.
+
+    The number of connections is bounded; a handler must `trust` a connection that is to stay.
+    """
 
     def __init__(self, routes: Sequence[BaseRoute], opened: socket.socket, **settings: Any) -> None:
         """Starts serving on an open socket; `settings` are settings of uvicorn."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ready = threading.Event()
         app = Starlette(routes=routes)
-        config = uvicorn.Config(app, log_level="error", access_log=False, lifespan="off", **settings)
+        self._connections: dict[_Connection, asyncio.TimerHandle | None] = {}
+        self._errors: set[str] = set()
+        protocol: Any = partial(_Connection, self._connections)
+        limits = {"http": protocol, "backlog": BACKLOG, "ws_max_size": MAX_BODY, "ws": "websockets-sansio"}
+        config = uvicorn.Config(app, log_level="error", access_log=False, lifespan="off", **limits, **settings)
         self._socket, self._server = opened, uvicorn.Server(config)
         serve = self._serve_in_loop
         self._thread = threading.Thread(target=lambda: asyncio.run(serve()), name="errand-server", daemon=True)
         self._thread.start()
         self._ready.wait(START_LIMIT_S)
 
-    def call_soon(self, callback: Callable[[], None]) -> None:
+    def call_soon(self, callback: Callable[[], object]) -> None:
         """Schedules `callback` in the serving thread. Any thread may call it; after the end it does nothing."""
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(callback)
 
     def close(self) -> None:
-        """Answers the open requests and stops serving; idempotent."""
+        """Answers the open requests and stops serving; cuts off clients that take longer; idempotent."""
         self._server.should_exit = True
+        self.call_soon(lambda: asyncio.get_running_loop().call_later(CLOSE_S, self._cut_off))
         self._thread.join(START_LIMIT_S)
 
     def __enter__(self) -> Self:
@@ -51,21 +106,37 @@ class Server:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _cut_off(self) -> None:
+        for each in self._connections:
+            each.transport.abort()
+
+    def _log_error(self, _: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
+        """Logs an error of the serving thread once, such as too many open files."""
+        said, error = f"{context['message']}: {context.get('exception')}", context.get("exception")
+        if said not in self._errors and len(self._errors) < MOST_ERRORS:
+            self._errors.add(said)
+            _LOG.error(said, exc_info=None if isinstance(error, OSError) else error)
+
     async def _serve_in_loop(self) -> None:
         self._loop = asyncio.get_running_loop()
+        self._loop.set_exception_handler(self._log_error)
         self._ready.set()
         await self._server.serve(sockets=[self._socket])
 
 
+BODY_LIMITS: Final = f"at most {MAX_BODY} bytes within {BODY_S:g} s"
+
+
 async def body_of(request: Request) -> bytes | None:
-    """Reads the body of a request; returns None if the body is larger than MAX_BODY, or the client disconnects."""
+    """Reads the body of a request; returns None if it exceeds `BODY_LIMITS`, or the client disconnects."""
     body = b""
     try:
-        async for part in request.stream():
-            body += part
-            if len(body) > MAX_BODY:
-                return None
-    except ClientDisconnect:
+        async with asyncio.timeout(BODY_S):
+            async for part in request.stream():
+                body += part
+                if len(body) > MAX_BODY:
+                    return None
+    except (ClientDisconnect, TimeoutError):
         return None
     return body
 
@@ -108,9 +179,10 @@ class CallServer(Server):
         if scheme.lower() != "bearer" or not right:
             said = {"error": "the token is missing or wrong: send 'Authorization: Bearer TOKEN'"}
             return JSONResponse(said, HTTPStatus.UNAUTHORIZED, {"WWW-Authenticate": "Bearer"})
+        trust(request)
         body = await body_of(request)
         if body is None:
-            said = {"error": f"the body is larger than {MAX_BODY} bytes"}
+            said = {"error": f"the body is too large or comes too slowly: send {BODY_LIMITS}"}
             return JSONResponse(said, HTTPStatus.REQUEST_ENTITY_TOO_LARGE, {"Connection": "close"})
         try:
             answer = await asyncio.to_thread(self._handler, request.path_params["name"], body)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ MOST_LETTERS: Final = 1000
 FEW_LETTERS: Final = 60
 _USED_BY: Final = "used by"
 _MOST_USERS: Final = 3
+_LONGEST_CHAIN: Final = 20
 
 
 @dataclass(frozen=True)
@@ -83,9 +85,52 @@ def one_line(text: str) -> str:
     return line if line.isprintable() else "".join(one if one.isprintable() else ascii(one)[1:-1] for one in line)
 
 
-def disk_is_full(error: BaseException) -> bool:
-    """Returns whether an error means that the disk is full."""
-    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+_SHORTAGES: Final = {
+    "the disk is full": (errno.ENOSPC, errno.EDQUOT, "SQLITE_FULL"),
+    "too many files are open": (errno.EMFILE, errno.ENFILE),
+    "there is too little memory": (errno.ENOMEM, MemoryError, "SQLITE_NOMEM"),
+}
+
+
+def shortage(error: BaseException | None) -> str | None:
+    """Returns what this machine lacks, as in "the disk is full", if a lack of disk, files or memory caused an error."""
+    for _ in range(_LONGEST_CHAIN if error else 0):
+        marks = {
+            isinstance(error, MemoryError) and MemoryError,
+            getattr(error, "errno", None),
+            getattr(error, "sqlite_errorname", None),
+        }
+        if found := [lack for lack, signs in _SHORTAGES.items() if marks.intersection(signs)]:
+            return found[0]
+        error = error and (error.__cause__ or error.__context__)
+    return None
+
+
+def shortage_of_files(count: int) -> str | None:
+    """Returns what this machine lacks if `count` more files cannot be opened now."""
+    try:
+        SpareFiles(count).close()
+    except OSError as error:
+        return shortage(error)
+    return None
+
+
+class SpareFiles:
+    """Open files that a program reserves for later; `close` frees them. Raises OSError if there are too few."""
+
+    def __init__(self, count: int) -> None:
+        self._files: list[int] = []
+        try:
+            while len(self._files) < count:
+                self._files.append(os.open(os.devnull, os.O_RDONLY))
+        except OSError:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Frees the files; idempotent."""
+        while self._files:
+            os.close(self._files.pop())
 
 
 class Problems:

@@ -194,7 +194,6 @@ def test_a_robot_backs_off_forgets_its_obstacles_and_goes_on(tmp_path):
 
 
 def test_a_viewer_follows_a_mission_in_the_plant(tmp_path):
-    pytest.importorskip("foxglove")
     prepared, reading = prepare(Request(sentence="go to the hall", seed=1, out=tmp_path, record=False)), []
     with (
         closing(LiveServer("127.0.0.1:0")) as server,

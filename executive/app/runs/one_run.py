@@ -41,7 +41,7 @@ from plant.worlds.world import World
 from skills.api import PlanningError, Publish, Worker
 from skills.estimate.grid_map import load_grid_map
 from skills.faults.faulty_robot import FaultyRobot, inject_faults, parse_fault
-from skills.inputs.errors import InputError
+from skills.inputs.errors import InputError, SpareFiles, shortage_of_files
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path
 from skills.robot import Pose2D, Robot
@@ -49,6 +49,7 @@ from skills.robot import Pose2D, Robot
 if TYPE_CHECKING:
     from executive.app.runs.page_view import PageView  # understands sentences
 
+_FILES_RESERVED, _FILES_FREE = 32, 8
 _MOST_STARTS: Final = 1000
 
 
@@ -89,7 +90,7 @@ def run_request(
     idle = [name for name in kinds if all(name != entry.tree.robot_name for entry in entries)]
     spare = [backend.entry(replace(prepared.tree, robot_name=name), None) for name in idle]
     path, clock = out / ("log.mcap" if durable is None else durable.log), backend.clock
-    with closing(EventLog(path, clock, apart=prepared.several)) as log:
+    with closing(FilesOfRun()) as files, closing(EventLog(path, clock, apart=prepared.several)) as log:
         if page is not None:
             page.serve(log, backend.show_live())
         if live is not None:
@@ -100,7 +101,7 @@ def run_request(
         for each in prepared.all:
             announce(log, clock, each.tree.robot_name, each.tree.commands, each.knowledge, **facts)
         journals = () if durable is None else durable.journals.values()
-        watching = [artifacts, log, *journals, *visitors, *([] if page is None else [page])]
+        watching = [files, artifacts, log, *journals, *visitors, *([] if page is None else [page])]
         if scenario:
             watching.append(DisturbanceLog(log, entries[0].robot, backend.happened))
         if profile is not None:
@@ -312,6 +313,23 @@ class RunProfile(RunVisitor):
     def end(self, result: RunResult) -> None:
         """Ends the measurement."""
         self._profile.leave("executive", self._begun_s)
+
+
+class FilesOfRun(RunVisitor):
+    """Open files that a run reserves: some for the time when too many files are open, the others for its report."""
+
+    def __init__(self) -> None:
+        self._while_running, self._at_end = SpareFiles(_FILES_RESERVED), SpareFiles(_FILES_RESERVED)
+
+    def tick(self, progress: Progress) -> None:
+        """Frees files for the mission, which loads code and models late, when too many files are open."""
+        if shortage_of_files(_FILES_FREE):
+            self._while_running.close()
+
+    def close(self) -> None:
+        """Frees all files; idempotent."""
+        self._while_running.close()
+        self._at_end.close()
 
 
 Happened = Callable[[], Sequence[tuple[float, str]]]

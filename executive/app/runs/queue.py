@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -25,11 +26,14 @@ from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.recollection import Recollection
 from executive.store.resuming import ended_tree, resumed_tree
 from executive.view.foxglove import LiveServer
-from skills.inputs.errors import InputError, disk_is_full
+from skills.inputs.errors import InputError, shortage, shortage_of_files
 
 if TYPE_CHECKING:
     from executive.app.runs.page_view import PageView
 
+FILES_OF_A_MISSION: Final = 200
+"""Files that must be free when a queued mission begins."""
+ROOM_WAIT_S: Final = 2.0
 _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCELLED, MissionState.ERROR)
 
 
@@ -147,14 +151,16 @@ class MissionRuns:
         self._missions, self._screen, self._ask, self._run_prepared = missions, screen, ask, run or run_request
         self._control: Control | None = None
         self._cancelled: str | None = None
+        self._stopped, self._lack = threading.Event(), ""
 
     def run(self, mission: StoredMission, prepared: Prepared | None = None) -> MissionResult:
         """Runs a mission from its beginning, or resumes an interrupted or cancelled one, to its end.
 
-        Sets aside a queued mission that cannot be run. `prepared` is the prepared mission; None: it is prepared here.
+        Sets aside a queued mission that cannot be run. While this machine lacks disk, files or memory, a queued mission
+        waits. `prepared` is the prepared mission; None: it is prepared here.
 
         Raises:
-            StoreError: the store cannot be used, or the disk is full, so that no mission can be run.
+            StoreError: the store cannot be used, or the queue is cancelled while it waits; no mission can be run.
             InputError: a mission outside a queue has a file, world or plant state that cannot be used.
         """
         if not mission.queued:
@@ -163,23 +169,40 @@ class MissionRuns:
                 self._missions.finish(other.id, MissionState.CANCELLED, what)
                 self._screen.tell(f"Mission {other.id} ({other.request.name}) had been interrupted; it is given up.")
             return self._run(mission, prepared)
-        try:
-            return self._run(mission, prepared)
-        except StoreError:
-            raise
-        except InputError as error:
-            cause = str(error)
-        except OSError as error:
-            cause = f"{error.filename}: {error.strerror}" if error.filename else str(error)
-        except Exception as defect:
-            cause = f"a defect of errand or of a plug-in ended it ({type(defect).__name__}: {defect})"
-            file = mission.request.out / f"mission-{mission.id}-traceback.txt"
-            with suppress(OSError):
-                file.write_text(traceback.format_exc(), encoding="utf-8")
-            self._screen.tell(f"The traceback is in {file}")
-        finally:
-            return_memory()
-        return self.set_aside(mission, cause)
+        lack = shortage_of_files(FILES_OF_A_MISSION)
+        while True:
+            if lack is not None:
+                self._wait_for_room(lack)
+            try:
+                return self._run(self._missions.mission(mission.id), prepared)
+            except Exception as error:
+                lack = shortage(error) or shortage_of_files(FILES_OF_A_MISSION)
+                if lack is None:
+                    if isinstance(error, StoreError):
+                        raise
+                    return self.set_aside(mission, self._cause_of(mission, error))
+            finally:
+                return_memory()
+
+    def _wait_for_room(self, lack: str) -> None:
+        """Waits a little, and says why unless it has said so. Raises StoreError if the queue is cancelled."""
+        if self._lack != lack:
+            self._screen.tell(f"errand: {lack}; the queue waits until there is room")
+        self._lack = lack
+        if self._stopped.wait(ROOM_WAIT_S):
+            raise STORE_FILE.shortage_error(self._missions.path, lack)
+
+    def _cause_of(self, mission: StoredMission, error: Exception) -> str:
+        """Returns why a mission cannot be run; writes the traceback of a defect to a file."""
+        if isinstance(error, InputError):
+            return str(error)
+        if isinstance(error, OSError):
+            return f"{error.filename}: {error.strerror}" if error.filename else str(error)
+        file = mission.request.out / f"mission-{mission.id}-traceback.txt"
+        with suppress(OSError):
+            file.write_text(traceback.format_exc(), encoding="utf-8")
+        self._screen.tell(f"The traceback is in {file}")
+        return f"a defect of errand or of a plug-in ended it ({type(error).__name__}: {error})"
 
     def set_aside(self, mission: StoredMission, cause: str) -> MissionResult:
         """Ends a mission that cannot be run, and stores the cause."""
@@ -192,6 +215,7 @@ class MissionRuns:
     def cancel(self, reason: str) -> None:
         """Cancels the mission under way and all later ones. Signal handlers may call it."""
         self._cancelled = reason
+        self._stopped.set()
         if self._control is not None:
             self._control.cancel(reason)
 
@@ -247,7 +271,8 @@ class MissionRuns:
 def note_run(missions: MissionStore, mission: StoredMission, kept: KeptRun) -> Iterator[Callable[[RunReport], None]]:
     """Stores that a mission runs, and its end when the yielded function gets the report; so does the run's folder.
 
-    If the run raises InputError before it begins, the store is restored. Raises InputError if the disk is full.
+    If the run raises InputError before it begins, the store is restored. Raises StoreError if this machine lacks
+    disk, files or memory.
     """
     missions.begin(mission.id, replace(mission.request, out=kept.request.out.resolve()))
     over = False
@@ -260,8 +285,6 @@ def note_run(missions: MissionStore, mission: StoredMission, kept: KeptRun) -> I
 
     try:
         yield ended
-    except OSError as error:
-        raise STORE_FILE.full_disk_error(missions.path) if disk_is_full(error) else error from error
     except InputError:
         if over:
             raise
@@ -271,6 +294,10 @@ def note_run(missions: MissionStore, mission: StoredMission, kept: KeptRun) -> I
         else:
             missions.remove(mission.id)
         raise
+    except Exception as error:
+        if (lack := shortage(error)) is None:
+            raise
+        raise STORE_FILE.shortage_error(missions.path, lack) from error
 
 
 def plant_file(store: MissionStore) -> Path:

@@ -12,23 +12,23 @@ import stat
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Final, Protocol
 
 from executive.app.prepare.from_request import prepare_checked
-from executive.app.runs.queue import MissionResult, Runner, interrupted_error, next_queued, run_in_turn
+from executive.app.runs.queue import ROOM_WAIT_S, MissionResult, Runner, interrupted_error, next_queued, run_in_turn
 from executive.mission.parameters import parse_json_values
 from executive.mission.request import Request
-from executive.store.database import STORE_FILE
+from executive.store.database import STORE_FILE, StoreError
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.standing_missions import StandingMission, StandingMissions, TooManyError
 from executive.store.trigger_source import TriggerSource, trigger_source
 from executive.store.triggers import OnCall, OnTopic, Trigger
 from executive.store.wakeup import wake_server
 from executive.view.serving import CallError, CallServer
-from skills.inputs.errors import InputError
+from skills.inputs.errors import InputError, shortage
 from skills.inputs.plugins import PluginDefect, run_in_thread
 
 LIMIT_S: Final = 10.0
@@ -109,7 +109,14 @@ class QueueServer:
         waiting_since = now() if again else serving_since
         while self.stopped is None:
             self._update_listeners()
-            fired = self._standing.fire_due(waiting_since=waiting_since, serving_since=serving_since)
+            try:
+                fired = self._standing.fire_due(waiting_since=waiting_since, serving_since=serving_since)
+            except StoreError as error:
+                if shortage(error) is None:
+                    raise
+                self._say_once(error)
+                self._waiting.wait(now() + timedelta(seconds=ROOM_WAIT_S))
+                continue
             for each in fired:
                 self._tell(f"Mission {each.id} is queued: {each.request.name} ({each.why})")
             if end is not None and now() >= end:
@@ -128,9 +135,12 @@ class QueueServer:
         try:
             self._follow(each.trigger for each in self._standing.missions())
         except InputError as error:
-            if str(error) != self._refused:
-                self._tell(f"errand: {error}")
-            self._refused = str(error)
+            self._say_once(error)
+
+    def _say_once(self, error: InputError) -> None:
+        if str(error) != self._refused:
+            self._tell(f"errand: {error}")
+        self._refused = str(error)
 
 
 @dataclass(frozen=True)

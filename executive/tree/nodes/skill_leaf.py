@@ -31,7 +31,7 @@ from executive.words.knowledge import Knowledge, Pose
 from executive.words.leaf_steps import CallSkill
 from executive.words.slug import slug
 from skills.api import Cause, Failed, Part, Running, Skill, Step, Succeeded, Surface
-from skills.inputs.errors import InputError, listing, suggestion
+from skills.inputs.errors import InputError, listing, shortage, suggestion
 from skills.robot import Pose2D
 
 ResultT = TypeVar("ResultT")
@@ -271,6 +271,8 @@ class SkillLeaf(ExplainedLeaf):
         except BaseException as defect:
             if type(defect) is KeyboardInterrupt or getattr(defect, "stops_run", False):
                 raise  # a robot or a tick hangs, or Ctrl-C: no defect of a skill
+            if isinstance(defect, OSError) and shortage(defect):
+                raise  # the mission can be resumed when there is room again
             trace = traceback.format_exc()
             self.context.publish(ERROR_TOPIC, {"node": self.path_id, "traceback": trace})
             text = str(defect.args[0]) if isinstance(defect, KeyError) and defect.args else str(defect)

@@ -73,3 +73,16 @@ def test_a_disk_that_is_full_when_pictures_are_written_leaves_the_mission_resuma
     assert backend.asked == [("drive", Outcome.SUCCESS)]
     with MissionStore(tmp_path / "missions.sqlite", create=False) as store:
         assert [mission.state for mission in store.missions()] == [MissionState.RUNNING]
+
+
+def test_a_skill_that_finds_too_many_files_open_leaves_the_mission_resumable(prepared, tmp_path, monkeypatch):
+    def starved(self):
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    monkeypatch.setattr("skills.navigate.skill.Navigate.step", starved)
+    with MissionStore(tmp_path / "missions.sqlite") as store:
+        with pytest.raises(
+            InputError, match="too many files are open; what was written is kept: make room, then go on"
+        ):
+            run_kept(prepared, store, ScriptedBackend())
+        assert [mission.state for mission in store.missions()] == [MissionState.RUNNING]

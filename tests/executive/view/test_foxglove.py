@@ -5,7 +5,6 @@ import json
 import os
 import socket
 import struct
-import sys
 import time
 from contextlib import closing, contextmanager
 
@@ -26,7 +25,6 @@ POSE |= {"pose": {"position": {"x": 1.0, "y": 2.0, "z": 0.0}, "orientation": {"x
 
 @pytest.fixture
 def server():
-    pytest.importorskip("foxglove")
     with closing(LiveServer(ANY_PORT)) as running:
         yield running
 
@@ -135,7 +133,13 @@ def test_client_that_reads_nothing_delays_neither_the_run_nor_its_end(server, lo
     with socket.create_connection(server.url.removeprefix("ws://").split(":")) as deaf:
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         key = base64.b64encode(os.urandom(16)).decode()
-        lines = ("GET / HTTP/1.1", "Host: x", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13")
+        lines = (
+            "GET / HTTP/1.1",
+            "Host: 127.0.0.1",
+            "Upgrade: websocket",
+            "Connection: Upgrade",
+            "Sec-WebSocket-Version: 13",
+        )
         more = (f"Sec-WebSocket-Key: {key}", f"Sec-WebSocket-Protocol: {PROTOCOL}", "", "")
         deaf.sendall("\r\n".join((*lines, *more)).encode())
         assert b"101" in deaf.recv(64)
@@ -146,6 +150,65 @@ def test_client_that_reads_nothing_delays_neither_the_run_nor_its_end(server, lo
             log("mine", {"text": "z" * 20_000})  # 40 MB, far more than the socket holds
         server.close()
         assert time.perf_counter() - begun_s < 10.0
+
+
+@pytest.mark.parametrize(
+    ("origin", "host", "allowed"),
+    [
+        (None, None, True),
+        ("https://app.foxglove.dev", None, True),
+        ("file://", None, True),
+        (None, "localhost:8765", True),
+        (None, "192.168.1.5:8765", True),
+        ("http://evil.example", None, False),
+        ("null", None, False),
+        ("https://app.foxglove.dev.evil.example", None, False),
+        (None, "evil.example:8765", False),
+        ("http://evil.example:8765", "evil.example:8765", False),
+        (None, "[", False),
+    ],
+)
+def test_other_pages_and_other_hosts_are_refused(server, origin, host, allowed):
+    address = server.url.removeprefix("ws://")
+    with socket.create_connection(address.split(":")) as client:
+        headers = [f"Host: {host or address}", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13"]
+        headers += ["Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", *([f"Origin: {origin}"] if origin else [])]
+        client.sendall("\r\n".join(["GET / HTTP/1.1", *headers, "", ""]).encode())
+        assert client.recv(64).split()[1] == (b"101" if allowed else b"403")
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "{",
+        "[]",
+        "{}",
+        b"\x01",
+        {"op": "subscribe"},
+        {"op": "subscribe", "subscriptions": [{"id": -1, "channelId": 1}]},
+        {"op": "subscribe", "subscriptions": [{"id": "x", "channelId": [1]}]},
+        {"op": "subscribe", "subscriptions": [{"id": 3, "channelId": 99}]},
+        {"op": "unsubscribe", "subscriptionIds": [[]]},
+        {"op": "unsubscribe", "subscriptionIds": 7},
+    ],
+)
+def test_a_message_that_makes_no_sense_is_ignored(server, log, said):
+    with client_of(server) as client:
+        client.socket.send(json.dumps(said) if isinstance(said, dict) else said)
+        log("pose", POSE)
+        assert len(client.messages(2)) == 2
+
+
+def test_a_client_that_unsubscribes_gets_no_more(server, log, clock):
+    log("mine", {"text": "a"})
+    with client_of(server) as client:
+        client.messages(1)
+        client.socket.send(json.dumps({"op": "unsubscribe", "subscriptionIds": [1]}))
+        client.socket.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 9, "channelId": 1}]}))
+        frame = b""
+        while not frame.startswith(b"\x01"):
+            frame = client.socket.recv(timeout=10)
+        assert struct.unpack_from("<I", frame, 1) == (9,)
 
 
 def test_port_in_use_is_one_error(server):
@@ -160,19 +223,12 @@ def test_address_without_a_port_is_refused(address):
         LiveServer(address)
 
 
-def test_missing_sdk_names_the_extra(monkeypatch):
-    monkeypatch.setitem(sys.modules, "foxglove", None)
-    with pytest.raises(InputError, match=r"the extra `foxglove`.*pip install 'spot-errand\[foxglove\]'"):
-        LiveServer(ANY_PORT)
-
-
 def test_nothing_is_served_without_an_address():
     with serve_live(None, pytest.fail) as server:
         assert server is None
 
 
 def test_the_address_is_shown():
-    pytest.importorskip("foxglove")
     lines = []
     with serve_live(ANY_PORT, lines.append) as server:
         assert lines == [f"Foxglove: {server.url}"] and server.url.startswith("ws://127.0.0.1:")

@@ -1,13 +1,18 @@
 """HTTP calls: nothing without the token, small bodies only, and each refusal has its status."""
 
+import errno
 import http.client
 import json
 import socket
+import time
+from contextlib import ExitStack, suppress
 from http import HTTPStatus
+from pathlib import Path
 
 import pytest
 
-from executive.view.serving import MAX_BODY, CallError, CallServer
+from executive.view import serving
+from executive.view.serving import BACKLOG, MAX_BODY, MOST_CONNECTIONS, CallError, CallServer
 
 TOKEN = "a-token-of-the-test"
 
@@ -92,6 +97,92 @@ def test_the_server_listens_only_at_its_own_address(server):
 def test_an_address_that_is_taken_is_an_error():
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use"):
         CallServer(lambda name, body: {}, token=TOKEN, host="127.0.0.1", port=taken.getsockname()[1])
+
+
+@pytest.fixture
+def strangers(server):
+    """Opens connections that send the given bytes; returns them."""
+    with ExitStack() as stack:
+
+        def connect(count, sent=b""):
+            opened = [stack.enter_context(socket.create_connection(("127.0.0.1", server.port))) for _ in range(count)]
+            for each in opened:
+                each.sendall(sent)
+            return opened
+
+        yield connect
+
+
+def is_closed(connection, within_s=5.0):
+    connection.settimeout(within_s)
+    with suppress(ConnectionResetError):
+        return connection.recv(1) == b""
+    return True
+
+
+def open_files():
+    return len([*Path("/proc/self/fd").iterdir()])
+
+
+@pytest.mark.parametrize("sent", [b"", b"POST /missions/patrol HTTP/1.1\r\nAuthorization: Bea"])
+def test_connections_without_the_token_are_bounded_and_calls_are_still_answered(server, strangers, capfd, sent):
+    before = open_files()
+    opened = strangers(2 * MOST_CONNECTIONS, sent)
+    assert ask(server)[0] == 202
+    assert is_closed(opened[0])
+    assert open_files() - before <= len(opened) + MOST_CONNECTIONS + BACKLOG
+    assert ask(server)[0] == 202
+    assert capfd.readouterr().err == ""
+
+
+def test_a_caller_keeps_its_connection_while_others_connect(server, strangers):
+    caller = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    sockets = set()
+    for _ in range(3):
+        caller.request("POST", "/missions/patrol", b"", {"Authorization": f"Bearer {TOKEN}"})
+        assert caller.getresponse().read() == b'{"missions":[7]}'
+        sockets.add(caller.sock)
+        strangers(MOST_CONNECTIONS)
+    assert len(sockets) == 1
+
+
+@pytest.mark.parametrize("sent", [b"", b"POST /missions/patrol HTTP/1.1\r\nx: "])
+def test_a_slow_header_ends_the_connection(calls, monkeypatch, sent):
+    monkeypatch.setattr("executive.view.serving.STRANGER_S", 0.3)
+    with (
+        CallServer(lambda name, body: {}, token=TOKEN, host="127.0.0.1", port=0) as server,
+        socket.create_connection(("127.0.0.1", server.port)) as client,
+    ):
+        client.sendall(sent)
+        assert is_closed(client)
+
+
+def test_a_slow_body_is_refused(server, calls, monkeypatch):
+    monkeypatch.setattr("executive.view.serving.BODY_S", 0.3)
+    with socket.create_connection(("127.0.0.1", server.port)) as client:
+        head = f"POST /missions/patrol HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {TOKEN}\r\nContent-Length: 9"
+        client.sendall(f"{head}\r\n\r\n{{".encode())
+        client.settimeout(5.0)
+        assert client.recv(64).startswith(b"HTTP/1.1 413")
+    assert calls == []
+
+
+def test_an_error_of_the_serving_thread_is_logged_once(server, caplog):
+    error = OSError(errno.EMFILE, "Too many open files")
+    for number in range(1000):
+        context = {"message": "no connection" if number % 2 else f"error {number}", "exception": error}
+        server.call_soon(lambda context=context: server._loop.call_exception_handler(context))
+    assert ask(server)[0] == 202
+    assert len(caplog.records) == serving.MOST_ERRORS
+    assert [each.getMessage() for each in caplog.records].count(f"no connection: {error}") == 1
+    assert not any(each.exc_info for each in caplog.records)
+
+
+def test_a_client_that_reads_nothing_does_not_delay_the_end(server, strangers):
+    strangers(3, b"POST /missions/patrol HTTP/1.1\r\nx: ")
+    begun_s = time.monotonic()
+    server.close()
+    assert time.monotonic() - begun_s < 5.0
 
 
 def test_a_closed_server_answers_no_call(server):

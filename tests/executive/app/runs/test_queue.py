@@ -1,5 +1,7 @@
 """Missions of a store, run by a stub in place of the simulated world."""
 
+import errno
+import resource
 from contextlib import contextmanager
 
 import pytest
@@ -9,13 +11,18 @@ from executive.app.runs.one_run import FinishedRun
 from executive.app.runs.queue import MissionRuns, RunOptions
 from executive.mission.request import Request
 from executive.run.control import Control
-from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.node_view import node_view
 from executive.words.goal import RefereeReport
 from skills.inputs.errors import InputError
 
 GO = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
+
+
+def caused(error, cause):
+    """An error with its cause, as `raise error from cause` leaves it."""
+    error.__cause__ = cause
+    return error
 
 
 class Screen:
@@ -67,12 +74,60 @@ class TestMissionRuns:
         assert store.mission(1).message == "the world is full; take another"
         assert store.mission(1).state is MissionState.ERROR
 
-    def test_a_full_disk_ends_the_queue(self, runs, store, mission):
-        def fill(prepared, **_):
-            raise STORE_FILE.full_disk_error(store.path)
+    @pytest.mark.parametrize(
+        ("error", "lack"),
+        [
+            (OSError(errno.ENOSPC, "No space left on device"), "the disk is full"),
+            (OSError(errno.EMFILE, "Too many open files"), "too many files are open"),
+            (OSError(errno.ENFILE, "Too many open files in system"), "too many files are open"),
+            (OSError(errno.ENOMEM, "Cannot allocate memory"), "there is too little memory"),
+            (MemoryError(), "there is too little memory"),
+            (caused(InputError("the world cannot be read"), OSError(errno.EMFILE, "")), "too many files are open"),
+        ],
+    )
+    def test_a_mission_waits_while_this_machine_lacks_something(self, store, mission, monkeypatch, error, lack):
+        monkeypatch.setattr("executive.app.runs.queue.ROOM_WAIT_S", 0.01)
+        attempts = []
 
-        with pytest.raises(InputError, match="the disk is full"):
-            runs(fill).run(mission)
+        def run(prepared, *, control, **_):
+            attempts.append(prepared)
+            if len(attempts) < 4:
+                raise error
+            return succeeded(prepared)
+
+        screen = Screen()
+        assert MissionRuns(store, screen, run=run).run(mission).outcome == "success"
+        said = [line for line in screen.lines if "the queue waits" in line]
+        assert said == [f"errand: {lack}; the queue waits until there is room"]
+        assert store.mission(1).state is MissionState.SUCCESS
+
+    def test_a_mission_waits_while_no_file_can_be_opened(self, store, mission, monkeypatch):
+        monkeypatch.setattr("executive.app.runs.queue.ROOM_WAIT_S", 0.01)
+        screen, used = Screen(), []
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+
+        def tell(line, *, title=False):
+            used.append(line)
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+        screen.tell = tell
+        runs = MissionRuns(store, screen, run=lambda prepared, **_: succeeded(prepared))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (20, hard))
+        try:
+            assert runs.run(mission).outcome == "success"
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        assert used[0] == "errand: too many files are open; the queue waits until there is room"
+
+    def test_a_queue_that_waits_can_be_cancelled(self, runs, store, mission):
+        def fill(prepared, **_):
+            begun.cancel("cancelled by SIGINT")
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        begun = runs(fill)
+        with pytest.raises(InputError, match=r"the disk is full; .*make room, then go on with `errand resume"):
+            begun.run(mission)
+        assert store.mission(1).state is MissionState.RUNNING
 
     def test_a_mission_cancelled_before_its_start_is_cancelled_at_once(self, runs, mission):
         begun = runs(cancelled_by_control)
@@ -86,6 +141,12 @@ class TestMissionRuns:
 
         begun = runs(start)
         assert begun.run(mission).message == "cancelled by SIGINT"
+
+
+def succeeded(prepared):
+    """The end of a run whose mission is done."""
+    report = RunReport("success", None, "done", RefereeReport(True, "", 0, 0), (), "flat", 1, 1.0, 1.0, 1.0, 1, "log")
+    return FinishedRun(report, node_view(prepared.tree.root))
 
 
 def cancelled_by_control(prepared, *, control, **_):

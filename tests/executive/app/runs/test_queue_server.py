@@ -1,5 +1,6 @@
 """The server of a queue: missions in their turn on a clock that the test drives, calls, messages and tokens."""
 
+import errno
 import http.client
 import json
 import signal
@@ -21,6 +22,7 @@ from executive.app.runs.queue_server import CallAddress, CallToken, Listeners, Q
 from executive.cli.entry import app
 from executive.mission.request import Request
 from executive.run.visitor import TickNote
+from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing_missions import MOST_WAITING, StandingMissions
 from executive.store.triggers import Missed, OnCall, OnTopic, trigger_of
@@ -558,3 +560,21 @@ def test_a_server_process_runs_a_called_mission_and_ends_at_sigterm(tmp_path):
     with MissionStore(tmp_path / ".errand" / "missions.sqlite") as store:
         (battery,) = store.rows("SELECT lowest_charge, last_charge, ended FROM mission WHERE ended")
         assert 0.9 < battery["lowest_charge"] <= battery["last_charge"] <= 1.0 and battery["ended"]
+
+
+def test_a_full_disk_makes_the_server_wait(server, store, standing, world, lines, monkeypatch):
+    standing.add(REQUEST, trigger_of("every 40m"))
+    fire_due, failures = standing.fire_due, [STORE_FILE.failures(store.path) for _ in range(2)]
+
+    def full(**times):
+        if not failures:
+            return fire_due(**times)
+        with failures.pop():
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(standing, "fire_due", full)
+    server.serve(end=START + HOUR)
+    assert [begun for begun, *_ in world.runs] == ["08:40"]
+    assert [line for line in lines if "disk" in line] == [
+        f"errand: {STORE_FILE.shortage_error(store.path, 'the disk is full')}"
+    ]

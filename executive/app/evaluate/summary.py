@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple
 from scipy.stats import binomtest, fisher_exact
 
 from executive.app.evaluate.results import Case, Evidence, Results, RunSpec, Standing
+from executive.app.report.run_report import title_of
 from executive.view.html import render
 
 _CONFIDENCE: Final = 0.95
@@ -293,7 +294,7 @@ def to_page(
         inspected.append((case, seen, has_pictures, (command_of(case.run), *log)))
     return render(
         "evaluation.html",
-        title=Path(about["scenario"]).stem.replace("_", " "),
+        title=title_of(case.run.mission for case in cases) if cases else Path(about["scenario"]).stem,
         facts=(
             ("evaluation", about["scenario"]),
             ("runs with a result", f"{len(cases)} of {about['runs']}" if "runs" in about else str(len(cases))),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -22,7 +23,17 @@ from executive.app.prepare.placed_robots import placed_robots
 from executive.app.prepare.prepared import Prepared
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.app.report.artifacts import Artifacts
-from executive.app.report.report_page import REPORT, MissionRow, ReportPage, ReportPart, map_of, part_of, save_report
+from executive.app.report.report_page import (
+    REPORT,
+    MissionRow,
+    ReportPage,
+    ReportPart,
+    facts_now,
+    links_in,
+    map_of,
+    part_of,
+    save_report,
+)
 from executive.app.report.run_report import VERDICTS, Verdict, title_of
 from executive.app.runs.one_run import log_map
 from executive.app.runs.page_view import PageView
@@ -87,7 +98,9 @@ def run_fleet(
     recording = backend.leave(artifacts, out)
     lasted = f"{backend.clock.now() - begun_s:.1f} s simulated in {result.wall_time_s:.1f} s"
     facts = (("world and seed", f"{first.world.name}, seed {seed}"),) if first is not None else ()
-    verdict = _write_report(dispatch, out, artifacts, read_events(log.path), (*facts, ("duration", lasted)))
+    verdict = _write_report(
+        dispatch, out, artifacts, read_events(log.path), (*facts, ("duration", lasted), *facts_now())
+    )
     if page is not None:
         page.offer(recording, out / REPORT, [verdict])
 
@@ -206,6 +219,8 @@ def _write_report(
         missions=rows,
         map=map_of(artifacts, events, several=len(kinds) > 1),
         parts=parts,
+        links=links_in(out, "log.mcap"),
+        commands=(("replay", shlex.join(["errand", "replay", str(out / "log.mcap")])),),
     )
     save_report(out, page)
     left = "; ".join(f"{row.request}: {row.message or row.word}" for row in rows if row.good is not True)

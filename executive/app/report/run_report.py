@@ -211,6 +211,8 @@ class RunReport(Ending):
         yield from (escape(f"  {event}") for event in (*self.zones, *self.notes, *self.seen.events))
 
 
+DATE: Final = "%Y-%m-%d %H:%M"
+"""Form of the date in reports."""
 _LONG_TEXT: Final = 100
 """Longest reason that fits on the line of its verdict, in characters."""
 _QUOTED: Final = r"""“[^”]*”|"[^"]*"|(?<!\w)'(?:[^']|(?<=\w)'(?=\w))*'(?!\w)"""

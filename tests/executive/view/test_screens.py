@@ -191,7 +191,7 @@ def test_the_report_of_an_evaluation_fits_its_page(page, tmp_path):
         cases.append(Case(RunSpec(Request("fetch me the hammer", world="flat", seed=seed), "fetch"), report))
     found = Results(tuple(cases), {"scenario": "random.yaml", "code": "1", "logs": str(tmp_path)})
     told = Evidence(timeline=((1.0, "navigate", LONG),))
-    html = to_page(found, lambda _: told, lambda _: f"errand run {LONG}", against=cases[:2], other="before.json")
+    html = to_page(found, lambda _: told, against=cases[:2], other="before.json")
     (tmp_path / "results.html").write_text(html, encoding="utf-8")
     page.goto((tmp_path / "results.html").as_uri())
     page.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")

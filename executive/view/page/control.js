@@ -19,7 +19,8 @@
 
     allow(actions) {
       this.actions = new Set(actions);
-      byId("controls").hidden = !this.actions.has("pause");
+      byId("controls").hidden = !this.actions.has("stop");
+      for (const id of ["pause", "step", "cancel"]) byId(id).hidden = !this.actions.has(id);
       byId("say").hidden = !this.actions.has("say");
       byId("after").hidden = !this.actions.has("queue");
     }

@@ -92,7 +92,8 @@
       drawn = performance.now();
       map.draw(latest, store.robots);
       missions.draw(latest.missions, store.robots);
-      for (const panel of shown()) panel.camera.draw(panel.view);
+      if (teleop.allowed()) teleop.drawCameras(store.live, parts.camera, parts.seen);
+      else for (const panel of shown()) panel.camera.draw(panel.view);
       events.draw(timeline.t, timeline.following);
       timeline.drawMarks();
       seekScene();
@@ -110,7 +111,7 @@
         byId("camera-follows").hidden = false;
         scene.show(fileOf(message.data.address), true);
       }
-      if (message.live === "progress") store.end = Math.max(store.end, message.data.now_s);
+      if (message.live === "progress" || message.live === "teleop") store.end = Math.max(store.end, message.data.now_s);
     }
     timeline.grow();
     schedule();

@@ -92,8 +92,8 @@
 
   class Header {
     draw(store, view, replaying) {
-      const tree = view.trees[view.trees.length - 1], several = store.robots.length > 1;
-      const mission = !tree ? "Errand" : several ? store.robots.join(", ") : missionOf(tree.root).name;
+      const tree = view.trees[view.trees.length - 1], several = store.robots.length > 1, driven = store.live.teleop;
+      const mission = !tree ? (driven ? `${driven.robot}, by hand` : "Errand") : several ? store.robots.join(", ") : missionOf(tree.root).name;
       byId("title").textContent = tree && !several ? `${tree.robot}: ${mission}` : mission;
       document.title = tree ? `${mission} – Errand` : "Errand";
       byId("clock").textContent = `${(replaying ? view.t : store.end).toFixed(1)} s`;

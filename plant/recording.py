@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatParams
+from pydrake.geometry import Box, Meshcat, MeshcatParams, Rgba
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram, build_diagram
@@ -21,6 +24,14 @@ _FEWEST_FRAMES = 400
 """A frame takes `_BODY_BYTES` of a file for each body; the shapes of a world take about ten megabytes."""
 BESIDE_M = (-0.4, -1.0, 3.6)
 """Offset of the following camera from the robot, in the axes of the world: steep, to look over a wall behind it."""
+_OVERLAY = Path(__file__).parent / "recording_overlay.html"
+_TRACK_PERIOD_S = 0.2
+_WIDE_RATIO = 1.4
+"""Width of a window for its height in which the overview shows the whole world."""
+_GROUND_M = 200.0
+_GROUND = Rgba(0.52, 0.54, 0.5)
+Steps = Mapping[str, Sequence[tuple[float, str]]]
+"""What each robot does, in words, from which times (s) on."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +117,9 @@ class View:
 
 
 def prepare_view(meshcat: Meshcat, view: View | None) -> None:
-    """Removes the grid and the axes, sets the light, and sets the camera to `view`."""
+    """Removes the grid and the axes, lays ground below the world, sets the light, and sets the camera to `view`."""
+    meshcat.SetObject("/ground", Box(_GROUND_M, _GROUND_M, 0.02), _GROUND)
+    meshcat.SetTransform("/ground", RigidTransform([0.0, 0.0, -0.06]))
     for helper in ("/Grid", "/Axes"):
         meshcat.SetProperty(helper, "visible", False)
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.6)
@@ -119,21 +132,40 @@ def set_camera(meshcat: Meshcat, view: View) -> None:
     meshcat.SetCameraPose(np.array(view.p_WCamera), np.array(view.p_WTarget))
 
 
-def save_html(world: WorldDiagram, frames: Sequence[Frame], path: Path, view: View | None = None) -> None:
-    """Writes an animation of `frames` as one HTML file without a server, which opens on `view`."""
+def save_html(
+    world: WorldDiagram,
+    frames: Sequence[Frame],
+    path: Path,
+    view: View | None = None,
+    steps: Steps = MappingProxyType({}),
+) -> None:
+    """Writes an animation of `frames` as one HTML file without a server, with the robots' `steps` as captions.
+
+    The camera follows the first robot; `view` shows the whole world.
+    """
     meshcat = Meshcat(MeshcatParams(host=HOST, port=0, show_stats_plot=False))  # it cannot do without a port
     prepare_view(meshcat, view)
     shown = build_diagram(replace(world.config, render=False), meshcat)
     root_context = shown.diagram.CreateDefaultContext()
     context = shown.plant.GetMyMutableContextFromRoot(root_context)
+    tracks: dict[str, list[tuple[float, float, float]]] = {name: [] for name in sorted(shown.robots)}
     meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND)
     for frame in frames:
         root_context.SetTime(frame.time_s)
         shown.plant.SetPositions(context, frame.positions)
         shown.diagram.ForcedPublish(root_context)
+        for name, track in tracks.items():
+            if not track or frame.time_s - track[-1][0] >= _TRACK_PERIOD_S:
+                x_m, y_m, _ = shown.robots[name].body.EvalPoseInWorld(context).translation()
+                track.append((round(frame.time_s, 2), round(x_m, 3), round(y_m, 3)))
     meshcat.StopRecording()
     meshcat.PublishRecording()
-    path.write_text(meshcat.StaticHtml())
+    overview = None if view is None else [view.p_WCamera, view.p_WTarget]
+    values = {"tracks": tracks, "steps": {**steps}, "view": overview, "ratio": _WIDE_RATIO}
+    told = json.dumps(values).replace("<", "\\u003c")
+    page, end = meshcat.StaticHtml().rsplit("</body>", 1)
+    data = f'<script id="recorded-run" type="application/json">{told}</script>'
+    path.write_text(f"{page}{data}\n{_OVERLAY.read_text(encoding='utf-8')}</body>{end}", encoding="utf-8")
 
 
 HOST = "127.0.0.1"

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from pydrake.geometry import QueryObject
@@ -13,7 +14,7 @@ from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.events import Moves
 from plant.people.listeners import Listeners
-from plant.recording import LiveScene, Recorder, View, save_html
+from plant.recording import LiveScene, Recorder, Steps, View, save_html
 from plant.referee.referee import Referee
 from plant.rendering import render_parameters
 from plant.robots.robot_kind import PlacedRobot
@@ -154,12 +155,12 @@ class Simulation:
         self.engine.after_advance(lambda: scene(self.engine.now()))
         return scene
 
-    def save_recording(self, path: Path) -> None:
-        """Writes the recording as one HTML file. Raises LookupError without a recording."""
+    def save_recording(self, path: Path, steps: Steps = MappingProxyType({})) -> None:
+        """Writes the recording as one HTML file, with what each robot does. Raises LookupError without a recording."""
         if self.recorder is None:
             raise LookupError("nothing was recorded: build the simulation with record=True")
         self.recorder(self.engine.now())  # the only frame of a run that ends before its first step
-        save_html(self.engine.world, self.recorder.frames, path, self._overview())
+        save_html(self.engine.world, self.recorder.frames, path, self._overview(), steps)
 
     def _overview(self) -> View:
         return View.from_above(self.world.corners)

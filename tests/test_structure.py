@@ -11,23 +11,23 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3381,
+    "executive/words": 3386,
     "executive/language": 8239,
     "executive/speech": 1570,
-    "executive/mission": 1569,
+    "executive/mission": 1655,
     "executive/tree": 8595,
-    "executive/run": 3248,
+    "executive/run": 3291,
     "executive/record": 1093,
     "executive/store": 1600,
     "executive/conversation": 595,
-    "executive/view": 1840,
+    "executive/view": 1848,
     "executive/testing": 848,
-    "executive/app": 8017,
-    "executive/cli": 4114,
-    "skills": 28124,
-    "plant": 11261,
+    "executive/app": 8232,
+    "executive/cli": 4009,
+    "skills": 28128,
+    "plant": 11297,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 420, 60, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 422, 60, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,7 +15,7 @@ import typer
 
 from executive.cli.defaults import runs_folder, typed_options, yielding
 from executive.cli.number_options import quantity_option
-from executive.cli.options import ANYWAY, AS_JSON, REQUEST_OPTIONS, request_arguments, takes_request
+from executive.cli.options import ANYWAY, AS_JSON, REQUEST_OPTIONS, takes_request
 from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer
 from executive.mission.request import Request
 from skills.inputs.errors import InputError
@@ -26,7 +25,7 @@ from skills.quantities import Count
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from executive.app.evaluate.results import Case, Evaluation, Results, ResultsFile, RunSpec
+    from executive.app.evaluate.results import Case, Evaluation, Results, ResultsFile
     from executive.app.evaluate.summary import Group, StandingRow
 
 RESULTS: Final = "results.sqlite"
@@ -192,7 +191,7 @@ def _show(evaluation: Evaluation, found: Results, console: Console) -> dict[str,
         "runs": [{**case.report.to_json(), "id": case.run.id} for case in found.cases],
         **totals_of(found.cases),
         **({"conditions": conditions} if conditions else {}),
-        **standings_json(found, command_of),
+        **standings_json(found),
         "scenario": evaluation.name,
         "workers": int(found.about.get("workers", 0)),
         "missions_per_hour": None if rate is None else float(rate),
@@ -238,11 +237,6 @@ def _standing_row(row: StandingRow) -> tuple[str, ...]:
     return row.standing.words, str(row.rate.successes), f"{row.rate.value:.1%}", row.rate.interval_text, causes
 
 
-def command_of(run: RunSpec) -> str:
-    """Returns the command line that repeats a run."""
-    return shlex.join(["errand", "run", *request_arguments(run.request)])
-
-
 def report(
     run: Annotated[
         Path | None,
@@ -274,11 +268,11 @@ def report(
                 other = _results(compared_with).cases
         _show_report(console, found, other)
         if out is not None:
-            page = to_page(found, stored.evidence, command_of, against=other, other=str(against or ""))
+            page = to_page(found, stored.evidence, against=other, other=str(against or ""))
             with writing(out):
                 out.write_text(page, encoding="utf-8")
             console.print(f"Written: {out}", markup=False)
-        finish(summary_json(found, command_of, other), as_json)
+        finish(summary_json(found, other), as_json)
 
 
 def _open_report(folder: Path, *, as_json: bool) -> None:

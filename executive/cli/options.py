@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
-import enum
 import functools
 import inspect
-import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import takewhile
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, get_args
 
 import typer
 from typer.core import TyperCommand
@@ -20,7 +17,7 @@ from typer.core import TyperCommand
 from executive.cli.defaults import yielding
 from executive.cli.number_options import NumberReader, quantity_option
 from executive.mission.request import Request, parse_start
-from executive.words.forms import Option
+from executive.mission.request_fields import RequestField, request_fields
 from executive.words.forms import OptionGroup as Group
 from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
@@ -123,87 +120,33 @@ def join_values(arguments: Sequence[str]) -> list[str]:
     return words
 
 
-@dataclasses.dataclass(frozen=True)
-class _Typed:
-    """Field with an option; `part` is the field of the request that contains it (empty: the request itself)."""
-
-    part: str
-    name: str
-    kind: Any
-    option: Option
-    default: Any
-
-    @property
-    def several(self) -> bool:
-        """True if the option may be repeated."""
-        return get_origin(self.kind) is tuple
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the option."""
-        return (self.option.name or f"--{self.name.replace('_', '-')}",)
-
-    def parameter(self, default: Any) -> inspect.Parameter:
-        """Returns the parameter from which Typer builds the option."""
-        option, kind = self.option, self.kind
-        plain = next(each for each in get_args(kind) if each is not NoneType) if NoneType in get_args(kind) else kind
-        if quantity_of(plain) is not None:
-            info = quantity_option(plain, *self.names, help=option.help, group=option.group)
-            kind = get_args(plain)[0] if plain is kind else get_args(plain)[0] | None
-        elif option.argument:
-            info = typer.Argument(metavar=option.metavar, help=option.help, show_default=False)
-        else:
-            info = typer.Option(*self.names, metavar=option.metavar, help=option.help, rich_help_panel=option.group)
-        if option.read is not None:
-            kind, default = (bool, False) if option.typed is bool else (option.typed | None, None)
-        elif self.several:
-            kind, default = list[get_args(kind)[0]] | None, None  # type: ignore[misc]
-        hint: Any = Annotated[kind, info]
-        return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
-
-    def value(self, typed: Any) -> Any:
-        """Converts a typed value to the field's value; returns the default if none is typed. Raises InputError."""
-        if self.option.read is not None:
-            return self.default if typed in (None, False) or typed == [] else self.option.read(typed)
-        return tuple(typed or ()) if self.several else typed
-
-    def arguments(self, value: Any) -> list[str]:
-        """Returns the command-line arguments that produce a value."""
-        if self.option.argument:
-            return [str(value)]
-        if isinstance(value, bool):
-            yes, _, no = self.names[0].partition("/")
-            return [yes if value or not no else no]
-        if isinstance(value, Mapping):
-            words = [f"{name}={json.dumps(each)}" for name, each in value.items()]
-        elif self.several:
-            words = [*map(str, value)] if self.option.read is None else [",".join(map(str, value))]
-        else:
-            words = [_text(value)]
-        return [f"{self.names[0]}={word}" for word in words]
+def _parameter(field: RequestField, default: Any) -> inspect.Parameter:
+    """Returns the parameter from which Typer builds the option."""
+    option, kind = field.option, field.kind
+    plain = next(each for each in get_args(kind) if each is not NoneType) if NoneType in get_args(kind) else kind
+    if quantity_of(plain) is not None:
+        info = quantity_option(plain, *field.names, help=option.help, group=option.group)
+        kind = get_args(plain)[0] if plain is kind else get_args(plain)[0] | None
+    elif option.argument:
+        info = typer.Argument(metavar=option.metavar, help=option.help, show_default=False)
+    else:
+        info = typer.Option(*field.names, metavar=option.metavar, help=option.help, rich_help_panel=option.group)
+    if option.read is not None:
+        kind, default = (bool, False) if option.typed is bool else (option.typed | None, None)
+    elif field.several:
+        kind, default = list[get_args(kind)[0]] | None, None  # type: ignore[misc]
+    hint: Any = Annotated[kind, info]
+    return inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
 
 
-def _text(value: Any) -> str:
-    if isinstance(value, Pose2D):
-        return f"{value.x_m!r} {value.y_m!r} {value.yaw_rad!r}"
-    return str(value.value if isinstance(value, enum.Enum) else value)
+def _value(field: RequestField, typed: Any) -> Any:
+    """Converts a typed value to the field's value; returns the default if none is typed. Raises InputError."""
+    if field.option.read is not None:
+        return field.default if typed in (None, False) or typed == [] else field.option.read(typed)
+    return tuple(typed or ()) if field.several else typed
 
 
-def _typed_fields(model: Any = Request, part: str = "") -> Iterator[_Typed]:
-    """Yields the fields that have an option, including those inside parts of the request."""
-    hints = get_type_hints(model, include_extras=True)
-    for each in dataclasses.fields(model):
-        hint = hints[each.name]
-        option = next((mark for mark in getattr(hint, "__metadata__", ()) if isinstance(mark, Option)), None)
-        if option is not None:
-            default = each.default if each.default_factory is dataclasses.MISSING else each.default_factory()
-            kind = get_args(hint)[0] if quantity_of(hint) is None else hint
-            yield _Typed(part, each.name, kind, option, default)
-        elif not part and dataclasses.is_dataclass(hint):
-            yield from _typed_fields(hint, each.name)
-
-
-REQUEST_OPTIONS: Final = frozenset(each.name for each in _typed_fields()) - {"file", "out"}
+REQUEST_OPTIONS: Final = frozenset(each.name for each in request_fields()) - {"file", "out"}
 """Names of the options that make a request what it is, wherever its files go."""
 
 
@@ -218,16 +161,6 @@ def start_pose(text: str | None) -> Pose2D | None:
     return start if isinstance(start, Pose2D) else None
 
 
-def request_arguments(request: Request) -> list[str]:
-    """Returns the arguments of `errand run` that produce this request."""
-    arguments = list[str]()
-    for each in _typed_fields():
-        value = getattr(getattr(request, each.part) if each.part else request, each.name)
-        if value != each.default:
-            arguments += each.arguments(value)
-    return arguments
-
-
 def takes_request(
     *names: str, without: Sequence[str] = (), **defaults: Any
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -235,14 +168,14 @@ def takes_request(
 
     `defaults` replace the fields' own defaults.
     """
-    fields = [each for each in _typed_fields() if (not names or each.name in names) and each.name not in without]
+    fields = [each for each in request_fields() if (not names or each.name in names) and each.name not in without]
 
     def decorated(function: Callable[..., None]) -> Callable[..., None]:
         """Returns the command with the options for the fields, followed by its own."""
         signature = inspect.signature(function, eval_str=True)
         _, *own = (each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values())
         context = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
-        options = [each.parameter(defaults.get(each.name, each.default)) for each in fields]
+        options = [_parameter(each, defaults.get(each.name, each.default)) for each in fields]
         parameters = [context, *options, *(each for each in own if each.name != "context")]
 
         @functools.wraps(function)
@@ -258,10 +191,10 @@ def takes_request(
     return decorated
 
 
-def _request(typed: Iterable[tuple[_Typed, Any]]) -> Request:
+def _request(typed: Iterable[tuple[RequestField, Any]]) -> Request:
     """Builds the request from typed values. Raises InputError."""
     values: dict[str, Any] = {}
     for each, words in typed:
         part = values if not each.part else values.setdefault(each.part, {})
-        part[each.name] = each.value(words)
+        part[each.name] = _value(each, words)
     return Request(**values)

@@ -5,20 +5,19 @@ from __future__ import annotations
 import re
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import typer
 
 from executive.app.kernels import kernel_steps, newly_compiled
 from executive.app.prepare.mission_files import save_pose
 from executive.app.prepare.placed_robots import only_robot, refuse_blocked
-from executive.app.prepare.worlds import open_world
-from executive.app.runs.backend import Scene
-from executive.app.runs.page_view import scene_actions
+from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.app.runs.simulated import simulate
+from executive.app.runs.teleop_page import TeleopPage
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START
 from executive.cli.output import console_for, progress_bar
@@ -26,7 +25,6 @@ from executive.cli.run_keys import read_keys
 from executive.mission.request import parse_start
 from executive.run.worker import LockStepWorker
 from executive.view.feed import Feed
-from executive.view.page_control import Action, RefusedError
 from executive.view.server import PageContent, serve
 from plant.worlds.world import World
 from skills.api import SkillContext
@@ -35,7 +33,7 @@ from skills.inputs.errors import InputError, Problems, count_text
 from skills.quantities import Delay, Port, Seed
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack
-from skills.teleop.driver import KEYS, Teleop, TeleopOptions, axis_values, read_axis_values
+from skills.teleop.driver import Teleop, TeleopOptions, axis_values
 
 HOLDER: Final = "teleop"
 SAVE_KEY: Final = "p"
@@ -78,13 +76,14 @@ def teleop(
             return f"saved as {save_pose(poses, name, hands.pose(), world=opened.name)}"
 
         feed, scene = Feed(), simulation.show_live()
-        server = stack.enter_context(serve(PageContent(feed, page_actions(hands, save, scene), scene.url), port))
+        page = TeleopPage(hands, context, feed, save)
+        page.show_map(opened, knowledge_of(opened))
+        server = stack.enter_context(serve(PageContent(feed, page.actions(scene), scene.url), port))
         console = console_for(False)
         stack.enter_context(read_keys(TerminalKeys(hands, save, console.print).press))
         console.print(f"The page: {server.url}\n{_HELP}", markup=False)
-        feed.tell("teleop_keys", {key: axis for key, (axis, _) in KEYS.items()})
         try:
-            drive(hands, context, limit, lambda: feed.tell("teleop", _state(hands)))
+            drive(hands, context, limit, page.report)
         except KeyboardInterrupt:
             return
 
@@ -144,37 +143,6 @@ class TerminalKeys:
                 self._say(self._save(None))
             except InputError as error:
                 self._say(str(error))
-
-
-def page_actions(hands: Teleop, save: Callable[[str | None], str], scene: Scene | None) -> Mapping[str, Action]:
-    """Returns the actions for the page: `teleop` with held keys and sticks, `save_pose` with a name."""
-
-    def ask(values: Mapping[str, Any]) -> str:
-        try:
-            hands.ask(read_axis_values(values))
-        except ValueError as error:
-            raise RefusedError(str(error)) from error
-        return ""
-
-    def save_as(values: Mapping[str, Any]) -> str:
-        name = values.get("name")
-        try:
-            return save(name if isinstance(name, str) and name else None)
-        except InputError as error:
-            raise RefusedError(str(error)) from error
-
-    return {"teleop": ask, "save_pose": save_as, **({} if scene is None else scene_actions(scene))}
-
-
-def _state(hands: Teleop) -> dict[str, Any]:
-    """Returns the robot's state for the page."""
-    pose = hands.pose()
-    return {
-        "note": hands.note,
-        "base": [pose.base.x_m, pose.base.y_m, pose.base.yaw_rad],
-        "joints_rad": list(pose.joints_rad),
-        "opening": pose.opening,
-    }
 
 
 def warm_up() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -10,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from executive.cli.options import AS_JSON, request_arguments
+from executive.cli.options import AS_JSON
 from executive.cli.output import console_for, finish, show_table
 from executive.mission.request import Request
+from executive.mission.request_fields import command_of
 
 if TYPE_CHECKING:
     from executive.app.runs.folders import KeptRun
@@ -57,7 +57,7 @@ def _values(kept: KeptRun) -> dict[str, Any]:
     from executive.app.report.run_report import VERDICTS
 
     asked, report = kept.request, kept.report or {"outcome": "running or interrupted"}
-    command = shlex.join(["errand", "run", *request_arguments(replace(asked, out=Request.out))])
+    command = command_of(replace(asked, out=Request.out))
     verdict = "" if kept.report is None else VERDICTS[(report.get("referee") or {}).get("success")]
     values = {"run": asked.out.name, "mission": asked.name, "seed": asked.seed, "outcome": report["outcome"]}
     values |= {"verdict": verdict, "message": report.get("message", "")}

@@ -91,7 +91,7 @@ NEAR_M: Final = 1.3
 IN_THE_ROOM_M: Final = 0.3
 """Largest distance (m) outside a room's outline that still counts as inside: walls have a thickness."""
 _STOP_REASON: Final = "told to stop"
-_HELD: Final = frozenset({Mode.PAUSED, Mode.STOPPED, Mode.LEASE_LOST})
+_HELD: Final = frozenset({Mode.PAUSED, Mode.STEPPING, Mode.STOPPED, Mode.LEASE_LOST})
 
 
 class RemarkAnswers:
@@ -148,7 +148,7 @@ class RemarkAnswers:
         now = RobotMode(state.mode, state.reason) if one is None else state.robots[one]
         if now.mode is Mode.STOPPED and now.reason != _STOP_REASON:
             return refusal(f"{now.reason}; release it where it was pressed")
-        held = now.mode in (Mode.STOPPED, Mode.PAUSED)
+        held = now.mode in (Mode.STOPPED, Mode.PAUSED, Mode.STEPPING)
         self._control.release_stop_button(robot=one)
         self._control.resume(robot=one)
         if one is not None and (still := self._control.state.robots[one]).mode in (Mode.STOPPED, Mode.PAUSED):

@@ -371,7 +371,8 @@ class Control:
             whose = (None, robot) if robot or mode is not Mode.LEASE_LOST else (None, *self._missions)
             for who in whose:
                 if (who, mode) in self._holds:
-                    return RobotMode(mode, self._holds[who, mode])
+                    steps = mode is Mode.PAUSED and who is None and self._stride is not None
+                    return RobotMode(Mode.STEPPING if steps else mode, self._holds[who, mode])
         ready = not self._begun or (robot is not None and not self._missions[robot])
         return RobotMode(Mode.READY if ready else Mode.RUNNING)
 

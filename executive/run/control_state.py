@@ -14,6 +14,7 @@ class Mode(enum.Enum):
     READY = "ready"  # it has not begun
     RUNNING = "running"  # trees are ticked
     PAUSED = "paused"  # by the operator or at a breakpoint
+    STEPPING = "stepping"  # paused, until the step under way is complete
     LEASE_LOST = "lease lost"  # another program moves the robot
     STOPPED = "stopped"  # the stop button is pressed
     ENDED = "ended"  # it is over

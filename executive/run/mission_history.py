@@ -17,11 +17,17 @@ from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.search import ANSWER_TOPIC
+from executive.words.goal import GoalKind
 from executive.words.slug import slug
 from skills.api import Part
 from skills.robot import Clock
 
 MOST_CHARS: Final = 300
+_GO: Final = "go to "
+_JOINED: Final = (" and ", " or ")
+_WITHOUT_NEWS: Final = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN, GoalKind.MET)
+"""Goals that change nothing: the answers tell them, or where the robot is."""
+_LET_GO: Final = (GoalKind.HANDED_OVER, GoalKind.PLACED)
 _DENIALS: Final = ("no ", "not ", "nobody ", "nothing ")
 _ENDED: Final = (Status.SUCCESS, Status.FAILURE)
 
@@ -214,11 +220,43 @@ def claim(message: str, findings: Sequence[Finding], skipped: Sequence[str] = ()
     return "; ".join(filter(None, (findings_in_words(findings), after)))
 
 
+def achieved(reached: Sequence[tuple[GoalKind, str, str]], message: str) -> str:
+    """Sums a mission up: what its steps have changed, else the places where the robot went; `message` without goals.
+
+    `reached` has the kind of goal, the name and the message of each step. What was grasped and then put down or handed
+    over is one change. A `message` that is empty stands for answers, which say enough where nothing was changed.
+    """
+    given_up = [number for number, (kind, _, _) in enumerate(reached) if kind in _LET_GO]
+    news = [
+        told
+        for number, (kind, _, told) in enumerate(reached)
+        if kind not in _WITHOUT_NEWS and not (kind is GoalKind.GRASPED and any(later > number for later in given_up))
+    ]
+    went = [name.removeprefix(_GO) for kind, name, _ in reached if kind is GoalKind.WENT and name.startswith(_GO)]
+    if news or not message:
+        return _counted(Counter(news))
+    *first, last = list(dict.fromkeys(went)) or [""]
+    places = f"{', '.join(first)} and {last}" if first else last
+    return f"went to {places}" if places and all(kind is GoalKind.WENT for kind, _, _ in reached) else message
+
+
 def findings_in_words(findings: Sequence[Finding]) -> str:
     """Text of the answers: a single one in full, several shortened and without repetition, the rest as "and N more"."""
+    findings = [one for one in findings if not any(_repeats(one, other) for other in findings)]
     counts = Counter(finding.sentence for finding in findings)
     if len(counts) == 1 and len(findings) == 1:
         return findings[0].sentence
+    return _counted(counts)
+
+
+def _repeats(decision: Finding, look: Finding) -> bool:
+    """Returns whether a decision on one condition says again what the look in it has just found."""
+    inside = look.path_id.startswith(f"{decision.path_id}/") and look.t_s == decision.t_s
+    return inside and not any(word in decision.question for word in _JOINED)
+
+
+def _counted(counts: Mapping[str, int]) -> str:
+    """Joins sentences with their counts up to `MOST_CHARS`; the rest is "and N more"."""
     sentences = [_brief(sentence) + (f" ({n} times)" if n > 1 else "") for sentence, n in counts.items()]
     shown: list[str] = []
     for sentence in sentences:

@@ -7,8 +7,7 @@ from typing import Final
 import numpy as np
 
 from executive.record.schemas import DOORS, JOINTS, NAVIGATION, POSE, SCAN, STATE, stamp
-from executive.tree.context import RunContext
-from skills.api import LocalisationEstimate, ObstacleLayerView, ParticleView
+from skills.api import LocalisationEstimate, ObstacleLayerView, ParticleView, SkillContext
 from skills.doorway import Doorway, SeenDoor
 from skills.robot import Pose2D
 
@@ -24,7 +23,7 @@ _NOTHING: Final = np.empty((0, 2))
 class RobotLog:
     """Writer of a robot's log: pose, state and navigation twice a second, sensors and doors once a second."""
 
-    def __init__(self, name: str, context: RunContext) -> None:
+    def __init__(self, name: str, context: SkillContext) -> None:
         self._name, self._context = name, context
         self._pose_due_s = self._sensors_due_s = context.clock.now()
         self._navigation: Mapping[str, object] = {}

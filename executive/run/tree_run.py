@@ -8,7 +8,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
-from executive.run.mission_history import Executions, Findings, claim, findings_in_words
+from executive.run.mission_history import Executions, Findings, achieved, claim, findings_in_words
 from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
 from executive.tree.behaviour import Explained, ExplainedNode, Hook, message_of, suspend
@@ -173,6 +173,13 @@ class TreeRun:
             attempt(f"end {leaf.path_id}", leaf.abandon)
         self.log_changes(of_all=True)
 
+    def _reached(self) -> Sequence[tuple[GoalKind, str, str]]:
+        """Kind, name and last message of each step with a goal that has succeeded, in the order of the mission."""
+        nodes = {node.path_id: node for node in self._nodes}
+        parts = ((part.goal, nodes.get(part.node or part.path_id)) for part in self.tree.parts)
+        done = ((goal, node) for goal, node in parts if goal and node and node.status == Status.SUCCESS)
+        return list({node.path_id: (goal.kind, node.name, node.message) for goal, node in done}.values())
+
     def judge(self, ending: Ending | None, preempting: tuple[RobotResult, ...] = ()) -> RobotResult:
         """Returns the mission's result: from the tree's status if the tree has ended, else from `ending`."""
         root = self.root
@@ -186,11 +193,10 @@ class TreeRun:
         message = "; ".join((message, *self._endings))
         answers = {node.path_id: answer for node in self._nodes if (answer := node.answered()) is not None}
         findings, said = self._findings.findings, self._findings.said
-        if findings and outcome is Outcome.SUCCESS:
+        if outcome is Outcome.SUCCESS:
             skipped = [omission for node in self._nodes if (omission := node.omission()) is not None]
-            last = self.tree.parts[-1] if self.tree.parts else None
-            only_answers = last is None or last.goal is None or last.goal.kind in _GOALS_WITHOUT_NEWS
-            message = claim("" if only_answers else message, findings, skipped)
+            if findings or not skipped:
+                message = claim(achieved(self._reached(), "" if findings else message), findings, skipped)
         elif findings and outcome is Outcome.FAILURE:
             message = f"{message} (found out: {findings_in_words(findings)})"
         return RobotResult(
@@ -266,5 +272,3 @@ def _state(node: Explained) -> NodeState:
 
 
 _OUTCOMES = {Status.SUCCESS: Outcome.SUCCESS, Status.FAILURE: Outcome.FAILURE}
-_GOALS_WITHOUT_NEWS = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN, GoalKind.MET)
-"""Goals of a last step after which the claim is the answers alone: it would repeat one, or say where the robot is."""

@@ -32,7 +32,8 @@ from skills.inputs.errors import InputError
 from skills.inputs.outside import json_object
 
 HOST: Final = "127.0.0.1"
-RECORDING_ADDRESS: Final = "recording.html"
+_FILES: Final = frozenset({".html", ".mcap"})
+"""Endings of the files of a run that the page links to, and that link to each other."""
 TOKEN_HEADER: Final = "x-errand-token"
 _GOING_AWAY: Final = 1001
 _NOT_ALLOWED: Final = 4403
@@ -40,12 +41,13 @@ _NOT_ALLOWED: Final = 4403
 
 @dataclass(frozen=True)
 class PageContent:
-    """Content of the page: feed, actions for the buttons, and the address or recording of the 3D scene."""
+    """Content of the page: feed, actions for the buttons, the address or recording of the 3D scene, and the report."""
 
     feed: Feed
     actions: Mapping[str, Action] = field(default_factory=dict)
     scene_url: str | None = None
     recording: Path | None = None
+    report: Path | None = None
 
 
 class PageServer(Server):
@@ -62,10 +64,11 @@ class PageServer(Server):
         super().__init__(self._routes(), opened)
         content.feed.listen(self._wake)
 
-    def offer_recording(self, recording: Path) -> None:
-        """Adds the recording of the scene, which follows the page's slider."""
-        self._content = replace(self._content, recording=recording)
-        self._content.feed.tell("recording", {"address": RECORDING_ADDRESS})
+    def offer(self, recording: Path | None, report: Path | None) -> None:
+        """Adds the recording of the scene, which follows the page's slider, and the report of the run."""
+        self._content = replace(self._content, recording=recording, report=report)
+        if recording is not None:
+            self._content.feed.tell("recording", {"address": recording.name})
 
     @property
     def url(self) -> str:
@@ -92,7 +95,7 @@ class PageServer(Server):
         return [
             Route("/", guarded(self._page)),
             Route("/picture/{number:int}", guarded(self._picture)),
-            Route(f"/{RECORDING_ADDRESS}", guarded(self._recording)),
+            Route("/file/{token}/{name}", guarded(self._file)),
             Route("/action/{name}", guarded(self._act), methods=["POST"]),
             WebSocketRoute("/feed", self._send),
             Mount("/page", StaticFiles(directory=PAGE_FOLDER)),
@@ -103,7 +106,8 @@ class PageServer(Server):
         here = {f"{HOST}:{self.port}", f"localhost:{self.port}"}
         headers = connection.headers
         origin = headers.get("origin")
-        given = headers.get(TOKEN_HEADER) or connection.query_params.get("token") or ""
+        given = headers.get(TOKEN_HEADER) or connection.query_params.get("token")
+        given = given or connection.path_params.get("token", "")
         own_origin = origin is None or origin in {f"http://{host}" for host in here}
         own_host = headers.get("host", "") in here
         allowed = own_host and own_origin and secrets.compare_digest(given.encode(), self._token.encode())
@@ -138,11 +142,15 @@ class PageServer(Server):
             return JSONResponse({"error": str(error)}, HTTPStatus.NOT_FOUND)
         return Response(data, media_type=f"image/{form}")
 
-    async def _recording(self, request: Request) -> Response:
-        recording = self._content.recording
-        if recording is None or not recording.is_file():
-            return JSONResponse({"error": "there is no recording"}, HTTPStatus.NOT_FOUND)
-        return FileResponse(recording, media_type="text/html")
+    async def _file(self, request: Request) -> Response:
+        """Sends the recording, the report, or a file beside them to which the report links."""
+        name = request.path_params["name"]
+        offered = (each for each in (self._content.recording, self._content.report) if each is not None)
+        beside = (each.with_name(name) for each in offered if Path(name).suffix in _FILES)
+        found = next((each for each in beside if each.is_file()), None)
+        if found is None:
+            return JSONResponse({"error": f"there is no file '{name}' here"}, HTTPStatus.NOT_FOUND)
+        return FileResponse(found)
 
     async def _act(self, request: Request) -> Response:
         name = request.path_params["name"]
@@ -188,11 +196,11 @@ class PageServer(Server):
         await websocket.close(_GOING_AWAY)
 
     def _hello(self) -> dict[str, Any]:
-        recorded = self._content.recording is not None and self._content.recording.is_file()
+        recording = self._content.recording
         return {
             "actions": sorted(self._content.actions),
             "scene": self._content.scene_url,
-            "recording": RECORDING_ADDRESS if recorded else None,
+            "recording": recording.name if recording is not None and recording.is_file() else None,
         }
 
 

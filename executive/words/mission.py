@@ -172,6 +172,10 @@ class MissionPart(_Whole):
         return (self.after,) if isinstance(self.after, str) else self.after or ()
 
 
+_STATES: Final = frozenset({"be", "have"})
+"""Verbs of questions, which name nothing that the robot does: it finds out."""
+
+
 class Mission(_Whole):
     """Mission in one world, for one robot or with a part for each of several.
 
@@ -249,7 +253,8 @@ class Mission(_Whole):
         if first is None:
             name = type(steps[0]).__name__.lower() if steps else "do"
         else:
-            name = " ".join(filter(None, (first.verb or "do", str(first.object or first.item or first.goal or ""))))
+            verb = "find" if first.verb in _STATES else first.verb or "do"
+            name = " ".join(filter(None, (verb, str(first.object or first.item or first.goal or ""))))
         return cls(name=name, world=world, robot=robot or None, steps=tuple(steps))
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 
 from executive.words.goal import GoalCondition, GoalKind, Region, When
 from plant.referee.object_history import TimedPath, Truth
-from skills.inputs.errors import definite
+from skills.inputs.errors import count_text, definite
 from skills.robot import FloatArray
 
 NAMED_REGIONS = 3
@@ -134,9 +134,12 @@ def judge_greeted(condition: GoalCondition, truth: Truth) -> Finding:
     times_s = condition.spoken_s
     near = np.array([[_spoke_near(condition, robots, among[name], t_s) for t_s in times_s] for name in stayed])
     greeted = near.size and int(near[linear_sum_assignment(near, maximize=True)].sum())
-    said, there = len(times_s), " and ".join(stayed) or "nobody"
-    sentence = f"{there} stood in {where(condition.goal)}, and {greeted} of {len(stayed)} heard one of {said} greetings"
-    return Finding(greeted == len(stayed) and said <= max(1, len(present)), f"{sentence}.")
+    said, there = len(times_s), f"{' and '.join(stayed) or 'nobody'} stood in {where(condition.goal)}"
+    was = f"{'was' if len(stayed) == 1 else 'were'}{' not' if stayed and not greeted else ''} greeted"
+    some = f"{greeted} of {len(stayed)} " if 0 < greeted < len(stayed) else ""
+    heard = f" and {some}{was}" if stayed else ""
+    extra = f"; the robot spoke {count_text(said, 'time')}" if said != greeted else ""
+    return Finding(greeted == len(stayed) and said <= max(1, len(present)), f"{there}{heard}{extra}.")
 
 
 def _spoke_near(condition: GoalCondition, robots: list[TimedPath], person: TimedPath, time_s: float) -> bool:

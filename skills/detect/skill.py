@@ -297,15 +297,19 @@ class Detect(LookingSkill[DetectInputs]):
             return Look(image, place, found, placed, tuple(each for view in views for each in view.clusters))
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)
-        self._update(look)
+        self._update(look, ANY_OBJECT in inputs.classes)
         return look
 
-    def _update(self, look: Look) -> None:
+    def _update(self, look: Look, things: bool) -> None:
+        """Updates coverage and tracks; publishes the detections, with own objects and wanted `things`."""
         X_WO = look.localisation.X_WO
         if not is_dark(look.image):
             self._coverage.add(look.image, X_WO)
         tracks = self._tracker.update(look.detections_3d, lambda t: in_plain_view(look.image, X_WO, t.position_W))
-        sure = [detection for detection in look.detections if detection.score >= SURE_SCORE]
+        shown = {*self._own, ANY_OBJECT} if things else {*self._own}
+        placed = [each.detection for each in look.detections_3d if each.detection.class_name in shown]
+        own = [each for each in placed if all(each is not one for one in look.detections)]
+        sure = [detection for detection in (*look.detections, *own) if detection.score >= SURE_SCORE]
         self.context.publish("detections", detections_message(look.image, sure, look.detections_3d))
         self.context.publish("tracks", tracks_message(self.context, tracks))
         self._clusters += look.clusters

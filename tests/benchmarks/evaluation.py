@@ -22,7 +22,6 @@ from executive.app.evaluate.results import Case, Evaluation, Evidence, ResultsFi
 from executive.app.evaluate.summary import to_page
 from executive.app.evaluate.workers import local_cluster
 from executive.app.report.run_report import RunReport
-from executive.cli.evaluate_command import command_of
 from executive.mission.request import Request
 from executive.words.goal import RefereeReport
 from tests.benchmarks.harness import command
@@ -59,7 +58,7 @@ def report(results: int = 10_000):
         began = time.perf_counter()
         with ResultsFile(file) as kept:
             made = kept.results()
-            html.write_text(to_page(made, kept.evidence, command_of, against=made.cases, other="itself"))
+            html.write_text(to_page(made, kept.evidence, against=made.cases, other="itself"))
         failures = sum(not case.report.achieved for case in made.cases)
         took_s = round(time.perf_counter() - began, 2)
         return {"results": results, "failures": failures, "took_s": took_s, "bytes": html.stat().st_size}

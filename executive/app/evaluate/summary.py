@@ -3,13 +3,16 @@
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from scipy.stats import binomtest, fisher_exact
 
-from executive.app.evaluate.results import Case, Evidence, Results, RunSpec, Standing
+from executive.app.evaluate.results import Case, Evidence, Results, Standing
+from executive.app.report.run_report import DATE, title_of
+from executive.mission.request_fields import command_of
 from executive.view.html import render
 
 _CONFIDENCE: Final = 0.95
@@ -226,11 +229,7 @@ def fisher(first: Rate, second: Rate) -> float:
     return float(fisher_exact(table).pvalue)
 
 
-CommandOf = Callable[[RunSpec], str]
-"""Returns the command line that repeats a run."""
-
-
-def standings_json(found: Results, command_of: CommandOf) -> dict[str, Any]:
+def standings_json(found: Results) -> dict[str, Any]:
     """Returns claims against verdicts as JSON values: the counts, and each run that failed or made a false claim."""
     return {
         "standings": {
@@ -248,14 +247,14 @@ def standings_json(found: Results, command_of: CommandOf) -> dict[str, Any]:
                 "cause": case.report.cause,
                 "why": case.why,
                 "log": None if (folder := found.log_folder(case)) is None else str(folder),
-                "command": command_of(case.run),
+                "command": command_of(case.run.request),
             }
             for case in cases_to_inspect(found.cases)
         ],
     }
 
 
-def summary_json(found: Results, command_of: CommandOf, against: Sequence[Case] | None = None) -> dict[str, Any]:
+def summary_json(found: Results, against: Sequence[Case] | None = None) -> dict[str, Any]:
     """Returns the summary as JSON values, with a comparison if the cases of another file are given."""
     cases = found.cases
     comparisons = {} if against is None else {"against": [asdict(each) for each in comparisons_of(cases, against)]}
@@ -267,14 +266,13 @@ def summary_json(found: Results, command_of: CommandOf, against: Sequence[Case] 
         "causes": [asdict(row) for row in causes_of(cases)],
         "skills": {row.skill: {"runs": row.runs, "sim_s": row.sim_s, "share": row.share} for row in time_rows(cases)},
         **comparisons,
-        **standings_json(found, command_of),
+        **standings_json(found),
     }
 
 
 def to_page(
     found: Results,
     evidence: Callable[[str], Evidence],
-    command_of: CommandOf,
     *,
     against: Sequence[Case] | None = None,
     other: str = "",
@@ -290,13 +288,14 @@ def to_page(
     for case, seen, has_pictures in _with_evidence(cases, evidence):
         folder = found.log_folder(case)
         log = [] if folder is None else [f"errand log {folder / 'log.mcap'}"]
-        inspected.append((case, seen, has_pictures, (command_of(case.run), *log)))
+        inspected.append((case, seen, has_pictures, (command_of(case.run.request), *log)))
     return render(
         "evaluation.html",
-        title=Path(about["scenario"]).stem.replace("_", " "),
+        title=title_of(case.run.mission for case in cases) if cases else Path(about["scenario"]).stem,
         facts=(
             ("evaluation", about["scenario"]),
             ("runs with a result", f"{len(cases)} of {about['runs']}" if "runs" in about else str(len(cases))),
+            ("date", datetime.now().strftime(DATE)),
             ("version", about["code"]),
             ("missions per hour", about.get("missions_per_hour", "?")),
         ),

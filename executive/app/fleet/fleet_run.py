@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -22,8 +23,18 @@ from executive.app.prepare.placed_robots import placed_robots
 from executive.app.prepare.prepared import Prepared
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.app.report.artifacts import Artifacts
-from executive.app.report.report_page import MissionRow, ReportPage, ReportPart, map_of, part_of, save_report
-from executive.app.report.run_report import VERDICTS
+from executive.app.report.report_page import (
+    REPORT,
+    MissionRow,
+    ReportPage,
+    ReportPart,
+    facts_now,
+    links_in,
+    map_of,
+    part_of,
+    save_report,
+)
+from executive.app.report.run_report import VERDICTS, Verdict, title_of
 from executive.app.runs.one_run import log_map
 from executive.app.runs.page_view import PageView
 from executive.app.runs.signals import ended_by_signals
@@ -87,9 +98,11 @@ def run_fleet(
     recording = backend.leave(artifacts, out)
     lasted = f"{backend.clock.now() - begun_s:.1f} s simulated in {result.wall_time_s:.1f} s"
     facts = (("world and seed", f"{first.world.name}, seed {seed}"),) if first is not None else ()
-    _write_report(dispatch, out, artifacts, read_events(log.path), (*facts, ("duration", lasted)))
+    verdict = _write_report(
+        dispatch, out, artifacts, read_events(log.path), (*facts, ("duration", lasted), *facts_now())
+    )
     if page is not None:
-        page.offer(recording)
+        page.offer(recording, out / REPORT, [verdict])
 
 
 @dataclass
@@ -179,8 +192,8 @@ def _world_of(queued: Sequence[StoredMission]) -> World:
 
 def _write_report(
     dispatch: Dispatch, out: Path, artifacts: Artifacts, events: Sequence[Event], facts: Sequence[tuple[str, str]]
-) -> None:
-    """Writes the report of a fleet's run into the folder `out`."""
+) -> Verdict:
+    """Writes the report of a fleet's run into the folder `out`; returns how many of its missions are done."""
     kinds = {name: robot.placed.kind for name, robot in dispatch.robots.items()}
     values = missions_json(dispatch.store, list(dispatch.missions))
     rows: list[MissionRow] = []
@@ -197,12 +210,18 @@ def _write_report(
             own = [event for event in events if each.since_s <= event.stamp_s <= each.until_s]
             title = f"Mission {each.number}, {tree.robot_name} ({kind}): {tree.mission_name}"
             parts.append(part_of(each.ended, tuple(kinds), artifacts, own, title=title))
+    asked = [each.stored.request for each in dispatch.missions.values()]
+    done = f"{sum(row.good is True for row in rows)} of {len(rows)} missions done"
     page = ReportPage(
-        title="Fleet",
-        request=f"{sum(row.good is True for row in rows)} of {len(rows)} missions done",
+        title=title_of(each.name or each.sentence or "fleet" for each in asked),
+        request=done,
         facts=(("robots", ", ".join(f"{name} ({kind})" for name, kind in kinds.items())), *facts),
         missions=rows,
         map=map_of(artifacts, events, several=len(kinds) > 1),
         parts=parts,
+        links=links_in(out, "log.mcap"),
+        commands=(("replay", shlex.join(["errand", "replay", str(out / "log.mcap")])),),
     )
     save_report(out, page)
+    left = "; ".join(f"{row.request}: {row.message or row.word}" for row in rows if row.good is not True)
+    return Verdict("The fleet", not left, done, left)

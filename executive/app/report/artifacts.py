@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from executive.record.history import Event
-from executive.record.schemas import DESTINATION, TRANSITIONS, TREE
+from executive.record.schemas import ACTIVITY, DESTINATION, TRANSITIONS, TREE
 from executive.run.visitor import RunVisitor
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.view.map_picture import newest_zones
@@ -42,11 +42,17 @@ _AHEAD_M: Final[Mapping[str, float]] = MappingProxyType({"hand_over": 0.4})
 
 @dataclass
 class RobotArtifacts:
-    """Recorded detections of one robot, the times (s) of its hand-over and placement, and pictures from its skills."""
+    """Recorded detections of one robot, the times (s) of its hand-over and placement, and pictures from its skills.
+
+    `looked` are the latest detections with their numbers, `begun` how many there were when each node began, `confirmed`
+    those that confirmed an object since the last answer.
+    """
 
     seen: Mapping[str, Any] | None = None
-    confirmed: Mapping[str, Any] | None = None
-    looked: deque[Mapping[str, Any]] = field(default_factory=lambda: deque(maxlen=_MOST_LOOKS))
+    confirmed: list[Mapping[str, Any]] = field(default_factory=list)
+    looked: deque[tuple[int, Mapping[str, Any]]] = field(default_factory=lambda: deque(maxlen=_MOST_LOOKS))
+    looks: int = 0
+    begun: dict[str, int] = field(default_factory=dict)
     detection: Mapping[str, Any] | None = None
     moments: dict[str, float] = field(default_factory=dict)
     shown: list[tuple[str, bytes]] = field(default_factory=list)
@@ -56,7 +62,8 @@ class Artifacts(RunVisitor):
     """Visitor that collects what the pictures of a run need, and adds a picture to each answer in the log.
 
     `pictures` are small JPEG files of the answers, at most `MOST_BYTES` in all. `numbers` maps a node's path id and a
-    time (s) to the index of an answer's picture. `drawn` are the written files by name, `trees` the logged trees.
+    time (s) to the index of an answer's picture. `drawn` are the written files by name, `trees` the logged trees,
+    `steps` what each robot does, with the times (s).
     """
 
     def __init__(self) -> None:
@@ -66,6 +73,8 @@ class Artifacts(RunVisitor):
         self.numbers: dict[tuple[str, float], int] = {}
         self.drawn: dict[str, Path] = {}
         self.trees: list[Mapping[str, Any]] = []
+        self.steps: dict[str, list[tuple[float, str]]] = {}
+        self._step_of: dict[str, str] = {}
 
     def of_robot(self, robot_name: str) -> RobotArtifacts:
         """Returns what was collected for a robot."""
@@ -76,34 +85,50 @@ class Artifacts(RunVisitor):
         own = self.of_robot(str(message.get("robot", "")))
         if topic == TREE:
             self.trees.append(message)
+            self._step_of |= _steps_of(message["root"], message["root"]["name"])
+        if topic == ACTIVITY or (topic == TRANSITIONS and message["to"] == "RUNNING"):
+            self._caption(message)
         if topic == DETECTIONS:
-            own.looked.append(message)
+            own.looked.append((own.looks, message))
+            own.looks += 1
             own.seen = message if message["detections"] else own.seen
         if topic == PICTURES and len(own.shown) < MOST_SHOWN:
             own.shown.append((str(message["caption"]), to_jpeg(message["image"])))
         if topic == DESTINATION:
-            own.confirmed = own.seen
+            own.confirmed += [] if own.seen is None else [own.seen]
             own.detection = own.detection or own.seen
         if topic == ANSWER_TOPIC:
             message = self._with_picture(message, own)
+        if topic == TRANSITIONS and message["to"] == "RUNNING":
+            own.begun[str(message["node"])] = own.looks
         if topic == TRANSITIONS and message["to"] == "SUCCESS" and not message.get("restored", False):
             name = _MOMENTS.get(str(message["node"]).rsplit("/", 1)[-1])
             if name is not None:
                 own.moments[name] = float(message["t"])
         return message
 
+    def _caption(self, message: Mapping[str, Any]) -> None:
+        """Adds a step of a robot and what it does in it, once each time."""
+        step, own = self._step_of.get(str(message["node"])), self.steps.setdefault(str(message.get("robot", "")), [])
+        text = " – ".join(filter(None, (step, str(message.get("message", "")))))
+        if step is not None and (not own or own[-1][1] != text):
+            own.append((round(float(message["t"]), 2), text))
+
     def _with_picture(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
-        """Adds a picture to an answer: the view with the found object or person, or all views if nothing was found."""
-        looked = list(own.looked)
+        """Adds a picture to an answer: the views with the found objects or the person, or all views if none was found.
+
+        Only views since the answering node began count. A leaf, such as a question to a person, looks at nothing.
+        """
+        node, confirmed = str(message["node"]), own.confirmed
+        looked = [each for number, each in own.looked if number >= own.begun.get(node, own.looks)]
+        own.confirmed = []
         own.looked.clear()
-        if not looked:
+        if not looked or any(_is_leaf(tree["root"], node) for tree in self.trees):
             return message
-        with_finds = [each for each in looked if each["detections"]]
-        confirmed = [each for each in with_finds if each is own.confirmed]
-        if message["answer"] and with_finds:
-            self.answer = detection_picture((confirmed or with_finds)[-1])
-        else:
-            self.answer = _sheet([detection_picture(each) for each in looked])
+        finds = [each for each in looked if each["detections"]] if message["answer"] else []
+        found = [each for each in finds if any(each is one for one in confirmed)] or finds[-1:]
+        pictures = [detection_picture(each) for each in found or looked]
+        self.answer = pictures[0] if len(found) == 1 else _sheet(pictures)
         self._keep(message, self.answer)
         return {**message, "image": self.answer}
 
@@ -125,6 +150,20 @@ class Artifacts(RunVisitor):
         if sum(map(len, self.pictures)) + len(small) <= MOST_BYTES:
             self.numbers[key] = len(self.pictures)
             self.pictures.append(small)
+
+
+def _steps_of(node: Mapping[str, Any], step: str) -> dict[str, str]:
+    """Returns the step of the mission for each leaf of a logged tree, by the leaf's path id."""
+    step = str(node["name"]) if node.get("step") else step
+    if not node["children"]:
+        return {node["id"]: step}
+    return {path_id: name for child in node["children"] for path_id, name in _steps_of(child, step).items()}
+
+
+def _is_leaf(root: Mapping[str, Any], path_id: str) -> bool:
+    """Returns whether a logged tree has a node of this path id without children."""
+    below = root["children"]
+    return (root["id"] == path_id and not below) or any(_is_leaf(child, path_id) for child in below)
 
 
 def file_name(what: str, robot_name: str, robots: Sequence[str]) -> str:

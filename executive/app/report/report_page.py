@@ -1,10 +1,13 @@
 """Writes `report.html` with request, verdicts, steps, answers and pictures into a run's folder."""
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
+from urllib.parse import quote
 
 import cv2
 import numpy as np
@@ -13,7 +16,18 @@ from py_trees.common import Status
 from executive.app.prepare.prepared import Prepared
 from executive.app.report.artifacts import Artifacts, detection_picture, file_name, to_jpeg
 from executive.app.report.pictures import read_picture
-from executive.app.report.run_report import Ending, ReportedAnswer, ReportedObject, RobotReport, RunReport, counts_text
+from executive.app.report.run_report import (
+    DATE,
+    Ending,
+    ReportedAnswer,
+    ReportedObject,
+    RobotReport,
+    RunReport,
+    counts_text,
+    title_of,
+)
+from executive.mission.request_fields import command_of
+from executive.record.announce import PACKAGES, versions
 from executive.record.history import Event, seen_objects
 from executive.record.schemas import TRANSITIONS
 from executive.run.outcome import Finding, RunResult, Said
@@ -31,6 +45,7 @@ from skills.api import ObjectObservation
 from skills.inputs.errors import InputError
 
 REPORT: Final = "report.html"
+RECORDING: Final = "recording.html"
 TREE: Final = "tree"
 _CAPTIONS: Final = {
     "detection": "The first detection",
@@ -91,6 +106,7 @@ class ReportPart:
 class ReportPage:
     """Content of `report.html`. `request` is the sentence or the file, `facts` are pairs of a name and a value.
 
+    `links` are pairs of a name and the address of a file beside the report; `commands` are command lines with names.
     `alone` is the report on a single robot. For several robots, `parts` has one report for each robot, and `missions`
     has the missions of a fleet.
     """
@@ -108,6 +124,8 @@ class ReportPage:
     events: Sequence[str] = ()
     map: Picture | None = None
     plots: Sequence[str] = ()
+    links: Sequence[tuple[str, str]] = ()
+    commands: Sequence[tuple[str, str]] = ()
 
 
 @dataclass(frozen=True)
@@ -148,9 +166,11 @@ def write_report(
     for each, part in zip(ended, parts, strict=True):
         (out / f"{file_name(TREE, each.tree.robot_name, names)}.svg").write_text(part.tree_svg, encoding="utf-8")
     page = ReportPage(
-        title=", ".join(names) if several else prepared.mission.name,
+        title=title_of(each.mission.name for each in prepared.all),
         request=asked if request.sentence is None else f"“{request.sentence}”",
-        facts=_facts(report, "" if several else ended[0].tree.robot_name),
+        facts=(*_facts(report, "" if several else ended[0].tree.robot_name), *facts_now()),
+        links=links_in(out, Path(report.log).name),
+        commands=(("run", command_of(request)), ("replay", shlex.join(["errand", "replay", report.log]))),
         alone=None if several else parts[0],
         parts=parts if several else (),
         answers=report.answers,
@@ -248,6 +268,17 @@ def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
         return facts
     contacts = () if report.referee is None else (("contacts", counts_text(report.referee)),)
     return (("robot", robot_name), *facts, *contacts)
+
+
+def facts_now() -> tuple[tuple[str, str], ...]:
+    """Date and version of a report, as pairs of name and value."""
+    return ("date", datetime.now().strftime(DATE)), ("version", versions(PACKAGES[:1])[PACKAGES[0]])
+
+
+def links_in(out: Path, log: str) -> tuple[tuple[str, str], ...]:
+    """Links to the files of a run that are in its folder: the name of each and its address from the report."""
+    files = (("recording in 3D", RECORDING), ("event log", log), ("tree", f"{TREE}.svg"))
+    return tuple((name, quote(file)) for name, file in files if (out / file).is_file())
 
 
 def map_of(artifacts: Artifacts, events: Sequence[Event], *, several: bool) -> Picture | None:

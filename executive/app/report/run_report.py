@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from html import escape as html_text
@@ -75,8 +75,8 @@ class Verdict:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Splits the reason into sentences and into parts that end with a semicolon."""
-        return tuple(_SENTENCE_END.split(self.text))
+        """Splits the reason into sentences and into parts that end with a semicolon, but not within quotation marks."""
+        return tuple(part.strip() for part in _SENTENCE.findall(self.text))
 
 
 @dataclass(frozen=True)
@@ -156,6 +156,13 @@ class RunReport(Ending):
     zones: tuple[str, ...] = ()
     robots: Mapping[str, RobotReport] = field(default_factory=dict)
 
+    def every_verdict(self) -> Iterator[Verdict]:
+        """Yields the verdicts on the run; those of several robots have the robot's name, and count its contacts."""
+        for name, robot in self.robots.items():
+            yield from robot.verdicts(name=name, counts=True)
+        if not self.robots:
+            yield from self.verdicts()
+
     @property
     def duration_text(self) -> str:
         """Duration in words; says "simulated" only for a run with a referee."""
@@ -195,8 +202,7 @@ class RunReport(Ending):
         pace = "" if self.referee is None else f" ({self.real_time_factor:.1f} x real time)"
         figures = f"{self.duration_text}{pace}, {self.ticks} ticks"
         if self.robots:
-            for name, robot in self.robots.items():
-                yield from (line for verdict in robot.verdicts(name=name, counts=True) for line in verdict.lines())
+            yield from (line for verdict in self.every_verdict() for line in verdict.lines())
             yield from (escape(f"  {zone}") for zone in self.zones)
             yield figures
             return
@@ -205,12 +211,26 @@ class RunReport(Ending):
         yield from (escape(f"  {event}") for event in (*self.zones, *self.notes, *self.seen.events))
 
 
+DATE: Final = "%Y-%m-%d %H:%M"
+"""Form of the date in reports."""
 _LONG_TEXT: Final = 100
 """Longest reason that fits on the line of its verdict, in characters."""
-_SENTENCE_END: Final = re.compile(r"(?<=[.!?;]) (?=\S)")
+_QUOTED: Final = r"""“[^”]*”|"[^"]*"|(?<!\w)'(?:[^']|(?<=\w)'(?=\w))*'(?!\w)"""
+"""Quotation; an apostrophe within a word does not end it."""
+_SENTENCE: Final = re.compile(rf"(?:{_QUOTED}|\S|(?<![.!?;])\s)+")
+_MOST_NAMED: Final = 3
+"""Number of missions that a title names."""
 NOT_JUDGED: Final = RefereeReport(None, "there is no referee", 0, 0)
 VERDICTS: Final[Mapping[bool | None, str]] = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
 _MARKS: Final[Mapping[bool | None, str]] = {True: "[green]✓[/green]", False: "[red]✗[/red]", None: "[yellow]?[/yellow]"}
+
+
+def title_of(names: Iterable[str]) -> str:
+    """Title of a report on several missions: their names, each once."""
+    each = list(dict.fromkeys(names))
+    more = [f"{len(each) - _MOST_NAMED} more"] if len(each) > _MOST_NAMED else []
+    *first, last = [*each[:_MOST_NAMED], *more]
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 @cache

@@ -14,7 +14,7 @@ from py_trees.behaviour import Behaviour
 
 from executive.app.prepare.prepared import Prepared
 from executive.app.report.artifacts import Artifacts, draw_answer
-from executive.app.report.report_page import EndedTree, with_findings, write_report
+from executive.app.report.report_page import REPORT, EndedTree, with_findings, write_report
 from executive.app.report.run_report import RobotReport, RunReport
 from executive.app.runs.backend import Backend, Durable
 from executive.app.runs.goal_conditions import Share
@@ -120,7 +120,7 @@ def run_request(
         log(WORK, counts)
     finished, recording = _conclude(prepared, backend, result, log, artifacts, counts)
     if page is not None:
-        page.offer(recording)
+        page.offer(recording, out / REPORT, finished.report.every_verdict())
     return replace(finished, hung_up=ending.hung_up)
 
 

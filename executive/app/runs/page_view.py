@@ -1,13 +1,14 @@
 """Live page of a run (`--view`), which replays the run after its end."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from executive.app.prepare.from_request import prepare_checked
 from executive.app.prepare.mission_files import shipped_missions
 from executive.app.prepare.prepared import Prepared
+from executive.app.report.run_report import Verdict
 from executive.app.runs.backend import Scene
 from executive.app.runs.conversations import Conversations, load_ahead
 from executive.conversation import ReplyKind
@@ -90,10 +91,11 @@ class PageView(RunVisitor):
         """Sends the progress to the page."""
         self._progress.tick(progress)
 
-    def offer(self, recording: Path | None) -> None:
-        """Adds the recording of the ended run to the page, if there is a recording."""
-        if self._server is not None and recording is not None and recording.is_file():
-            self._server.offer_recording(recording)
+    def offer(self, recording: Path | None, report: Path, verdicts: Iterable[Verdict] = ()) -> None:
+        """Adds the verdicts on the ended run, its report, and its recording if there is one, to the page."""
+        if self._server is not None:
+            self._server.offer(recording if recording is not None and recording.is_file() else None, report)
+            self._feed.tell("verdict", {"verdicts": [asdict(each) for each in verdicts], "report": report.name})
 
     def stay(self, limit_s: float | None) -> None:
         """Serves the page until Ctrl-C or the limit (s, wall time), and then closes it."""

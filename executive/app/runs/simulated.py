@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from executive.app.prepare.placed_robots import robot_stack, shared_detector
 from executive.app.report.artifacts import Artifacts, draw_artifacts
+from executive.app.report.report_page import RECORDING
 from executive.app.runs.backend import Durable, Scene
 from executive.app.runs.goal_conditions import Share, verdict_of
 from executive.record.schemas import SPEECH
@@ -150,9 +151,10 @@ class SimulatedBackend:
         """Writes recording and pictures of a recorded run; returns the recording's path."""
         if not self._record:
             return None
-        self._settled().save_recording(out / "recording.html")
+        recording = out / RECORDING
+        self._settled().save_recording(recording, artifacts.steps)
         draw_artifacts(artifacts, self._simulation, sorted(self._robots), out)
-        return out / "recording.html"
+        return recording
 
 
 def kernels_folder(cache: Path | None = None) -> tuple[Path, bool]:

@@ -92,7 +92,7 @@ class AskPeople(ExplainedLeaf):
         answer = self._meant(said)
         if answer is not None:
             self.context.board.put(self.key, answer)
-            self.cause, self.message = None, f"{self._text}: {answer}"
+            self.cause, self.message = None, f"{self._text}{'' if self._text.endswith('?') else ':'} {answer}"
             self.report(answer)
             return Status.SUCCESS
         self._put(f"I did not understand '{said[:60]}'. {self._text}")

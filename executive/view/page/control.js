@@ -1,7 +1,7 @@
 "use strict";
 // The buttons, the sentence box and the keys; everything goes through one guarded request.
 (() => {
-  const { byId } = window.errand;
+  const { byId, isOver } = window.errand;
 
   class ControlPanel {
     constructor(token) {
@@ -19,7 +19,8 @@
 
     allow(actions) {
       this.actions = new Set(actions);
-      byId("controls").hidden = !this.actions.has("pause");
+      byId("controls").hidden = !this.actions.has("stop");
+      for (const id of ["pause", "step", "cancel"]) byId(id).hidden = !this.actions.has(id);
       byId("say").hidden = !this.actions.has("say");
       byId("after").hidden = !this.actions.has("queue");
     }
@@ -35,7 +36,7 @@
         this.tell(answer.ok ? said : error, !answer.ok);
         return answer.ok;
       } catch {
-        this.tell("errand does not answer: has it ended?", true);
+        this.tell("no answer from Errand: the connection may be lost", true);
         return false;
       }
     }
@@ -101,7 +102,7 @@
     draw(state, ended) {
       this.state = state;
       this.drawButtons(state ? state.buttons || [] : []);
-      const mode = state ? state.mode : "ready", over = ended || mode === "ended";
+      const mode = state ? state.mode : "ready", over = ended || isOver(state);
       const paused = mode === "paused", stopped = mode === "stopped";
       byId("pause").querySelector("span").textContent = paused ? "Go on" : "Pause";
       byId("pause").querySelector("path").setAttribute("d", paused ? "M4 2.5l9 5.5-9 5.5z" : "M4 3h3v10H4zM9 3h3v10H9z");

@@ -2,7 +2,7 @@
 // The list of what happened; an entry leads the slider to its time.
 (() => {
   const { LOOKS, lookOf, element } = window.errand;
-  const MOST = 600;
+  const MOST = 600, QUESTION = /^(question|answer)/; // whose message begins with the question's id
 
   const TEXTS = {
     run: (data) => ["run", `world ${data.world}, seed ${data.seed}: ${(data.commands || []).join(" · ")}`],
@@ -11,7 +11,7 @@
     missions: (data) => ["missions", data.missions.map((each) => `${each.id} ${each.robot || "no robot"}: ${each.outcome}`).join(", ")],
     speech: (data) => [`${data.robot} ${data.silent ? "shows" : "says"}`, `“${data.text}”`],
     errors: (data) => ["defect", (data.traceback || "").trim().split("\n").pop()],
-    control: (data) => [data.what || "control", data.message || ""],
+    control: (data) => [data.what || "control", QUESTION.test(data.what) ? (data.message || "").replace(/^\S+: /, "") : data.message || ""],
     question: (data) => ["question", data.text || data.message || ""],
   };
 
@@ -38,7 +38,7 @@
       }
       if (!TEXTS[topic] || this.choice.value === "failures") return null;
       const [what, why] = TEXTS[topic](data);
-      return { t, look: topic === "errors" ? "failure" : "idle", symbol: "·", what: topic === "speech" ? what : this.whose(data) + what, why };
+      return { t, look: topic === "errors" ? "failure" : "idle", symbol: "·", what: topic === "speech" ? what : this.whose(data) + what, why: this.store.titled(why) };
     }
 
     change(data, t) {

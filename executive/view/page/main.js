@@ -1,9 +1,10 @@
 "use strict";
 // Puts the page together: messages come from the server while a run is under way, or stand in the page itself.
 (() => {
-  const { Store, MapPanel, Header, ModePanel, modeOfAll, ScenePanel, EventPanel, Timeline, ControlPanel, TeleopPanel, RobotPanel, MissionsPanel, drawsSlowly, byId } = window.errand;
+  const { Store, MapPanel, Header, ModePanel, VerdictPanel, isOver, modeOfAll, ScenePanel, EventPanel, Timeline, ControlPanel, TeleopPanel, RobotPanel, MissionsPanel, drawsSlowly, byId } = window.errand;
   const recorded = byId("recorded") ? JSON.parse(byId("recorded").textContent) : null;
   const token = new URLSearchParams(location.search).get("token") || "";
+  const feedAddress = `ws://${location.host}/feed?token=${encodeURIComponent(token)}`, GOING_AWAY = 1001, AGAIN_MS = 2000;
   const store = new Store();
 
   function addressOf(picture) {
@@ -11,8 +12,10 @@
     return `picture/${picture}?token=${encodeURIComponent(token)}`;
   }
 
+  const fileOf = (name) => `file/${encodeURIComponent(token)}/${name}`; // a path, so that a file's links find the others
+
   const control = new ControlPanel(token);
-  const teleop = new TeleopPanel(control);
+  const teleop = new TeleopPanel(control), verdicts = new VerdictPanel(byId("verdicts"));
   const header = new Header();
   const parts = Object.fromEntries(["tree", "follow", "nodes", "mode", "why", "state", "camera", "seen", "questions", "doing"].map((id) => [id, byId(id)]));
   const one = new RobotPanel(parts, null, control, addressOf), all = new ModePanel(parts.mode, parts.why);
@@ -60,6 +63,7 @@
     header.draw(store, view, replaying);
     teleop.draw(store.live.teleop, store.live.teleop_keys);
     control.draw(controlState, !panels.size && store.now.outcomes.length > 0);
+    verdicts.draw(replaying ? null : store.live.verdict, fileOf);
     if (panels.size) all.draw(modeOfAll(replaying ? null : controlState, view, store.robots), true);
     for (const panel of shown()) panel.draw(store, view, replaying);
     measure();
@@ -88,7 +92,8 @@
       drawn = performance.now();
       map.draw(latest, store.robots);
       missions.draw(latest.missions, store.robots);
-      for (const panel of shown()) panel.camera.draw(panel.view);
+      if (teleop.allowed()) teleop.drawCameras(store.live, parts.camera, parts.seen);
+      else for (const panel of shown()) panel.camera.draw(panel.view);
       events.draw(timeline.t, timeline.following);
       timeline.drawMarks();
       seekScene();
@@ -104,9 +109,9 @@
       if (message.live === "hello") greet(message.data);
       if (message.live === "recording" && message.data.address) {
         byId("camera-follows").hidden = false;
-        scene.show(`${message.data.address}?token=${encodeURIComponent(token)}`, true);
+        scene.show(fileOf(message.data.address), true);
       }
-      if (message.live === "progress") store.end = Math.max(store.end, message.data.now_s);
+      if (message.live === "progress" || message.live === "teleop") store.end = Math.max(store.end, message.data.now_s);
     }
     timeline.grow();
     schedule();
@@ -115,7 +120,7 @@
   function greet({ actions, scene: address, recording }) {
     control.allow(actions);
     timeline.setLive(actions.length > 0);
-    if (recording) scene.show(`${recording}?token=${encodeURIComponent(token)}`, true);
+    if (recording) scene.show(fileOf(recording), true);
     else scene.show(address, false);
     byId("camera-follows").hidden = !(address || recording);
     if (control.actions.has("follow")) control.do("follow", { wanted: byId("beside").checked });
@@ -123,18 +128,32 @@
   }
 
   function connect() {
-    const socket = new WebSocket(`ws://${location.host}/feed?token=${encodeURIComponent(token)}`);
+    const socket = new WebSocket(feedAddress);
     let batches = 0;
     socket.addEventListener("message", (event) => {
       take(JSON.parse(event.data));
       batches += 1;
       greeted = batches > 1; // the first ones tell what was before the page was opened
     });
-    socket.addEventListener("close", () => {
-      store.live.control = store.live.control ? { ...store.live.control, mode: "ended", questions: [] } : null;
-      byId("announced").textContent = "errand has ended; the page shows what happened.";
-      schedule();
-    });
+    socket.addEventListener("close", ({ code }) => leave(code === GOING_AWAY));
+  }
+
+  // The server says when it ends. Where it says nothing, nobody knows what the robot does, and the page asks again.
+  function leave(ended) {
+    const mode = ended ? "ended" : "lost", seen = `what is shown is as of ${store.end.toFixed(1)} s`;
+    if (store.live.control && !isOver(store.live.control)) store.live.control = { ...store.live.control, mode, reason: "", robots: {}, questions: [], breakpoints: [] };
+    byId("connection").hidden = false;
+    byId("connection").dataset.look = ended ? "idle" : "failure";
+    byId("connection").textContent = ended ? "Errand has ended; the page shows what happened." : `The connection to Errand is lost: ${seen}. The robot may still move. Trying again …`;
+    if (!ended) setTimeout(reach, AGAIN_MS);
+    schedule();
+  }
+
+  // All is loaded anew as soon as the server answers.
+  function reach() {
+    const socket = new WebSocket(feedAddress);
+    socket.addEventListener("open", () => location.reload());
+    socket.addEventListener("error", () => setTimeout(reach, AGAIN_MS));
   }
 
   function setTheme(theme) {

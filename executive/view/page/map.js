@@ -3,6 +3,7 @@
 (() => {
   const LENGTH_M = 1.1, WIDTH_M = 0.5; // a standing Spot
   const SEEN_M = 0.05; // a cell
+  const PERSON_M = 0.45; // cells so near to a person are the person
   const DASHES = [[5, 4], [2, 3], [9, 4], [9, 3, 2, 3], [1, 4], [14, 4]]; // one for each colour of a robot
   const RESERVED_PX = 9, FOOT_PX = 30; // the scale stands below the map
   const LENGTHS_M = [0.5, 1, 2, 5, 10, 20, 50];
@@ -13,20 +14,21 @@
 
   // Names on the map: each near its point, where it covers no other name and no mark.
   class Names {
-    constructor(brush, width, height) { Object.assign(this, { brush, width, height, taken: [], later: [] }); }
+    // `inside` is the rectangle of the map, which names do not leave.
+    constructor(brush, inside) { Object.assign(this, { brush, inside, taken: [], later: [] }); }
 
     keepClear(u, v, radius) { this.taken.push([u - radius, v - radius, u + radius, v + radius]); }
 
     add(text, u, v, colour, font) { this.later.push({ text, u, v, colour, font }); }
 
     draw(halo) {
-      const { brush, width, height } = this;
+      const { brush, inside: [west, north, east, south] } = this;
       brush.textAlign = "left";
       for (const { text, u, v, colour, font } of this.later) {
         brush.font = font;
-        const wide = brush.measureText(text).width + 4, high = 16, keep = (x, most) => Math.min(Math.max(x, 0), Math.max(0, most));
+        const wide = brush.measureText(text).width + 4, high = 16, keep = (x, least, most) => Math.max(least, Math.min(x, most));
         const shifts = [0, -1, 1, -2, 2, -3, 3].flatMap((dv) => [0, -0.6, 0.6, -1.1, 1.1].map((du) => [du * wide, dv * high]));
-        const boxes = shifts.map(([du, dv]) => { const left = keep(u + du - wide / 2, width - wide), top = keep(v + dv - high / 2, height - high); return [left, top, left + wide, top + high]; });
+        const boxes = shifts.map(([du, dv]) => { const left = keep(u + du - wide / 2, west, east - wide), top = keep(v + dv - high / 2, north, south - high); return [left, top, left + wide, top + high]; });
         const cost = ([l, t, r, b]) => Math.hypot((l + r) / 2 - u, (t + b) / 2 - v) + this.taken.reduce((sum, [l2, t2, r2, b2]) => sum + 100 * Math.max(0, Math.min(r, r2) - Math.max(l, l2)) * Math.max(0, Math.min(b, b2) - Math.max(t, t2)), 0);
         const best = boxes.reduce((one, other) => (cost(other) < cost(one) ? other : one));
         this.taken.push(best);
@@ -92,7 +94,8 @@
       const { origin_m: origin, size_m: size } = this.map || this.around();
       const room = height - FOOT_PX, scale = Math.min(width / size.x, room / size.y) * 0.97;
       const left = (width - size.x * scale) / 2, bottom = (room + size.y * scale) / 2;
-      return { scale, left, bottom, size, at: (x, y) => [left + (x - origin.x) * scale, bottom - (y - origin.y) * scale] };
+      const inside = [Math.max(0, left), Math.max(0, bottom - size.y * scale), Math.min(width, left + size.x * scale), Math.min(room, bottom)];
+      return { scale, left, bottom, size, inside, at: (x, y) => [left + (x - origin.x) * scale, bottom - (y - origin.y) * scale] };
     }
 
     around() {
@@ -111,20 +114,21 @@
       brush.setTransform(ratio, 0, 0, ratio, 0, 0);
       brush.fillStyle = css("--unknown");
       brush.fillRect(0, 0, width, height);
-      const frame = this.frame(width, height), names = (this.names = new Names(brush, width, height - FOOT_PX));
+      const frame = this.frame(width, height), names = (this.names = new Names(brush, frame.inside));
       this.outlines = [];
       this.drawGrid(brush, frame);
       for (const zone of this.zones()) this.drawZone(brush, frame, zone);
       for (const [name, robot] of this.view.robots) {
         const style = this.styleOf(name);
         if (robot.reserved) this.drawReserved(brush, frame, robot.reserved, style);
-        this.drawSeen(brush, frame, robot.seen);
+        this.drawSeen(brush, frame, robot.seen.filter(([x, y]) => this.people().every(([u, v]) => Math.hypot(x - u, y - v) > PERSON_M)));
         this.drawParticles(brush, frame, robot.particles);
         this.line(brush, frame, robot.trail, style.trail, []);
         if (robot.path) this.line(brush, frame, robot.path, style.path, style.dashes);
       }
       for (const { ends, state } of this.doors()) this.line(brush, frame, ends, css(DOORS[state][0]), DOORS[state][2], DOORS[state][1]);
       this.drawThings(brush, frame);
+      for (const place of this.people()) this.drawPerson(brush, frame, place);
       const said = [];
       for (const [name, robot] of this.view.robots) if (robot.pose) said.push(this.drawRobot(brush, frame, name, robot));
       this.drawPlaces(brush, frame);
@@ -132,6 +136,7 @@
       this.drawScale(brush, frame, height);
       this.explain();
       this.where.textContent = said.join("; ");
+      said.push(...this.people().map(([x, y]) => `person at x ${x.toFixed(2)} m, y ${y.toFixed(2)} m`));
       this.canvas.setAttribute("aria-label", `Map. ${said.join("; ")}`);
     }
 
@@ -179,6 +184,7 @@
         ...(any((each) => each.particles.length) ? [["--cancelled", "where it may be"]] : []),
         ...(any((each) => each.seen.length) ? [["--failure", "obstacle that the map lacks"]] : []),
         ...(this.view.destinations.length || any((each) => each.held) ? [["--object", "object found"]] : []),
+        ...(this.people().length ? [["--person", "person"]] : []),
         ...(this.map && this.map.dock ? [["--dock", "dock"]] : []),
         ...this.explainDoors(),
         ...this.zones().map(({ kind, rule }) => [`--zone-${kind}`, rule]),
@@ -295,6 +301,23 @@
       const side = Math.max(2, SEEN_M * scale);
       brush.fillStyle = css("--failure");
       for (const [x, y] of cells) { const [u, v] = at(x, y); brush.fillRect(u - side / 2, v - side / 2, side, side); }
+    }
+
+    // The people that the robots see now.
+    people() { return [...this.view.robots.values()].flatMap((robot) => robot.people); }
+
+    // A person from above: shoulders and head.
+    drawPerson(brush, { at, scale }, [x, y]) {
+      const [u, v] = at(x, y), wide = Math.max(0.28 * scale, 7);
+      brush.strokeStyle = css("--floor");
+      brush.lineWidth = 1;
+      for (const [fill, du, dv] of [["--person", wide, 0.55 * wide], ["--text", 0.42 * wide, 0.42 * wide]]) {
+        brush.beginPath();
+        brush.ellipse(u, v, du, dv, 0, 0, 2 * Math.PI);
+        brush.fillStyle = css(fill);
+        brush.fill(); brush.stroke();
+      }
+      this.names.keepClear(u, v, wide);
     }
 
     drawThings(brush, { at }) {

@@ -8,9 +8,14 @@
 
   const MODES = {
     ready: ["idle", "ready"], running: ["running", "running"], paused: ["cancelled", "paused"],
-    "lease lost": ["failure", "lease lost"], stopped: ["failure", "stop button"], ended: ["idle", "ended"],
+    stepping: ["running", "stepping"], pausing: ["cancelled", "pausing"],
+    "lease lost": ["failure", "lease lost"], stopped: ["failure", "stop button"], ended: ["idle", "ended"], lost: ["failure", "no connection"],
   };
-  const MODE_SYMBOLS = { paused: "‖", stopped: "■", "lease lost": "!" };
+  const MODE_SYMBOLS = { paused: "‖", pausing: "‖", stopped: "■", "lease lost": "!", lost: "!" };
+  const STANDS_M_S = 0.05; // odometry of a standing robot is not quite still
+
+  const isOver = (control) => control !== null && ["ended", "lost"].includes(control.mode);
+  const moves = (view) => [...view.robots.values()].some((robot) => robot.state && robot.state.speed_m_s > STANDS_M_S);
   const OUTCOMES = { success: "success", failure: "failure", cancelled: "cancelled", error: "failure" };
 
   // What the pill says: the outcome when there is one, else the mode of the control, else what the tree says.
@@ -20,15 +25,15 @@
       const look = OUTCOMES[outcome.outcome] || "failure";
       return [look, LOOKS[look].symbol, outcome.outcome + (look === "failure" && outcome.cause ? ` (${outcome.cause})` : ""), outcome.message];
     }
-    const mode = control && control.mode;
-    if (mode && MODES[mode]) return [MODES[mode][0], MODE_SYMBOLS[mode] || LOOKS[MODES[mode][0]].symbol, MODES[mode][1], control.reason];
+    const mode = control && (control.mode === "paused" && moves(view) ? "pausing" : control.mode);
+    if (mode && MODES[mode]) return [MODES[mode][0], MODE_SYMBOLS[mode] || LOOKS[MODES[mode][0]].symbol, MODES[mode][1], control.reason || ""];
     return view.trees.length ? ["running", "▶", "running", ""] : ["idle", "○", "waiting", ""];
   }
 
   // The same for several robots, of which each says more itself.
   function modeOfAll(control, view, robots) {
     const ended = robots.map((name) => view.outcomes.filter((each) => each.robot === name).pop()).filter(Boolean);
-    if (ended.length < robots.length && !(control && control.mode === "ended")) return modeOf(control, { ...view, outcomes: [] });
+    if (ended.length < robots.length && (control && control.mode) !== "ended") return modeOf(control, { ...view, outcomes: [] });
     const bad = ended.filter((each) => each.outcome !== "success");
     const look = bad.length || !ended.length ? "failure" : "success", why = bad.map((each) => `${each.robot}: ${each.message}`).join("; ");
     return [look, LOOKS[look].symbol, bad.length ? `${ended.length - bad.length} of ${ended.length} did it` : "success", why];
@@ -87,8 +92,8 @@
 
   class Header {
     draw(store, view, replaying) {
-      const tree = view.trees[view.trees.length - 1], several = store.robots.length > 1;
-      const mission = !tree ? "Errand" : several ? store.robots.join(", ") : missionOf(tree.root).name;
+      const tree = view.trees[view.trees.length - 1], several = store.robots.length > 1, driven = store.live.teleop;
+      const mission = !tree ? (driven ? `${driven.robot}, by hand` : "Errand") : several ? store.robots.join(", ") : missionOf(tree.root).name;
       byId("title").textContent = tree && !several ? `${tree.robot}: ${mission}` : mission;
       document.title = tree ? `${mission} – Errand` : "Errand";
       byId("clock").textContent = `${(replaying ? view.t : store.end).toFixed(1)} s`;
@@ -107,7 +112,7 @@
     draw([look, symbol, text, why], over, who = "") {
       const [mark, words] = this.pill.children, failed = over && look === "failure";
       this.pill.dataset.look = look;
-      this.pill.title = why || "";
+      this.pill.title = why;
       this.why.hidden = !failed;
       this.why.textContent = failed ? why : "";
       mark.textContent = symbol;
@@ -115,6 +120,28 @@
         words.textContent = text;
         byId("announced").textContent = [who, text, why].filter(Boolean).join(": ");
       }
+    }
+  }
+
+  // At the end: what the robot claims, what the referee saw, and the way to the report.
+  class VerdictPanel {
+    constructor(box) { this.box = box; }
+
+    draw(verdict, addressOf) {
+      if (verdict === this.shown) return;
+      this.shown = verdict;
+      this.box.hidden = !verdict;
+      if (!verdict) return;
+      const link = Object.assign(element("a", "", "Report"), { href: addressOf(verdict.report), target: "_blank", hidden: !verdict.report });
+      this.box.replaceChildren(...verdict.verdicts.map((each) => this.said(each)), link);
+      byId("announced").textContent = verdict.verdicts.map(({ who, word }) => `${who}: ${word}`).join("; ");
+    }
+
+    said({ who, good, word, text }) {
+      const look = good === null ? "idle" : good ? "success" : "failure", said = element("p", "verdict");
+      said.dataset.look = look;
+      said.append(element("span", "", `${who}: `), element("b", "", `${good === null ? "?" : LOOKS[look].symbol} ${word}`), ` ${text}`);
+      return said;
     }
   }
 
@@ -269,5 +296,5 @@
     }
   }
 
-  Object.assign(window.errand, { Header, ModePanel, modeOf, modeOfAll, missionOf, StatePanel, decisive, CameraPanel, ScenePanel, QuestionPanel, drawsSlowly, byId });
+  Object.assign(window.errand, { Header, ModePanel, VerdictPanel, isOver, modeOf, modeOfAll, missionOf, StatePanel, decisive, CameraPanel, ScenePanel, QuestionPanel, drawsSlowly, byId });
 })();

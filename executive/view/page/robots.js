@@ -1,7 +1,7 @@
 "use strict";
 // What is shown of one robot, the buttons that are for it alone, and the missions that are given out among several.
 (() => {
-  const { LOOKS, TreePanel, StatePanel, CameraPanel, QuestionPanel, ModePanel, modeOf, missionOf, decisive, element, byId } = window.errand;
+  const { LOOKS, TreePanel, StatePanel, CameraPanel, QuestionPanel, ModePanel, isOver, modeOf, missionOf, decisive, element, byId } = window.errand;
   const COLOURS = 6;
 
   // A robot's colour and dashes by its place among the names; the name always stands beside them.
@@ -52,9 +52,9 @@
     draw(store, whole, replaying) {
       const view = (this.view = this.name === null ? whole : viewOf(whole, this.name)), controlState = store.live.control || null;
       const tree = view.trees[view.trees.length - 1], over = view.outcomes.length > 0, progress = replaying || over ? null : this.progress(store, tree);
-      const own = controlState && this.name !== null ? (controlState.robots || {})[this.name] || { mode: "ready" } : controlState;
+      const own = controlState && this.name !== null && !isOver(controlState) ? (controlState.robots || {})[this.name] || { mode: "ready" } : controlState;
       this.tree.progress = progress;
-      this.tree.breakpoints = controlState && controlState.mode !== "ended" && this.control.actions.has("break") ? new Set(controlState.breakpoints) : null;
+      this.tree.breakpoints = controlState && !isOver(controlState) && this.control.actions.has("break") ? new Set(controlState.breakpoints) : null;
       this.tree.at = controlState ? controlState.at : null;
       this.tree.decisive = decisive(store, view);
       this.state.draw(view);
@@ -74,14 +74,14 @@
     asked(store, controlState) {
       const mine = (each) => this.name === null || each.robot === this.name;
       const back = Object.entries(store.live).filter(([about]) => about.split("/")[0] === "asked").map(([, { question }]) => question);
-      const waits = (each) => each && controlState.mode !== "ended" && this.control.actions.has("say") && each.until_s > store.end;
+      const waits = (each) => each && !isOver(controlState) && this.control.actions.has("say") && each.until_s > store.end;
       const own = (each) => ({ ...each, id: null, default: null, options: each.options.length ? [...each.options, "never mind"] : [] });
       return [...controlState.questions, ...back.filter(waits).map(own)].filter(mine);
     }
 
     // The mission's name, and the buttons; what holds all robots is let go of above.
     drawOwn(controlState, own, tree, over) {
-      const { parts } = this, mode = (this.now = own || { mode: "ready" }).mode, all = controlState && ["paused", "stopped", "ended"].includes(controlState.mode);
+      const { parts } = this, mode = (this.now = own || { mode: "ready" }).mode, all = controlState && ["paused", "stepping", "stopped", "ended", "lost"].includes(controlState.mode);
       parts.mission.textContent = tree ? missionOf(tree.root).name : "nothing to do";
       parts.pause.querySelector("span").textContent = mode === "paused" ? "Go on" : "Pause";
       parts.pause.setAttribute("aria-pressed", mode === "paused");
@@ -89,7 +89,7 @@
       parts.stop.setAttribute("aria-pressed", mode === "stopped");
       for (const key of ["pause", "cancel", "stop"]) {
         parts[key].hidden = !this.control.actions.has(key);
-        parts[key].disabled = !controlState || controlState.mode === "ended" || (all && key !== "cancel") || (over && key !== "stop");
+        parts[key].disabled = !controlState || isOver(controlState) || (all && key !== "cancel") || (over && key !== "stop");
       }
     }
   }

@@ -10,6 +10,7 @@
     expected: { symbol: "–", word: "found nothing" },
     cancelled: { symbol: "⊘", word: "cancelled" },
   };
+  const CHARGE_NOISE = 0.02, CHARGE_SHARE = 0.1; // a battery's reading wavers, its charge does not
   const BY_STATUS = { RUNNING: "running", SUCCESS: "success", FAILURE: "failure" };
 
   function lookOf(state) {
@@ -22,7 +23,7 @@
   }
 
   function robotOf(view, name) {
-    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null, particles: [], seen: [], doors: [], reserved: null, detections: null });
+    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null, particles: [], seen: [], people: [], doors: [], reserved: null, detections: null });
     return view.robots.get(name);
   }
 
@@ -58,8 +59,10 @@
       if (!data.holding) robot.held = null;
       else if (!robot.held) robot.held = found ? found.name : "something";
       if (robot.held) view.destinations = view.destinations.filter((each) => each.name !== robot.held);
-      robot.state = data;
+      const before = robot.state ? robot.state.charge : data.charge, smooth = Math.abs(data.charge - before) < CHARGE_NOISE ? before + CHARGE_SHARE * (data.charge - before) : data.charge;
+      robot.state = { ...data, charge: smooth };
     },
+    people(view, data) { robotOf(view, data.robot).people = data.people.map((each) => each.position_W); },
     path(view, data) {
       robotOf(view, data.robot).path = data.poses.map((pose) => [pose.position.x, pose.position.y]);
     },
@@ -94,13 +97,15 @@
 
     // Take a message in: one of the log, or the newest word on something that is not logged.
     add(message) {
+      if (message.live === "control") for (const mode of [message.data, ...Object.values(message.data.robots)]) mode.reason = this.titled(mode.reason);
       if (message.live) { this.live[message.live] = message.data; return; }
       this.messages.push(message);
       this.end = Math.max(this.end, message.t);
       if (message.topic === "run") this.meet(Object.keys((this.run = message.data).robots || {}));
       if (message.topic === "tree" || message.topic === "pose") this.meet([message.data.robot]);
       if (message.topic === "map") this.map = message.data;
-      if (message.topic === "tree") this.learn(message.data.root, 0);
+      if (message.topic === "tree") this.learn(message.data.root, 0, null);
+      if (message.topic === "transitions") this.leaveToChild(message);
       this.apply(this.now, message);
     }
 
@@ -108,10 +113,26 @@
       if (names.some((name) => !this.robots.includes(name))) this.robots = [...new Set([...this.robots, ...names])].sort();
     }
 
-    learn(node, depth) {
-      this.known.set(node.id, { name: node.title || node.name, kind: node.type, leaf: node.children.length === 0, depth });
-      node.children.forEach((child) => this.learn(child, depth + 1));
+    learn(node, depth, parent) {
+      this.known.set(node.id, { name: node.title || node.name, kind: node.type, leaf: node.children.length === 0, depth, parent, began: null });
+      node.children.forEach((child) => this.learn(child, depth + 1, node.id));
     }
+
+    // A node that begins repeats the sentence with which its child begins: it stands at the child alone, which goes on.
+    leaveToChild({ data, t }) {
+      const known = this.known.get(data.node);
+      if (!known || data.to !== "RUNNING") return;
+      known.began = { data, t };
+      for (let up = this.known.get(known.parent); up; up = this.known.get(up.parent)) {
+        if (!up.began || up.began.t !== t || up.began.data.message !== data.message) return;
+        const state = this.now.states.get(up.began.data.node);
+        up.began.data.message = "";
+        if (state && state.t === t) state.message = "";
+      }
+    }
+
+    // Nodes by their titles, where a text names them by their path ids.
+    titled(text) { return text.replace(/[^\s:'"(]+\/[^\s:'",;)]+/g, (id) => (this.known.has(id) ? `“${this.known.get(id).name}”` : id)); }
 
     apply(view, message) {
       const apply = APPLY[message.topic];

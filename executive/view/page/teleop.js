@@ -44,12 +44,26 @@
 
     draw(told, keys) {
       byId("teleop-panel").hidden = !this.allowed();
+      document.querySelector("main").classList.toggle("by-hand", this.allowed());
       byId("tree-panel").hidden = this.allowed(); // nothing is run where the robot is driven by hand
       if (!told) return;
       this.keys = new Set(Object.keys(keys || {}));
       const [x, y, yaw] = told.base, joints = told.joints_rad.map((angle) => angle.toFixed(2)).join(" ");
       byId("teleop-told").textContent = told.note || `x ${x.toFixed(2)} y ${y.toFixed(2)} yaw ${yaw.toFixed(2)} · arm ${joints} · gripper ${told.opening.toFixed(2)}`;
       byId("teleop-told").classList.toggle("bad", Boolean(told.note));
+    }
+
+    // The latest picture of each camera, side by side.
+    drawCameras(live, box, seen) {
+      const order = ([about]) => (about === "camera/hand" ? "" : about); // the hand's picture comes first, and is the largest
+      const found = Object.entries(live).filter(([about]) => about.startsWith("camera/")).sort((one, other) => order(one).localeCompare(order(other))), names = found.map(([about]) => about.split("/")[1]);
+      if (names.join() !== box.dataset.names) {
+        box.dataset.names = names.join();
+        box.classList.add("several-cameras");
+        box.replaceChildren(...names.map((name) => Object.assign(new Image(), { alt: `Camera ${name}`, title: name })));
+        seen.textContent = names.join(", ");
+      }
+      found.forEach(([, { data, format }], n) => { const address = `data:image/${format};base64,${data}`; if (box.children[n].src !== address) box.children[n].src = address; });
     }
 
     allowed() { return this.control.actions.has("teleop"); }

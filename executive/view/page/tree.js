@@ -90,7 +90,7 @@
       dot.title = "Pause before this node (b)";
       dot.setAttribute("aria-label", `Breakpoint at ${title}`);
       dot.hidden = true;
-      row.title = node.source ? `${node.id}\n${node.source.file.split("/").pop()}:${node.source.line}` : node.id;
+      row.title = node.source ? `${title}\n${node.source.file.split("/").pop()}:${node.source.line}` : title;
       row.append(fold, symbol, name, took, dot);
       li.append(row);
       const entry = { node, chain, title, kind, step, parent, li, row, fold, symbol, note, bar, dot, count, took, list: null, children: [], open: true, chosen: undefined, size: chain.length };

@@ -10,8 +10,9 @@ from typer.testing import CliRunner
 
 from executive.app.evaluate.results import RunSpec
 from executive.cli.entry import shipped_command
-from executive.cli.options import StartCommand, join_values, request_arguments, takes_request
+from executive.cli.options import StartCommand, join_values, takes_request
 from executive.mission.request import Request
+from executive.mission.request_fields import request_arguments
 from executive.store.database import form
 from executive.store.missions import MissionStore
 from executive.store.standing_missions import StandingMissions

@@ -1,5 +1,6 @@
 """`errand teleop`: the plant's robot driven by hand, the page's actions, saved poses, a lease that another holds."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -9,11 +10,15 @@ from pydrake.math import RollPitchYaw
 
 from executive.app.prepare.mission_files import save_pose
 from executive.app.prepare.placed_robots import only_robot
-from executive.app.prepare.worlds import open_world
+from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.app.runs.simulated import simulate
-from executive.cli.robot_command import TerminalKeys, advance, context_for, page_actions
+from executive.app.runs.teleop_page import TeleopPage
+from executive.cli.robot_command import TerminalKeys, advance, context_for
 from executive.mission.load import load_mission
+from executive.testing.bench import scripted_bench
+from executive.view.feed import Feed
 from executive.view.page_control import RefusedError
+from plant.robots.spot.kind import spot_capabilities
 from skills.inputs.errors import InputError
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Pose2D
@@ -48,14 +53,43 @@ def test_the_save_key_saves_and_says_so():
     assert said == ["saved None"]
 
 
-def test_the_page_asks_and_nonsense_is_refused():
+@pytest.fixture
+def bench():
+    return scripted_bench(spot_capabilities())[0]
+
+
+def live_of(feed):
+    """The latest words of a feed by what they are about, and all messages by topic."""
+    said = [json.loads(text) for text in feed.since((0, 0))[1]]
+    messages = [(each["topic"], each["data"]) for each in said if "topic" in each]
+    return {each["live"]: each["data"] for each in said if "live" in each}, messages
+
+
+def test_the_page_asks_and_nonsense_is_refused(bench):
     hands = Asked()
-    actions = page_actions(hands, lambda name: f"saved {name}", None)
+    actions = TeleopPage(hands, bench.context(), Feed(), lambda name: f"saved {name}").actions(None)
     actions["teleop"]({"keys": ["w"], "axes": {"turn": 0.5}})
     assert hands.last == {"forward": 1.0, "turn": 0.5}
     with pytest.raises(RefusedError, match="axis 'warp'"):
         actions["teleop"]({"axes": {"warp": 1.0}})
     assert actions["save_pose"]({"name": "look"}) == "saved look"
+
+
+def test_the_stop_button_of_the_page_holds_until_it_is_released(bench):
+    hands, feed = Asked(), Feed()
+    actions = TeleopPage(hands, bench.context(), feed).actions(None)
+    assert live_of(feed)[0]["control"]["mode"] == "running"
+    actions["teleop"]({"keys": ["w"]})
+    actions["stop"]({})
+    assert (hands.last, live_of(feed)[0]["control"]["mode"]) == ({}, "stopped")
+    with pytest.raises(RefusedError, match="release it to drive"):
+        actions["teleop"]({"keys": ["w"]})
+    assert hands.last == {}
+    actions["release"]({})
+    actions["teleop"]({"keys": ["w"]})
+    assert hands.last == {"forward": 1.0}
+    told = [(data["what"], data["message"]) for topic, data in live_of(feed)[1] if topic == "control"]
+    assert told == [("stop button", "stopped"), ("stop button", "stop button released")]
 
 
 def test_a_saved_pose_is_a_mission_file(tmp_path):
@@ -98,6 +132,18 @@ def test_the_plants_robot_is_driven_by_hand():
     )
     robot = simulation.robots["Alice"]
     context = context_for(world, robot, simulation.clock, simulation.starts["Alice"])
+    feed = Feed()
+    page = TeleopPage(Teleop(context), context, feed)
+    page.show_map(world, knowledge_of(world))
+    for _ in range(3):
+        page.report()
+        simulation.clock.advance(0.2)
+    live, messages = live_of(feed)
+    assert {each for each in live if each.startswith("camera/")} == {
+        f"camera/{n}" for n in ("hand", "frontleft", "frontright")
+    }
+    assert live["teleop"]["base"][:2] == pytest.approx([5.2, 4.5], abs=0.05)
+    assert {"map", "pose", "state", "navigation"} <= {topic for topic, _ in messages}
     hands, model = Teleop(context), arm_model(robot.capabilities())
     speeds, rates = [], []
 

@@ -1,14 +1,16 @@
 """What a mission found out: every answer in order, and what its claim tells of them."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.run.mission_history import Findings, claim, history_keys
+from executive.run.mission_history import Findings, achieved, claim, history_keys
 from executive.run.outcome import Finding, Outcome, Said
 from executive.tree.board import Board
+from executive.words.goal import GoalKind
 from skills.api import Cause, Failed, Succeeded
 from tests.tables import yaml_beside
 
@@ -118,9 +120,40 @@ def test_a_mission_that_failed_says_what_it_found_before(compiled, run_tree, scr
     assert worst.message.endswith("(found out: yes: a hammer in the kitchen)")
 
 
-def test_a_pure_drive_keeps_its_sentence(compiled, run_tree):
+def test_a_pure_drive_says_where_the_robot_went(compiled, run_tree):
     worst = run_tree(compiled(CHECKS[2])).worst
-    assert (worst.message, worst.findings) == ("navigate done", ())
+    assert (worst.message, worst.findings) == ("went to the start", ())
+
+
+GOT = (GoalKind.GRASPED, "get the beer", "the object is held near the body")
+GAVE = (GoalKind.HANDED_OVER, "bring it to Robin", "gave the beer to Robin")
+HALL, OFFICE = ((GoalKind.WENT, f"go to the {name}", "standing 0.00 m off the goal") for name in ("hall", "office"))
+
+
+@pytest.mark.parametrize(
+    ("reached", "last", "told"),
+    [
+        ([], "waited 1 s", "waited 1 s"),
+        ([GOT, GAVE], "waited 1 s", "gave the beer to Robin"),
+        ([GAVE, HALL], "standing 0.00 m off the goal", "gave the beer to Robin"),
+        ([GAVE, GOT], "waited 1 s", "gave the beer to Robin; the object is held near the body"),
+        ([GAVE, GAVE], "waited 1 s", "gave the beer to Robin (2 times)"),
+        ([HALL], "standing 0.00 m off the goal", "went to the hall"),
+        ([HALL, OFFICE, HALL], "said hello", "went to the hall and the office"),
+        ([HALL], "", ""),
+    ],
+)
+def test_a_claim_sums_the_mission_up_and_does_not_repeat_its_last_step(reached, last, told):
+    assert achieved(reached, last) == told
+
+
+def test_a_decision_does_not_say_again_what_its_only_look_has_found():
+    look = Finding("alice/p/1/check/look-1", 5.0, "somebody in the office", False, "no: nobody in the office")
+    one = Finding("alice/p/1", 5.0, "no person at office", True, "yes: no person at office")
+    both = replace(one, question="no person at office and battery over 50 %", sentence="yes: it is")
+    assert claim("", [look, one]) == "no: nobody in the office"
+    assert claim("", [look, replace(one, t_s=9.0)]) == "nobody in the office; yes: no person at office"
+    assert claim("", [look, both]) == "nobody in the office; yes: it is"
 
 
 class Repeated(Behaviour):

@@ -1,16 +1,20 @@
 """The page in a real browser: states, controls, keyboard, replay, and that changes are seen."""
 
 import http.server
+import json
 import re
+import subprocess
+import sys
 import threading
 import time
 from contextlib import ExitStack
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 
 from executive.app.report.report_page import ReportPage, ReportPart, StepRow
-from executive.app.report.run_report import ReportedAnswer, RobotReport
+from executive.app.report.run_report import ReportedAnswer, RobotReport, Verdict
 from executive.conversation import Conversation, Speech
 from executive.language.questions import ClarifyingQuestion, Slot
 from executive.language.understand import Status, Understanding
@@ -396,10 +400,10 @@ def test_a_log_is_served_with_map_picture_and_events(page, replay):
     assert float(page.locator("#slider").input_value()) > 0
 
 
-def state(holding=False, charge=0.9, localised=True):
+def state(holding=False, charge=0.9, localised=True, speed_m_s=0.42):
     return {
         "robot": "Alice", "holding": holding, "charge": charge,
-        "localised": localised, "position_sigma_m": 0.02, "speed_m_s": 0.42,
+        "localised": localised, "position_sigma_m": 0.02, "speed_m_s": speed_m_s,
     }  # fmt: skip
 
 
@@ -413,6 +417,203 @@ def test_the_state_of_the_robot_stands_above_all(page, live, feed):
     feed("state", 1.5, state(charge=0.1, localised=False))
     expect(strip.locator(".bad")).to_have_text(["battery10 %", "placelost"])
     expect(strip).to_contain_text("holdsnothing")
+
+
+def test_a_battery_whose_reading_wavers_does_not_waver_on_the_page(page, live, feed):
+    # 99.4 and 99.6 %, turn and turn about, are one charge; 0.95 is another
+    shown = page.locator("#state")
+    feed("state", 0.5, state(charge=0.994))
+    expect(shown).to_contain_text("battery99 %")
+    for number in range(8):
+        feed("state", 1.0 + number, state(charge=(0.996, 0.994)[number % 2]))
+        assert "battery99 %" in shown.inner_text().replace("\n", "")
+    feed("state", 20.0, state(charge=0.95))
+    expect(shown).to_contain_text("battery95 %")
+
+
+def test_a_robot_that_still_moves_is_pausing_and_a_step_is_one_until_a_node_changes(page, live, control, feed):
+    pill = page.locator("#mode-text")
+    feed("state", 0.5, state(speed_m_s=0.4))
+    page.click("#pause")
+    expect(pill).to_have_text("pausing")
+    feed("state", 1.0, state(speed_m_s=0.01))
+    expect(pill).to_have_text("paused")
+    page.click("#step")
+    expect(pill).to_have_text("stepping")
+    feed("state", 1.5, state(speed_m_s=0.4))
+    control.note_tick(changed=False)
+    expect(pill).to_have_text("stepping")
+    control.note_tick(changed=True)
+    expect(pill).to_have_text("pausing")
+    feed("state", 2.0, state(speed_m_s=0.0))
+    expect(pill).to_have_text("paused")
+
+
+def test_a_parent_does_not_keep_the_first_sentence_of_its_child(page, live, feed, tree):
+    leaf = leaf_ids(tree)[-1]
+    above = [each.path_id for each in tree.root.walk() if any(one.path_id == leaf for one in each.walk())]
+    page.select_option("#nodes", "all")
+    for node in above:
+        change(feed, node, "RUNNING", 1.0, "finding out where I am")
+    expect(page.locator("#tree")).to_contain_text("finding out where I am")
+    assert page.locator("#tree .note", has_text="finding out where I am").count() == 1
+    feed("activity", 2.0, {"t": 2.0, "robot": "Alice", "node": leaf, "message": "on the way, 2.8 m to go"})
+    expect(row(page, leaf)).to_contain_text("on the way, 2.8 m to go")
+    assert "finding out" not in page.locator("#tree").inner_text()
+
+
+def test_a_parent_keeps_a_sentence_of_its_own(page, live, feed, tree):
+    leaf = leaf_ids(tree)[-1]
+    parent = [each.path_id for each in tree.root.walk() if any(one.path_id == leaf for one in each.walk())][-2]
+    page.select_option("#nodes", "all")
+    change(feed, parent, "RUNNING", 1.0, "waits at the breakpoint")
+    expect(page.locator("#tree")).to_contain_text("waits at the breakpoint")
+
+
+def test_breakpoints_and_questions_are_named_as_people_name_them(page, live, control, feed, tree, clock):
+    step = tree.mission.children[-1]
+    control.stop_at_breakpoint(step.path_id)
+    expect(page.locator("#mode-text")).to_have_text("paused")
+    assert page.locator("#mode").get_attribute("title").startswith("at the breakpoint “")
+    for what, message in (
+        ("breakpoint", f"at the breakpoint {step.path_id}"),
+        ("question", "hand-over/Alice: Let go?"),
+    ):
+        feed("control", 1.0, {"t": 1.0, "what": what, "message": message})
+    expect(page.locator("#events")).to_contain_text("question Let go?")
+    page.select_option("#nodes", "all")
+    shown = page.evaluate("document.body.innerText + [...document.querySelectorAll('[title]')].map((e) => e.title)")
+    assert (step.path_id in shown, "alice/" in shown, "hand-over/Alice" in shown) == (False, False, False)
+
+
+def contrast(page, selector):
+    """Contrast of a text with its ground, as WCAG defines it."""
+    return page.evaluate(
+        r"""(selector) => {
+          const style = getComputedStyle(document.querySelector(selector));
+          const part = (c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+          const [one, other] = [style.color, style.backgroundColor].map((colour) => {
+            const [r, g, b] = colour.match(/[\d.]+/g).map(Number);
+            return 0.2126 * part(r) + 0.7152 * part(g) + 0.0722 * part(b) + 0.05;
+          });
+          return Math.max(one, other) / Math.min(one, other);
+        }""",
+        selector,
+    )
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_release_is_legible_under_the_mouse(page, live, theme):
+    page.emulate_media(color_scheme=theme)
+    page.click("#stop")
+    expect(page.locator("#stop")).to_have_text("Release")
+    page.hover("#stop")
+    assert contrast(page, "#stop") >= 4.5
+    page.mouse.move(0, 0)
+    assert contrast(page, "#stop") >= 4.5
+
+
+def test_people_are_drawn_as_people_and_not_as_obstacles(page, live, feed, knowledge):
+    feed("map", 0.0, map_message(GridMap(np.eye(40, dtype=bool), 0.25, (-5.0, -5.0)), knowledge, world="test"))
+    cells = {"particle_x": [], "particle_y": [], "seen_x": [1.0, 1.1, 3.0], "seen_y": [2.0, 2.1, 3.0]}
+    feed("navigation", 0.5, {"robot": "Alice", **cells})
+    expect(page.locator("#legend")).to_contain_text("obstacle that the map lacks")
+    feed("people", 1.0, {"robot": "Alice", "people": [{"position_W": [1.0, 2.0]}]})
+    expect(page.locator("#map")).to_have_attribute("aria-label", re.compile("person at x 1.00 m, y 2.00 m"))
+    expect(page.locator("#legend")).to_contain_text("person")
+    feed("people", 2.0, {"robot": "Alice", "people": []})
+    expect(page.locator("#legend")).not_to_contain_text("person")
+
+
+def test_the_map_keeps_its_place_when_its_legend_grows_and_names_stay_inside(page, live, feed, knowledge):
+    feed("map", 0.0, map_message(GridMap(np.eye(40, dtype=bool), 0.25, (-5.0, -5.0)), knowledge, world="test"))
+    pose = {"position": {"x": 4.9, "y": 4.9, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    feed("pose", 0.5, {"robot": "Alice", "pose": pose})
+    for width in (1280, 390):
+        page.set_viewport_size({"width": width, "height": 800})
+        page.wait_for_function("() => (window.errand.page.map.names || {later: []}).later.length > 0")
+        box = page.locator("#map").bounding_box()
+        feed("object_destination", 0.5, {"class_name": "a bottle with a long name", "goal_x": -4.9, "goal_y": -4.9})
+        doors = [
+            {"between": ["hall", f"room {n}"], "ends": [[n, 0], [n, 1]], "state": "closed", "seen_s": 1.0}
+            for n in range(3)
+        ]
+        feed("doors", 1.0, {"robot": "Alice", "doors": doors[: 3 if width == 1280 else 1]})
+        expect(page.locator("#legend")).to_contain_text("closed: door between hall and room 0")
+        assert page.locator("#map").bounding_box() == box
+        outside = page.evaluate(
+            """() => {
+              const { taken, later, inside: [west, north, east, south] } = window.errand.page.map.names;
+              const leaves = ([l, t, r, b]) => l < west - 1 || t < north - 1 || r > east + 1 || b > south + 1;
+              return taken.slice(-later.length).filter(leaves);
+            }"""
+        )
+        assert outside == []
+
+
+def test_the_verdicts_and_the_way_to_the_report_appear_at_the_end(page, serve, controlled, tree, feed, tmp_path):
+    (tmp_path / "report.html").write_text("<h1>Reported</h1>")
+    server = serve(controlled({"Alice": tree}))
+    assert page.locator("#verdicts").is_hidden()
+    end(feed, 6.0, "success", message="gave the drink to Robin")
+    server.offer(None, tmp_path / "report.html")
+    verdicts = [
+        Verdict("The tree claims", True, "success", "gave it"),
+        Verdict("The referee saw", False, "not fulfilled", "It fell."),
+    ]
+    feed.tell("verdict", {"verdicts": [asdict(each) for each in verdicts], "report": "report.html"})
+    expect(page.locator("#verdicts .verdict")).to_have_text(
+        ["The tree claims: ✓ success gave it", "The referee saw: ✗ not fulfilled It fell."]
+    )
+    with page.context.expect_page() as opened:
+        page.get_by_role("link", name="Report").click()
+    expect(opened.value.locator("h1")).to_have_text("Reported")
+
+
+SERVER = """
+import json, sys
+from executive.run.control import Control
+from executive.view.feed import Feed
+from executive.view.page_control import control_actions, control_json
+from executive.view.server import PageContent, PageServer
+control, feed = Control(), Feed()
+control.begin({})
+feed.tell("control", control_json(control.state))
+feed("state", 3.0, json.loads(sys.argv[1]))
+server = PageServer(PageContent(feed, control_actions(control)))
+print(server.url, flush=True)
+sys.stdin.read()
+server.close()
+"""
+
+
+@pytest.fixture
+def process():
+    """A server of the page in a process of its own, which ends in an orderly way when its input is closed."""
+    command = [sys.executable, "-c", SERVER, json.dumps(state())]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as running:
+        yield running
+        running.kill()
+
+
+def test_a_lost_connection_is_a_banner_and_not_an_end(page, process):
+    page.goto(process.stdout.readline().strip())
+    expect(page.locator("#mode-text")).to_have_text("running")
+    process.kill()
+    expect(page.locator("#connection")).to_contain_text(
+        "The connection to Errand is lost: what is shown is as of 3.0 s"
+    )
+    expect(page.locator("#mode-text")).to_have_text("no connection")
+    assert "ended" not in page.locator("body").inner_text()
+    assert all(page.locator(f"#{each}").is_disabled() for each in ("pause", "step", "cancel", "stop"))
+
+
+def test_an_end_that_the_server_announces_is_no_lost_connection(page, process):
+    page.goto(process.stdout.readline().strip())
+    expect(page.locator("#mode-text")).to_have_text("running")
+    process.stdin.close()
+    expect(page.locator("#connection")).to_have_text("Errand has ended; the page shows what happened.")
+    expect(page.locator("#mode-text")).to_have_text("ended")
 
 
 def test_a_held_object_is_drawn_with_the_robot_on_the_map(page, live, feed):
@@ -546,7 +747,7 @@ def test_the_recording_in_a_served_replay_follows_the_slider(page, replay, recor
 def test_the_recording_that_is_there_when_a_run_has_ended_follows_the_slider(page, replay, recording):
     server = replay()
     expect(page.locator("#mode-text")).to_have_text("failure (EXECUTION)")
-    server.offer_recording(recording)
+    server.offer(recording, None)
     expect_scene_follows_slider(page)
 
 

@@ -1,5 +1,9 @@
 """Sizes and overflow of the page and the report in a browser, on a desk and on a telephone, light and dark."""
 
+import base64
+import re
+
+import cv2
 import numpy as np
 import pytest
 
@@ -9,12 +13,14 @@ from executive.app.report.report_page import ReportPage, ReportPart, StepRow
 from executive.app.report.run_report import ReportedAnswer, ReportedObject, RobotReport, RunReport
 from executive.mission.request import Request
 from executive.record.announce import map_message
+from executive.run.control_state import ControlState, Mode
 from executive.run.outcome import Said
 from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
 from executive.view.feed import Feed
 from executive.view.formats import to_svg
 from executive.view.html import render
+from executive.view.page_control import control_json
 from executive.view.server import PageContent, PageServer
 from executive.view.text import Styles, readable
 from executive.words.goal import RefereeReport
@@ -74,7 +80,9 @@ def running(nested):
     feed("activity", 2.0, {"t": 2.0, "robot": "Alice", "node": wait, "message": LONG})
     state = {"holding": True, "charge": 0.9, "localised": True, "position_sigma_m": 0.02, "speed_m_s": 0.4}
     feed("state", 2.0, {"robot": "Alice", **state})
-    with PageServer(PageContent(feed, {name: lambda values: "" for name in ("pause", "say", "queue")})) as server:
+    with PageServer(
+        PageContent(feed, {name: lambda values: "" for name in ("pause", "step", "cancel", "stop", "say", "queue")})
+    ) as server:
         yield server.url
 
 
@@ -110,7 +118,9 @@ def several(nested, knowledge):
         feed("state", 0.7, {"robot": name, **state})
     row = {"sentence": f"fetch it {LONG}", "robot": "Alice", "outcome": "running", "message": LONG, "reassigned": 2}
     feed("missions", 1.0, {"missions": [{"id": number, **row} for number in range(3)]})
-    with PageServer(PageContent(feed, {name: lambda values: "" for name in ("pause", "cancel", "say")})) as server:
+    with PageServer(
+        PageContent(feed, {name: lambda values: "" for name in ("pause", "step", "cancel", "stop", "say")})
+    ) as server:
         yield server.url
 
 
@@ -126,6 +136,51 @@ def test_the_page_of_several_robots_fits_and_no_name_on_the_map_covers_another(p
         .every((area) => area <= 1);
     }"""
     page.wait_for_function(uncovered)  # the map is drawn once more when its panel has its size
+
+
+def test_the_page_of_a_fleet_fits_three_screens_of_a_telephone_and_its_stop_button_stays_in_view(page, several):
+    page.goto(several)
+    page.locator("#legend li").first.wait_for()
+    width, height = page.viewport_size["width"], page.viewport_size["height"]
+    if width > 900:
+        return
+    assert page.evaluate("document.documentElement.scrollHeight") <= 3 * height
+    for share in (0.0, 0.5, 1.0):
+        page.evaluate("share => scrollTo(0, share * document.documentElement.scrollHeight)", share)
+        expect(page.locator("#stop")).to_be_in_viewport(ratio=1)
+
+
+@pytest.fixture
+def driven():
+    """The address of the page of a robot that is driven by hand, with three cameras."""
+    feed, dot = Feed(), base64.b64encode(cv2.imencode(".jpg", np.full((48, 64, 3), 90, np.uint8))[1]).decode()
+    feed("control", 1.0, {"t": 1.0, "what": "stop button", "message": "released"})
+    for source in ("frontleft", "frontright", "hand"):
+        feed.tell(f"camera/{source}", {"format": "jpeg", "data": dot, "width": 64, "height": 48})
+    feed.tell("control", control_json(ControlState(mode=Mode.RUNNING)))
+    own = {"robot": "Alice", "note": "", "base": [1.0, 2.0, 0.0], "joints_rad": [0.0] * 6, "opening": 0.0, "now_s": 2.0}
+    feed.tell("teleop", own)
+    turn, position = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}, {"x": 1.0, "y": 2.0, "z": 0.0}
+    feed("pose", 0.5, {"robot": "Alice", "pose": {"position": position, "orientation": turn}})
+    actions = {name: lambda values: "" for name in ("teleop", "save_pose", "stop", "release")}
+    with PageServer(PageContent(feed, actions)) as server:
+        yield server.url
+
+
+def test_a_robot_is_driven_by_hand_by_its_own_cameras_with_map_events_and_stop_button(page, driven):
+    page.goto(driven)
+    expect(page.locator("#camera img")).to_have_count(3)
+    assert page.locator("#camera img").first.get_attribute("alt") == "Camera hand"
+    expect(page.locator("#map")).to_have_attribute("aria-label", re.compile("Alice at x 1.00 m, y 2.00 m"))
+    expect(page.locator("#events")).to_contain_text("stop button released")
+    expect(page.locator("#stop")).to_be_in_viewport(ratio=1)
+    assert [page.locator(f"#{each}").is_visible() for each in ("pause", "step", "cancel")] == [False] * 3
+    expect_fit(page)
+    if page.viewport_size["width"] < 900:
+        assert page.locator("#teleop-panel").bounding_box()["y"] < page.locator("#map-panel").bounding_box()["y"]
+    else:
+        boxes = [page.locator(f"#{each}-panel").bounding_box() for each in ("teleop", "map", "camera", "events")]
+        assert all(box["y"] + box["height"] <= page.viewport_size["height"] for box in boxes)
 
 
 def test_no_empty_panel_is_shown_for_a_scene_that_is_not_there(page, running):
@@ -191,7 +246,7 @@ def test_the_report_of_an_evaluation_fits_its_page(page, tmp_path):
         cases.append(Case(RunSpec(Request("fetch me the hammer", world="flat", seed=seed), "fetch"), report))
     found = Results(tuple(cases), {"scenario": "random.yaml", "code": "1", "logs": str(tmp_path)})
     told = Evidence(timeline=((1.0, "navigate", LONG),))
-    html = to_page(found, lambda _: told, lambda _: f"errand run {LONG}", against=cases[:2], other="before.json")
+    html = to_page(found, lambda _: told, against=cases[:2], other="before.json")
     (tmp_path / "results.html").write_text(html, encoding="utf-8")
     page.goto((tmp_path / "results.html").as_uri())
     page.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")

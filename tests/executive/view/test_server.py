@@ -77,12 +77,24 @@ def test_each_server_has_a_token_of_its_own(feed, server):
         assert len(token_of(other)) >= 32
 
 
-@pytest.mark.parametrize("path", ["/", "/recording.html", "/picture/0"])
+@pytest.mark.parametrize("path", ["/", "/picture/0"])
 def test_nothing_of_the_run_is_shown_without_the_token(server, feed, path):
     feed("detections", 0.0, {"format": "png", "data": "AAAA"})
     assert ask(server, "GET", path)[0] == 403
     assert ask(server, "GET", f"{path}?token=wrong")[0] == 403
     assert ask(server, "GET", f"{path}?token={token_of(server)}")[0] == 200
+
+
+def test_the_files_of_the_run_link_to_each_other_and_nothing_else_is_sent(server, tmp_path):
+    # the report lies beside the recording; a store and what lies above the folder are no files of the page
+    (tmp_path / "report.html").write_text("<p>reported</p>")
+    (tmp_path / "missions.sqlite").write_text("secret")
+    token = token_of(server)
+    assert ask(server, "GET", f"/file/{token}/recording.html") == (200, b"<p>recorded</p>")
+    assert ask(server, "GET", f"/file/{token}/report.html") == (200, b"<p>reported</p>")
+    assert ask(server, "GET", "/file/wrong/report.html")[0] == 403
+    for name in ("missions.sqlite", "none.html", "..%2Freport.html", "%2E%2E"):
+        assert ask(server, "GET", f"/file/{token}/{name}")[0] == 404
 
 
 @pytest.mark.parametrize(

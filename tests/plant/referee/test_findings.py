@@ -84,11 +84,25 @@ KIM, ROBIN = path((0.0, 1.5, 0.0)), path((3.0, 1.5, 0.0))
 
 
 @pytest.mark.parametrize(
-    ("spoken_s", "right"),
-    [((5.0, 12.0), True), ((5.0,), False), ((5.0, 6.0), False), ((5.0, 12.0, 13.0), False), ((), False)],
+    ("spoken_s", "right", "why"),
+    [
+        ((5.0, 12.0), True, "Kim and Robin stood in the hall and were greeted."),
+        ((5.0,), False, "Kim and Robin stood in the hall and 1 of 2 were greeted."),
+        ((5.0, 6.0), False, "Kim and Robin stood in the hall and 1 of 2 were greeted; the robot spoke 2 times."),
+        ((5.0, 12.0, 13.0), False, "Kim and Robin stood in the hall and were greeted; the robot spoke 3 times."),
+        ((), False, "Kim and Robin stood in the hall and were not greeted."),
+    ],
 )
-def test_each_person_in_the_room_is_greeted_once(spoken_s, right):
-    assert finding(greeted(*spoken_s), ROUND, Kim=KIM, Robin=ROBIN).success is right
+def test_each_person_in_the_room_is_greeted_once(spoken_s, right, why):
+    found = finding(greeted(*spoken_s), ROUND, Kim=KIM, Robin=ROBIN)
+    assert (found.success, found.why) == (right, why)
+
+
+def test_one_person_is_greeted_in_the_singular():
+    assert (
+        finding(greeted(5.0), ROUND, Robin=path((3.0, 1.5, 0.0))).why
+        == "Robin stood in the hall and was not greeted; the robot spoke 1 time."
+    )
 
 
 def test_a_person_who_left_the_room_need_not_be_greeted():

@@ -1,5 +1,7 @@
 """Search for own objects, which the detector knows by their models."""
 
+from dataclasses import replace
+
 from own_models import can_model
 from table_robot import Colours, TableRobot, context_of, failed, outcome
 from table_scene import BLUE, COKE, GREEN, RED, TABLE, Can
@@ -51,3 +53,17 @@ def test_search_for_a_class_aligns_no_model(monkeypatch):
     monkeypatch.setattr("skills.perception.model_matching.fits", None)
     step = outcome(*search([COKE, TIN], "coke"))
     assert isinstance(step, Succeeded), step
+
+
+def test_own_object_has_a_box_in_the_published_picture():
+    skill, inputs = search([COKE, TIN], "tin")
+    shown = []
+    skill.context = replace(
+        skill.context, publish=lambda topic, message: shown.append(message) if topic == "detections" else None
+    )
+    assert isinstance(outcome(skill, inputs), Succeeded)
+    names = [{each["class_name"] for each in message["detections"]} for message in shown]
+    assert {"tin"} in names
+    assert not any("thing" in each for each in names)
+    u0, v0, u1, v1 = next(each["box"] for message in shown for each in message["detections"])
+    assert u1 > u0 and v1 > v0

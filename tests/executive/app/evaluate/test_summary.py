@@ -68,10 +68,10 @@ def test_the_page_lists_each_run_to_inspect_with_its_sentence_and_the_commands(t
     log = tmp_path / CASES[2].run.id
     log.mkdir()
     found = Results(CASES, {"scenario": "random.yaml", "code": "1", "logs": str(tmp_path)})
-    page = summary.to_page(found, lambda _: Evidence(), lambda _: "errand run --say x")
+    page = summary.to_page(found, lambda _: Evidence())
     assert "claimed, not fulfilled: FALSE CLAIM</b> fetch me the hammer 3, flat, seed 3" in page
-    assert page.count("errand run --say x\n") == 7
-    assert page.count(f"errand run --say x\nerrand log {log}/log.mcap\n") == 1
+    assert page.count("errand run &#39;--say=fetch me the hammer") == 7
+    assert page.count(f"--seed=3\nerrand log {log}/log.mcap\n") == 1
     assert "fetch me the hammer 1," not in page
 
 

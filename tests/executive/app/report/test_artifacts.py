@@ -17,12 +17,17 @@ def looked(*boxes, grey=False):
     return {"detections": found, "image": picture}
 
 
+def began(artifacts, node="alice/q"):
+    artifacts.message("transitions", {"robot": "", "node": node, "t": 0.0, "to": "RUNNING", "message": ""})
+
+
 def answered(artifacts, answer):
     return artifacts.message("answer", {"node": "alice/q", "question": "q", "answer": answer, "message": "m"})
 
 
 def test_a_positive_answer_shows_the_found_object_with_its_box(tmp_path):
     artifacts = Artifacts()
+    began(artifacts)
     artifacts.message("detections", looked())
     artifacts.message("detections", looked((10, 10, 40, 30)))
     artifacts.message("object_destination", {"class_name": "hammer"})
@@ -34,6 +39,7 @@ def test_a_positive_answer_shows_the_found_object_with_its_box(tmp_path):
 
 def test_a_negative_answer_shows_all_views():
     artifacts = Artifacts()
+    began(artifacts)
     for grey in (False, True, False, False, False):
         artifacts.message("detections", looked(grey=grey))
     assert answered(artifacts, False)["image"].shape == (480, 960, 3)
@@ -42,6 +48,7 @@ def test_a_negative_answer_shows_all_views():
 def test_a_picture_that_stands_on_end_keeps_its_shape_among_the_views():
     # 48 x 64 upright in a tile of 320 x 240: 180 wide, with empty sides
     artifacts = Artifacts()
+    began(artifacts)
     artifacts.message("detections", {"detections": [], "image": np.full((64, 48, 3), 90, np.uint8)})
     sheet = answered(artifacts, False)["image"]
     assert sheet.shape == (240, 320, 3)
@@ -51,12 +58,48 @@ def test_a_picture_that_stands_on_end_keeps_its_shape_among_the_views():
 def test_an_answer_about_a_person_shows_the_person_and_not_an_object_of_an_earlier_answer():
     # a hammer is found and confirmed, then a person is seen: no object is confirmed
     artifacts = Artifacts()
+    began(artifacts)
     artifacts.message("detections", looked((10, 10, 40, 30)))
     artifacts.message("object_destination", {"class_name": "hammer"})
     hammer = answered(artifacts, True)["image"]
     artifacts.message("detections", looked())
     artifacts.message("detections", looked((30, 20, 60, 44)))
     assert np.any(answered(artifacts, True)["image"] != hammer)
+
+
+def test_an_answer_of_a_person_has_no_picture_of_what_the_robot_saw_before():
+    # a beer is seen on the way; the person then declines a drink
+    artifacts = Artifacts()
+    ask = {"id": "alice/ask", "children": []}
+    artifacts.message("tree", {"robot": "", "root": {"id": "alice", "children": [ask]}})
+    artifacts.message("detections", looked((10, 10, 40, 30)))
+    artifacts.message("object_destination", {"class_name": "beer"})
+    began(artifacts, "alice/ask")
+    artifacts.message("detections", looked((10, 10, 40, 30)))
+    said = {
+        "node": "alice/ask",
+        "question": "Do you want a drink?",
+        "answer": "no",
+        "message": "Do you want a drink?: no",
+    }
+    assert "image" not in artifacts.message("answer", said)
+
+
+def test_an_answer_shows_no_view_from_before_its_node_began():
+    artifacts = Artifacts()
+    artifacts.message("detections", looked((10, 10, 40, 30)))
+    began(artifacts)
+    assert "image" not in answered(artifacts, True)
+
+
+def test_a_count_shows_every_view_that_confirmed_an_object():
+    artifacts = Artifacts()
+    began(artifacts)
+    for _ in range(2):
+        artifacts.message("detections", looked((10, 10, 40, 30)))
+        artifacts.message("object_destination", {"class_name": "hammer"})
+        artifacts.message("detections", looked())
+    assert answered(artifacts, 2)["image"].shape == (240, 640, 3)
 
 
 def test_without_a_question_there_is_no_picture(tmp_path):

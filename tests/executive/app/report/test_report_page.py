@@ -91,6 +91,7 @@ def test_pictures_of_many_answers_are_kept_up_to_a_limit():
     artifacts = Artifacts()
     noise = np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8)
     for number in range(90):
+        artifacts.message("transitions", {"node": "alice/q", "t": float(number), "to": "RUNNING"})
         artifacts.message("detections", {"detections": [], "image": noise})
         artifacts.message(
             "answer", {"node": "alice/q", "t": float(number), "question": "q", "answer": False, "message": "m"}
@@ -102,6 +103,7 @@ def test_pictures_of_many_answers_are_kept_up_to_a_limit():
 
 def test_an_answer_without_a_view_has_no_picture():
     artifacts = Artifacts()
+    artifacts.message("transitions", {"node": "alice/q", "t": 0.5, "to": "RUNNING"})
     artifacts.message("detections", {"detections": [], "image": np.zeros((48, 64, 3), np.uint8)})
     looked = {"node": "alice/q", "t": 1.0, "question": "q", "answer": False, "message": "m"}
     asked = {"node": "alice/ask", "t": 2.0, "question": "q", "answer": "yes", "message": "m"}

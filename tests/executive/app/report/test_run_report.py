@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.app.report.run_report import Verdict, counts_text
+from executive.app.report.run_report import Verdict, counts_text, title_of
 from executive.words.goal import RefereeReport
 
 
@@ -31,3 +31,29 @@ def test_a_long_verdict_is_a_list_of_its_sentences():
     first, *items = Verdict("The referee saw", False, "not fulfilled", " ".join(sentences)).lines()
     assert first.endswith("not fulfilled:")
     assert items == [f"  • {sentence}" for sentence in sentences]
+
+
+@pytest.mark.parametrize(
+    ("text", "sentences"),
+    [
+        ("It was lifted. It rests on Robin's tray.", ("It was lifted.", "It rests on Robin's tray.")),
+        ('It said "Dinner is ready. Come!" It left.', ('It said "Dinner is ready. Come!" It left.',)),
+        ("it said “One. Two; three.”; it left", ("it said “One. Two; three.”;", "it left")),
+        ("it heard 'Stop. It's hot!' at 2 s. It stood.", ("it heard 'Stop. It's hot!' at 2 s.", "It stood.")),
+        ('a stray " mark. Goes on', ('a stray " mark.', "Goes on")),
+    ],
+)
+def test_a_reason_is_not_split_inside_quotation_marks(text, sentences):
+    assert Verdict("The referee saw", True, "fulfilled", text).sentences == sentences
+
+
+@pytest.mark.parametrize(
+    ("names", "title"),
+    [
+        (["fetch drink", "fetch drink"], "fetch drink"),
+        (["fetch drink", "patrol"], "fetch drink and patrol"),
+        (["a", "b", "c", "d", "e"], "a, b, c and 2 more"),
+    ],
+)
+def test_a_title_names_the_missions(names, title):
+    assert title_of(names) == title

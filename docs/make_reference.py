@@ -26,17 +26,15 @@ from plant.worlds.world import SeedRules
 from skills.api import Skill
 from skills.faults.fault_kinds import STANDARD_FAULTS
 from skills.quantities import DURATION_PATTERN
-from skills.stack import SLOTS, components, skill_options, stack_schema
+from skills.stack import SLOTS, components, skill_options
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+from file_schemas import write_schemas
 from make_api import api_page
 from mission_constructs import constructs_text
-from mission_schema import mission_json_schema
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "reference"
-MISSION_SCHEMA = ROOT / "missions" / "mission.schema.json"
-STACK_SCHEMA = ROOT / "skills" / "stack.schema.json"
 NOTE = "<!-- Written by docs/make_reference.py; don't edit. -->\n\n"
 
 
@@ -65,7 +63,8 @@ SCHEMA_PAGES = (
     SchemaPage(
         "knowledge",
         "Knowledge files",
-        "`knowledge.yaml` of a world: the robot's knowledge of it. Metres and radians, in the world frame.",
+        "`knowledge.yaml` of a world: the robot's knowledge of it. Metres and radians, in the world frame. "
+        "`plant/worlds/knowledge.schema.json` is the schema for editors.",
         Knowledge,
         "plant/worlds/flat/knowledge.yaml",
     ),
@@ -73,7 +72,8 @@ SCHEMA_PAGES = (
         "world-objects",
         "World files",
         "`objects.yaml` of a world: what the seed places. Rooms and furniture are in `world.dmd.yaml` (Drake's model "
-        "directives), names and places in `knowledge.yaml`. [Make your own world](../how-to/own-world.md) begins here.",
+        "directives), names and places in `knowledge.yaml`. [Make your own world](../how-to/own-world.md) begins here. "
+        "`plant/worlds/objects.schema.json` is the schema for editors.",
         SeedRules,
         "plant/worlds/flat/objects.yaml",
     ),
@@ -83,14 +83,16 @@ SCHEMA_PAGES = (
         "A scenario: `errand run --scenario FILE`, also `evaluate`. Times are those "
         "of the robot's clock, in seconds from the beginning of the run. A door waits for who is in the doorway; a "
         "person waits before a closed one, or takes another path. What a gripper holds is not moved. The robot learns "
-        "of none of it but by its sensors. [Faults by name](faults.md) lists the faults.",
+        "of none of it but by its sensors. [Faults by name](faults.md) lists the faults. "
+        "`missions/scenarios/scenario.schema.json` is the schema for editors.",
         ScenarioFile,
         "missions/scenarios/busy_flat.yaml",
     ),
     SchemaPage(
         "skill-test",
         "Skill tests",
-        "`*.skilltest.yaml`: tests of one skill as data, collected by pytest.",
+        "`*.skilltest.yaml`: tests of one skill as data, collected by pytest. "
+        "`executive/testing/skilltest.schema.json` is the schema for editors.",
         SkillTestFile,
         "tests/skills/manipulation/stow.skilltest.yaml",
     ),
@@ -329,22 +331,10 @@ def faults_page() -> str:
     return f"{NOTE}# Faults by name\n\n{words}\n\n| example | effect | random |\n|---|---|---|\n{rows}\n"
 
 
-def stack_schema_text() -> str:
-    """The text of `skills/stack.schema.json`."""
-    return json.dumps(stack_schema(), indent=2) + "\n"
-
-
-def mission_schema_text() -> str:
-    """The text of `missions/mission.schema.json`."""
-    inputs = {name: skill.Inputs for name, skill in built_in_skills().items()}
-    return json.dumps(mission_json_schema(inputs), indent=2, ensure_ascii=False) + "\n"
-
-
 def main() -> None:
     """Write all pages."""
     FOLDER.mkdir(exist_ok=True)
-    STACK_SCHEMA.write_text(stack_schema_text(), encoding="utf-8")
-    MISSION_SCHEMA.write_text(mission_schema_text(), encoding="utf-8")
+    write_schemas(ROOT)
     for name, text in pages().items():
         (FOLDER / name).write_text(text, encoding="utf-8")
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final, get_type_hints
 
-from executive.words.leaf_steps import COMMAND_KEYS
+from executive.words.leaf_steps import COMMAND_KEYS, Dock
 from executive.words.mission import Mission
 from skills.quantities import base_type, bounds, unitless_name
 
@@ -22,6 +22,7 @@ def mission_json_schema(inputs: Mapping[str, type] = _NO_SKILLS) -> dict[str, An
     steps = described["$defs"]
     described["required"] = [key for key in described["required"] if key != "steps"]
     described["anyOf"] = [{"required": [key]} for key in ("steps", "parts")]
+    steps["Dock"]["required"] = [Dock.key]
     steps["Do"]["anyOf"] = [{"required": [key]} for key in COMMAND_KEYS]
     steps["CallSkill"]["allOf"] = [
         {
@@ -30,7 +31,7 @@ def mission_json_schema(inputs: Mapping[str, type] = _NO_SKILLS) -> dict[str, An
         }
         for name, record in inputs.items()
     ]
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
+    return described
 
 
 def _ports(record: type) -> Iterator[tuple[str, Any]]:

@@ -329,7 +329,7 @@ def _read(data: Any) -> Any:
 
 
 if not TYPE_CHECKING:
-    _AnyStep = Union[tuple(dict.fromkeys(_KEYS.values()))]  # noqa: UP007
+    _AnyStep = Union[(*dict.fromkeys(_KEYS.values()), Literal["dock"])]
 
 
 class _Document(Strict):

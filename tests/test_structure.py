@@ -11,18 +11,18 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3381,
+    "executive/words": 3398,
     "executive/language": 8239,
     "executive/speech": 1570,
-    "executive/mission": 1569,
-    "executive/tree": 8573,
+    "executive/mission": 1571,
+    "executive/tree": 8575,
     "executive/run": 3245,
-    "executive/record": 1089,
+    "executive/record": 1090,
     "executive/store": 1599,
     "executive/conversation": 595,
     "executive/view": 1551,
     "executive/testing": 848,
-    "executive/app": 7943,
+    "executive/app": 7971,
     "executive/cli": 3832,
     "skills": 28079,
     "plant": 11261,

@@ -11,18 +11,18 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3386,
+    "executive/words": 3403,
     "executive/language": 8239,
     "executive/speech": 1570,
-    "executive/mission": 1655,
-    "executive/tree": 8595,
+    "executive/mission": 1657,
+    "executive/tree": 8597,
     "executive/run": 3291,
-    "executive/record": 1093,
+    "executive/record": 1094,
     "executive/store": 1600,
     "executive/conversation": 595,
     "executive/view": 1848,
     "executive/testing": 848,
-    "executive/app": 8232,
+    "executive/app": 8260,
     "executive/cli": 4009,
     "skills": 28128,
     "plant": 11297,

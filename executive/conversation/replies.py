@@ -176,7 +176,7 @@ def place_in_words(pose: Pose2D | None, knowledge: Knowledge) -> str:
     if pose is None:
         return "I do not know where I am; I am looking for my place"
     here = (pose.x_m, pose.y_m)
-    distances = {name: distance_m(place.polygon, here) for name, place in knowledge.places.items()}
+    distances = {name: distance_m(outline, here) for name, outline in knowledge.rooms.items()}
     room = min(distances, key=lambda name: distances[name], default=None)
     if room is None:
         return f"I am at x {pose.x_m:.1f} m, y {pose.y_m:.1f} m"

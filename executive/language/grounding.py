@@ -86,7 +86,7 @@ class _Grounder:
     def commands(self, frame: CommandFrame) -> Iterator[Command]:
         """Converts one frame to a command, or to one for each room."""
         if frame.goal is not None and frame.goal.every_room and frame.item is None and frame.task is None:
-            yield from (Command(goal=room, verb=frame.verb) for room in self.knowledge.places)
+            yield from (Command(goal=room, verb=frame.verb) for room in self.knowledge.rooms)
             return
         item = None if frame.item is None else self.taken(frame.item)
         target = None if frame.object is None else self.target(frame.object, frame.task)
@@ -159,7 +159,7 @@ class _Grounder:
             goal, goal_at = person, None if location.within is None else self.place(location.within)
         if people and goal in self.knowledge.surfaces:
             raise RefusalError(f"I look for people in rooms, and the {goal} is none", [goal])
-        own = (goal in self.knowledge.places, goal in self.knowledge.surfaces, True)
+        own = (goal in self.knowledge.rooms, goal in (*self.knowledge.surfaces, *self.knowledge.poses), True)
         check_relation(act, [kind for kind, fits in zip(_KINDS, own, strict=True) if fits][:1], location)
         return goal, goal_at
 
@@ -209,7 +209,7 @@ class _Grounder:
 
     def _places(self, phrase: Phrase, room: str | None, known: Mapping[str, str]) -> Sequence[str]:
         """Places with exactly this name, or else with this noun; if a room is given, also places with a synonym."""
-        groups = {"room": tuple(self.knowledge.places), "surface": tuple(self.knowledge.surfaces)}
+        groups = {"room": tuple(self.knowledge.rooms), "surface": tuple(self.knowledge.surfaces)}
         named = len(phrase.content) > 1 or self.knowledge.place(phrase.text) is not None
         if not named and groups.get(phrase.head.lemma):  # any place: "the room", "a surface"
             return groups[phrase.head.lemma]

@@ -86,7 +86,7 @@ def take_rules(text: str, knowledge: Knowledge) -> tuple[str, Zones]:
     zones: dict[str, ZoneFacts] = {}
     own = {
         word.lower(): name
-        for name in knowledge.places
+        for name in knowledge.rooms
         for spelling in knowledge.spellings([name])
         for word in (*synonyms_for(spelling), spelling)
         if knowledge.place(word) in (None, name)

@@ -198,8 +198,8 @@ class _Resolver:
         if zone.place is None:
             return zone
         room = self.knowledge.place(zone.place)
-        if room not in self.knowledge.places:
-            rooms = self.knowledge.places
+        if room not in self.knowledge.rooms:
+            rooms = self.knowledge.rooms
             hint = suggestion(zone.place, self.knowledge.spellings(rooms), shown=tuple(rooms))
             raise error((*path, "place"), f"unknown room '{zone.place[:60]}'", hint)
         return zone.model_copy(update={"place": room})
@@ -264,8 +264,8 @@ class _Resolver:
         facts, named = self.knowledge, list[str]()
         for n, room in enumerate(rooms):
             known = facts.place(room)
-            if known not in facts.places:
-                raise error((*path, n), f"unknown room '{room}'", suggestion(room, facts.places))
+            if known not in facts.rooms:
+                raise error((*path, n), f"unknown room '{room}'", suggestion(room, facts.rooms))
             named.append(known)
         doors = [door.between for door in facts.doors if set(named) <= set(door.between)]
         if len(doors) == 1:
@@ -325,16 +325,18 @@ class _Resolver:
         return values
 
     def _known_values(self, error: _Error, of: str, path: KeyPath) -> tuple[str, ...]:
-        """Rooms, people or surfaces in a world, or only the people or surfaces in one room."""
+        """Rooms, named poses, people or surfaces in a world, or only the people, poses or surfaces in one room."""
         facts, (kind, _, room) = self.knowledge, of.partition(" in ")
-        if kind not in ("rooms", "people", "surfaces") or (kind == "rooms" and room):
-            hint = "write a list, or one of rooms, people, people in ROOM and surfaces in ROOM"
+        if kind not in ("rooms", "poses", "people", "surfaces") or (kind == "rooms" and room):
+            hint = "write a list, or one of rooms, poses, people and surfaces, or 'poses in ROOM' and the like"
             raise error(path, f"'{of[:60]}' is no list", hint)
         place = facts.place(room.removeprefix("the ")) if room else None
         if room and place is None:
             raise error(path, f"unknown place '{room[:60]}'", suggestion(room, facts.place_names()))
         if kind == "rooms":
-            return tuple(facts.places)
+            return tuple(facts.rooms)
+        if kind == "poses":
+            return tuple(name for name in facts.poses if place is None or facts.room(name) == facts.room(place))
         if kind == "surfaces":
             return tuple(facts.surfaces) if place is None else facts.surfaces_in(place)
         inside = {place, facts.room(place)} if place is not None else set()

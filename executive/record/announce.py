@@ -112,7 +112,8 @@ def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[s
     grey = grid.grey(**_GREY)
     png = cv2.imencode(".png", np.ascontiguousarray(grey[::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes()
     width_m, height_m = grid.size_m
-    middles = {name: np.mean(place.polygon, axis=0) for name, place in knowledge.places.items()}
+    middles = {name: np.mean(outline, axis=0) for name, outline in knowledge.rooms.items()}
+    middles |= {name: np.array([pose.x, pose.y]) for name in knowledge.poses if (pose := knowledge.place_pose(name))}
     return {
         "world": world,
         "frame_id": "world",

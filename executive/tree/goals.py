@@ -84,15 +84,15 @@ def _answered(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]
     who = knowledge.somebody(command.object.name)
     if who is not None:
         place = None if command.goal is None else knowledge.place(command.goal)
-        rooms = tuple(Region(name, knowledge.places[name].polygon) for name in knowledge.rooms_to_search(who, place))
+        rooms = tuple(Region(name, knowledge.rooms[name]) for name in knowledge.rooms_to_search(who, place))
         person = None if who == ANYBODY else who
         return GoalCondition(
             GoalKind.ANSWERED, (ANYBODY,), command.object_count, rooms, person=person, wanted=str(command.object)
         )
     classes, regions = _classes(command.object, knowledge), _regions(command, knowledge, elsewhere)
     place = None if command.goal is None else knowledge.place(command.goal)
-    around = [name for name in knowledge.places if place in (None, name)]
-    floors = tuple(Region(f"the floor of the {name}", knowledge.places[name].polygon, *FLOOR_M) for name in around)
+    around = [name for name in knowledge.rooms if place in (None, name)]
+    floors = tuple(Region(f"the floor of the {name}", knowledge.rooms[name], *FLOOR_M) for name in around)
     asked = str(command.object)
     return GoalCondition(GoalKind.ANSWERED, classes, command.object_count, regions, wanted=asked, maybe=floors)
 
@@ -129,7 +129,7 @@ def _with_person(kind: GoalKind) -> _Goal:
             return None  # the speaker is unknown, and the speech is judged by itself
         place = None if command.goal in (None, START) else knowledge.place(command.goal)
         rooms = () if place is None else (knowledge.room(place),)
-        regions = tuple(Region(room, knowledge.places[room].polygon) for room in rooms)
+        regions = tuple(Region(room, knowledge.rooms[room]) for room in rooms)
         return GoalCondition(kind, person=knowledge.person(name), goal=regions, when=When.END_OF_STEP)
 
     return goal
@@ -142,11 +142,12 @@ def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondi
 
 
 def _place_region(knowledge: Knowledge, goal: str) -> Region:
-    """Outline of a room; for a surface or the start, a square around the pose that a robot has there."""
+    """Outline of a room; for a surface or the start, a square around the pose there, a small one for a named pose."""
     place = knowledge.place(goal)
-    if place in knowledge.places:
-        return Region(place, knowledge.places[place].polygon)
-    return square_region(goal, knowledge.start if goal == START or place is None else knowledge.place_pose(place))
+    if place in knowledge.rooms:
+        return Region(place, knowledge.rooms[place])
+    pose = knowledge.start if goal == START or place is None else knowledge.place_pose(place)
+    return square_region(goal, pose, POSE_NEAR_M if place in knowledge.poses else NEAR_M)
 
 
 def square_region(name: str, pose: Pose, near_m: float = NEAR_M) -> Region:

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from executive.words.command import Task
 from executive.words.forms import Strict
-from executive.words.outlines import Corner, Polygon
+from executive.words.outlines import Corner, Polygon, distance_m
 from executive.words.robot_config import RobotsFile
 from executive.words.zone import ZoneFacts, with_files
 from skills.api import Tag, Zone
@@ -66,10 +66,12 @@ class BatteryFacts(Strict):
 
 
 class Place(Strict):
-    """Room: other names, the pose of a robot in it, its outline (world frame, m)."""
+    """Room, with its outline (world frame, m), or a named pose without one: other names, the pose of a robot there."""
 
-    pose: Pose = Field(description="pose of a robot in it")
-    polygon: Polygon = Field(description="outline, corners (x, y)")
+    pose: Pose = Field(description="pose of a robot in it; that of a named pose is taken exactly")
+    polygon: Polygon | None = Field(
+        default=None, description="outline of a room, corners (x, y); a place without one is a named pose"
+    )
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
 
 
@@ -139,7 +141,7 @@ class Knowledge(Strict):
     start: Pose = Field(description="its pose at the beginning")
     dock: Pose | None = Field(default=None, description="its pose for charging; without one it cannot charge")
     battery: BatteryFacts = Field(default=BatteryFacts(), description="charge at which it goes to the dock and leaves")
-    places: dict[Name, Place] = Field(default_factory=dict, description="the rooms by name")
+    places: dict[Name, Place] = Field(default_factory=dict, description="the rooms and the named poses by name")
     doors: tuple[Door, ...] = Field(default=(), description="the narrow passages between rooms")
     surfaces: dict[Name, SurfaceFacts] = Field(
         default_factory=dict, description="the flat tops where objects lie, by name"
@@ -158,28 +160,40 @@ class Knowledge(Strict):
 
     def known_zones(self) -> tuple[Zone, ...]:
         """Zones as the skills' own data type, in the file's order."""
-        rooms = {name: place.polygon for name, place in self.places.items()}
-        return tuple(facts.zone(name, rooms) for name, facts in self.zones.items())
+        return tuple(facts.zone(name, self.rooms) for name, facts in self.zones.items())
 
     def with_zones(self, zones: Mapping[str, ZoneFacts]) -> Knowledge:
         """Adds the zones that a mission declares; a zone whose name is taken gets another name."""
         more = {f"{name} (mission)" if name in self.zones else name: facts for name, facts in zones.items()}
         return self.model_copy(update={"zones": {**self.zones, **more}}) if more else self
 
+    @property
+    def rooms(self) -> dict[str, tuple[Corner, ...]]:
+        """Outlines of the rooms by name."""
+        return {name: place.polygon for name, place in self.places.items() if place.polygon is not None}
+
+    @property
+    def poses(self) -> tuple[str, ...]:
+        """Names of the named poses."""
+        return tuple(name for name, place in self.places.items() if place.polygon is None)
+
     def place(self, name: str) -> str | None:
-        """Name in the file of the room or surface that `name` means; None when `name` is unknown."""
+        """Name in the file of the room, named pose or surface that `name` means; None when `name` is unknown."""
         return _resolve(name, self.places) or _resolve(name, self.surfaces)
 
     def room(self, place: str) -> str:
-        """Room that contains a known place; a room contains itself."""
-        return self.surfaces[place].place if place in self.surfaces else place
+        """Room that contains a known place, or is nearest to a named pose; a room contains itself."""
+        if place in self.surfaces:
+            return self.surfaces[place].place
+        rooms, pose = self.rooms, self.places[place].pose
+        return place if place in rooms else min(rooms, key=lambda name: distance_m(rooms[name], (pose.x, pose.y)))
 
     def surfaces_in(self, place: str) -> tuple[str, ...]:
         """Surfaces in a room, in the file's order; for a surface, only the surface itself."""
         return tuple(name for name, surface in self.surfaces.items() if place in (name, surface.place))
 
     def place_pose(self, place: str) -> Pose:
-        """Pose of a robot at a known room (the room's pose) or surface (its first viewpoint)."""
+        """Pose of a robot at a known room or named pose, or at a surface (its first viewpoint)."""
         return self.surfaces[place].viewpoints[0] if place in self.surfaces else self.places[place].pose
 
     def object_name(self, name: str) -> str | None:
@@ -215,7 +229,7 @@ class Knowledge(Strict):
         if place is not None:
             return (self.room(place),)
         usual = (self.room(self.people[person].at),) if person in self.people else ()
-        return tuple(dict.fromkeys((*usual, *self.places)))
+        return tuple(dict.fromkeys((*usual, *self.rooms)))
 
     def default_place(self, task: Task | None, name: str) -> str | None:
         """Place for `task` on an object of a class or category when the speaker names no place.
@@ -233,7 +247,7 @@ class Knowledge(Strict):
         return (*self.things, *self.categories())
 
     def place_names(self) -> tuple[str, ...]:
-        """Names of all places: rooms, then surfaces."""
+        """Names of all places: rooms and named poses, then surfaces."""
         return (*self.places, *self.surfaces)
 
     def spellings(self, names: Iterable[str]) -> tuple[str, ...]:
@@ -294,12 +308,15 @@ def _cross_errors(knowledge: Knowledge, source: YamlSource, own: Collection[str]
     tasks = [task.value for task in Task]
     for index, door in enumerate(knowledge.doors):
         for side, room in enumerate(door.between):
-            yield from _unless_known(source, ("doors", index, "between", side), room, knowledge.places)
+            yield from _unless_known(source, ("doors", index, "between", side), room, knowledge.rooms)
     for name, surface in knowledge.surfaces.items():
-        yield from _unless_known(source, ("surfaces", name, "place"), surface.place, knowledge.places)
+        yield from _unless_known(source, ("surfaces", name, "place"), surface.place, knowledge.rooms)
     for name, zone in knowledge.zones.items():
         if zone.place is not None:
-            yield from _unless_known(source, ("zones", name, "place"), zone.place, knowledge.places)
+            yield from _unless_known(source, ("zones", name, "place"), zone.place, knowledge.rooms)
+    if knowledge.poses and not knowledge.rooms:
+        what = "no place has a polygon, so there is no room around the named poses"
+        yield source.error(("places",), what, "give one place the outline of a room")
     for name, person in knowledge.people.items():
         yield from _unless_known(source, ("people", name, "at"), person.at, knowledge.place_names())
     tagged = [tag.on for tag in knowledge.tags if tag.on is not None]

@@ -89,7 +89,7 @@ class Loop(Strict):
     ] = None
     for_each: tuple[Any, ...] | Text | None = Field(
         default=None,
-        description='One round for each of a list, or of "rooms", "people", "people in ROOM" or "surfaces in ROOM".',
+        description='One round for each of a list, or of "rooms", "poses", "people in ROOM" and the like.',
     )
     name: Annotated[Name | None, Field(alias="as", description="The name by which steps read it, as ${NAME}.")] = None
 

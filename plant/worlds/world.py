@@ -355,7 +355,7 @@ def load_world(name_or_path: str | Path) -> World:
         folder=folder,
         start=_pose(knowledge.start),
         dock=None if knowledge.dock is None else _pose(knowledge.dock),
-        rooms={name: place.polygon for name, place in knowledge.places.items()},
+        rooms=knowledge.rooms,
         surfaces=surfaces,
         surface_places={name: top.place for name, top in knowledge.surfaces.items()},
         seed_rules=rules,

@@ -36,7 +36,7 @@ def draw(number, *, detour):
     while True:
         world = str(rng.choice(WORLDS))
         knowledge = load_knowledge(load_world(world).knowledge_path)
-        room = str(rng.choice(list(knowledge.places)))
+        room = str(rng.choice(list(knowledge.rooms)))
         doors = [door.between for door in knowledge.doors if room in door.between]
         if not (2 if detour else 1) <= len(doors) <= MOST_DOORS or not is_cut_off(world, knowledge, room):
             continue

@@ -70,7 +70,7 @@ def meeting(number):
     def start(kind, place, door):
         """Free pose in a place near a door, about facing it; None where there is none."""
         footprint = Footprint.of(robot_kind(kind).capabilities())
-        low, high = (bound(knowledge.places[place].polygon, axis=0) for bound in (np.min, np.max))
+        low, high = (bound(knowledge.rooms[place], axis=0) for bound in (np.min, np.max))
         for _ in range(TRIES):
             away_m, angle = rng.uniform(*FROM_DOOR_M), rng.uniform(-math.pi, math.pi)
             x, y = door.at[0] + away_m * math.cos(angle), door.at[1] + away_m * math.sin(angle)

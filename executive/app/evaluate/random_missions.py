@@ -181,7 +181,7 @@ class _Slots(dict[str, str]):
     def room(self, what: str = "room") -> str:
         """Returns a room that differs from the rooms of other slots."""
         taken = [self._meant.get(other) for other in ("room", "second room")]
-        return self.placed(self.choice(what, [name for name in self._known.places if name not in taken]))
+        return self.placed(self.choice(what, [name for name in self._known.rooms if name not in taken]))
 
     def surface(self, names: Iterable[str] = ()) -> str:
         """Returns a surface where objects of these classes do not usually stand."""
@@ -192,7 +192,7 @@ class _Slots(dict[str, str]):
         """Returns a room that has surfaces, and where objects of these classes are not usually found."""
         known = self._known
         homes = {known.room(surface) for surface in self.usual_surfaces(names)}
-        rooms = (name for name in known.places if known.surfaces_in(name) and name not in homes)
+        rooms = (name for name in known.rooms if known.surfaces_in(name) and name not in homes)
         return self.placed(self.choice("furnished room", rooms))
 
     def person(self, *, only: bool = False) -> str:

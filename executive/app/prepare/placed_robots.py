@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from executive.app.prepare.worlds import free_ground
 from executive.mission.load import load_stack
 from executive.mission.request import Start
 from executive.words.knowledge import DOCK, Knowledge, Pose, RobotFacts
@@ -23,7 +24,6 @@ from skills.stack import DetectorComponent, RobotStack, default_stack
 
 if TYPE_CHECKING:
     from skills.detection import Detector
-    from skills.estimate.grid_map import GridMap
 
 
 DEFAULT_KIND: Final = "spot"
@@ -95,7 +95,7 @@ def _free_start(world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2
     """
     from plant.worlds.seeding import standing_points_W
 
-    reach_m, free = _reach_m(kind), _free_ground(world)
+    reach_m, free = _reach_m(kind), free_ground(world)
     places = free.centres(np.argwhere(free.distance > max(TURNING_M, reach_m)))
     for other in placed:
         away_m = np.hypot(*(places - [other.start.x_m, other.start.y_m]).T)
@@ -123,17 +123,10 @@ def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRo
 def refuse_blocked(world: World, pose: Pose2D, name: str = "the robot", kind: str = DEFAULT_KIND) -> None:
     """Raises InputError unless a robot's body is in free space at a pose, by the world's surveyed map."""
     discs = _discs(kind, pose)
-    if float(np.min(_free_ground(world).distance_m(discs[:, :2]) - discs[:, 2])) < 0.0:
+    if float(np.min(free_ground(world).distance_m(discs[:, :2]) - discs[:, 2])) < 0.0:
         there = f"({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g})"
         hint = "give a free pose; `errand world show` draws the world"
         raise InputError(f"at the start {there} {name} stands in an obstacle or outside of {world.name}", hint=hint)
-
-
-def _free_ground(world: World) -> GridMap:
-    """Loads the world's surveyed map, in which unknown cells count as blocked."""
-    from skills.estimate.grid_map import load_grid_map
-
-    return load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
 
 
 def _discs(kind: str, pose: Pose2D) -> FloatArray:
@@ -171,7 +164,7 @@ def stand_at(world: World, start: Start, seed: int) -> Pose2D:
         return start
     from plant.worlds.seeding import place_people
 
-    keepout = _free_ground(world)
+    keepout = free_ground(world)
     places = keepout.centres(np.argwhere(keepout.distance > TURNING_M))
     for person in place_people(world, seed):
         places = places[np.hypot(*(places - person.X_WO.translation()[:2]).T) > FROM_PEOPLE_M]

@@ -1,12 +1,22 @@
 """Opens worlds and their knowledge by name; loads nothing of the simulation."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from executive.words.knowledge import Knowledge, load_knowledge
 from plant.worlds.world import WORLDS_FOLDER, UnknownWorldError, World, WorldError, known_worlds, load_world
-from skills.inputs.errors import InputError, known_names, suggestion
+from skills.inputs.errors import InputError, Problems, known_names, suggestion
+from skills.inputs.yaml_source import KeyPath, read_yaml
+
+if TYPE_CHECKING:
+    from skills.estimate.grid_map import GridMap
 
 
 def open_world(name: str) -> World:
@@ -49,4 +59,27 @@ def with_map(world: World, folder: Path) -> World:
 
 def knowledge_of(world: World) -> Knowledge:
     """Loads the knowledge of a world and of its imported objects. Raises InputError."""
-    return load_knowledge(world.knowledge_path, tuple(world.own_objects))
+    knowledge = load_knowledge(world.knowledge_path, tuple(world.own_objects))
+    if knowledge.poses:
+        refuse_blocked_poses(world, knowledge, read_yaml(world.knowledge_path).error)
+    return knowledge
+
+
+def refuse_blocked_poses(world: World, knowledge: Knowledge, error: Callable[[KeyPath, str, str], InputError]) -> None:
+    """Raises InputError for a named pose in an obstacle or outside of the map; `error` gives it file and line."""
+    problems, poses = Problems(), {name: knowledge.place_pose(name) for name in knowledge.poses}
+    middles = np.array([(pose.x, pose.y) for pose in poses.values()]).reshape(-1, 2)
+    clear_m = free_ground(world).distance_m(middles)
+    for (name, pose), free_m in zip(poses.items(), clear_m, strict=True):
+        with problems:
+            if free_m <= 0.0:
+                what = f"places.{name}: ({pose.x:g}, {pose.y:g}) is in an obstacle or outside of {world.name}"
+                raise error(("places", name), what, "give a free pose; `errand world show` draws the world")
+    problems.raise_any()
+
+
+def free_ground(world: World) -> GridMap:
+    """Loads the world's surveyed map, in which unknown cells count as blocked."""
+    from skills.estimate.grid_map import load_grid_map
+
+    return load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()

@@ -340,6 +340,6 @@ def _answer(finding: Finding, parts: Sequence[StepPart], artifacts: Artifacts) -
 def _reported(seen: ObjectObservation, knowledge: Knowledge) -> ReportedObject:
     """Returns a seen object with its room."""
     x_m, y_m, _ = seen.position_W
-    rooms = (name for name, room in knowledge.places.items() if inside(room.polygon, (x_m, y_m)))
+    rooms = (name for name, outline in knowledge.rooms.items() if inside(outline, (x_m, y_m)))
     place = knowledge.room(seen.surface) if seen.surface in knowledge.surfaces else next(rooms, None)
     return ReportedObject(str(seen.kind), seen.surface, place, seen.position_W, seen.stamp_s)

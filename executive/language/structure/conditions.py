@@ -159,10 +159,10 @@ def _between(match: re.Match[str], knowledge: Knowledge) -> tuple[str, str]:
 
 def _room(name: str, knowledge: Knowledge) -> str:
     bare = re.sub(r"^(?:the|my|our|your) ", "", name, flags=re.IGNORECASE)
-    known = {spelling.lower(): room for room in knowledge.places for spelling in knowledge.spellings([room])}
+    known = {spelling.lower(): room for room in knowledge.rooms for spelling in knowledge.spellings([room])}
     found = knowledge.place(bare) or next(iter(synonyms_of(bare.lower(), known)), None)
     if found is None:
-        what = f"I know no room '{bare}'; known are {listing(knowledge.places)}"
+        what = f"I know no room '{bare}'; known are {listing(knowledge.rooms)}"
         raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
     return knowledge.room(found)
 

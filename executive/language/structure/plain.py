@@ -87,7 +87,7 @@ def negate(condition: Condition) -> Condition:
 def initial_state(knowledge: Knowledge, memory: Memory) -> State:
     """State where a sentence begins."""
     start = (knowledge.start.x, knowledge.start.y)
-    room = next((name for name, place in knowledge.places.items() if inside(place.polygon, start)), None)
+    room = next((name for name, outline in knowledge.rooms.items() if inside(outline, start)), None)
     return State(memory=memory, at=room)
 
 

@@ -372,7 +372,7 @@ class SentenceBuilder(DecisionBuilder):
     def _in_each(self, row: StepRow, says: Clause) -> None:
         """Adds speech in every room."""
         self.flush(row)
-        for room in self.reader.knowledge.places:
+        for room in self.reader.knowledge.rooms:
             there = Chunk(phrase_of_name(room, NounKind.PLACE), "to", PrepositionRole.GOAL)
             reading = self.reader.commands_from_items((verb("go"), there), replace(row.state, goal=None))
             said, state = self.sequence([says], reading.state)

@@ -145,7 +145,7 @@ def _person_at_start(builder: PlanBuilder) -> str:
     """Name of the only person whose place is in the start's room; "somebody" if there are none or several."""
     knowledge = builder.knowledge
     start = (knowledge.start.x, knowledge.start.y)
-    rooms = [name for name, place in knowledge.places.items() if inside(place.polygon, start)]
+    rooms = [name for name, outline in knowledge.rooms.items() if inside(outline, start)]
     there = [name for name, facts in knowledge.people.items() if knowledge.room(builder.place(facts.at)) in rooms]
     return there[0] if len(there) == 1 else "somebody"
 
@@ -367,7 +367,7 @@ def _near_plan(builder: PlanBuilder, item: ObjectKind, detection: str) -> NodeSp
         "which surfaces are near?",
         part="surfaces-near",
         surfaces=tuple(map(builder.surface, facts.surfaces)),
-        rooms={name: facts.places[surface.place].polygon for name, surface in facts.surfaces.items()},
+        rooms={name: facts.rooms[surface.place] for name, surface in facts.surfaces.items()},
         within_m=LOST_WITHIN_M,
         key=near,
         otherwise="there is only the floor",

@@ -177,7 +177,7 @@ def view_of(knowledge: Knowledge, door: Door, room: str) -> Pose2D | None:
     The robot faces the door, or stands along the wall in a narrow space, because its LiDAR sees all around.
     """
     across = _through_rad(knowledge, door)
-    outline = knowledge.places[room].polygon
+    outline = knowledge.rooms[room]
     into = min((across, across + math.pi), key=lambda each_rad: distance_m(outline, _from(door.at, each_rad, 0.5)))
     taken = [knowledge.surfaces[name].polygon for name in knowledge.surfaces_in(room)]
     return next((pose for pose in _before(door, into) if fits(_outline(pose), outline, taken)), None)
@@ -205,7 +205,7 @@ def doorway(knowledge: Knowledge, door: Door) -> Doorway:
 
 def _through_rad(knowledge: Knowledge, door: Door) -> float:
     """Direction (rad) through a door: perpendicular to the room's side that contains the door."""
-    sides = [nearest_side(knowledge.places[room].polygon, door.at, door.width) for room in door.between]
+    sides = [nearest_side(knowledge.rooms[room], door.at, door.width) for room in door.between]
     (x0, y0), (x1, y1) = min(sides, key=lambda side: side.off_m).ends
     return math.remainder(math.atan2(y1 - y0, x1 - x0) + math.pi / 2, math.tau)
 

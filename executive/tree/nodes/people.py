@@ -263,10 +263,10 @@ def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> No
     knowledge, met = builder.knowledge, builder.met_key(person)
     usual = knowledge.room(builder.place(knowledge.people[person].at))
     said = usual if place is None else knowledge.room(place)
-    others = tuple(dict.fromkeys(room for room in (usual, *knowledge.places) if room != said))
+    others = tuple(dict.fromkeys(room for room in (usual, *knowledge.rooms) if room != said))
     here = builder.at("here")
     near = here.node("only if near", f"{person} is near", _go_beside(here, person, met), key=met)
-    ports = {"area_W": knowledge.places[said].polygon, "place": said}
+    ports = {"area_W": knowledge.rooms[said], "place": said}
     there = _in_room(builder.at(said), said, _meet_one_plan(builder.at(said), person, ports))
     elsewhere = (_elsewhere_plan(builder.at("elsewhere"), person, others),) if others else ()
     return builder.first_of(
@@ -326,8 +326,8 @@ def _meet_one_plan(
 
 def _in_room(builder: PlanBuilder, room: str, then: NodeSpec) -> NodeSpec:
     """Goes to a room, and then runs another node there."""
-    place = builder.knowledge.places[room]
-    to = _to_room(builder, pose_2d(place.pose), Constant(place.polygon), f"the {room}")
+    pose, area = pose_2d(builder.knowledge.place_pose(room)), Constant(builder.knowledge.rooms[room])
+    to = _to_room(builder, pose, area, f"the {room}")
     return builder.sequence(f"in the {room}", to, then)
 
 
@@ -366,8 +366,10 @@ def _go_beside(builder: PlanBuilder, person: str, key: str, place: object = "", 
 
 
 def go_to_goal_plan(builder: PlanBuilder, goal: str) -> NodeSpec:
-    """Drives to a place or to the start; or finds a person and goes to them."""
+    """Drives near a place or the start, or exactly to a named pose; or finds a person and goes to them."""
     person = builder.knowledge.person(goal)
+    if person is None and builder.knowledge.place(goal) in builder.knowledge.poses:
+        return builder.navigate(goal_pose(builder, goal), goal_in_words(builder, goal), exactly=True)
     if person is None:
         return go_near_plan(builder, goal_pose(builder, goal), goal_in_words(builder, goal))
     at = builder.command.goal_at
@@ -380,7 +382,7 @@ def follow_plan(builder: PlanBuilder) -> NodeSpec:
     ports: dict[str, object] = {"person": ANYBODY if person == SPEAKER else person}
     if goal is not None:
         room = builder.knowledge.room(builder.place(goal))
-        ports |= {"until": room, "until_W": builder.knowledge.places[room].polygon}
+        ports |= {"until": room, "until_W": builder.knowledge.rooms[room]}
     to = "" if goal is None else f" to the {goal}"
     return _with_person(builder, person, f"follow {person_text(person)}{to}", "follow_person", ports)
 
@@ -402,9 +404,9 @@ def _guided_area(builder: PlanBuilder, goal: str) -> tuple[tuple[float, float], 
     knowledge, person = builder.knowledge, builder.knowledge.person(goal)
     if goal == START:
         at = (knowledge.start.x, knowledge.start.y)
-        return next((place.polygon for place in knowledge.places.values() if inside(place.polygon, at)), ())
+        return next((outline for outline in knowledge.rooms.values() if inside(outline, at)), ())
     place = builder.place(goal if person is None else knowledge.people[person].at)
-    return knowledge.places[knowledge.room(place)].polygon
+    return knowledge.rooms[knowledge.room(place)]
 
 
 def _with_person(builder: PlanBuilder, person: str, title: str, skill: str, ports: dict[str, object]) -> NodeSpec:
@@ -429,7 +431,7 @@ def greet_plan(builder: PlanBuilder) -> NodeSpec:
     within = builder.optional_ports("meet_person", {"within_m": GREETS_WITHIN_M})
     beside = _go_beside(builder, ANYBODY, builder.key("seen"), room, **within)
     visit = builder.sequence("greet somebody", beside, greet, part="visit")
-    ports = {"area_W": builder.knowledge.places[room].polygon, "place": room}
+    ports = {"area_W": builder.knowledge.rooms[room], "place": room}
     options = {"first": False, "where": f"in the {room}"}
     each = _each_person(builder, "greet each person here", ANYBODY, ports, visit, **options)
     return _in_room(builder, room, each)

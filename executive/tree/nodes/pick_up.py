@@ -64,9 +64,7 @@ def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float,
     """Returns poses beside a goal by their offsets (m); if the goal is known now, only poses in the same room."""
     if isinstance(pose, FromBoard):
         return {offset: BesideBoard(pose.key, *offset) for offset in NEARBY_M}
-    rooms = [
-        place.polygon for place in builder.knowledge.places.values() if inside(place.polygon, (pose.x_m, pose.y_m))
-    ]
+    rooms = [outline for outline in builder.knowledge.rooms.values() if inside(outline, (pose.x_m, pose.y_m))]
     poses = {offset: compose(pose, Pose2D(*offset, 0.0)) for offset in NEARBY_M}
     return {
         offset: other for offset, other in poses.items() if any(inside(room, (other.x_m, other.y_m)) for room in rooms)

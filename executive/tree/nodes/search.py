@@ -195,11 +195,12 @@ def people_looks(
         raise builder.error(f"the robot knows nobody by face, and {person} may be any of several people", hint)
     plans, moves = [], builder.optional_ports("find_people", {"moves": True})
     for room in knowledge.rooms_to_search(person, place):
-        below, facts = builder.at(room), knowledge.places[room]
-        ports = {"area_W": facts.polygon, "place": room, "person": person, "count": 0 if tallied else 1, **moves}
+        below, pose = builder.at(room), knowledge.place_pose(room)
+        area_W, count = knowledge.rooms[room], 0 if tallied else 1
+        ports = {"area_W": area_W, "place": room, "person": person, "count": count, **moves}
         tally = {_TALLY: below.key("all")} if tallied else {}
         look = below.skill("find_people", ports, {"observation": key, **tally})
-        plans.append((room, below.look_from(f"look about the {room}", pose_2d(facts.pose), f"the {room}", look)))
+        plans.append((room, below.look_from(f"look about the {room}", pose_2d(pose), f"the {room}", look)))
     return tuple(plans)
 
 
@@ -290,7 +291,7 @@ def _looks_from_aside(
     facts = builder.knowledge.surfaces
     single = [name for name in surfaces if len(facts[name].viewpoints) == 1]
     for name in single[:MOST_ASIDE]:
-        room = builder.knowledge.places[facts[name].place].polygon
+        room = builder.knowledge.rooms[facts[name].place]
         view = pose_2d(facts[name].viewpoints[0])
         poses = (compose(view, Pose2D(0.0, left_m, 0.0)) for left_m in (ASIDE_M, -ASIDE_M))
         aside = next((pose for pose in poses if inside(room, (pose.x_m, pose.y_m))), None)
@@ -340,7 +341,7 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         item = builder.required_object(command.object)
         what, asked = str(item), _asked_for(str(item), command.object_count)
         absent = str(item) if command.object_count == 1 else asked
-        whole_room = place is None or place in knowledge.places
+        whole_room = place is None or place in knowledge.rooms
         extra = {"floor": whole_room, "count": 0 if counting else 1}
         surfaces = required_surfaces(builder, item, place)
         looks = look_plans(builder.at("search"), item, surfaces, key, extra, tallied=counting)

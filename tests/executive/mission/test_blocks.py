@@ -103,6 +103,21 @@ def test_for_each_goes_through_what_the_world_has(block, of, some):
     assert some in [step.name for step in found.steps]
 
 
+POSES = """\
+knowledge:
+  places: {pump: {pose: {x: 8.4, y: 6.5, yaw: 0}}, fuse box: {pose: {x: 2.9, y: 2.7}}}
+steps:
+  - repeat: {for_each: poses, as: point}
+    steps: [{to: "${point}"}]
+"""
+
+
+@pytest.mark.parametrize(("of", "named"), [("poses", ["pump", "fuse box"]), ("poses in the bedroom", ["fuse box"])])
+def test_for_each_goes_through_the_named_poses(compile_text, of, named):
+    text = POSES.replace("for_each: poses", f"for_each: {of}")
+    assert [command.goal for command in compile_text(f"name: m\n{text}").commands] == named
+
+
 def test_for_each_in_for_each(block):
     inner = "{repeat: {for_each: [1, 2], as: b}, steps: [{speak: '${a}${b}'}]}"
     found = block(f"- repeat: {{for_each: [x, y], as: a}}\n  steps: [{inner}]")

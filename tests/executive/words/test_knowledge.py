@@ -40,6 +40,25 @@ def test_a_room_has_its_surfaces_and_a_surface_has_itself(knowledge):
     assert (knowledge.surfaces_in("workbench"), knowledge.room("workbench")) == (("workbench",), "workshop")
 
 
+PUMP = "places:\n  pump: {pose: {x: 3.5, y: 0.2, yaw: 1.5}, aliases: [feed pump]}\n"
+
+
+def test_a_place_without_an_outline_is_a_named_pose_and_no_room(write):
+    knowledge = load_knowledge(write(WORLD.replace("places:\n", PUMP)))
+    assert (knowledge.poses, set(knowledge.rooms)) == (("pump",), {"kitchen", "workshop"})
+    assert (knowledge.place("Feed Pump"), knowledge.room("pump"), knowledge.surfaces_in("pump")) == (
+        "pump",
+        "kitchen",
+        (),
+    )
+    assert (knowledge.place_pose("pump").y, "pump" in knowledge.place_names()) == (0.2, True)
+
+
+def test_a_named_pose_outside_of_all_rooms_belongs_to_the_nearest(write):
+    knowledge = load_knowledge(write(WORLD.replace("places:\n", PUMP.replace("3.5", "-1.0"))))
+    assert knowledge.room("pump") == "workshop"
+
+
 def test_poses_are_those_of_the_file(knowledge):
     assert (knowledge.place_pose("workshop").x, knowledge.place_pose("workbench").yaw) == (-3.0, 1.57)
 

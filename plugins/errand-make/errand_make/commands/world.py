@@ -67,10 +67,10 @@ def from_map(
 
 @world.command()
 def add(
-    what: Annotated[Addition, typer.Argument(help="room gives a found room its name.")],
+    what: Annotated[Addition, typer.Argument(help="room gives a found room its name; place names a pose.")],
     folder: Annotated[Path, typer.Argument(metavar="WORLD", help="Folder of the world.")],
     name: Annotated[
-        str | None, typer.Argument(help="Name of the table, person or room; of an object, its class or model.")
+        str | None, typer.Argument(help="Name of the table, person, room or place; of an object, its class or model.")
     ] = None,
     room: Annotated[str | None, typer.Option("--in", help="The room; of 'room', its former name.")] = None,
     at: Annotated[
@@ -82,7 +82,7 @@ def add(
     ] = None,
     surface: Annotated[str | None, typer.Option("--on", help="The surface on which the object lies.")] = None,
 ) -> None:
-    """Adds furniture, an object, a person, a dock, or the name of a room to a world of your own."""
+    """Adds furniture, an object, a person, a dock, the name of a room, or a named pose to a world of your own."""
     from errand_make.worlds.additions import add as add_to_world
 
     if name is None and what is not Addition.DOCK:
@@ -178,7 +178,8 @@ def show(
     facts = knowledge_of(drawn)
     with writing(out):
         save_png(out, draw_world(drawn, facts))
-    counts = ((facts.places, "room"), (facts.doors, "door"), (facts.surfaces, "surface"), (facts.zones, "zone"))
+    counts = [(facts.rooms, "room"), (facts.doors, "door"), (facts.surfaces, "surface"), (facts.zones, "zone")]
+    counts += [(facts.poses, "named pose")] if facts.poses else []
     typer.echo(f"{out}: {', '.join(count_text(len(each), noun) for each, noun in counts)}")
 
 
@@ -192,5 +193,5 @@ def _made(source: Path, out: Path, make: Callable[[Path], None]) -> None:
     made = open_world(str(out))
     facts = knowledge_of(made)
     start = f"{made.start.x_m:.2f} {made.start.y_m:.2f} {made.start.yaw_rad:.2f}"
-    rooms, doors = count_text(len(facts.places), "room"), count_text(len(facts.doors), "door")
+    rooms, doors = count_text(len(facts.rooms), "room"), count_text(len(facts.doors), "door")
     typer.echo(f"{out}: {rooms}, {doors}, start at {start} (m, rad)")

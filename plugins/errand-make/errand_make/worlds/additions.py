@@ -1,4 +1,4 @@
-"""Additions to a world of the user's own: furniture, objects, a person, a dock, and names of rooms."""
+"""Additions to a world of the user's own: furniture, objects, a person, a dock, names of rooms, and named poses."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def _add_furniture(site: Site, wanted: Wanted) -> str:
     if not (min(piece.size) >= 0.3 and max(piece.size) <= 3.0 and piece.size[2] <= 1.2):
         raise WorldError("width and depth are 0.3 to 3 m, and the height is 0.3 to 1.2 m")
     if wanted.at is None:
-        piece = furnish.place_in(site.world, grid, piece, facts.places[room].polygon, site.doors, rooms)
+        piece = furnish.place_in(site.world, grid, piece, facts.rooms[room], site.doors, rooms)
     elif (why := furnish.refusal(site.world, grid, piece, rooms)) is not None:
         raise WorldError(f"{wanted.name} cannot stand at ({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g}): {why}")
     else:
-        room = next((name for name, each in facts.places.items() if contains(each.polygon, (pose.x_m, pose.y_m))), room)
+        room = next((name for name, outline in facts.rooms.items() if contains(outline, (pose.x_m, pose.y_m))), room)
     grids = {name: site.grid(name) for name in BANDS_M if (site.folder / "map" / f"{name}.yaml").is_file()}
     furnish.add_furniture(site.folder, piece, room, grids)
     at = f"({piece.pose.x_m:.2f}, {piece.pose.y_m:.2f}, {piece.pose.yaw_rad:.2f})"
@@ -71,7 +71,7 @@ def _add_dock(site: Site, wanted: Wanted) -> str:
 
 def _name_room(site: Site, wanted: Wanted) -> str:
     if wanted.room is None:
-        raise InputError("the former name is missing", hint=f"name it by --in: {listing(site.facts.places)}")
+        raise InputError("the former name is missing", hint=f"name it by --in: {listing(site.facts.rooms)}")
     if site.facts.place(wanted.name) is not None:
         raise InputError(f"there is a '{wanted.name}' already", hint="choose another name", file=site.folder)
     former, file = site.room(wanted.room), site.folder / "knowledge.yaml"
@@ -79,10 +79,22 @@ def _name_room(site: Site, wanted: Wanted) -> str:
     return f"{former} is now {wanted.name}"
 
 
+def _add_place(site: Site, wanted: Wanted) -> str:
+    if wanted.at is None:
+        raise InputError("a named pose needs its pose", hint=f"write --at X Y YAW after {wanted.name}")
+    if site.facts.place(wanted.name) is not None:
+        raise InputError(f"there is a '{wanted.name}' already", hint="choose another name", file=site.folder)
+    file, pose = site.folder / "knowledge.yaml", dict(zip(("x", "y", "yaw"), wanted.at, strict=True))
+    file.write_text(furnish.with_entry(file, "places", wanted.name, {"pose": pose}), encoding="utf-8")
+    x, y, yaw = wanted.at
+    return f"{wanted.name} at ({x:.2f}, {y:.2f}, {yaw:.2f})"
+
+
 _ADDED: Final[Mapping[Addition, Callable[[Site, Wanted], str]]] = {
     Addition.OBJECT: _add_object,
     Addition.PERSON: _add_person,
     Addition.DOCK: _add_dock,
     Addition.ROOM: _name_room,
+    Addition.PLACE: _add_place,
 }
 """Additions other than furniture."""

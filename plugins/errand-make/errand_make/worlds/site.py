@@ -53,14 +53,12 @@ class Site:
 
     def room(self, said: str | None) -> str:
         """Returns the room of a name; without one, the room of the start. Raises InputError."""
-        places, start = self.facts.places, (self.world.start.x_m, self.world.start.y_m)
+        rooms, start = self.facts.rooms, (self.world.start.x_m, self.world.start.y_m)
         if said is None:
-            return next(
-                (name for name, each in places.items() if contains(each.polygon, start)), next(iter(places), "")
-            )
-        if (found := self.facts.place(said)) in places:
+            return next((name for name, outline in rooms.items() if contains(outline, start)), next(iter(rooms), ""))
+        if (found := self.facts.place(said)) in rooms:
             return str(found)
-        raise InputError(f"there is no room '{said}'", hint=suggestion(said, places), file=self.folder)
+        raise InputError(f"there is no room '{said}'", hint=suggestion(said, rooms), file=self.folder)
 
 
 @contextmanager

@@ -16,6 +16,7 @@ class Addition(StrEnum):
     PERSON = "person"
     DOCK = "dock"
     ROOM = "room"
+    PLACE = "place"
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,17 @@ def test_a_room_gets_its_name_in_all_facts(own):
     assert "there is a 'den' already" in refusal("world", "add", "room", own, "den", "--in", "room 2")
 
 
+def test_a_named_pose_is_a_place_to_go_to_and_no_room(own):
+    assert add("place", own, "pump", "--at", 3.5, 1.5, 1.57).endswith("pump at (3.50, 1.50, 1.57)\n")
+    knowledge = load_knowledge(own / "knowledge.yaml")
+    assert (knowledge.poses, set(knowledge.rooms)) == (("pump",), {"room 1", "room 2"})
+    checked = executive.check("go to the pump", world=str(own))
+    assert checked.ok
+    assert [str(command) for command in checked.trees[0].commands] == [
+        "Take [Nothing] to [pump] and do [Nothing] to [Nothing]"
+    ]
+
+
 @pytest.mark.parametrize("kind", ["table", "desk", "shelf"])
 def test_furniture_stands_at_a_wall_and_the_robot_finds_an_object_on_it(own, kind):
     add(kind, own, "big one", "--in", "room 1")

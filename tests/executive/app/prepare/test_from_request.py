@@ -207,6 +207,20 @@ def test_a_mask_is_read_again_before_each_run_and_refused_where_it_cannot_be(tmp
     assert (caught.value.file, caught.value.line) == (tmp_path / "mask.yaml", 1)
 
 
+@pytest.mark.parametrize(("at", "right"), [("x: 8.4, y: 6.5", True), ("x: 7.5, y: 8.6", False), ("x: -3, y: 1", False)])
+def test_a_named_pose_of_a_mission_is_on_free_ground(tmp_path, at, right):
+    pump = f"knowledge:\n  places:\n    pump: {{pose: {{{at}}}}}\n"
+    file = tmp_path / "go.yaml"
+    file.write_text(f"name: go\n{pump}steps: [{{to: pump}}]\n", encoding="utf-8")
+    if right:
+        (command,) = prepare(Request(file=file), ask=None).tree.commands
+        assert command.goal == "pump"
+        return
+    with pytest.raises(InputError, match=r"places\.pump: .* is in an obstacle or outside of flat") as caught:
+        prepare(Request(file=file), ask=None)
+    assert (caught.value.file, caught.value.line) == (file, 4)
+
+
 def test_people_of_a_variation_walk_in_the_world(tmp_path):
     request = Request("bring me a beer", world="flat", seed=2, out=tmp_path, variation=Variation(people=2))
     walking = {each.name for each in place_people(prepare(request, ask=None).world, 2) if each.route is not None}

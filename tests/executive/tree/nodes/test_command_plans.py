@@ -3,8 +3,14 @@
 from executive.app.runs.goal_conditions import conditions_of
 from executive.run.outcome import Outcome
 from executive.tree.board import Constant
+from executive.tree.compiler import compile_mission
+from executive.words.command import Command
 from executive.words.goal import GoalKind
+from executive.words.knowledge import Place, Pose
+from executive.words.leaf_steps import steps_of_commands
+from executive.words.mission import Mission
 from skills.api import Succeeded
+from skills.robot import Pose2D
 
 TWO = (
     "Take [Nothing] to [kitchen] and do [grasp] to [2 drink]",
@@ -41,6 +47,19 @@ def test_the_condition_is_one_of_two_things(compiled, run_tree, knowledge, scrip
     tree = compiled(*TWO)
     grasped, placed = conditions_of(tree, run_tree(tree).robots[0])
     assert (grasped.kind, grasped.count, placed.kind, placed.count) == (GoalKind.GRASPED, 2, GoalKind.PLACED, 2)
+
+
+def test_a_named_pose_is_taken_exactly_and_a_room_nearly(knowledge, registry):
+    pump = Place(pose=Pose(x=4.0, y=0.5, yaw=1.0))
+    knowledge = knowledge.model_copy(update={"places": {**knowledge.places, "pump": pump}})
+    steps = steps_of_commands([Command(goal="pump"), Command(goal="kitchen")])
+    tree = compile_mission(Mission(name="go", robot="Alice", steps=steps), knowledge=knowledge, registry=registry)
+    steps = (node for node in tree.root.walk() if node.name == "navigate" and "/watch/" not in node.path_id)
+    drives = [node.options["inputs"] for node in steps]
+    assert (drives[0]["goal"], drives[0]["position_tolerance_m"]) == (Constant(Pose2D(4.0, 0.5, 1.0)), Constant(0.08))
+    assert len(drives) == 2 and "position_tolerance_m" not in drives[1]
+    (at_pump, _) = (part.goal.goal[0] for part in tree.parts)
+    assert at_pump.contains((4.2, 0.5, 0.5)) and not at_pump.contains((4.4, 0.5, 0.5))
 
 
 GET = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"

@@ -238,7 +238,7 @@ def test_the_speaker_is_followed_and_guided_without_a_search(compiled):
 def test_following_ends_in_the_room_of_the_goal(compiled, knowledge):
     tree = compiled("Take [Nothing] to [counter] and do [follow] to [Robin]")
     (leaf,) = [node for node in tree.mission.walk() if node.name == "follow_person"]
-    assert leaf.options["inputs"]["until_W"] == Constant(knowledge.places["kitchen"].polygon)
+    assert leaf.options["inputs"]["until_W"] == Constant(knowledge.rooms["kitchen"])
 
 
 @pytest.mark.parametrize(

@@ -74,10 +74,8 @@ class CollisionGuard:
         """
         velocity, options = self._velocity_W(here), self._options
         speed = math.hypot(velocity[0], velocity[1]) + abs(float(velocity[2])) * self.footprint.circumscribed_m
-        if speed < 0.05:
-            return None
         near = np.ascontiguousarray(returns_W[np.hypot(*(returns_W[:, :2] - (here.x_m, here.y_m)).T) < 1.5 + speed, :2])
-        if len(near) < options.least_points:
+        if len(near) < options.least_points or speed < 0.05:
             return None
         until_s = options.reaction_s + 0.5 * speed / options.stop_m_s2
         times = np.linspace(0.0, until_s, 1 + math.ceil(speed * until_s / 0.05))

@@ -6,7 +6,7 @@ import math
 import zlib
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -89,7 +89,7 @@ class Camera(NoisySensor):
         if visual:
             self._work[f"pictures_{lens.width}x{lens.height}"] += 1
             colour = self._picture.colour(self._scene.picture(positions, self._number, depth=False))
-        grey = _NO_PICTURE if colour is None else _grey(colour)
+        grey = _NO_PICTURE if colour is None else np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
         return Image(
             stamp_s=stamp_s,
             source=self.spec.name,
@@ -108,10 +108,6 @@ class Camera(NoisySensor):
         small = np.asarray(cv2.resize(grey, (lens.width, lens.height)), dtype=np.uint8) if grey.size else None
         self._work[f"depth_pictures_{lens.width}x{lens.height}"] += 1
         return self._depth.depth(scene.picture(positions, self._number, depth=True), small)
-
-
-def _grey(colour: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    return np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
 
 
 _DOCKED_WITHIN_M = 0.2
@@ -153,23 +149,16 @@ class SensorSuite(
         self._body, self._index = body, joints
         self._dock, self._context = body.robot.dock, options.context
         self._kinematics = body.plant.CreateDefaultContext()
-        rngs = _generators(options.seed, body.name)
+        seeds = np.random.SeedSequence([options.seed, zlib.crc32(body.name.encode())]).spawn(6 + len(cameras))
+        rngs = map(np.random.default_rng, seeds)
         self._odometry_model = OdometryModel(next(rngs))
         self._imu_model = ImuModel(next(rngs))
         self._joint_model = JointModel(next(rngs), joints.names)
         self._gripper_model = GripperModel(next(rngs), gripper_noise)
         self._battery_model = BatteryModel(next(rngs), body.robot.charge, BatterySpec(runtime_s=runtime_s))
         self._lidar_period_s = lidar.period_s
-        self._lidar = Lidar(
-            body.plant,
-            options.scene_graph.model_inspector(),
-            lidar.link,
-            lidar.X_LinkL,
-            next(rngs),
-            unseen=body.instances(),
-            spec=lidar.spec,
-            work=options.work,
-        )
+        mount = body.plant, options.scene_graph.model_inspector(), lidar.link, lidar.X_LinkL
+        self._lidar = Lidar(*mount, next(rngs), unseen=body.instances(), spec=lidar.spec, work=options.work)
         self._cameras = {
             name: Camera(spec, self._link_frame(spec.link), next(rngs), scene=options.scene, work=options.work)
             for name, spec in cameras.items()
@@ -193,12 +182,12 @@ class SensorSuite(
         self._now_s = now_s
         X_WB = plant.EvalBodyPoseInWorld(self._context, self._body.body)
         V_WB = plant.EvalBodySpatialVelocityInWorld(self._context, self._body.body)
-        w_WB, v_WB = _array(V_WB.rotational()), _array(V_WB.translational())
+        w_WB, v_WB = V_WB.rotational(), V_WB.translational()
         self.odometry: Odometry = self._odometry_model.update(now_s, self._reckoned(X_WB), w_WB, v_WB)
         self.imu: Imu = self._imu_model.update(now_s, X_WB, w_WB, v_WB)
-        self._whole = _array(plant.GetPositions(self._context))
+        self._whole = plant.GetPositions(self._context)
         positions = self._whole[index.positions]
-        rates = _array(plant.GetVelocities(self._context)[index.velocities])
+        rates = plant.GetVelocities(self._context)[index.velocities]
         efforts = self._efforts(positions, rates)
         self.joints: Joints = self._joint_model.update(now_s, positions, rates, efforts)
         self.gripper: Gripper = self._gripper_model.update(now_s, *self._gripper_feels(positions, rates, efforts))
@@ -236,20 +225,14 @@ class SensorSuite(
         last = {frame: plant.GetJointByName(joints[-1], instance) for frame, joints in moved.items()}
         return {last[frame].child_body().name(): (frame, joints) for frame, joints in moved.items()}
 
-    def _frames_of_links(self) -> Mapping[str, tuple[str, RigidTransform]]:
-        """Frames of hand and head, by link: name of the frame and its pose in the body frame."""
-        joints = tuple(name for _, names in self._chains.values() for name in names)
-        poses = zip(self._chains.items(), self._X_BLinks(joints, tuple(self._chains)), strict=True)
-        return {link: (frame, X_BF) for (link, (frame, _)), X_BF in poses}
-
     def _efforts(self, positions: FloatArray, rates: FloatArray) -> FloatArray:
         """Efforts of the motors: the servo law with its limits, as in the solver at the end of a step."""
         plant, instance = self._body.plant, self._body.instance
         servos = plant.get_desired_state_input_port(instance)
         if not servos.HasValue(self._context):
             return np.zeros(len(positions))
-        desired = _array(servos.Eval(self._context))
-        feed_forward = _array(plant.get_actuation_input_port(instance).Eval(self._context))
+        desired = servos.Eval(self._context)
+        feed_forward = plant.get_actuation_input_port(instance).Eval(self._context)
         return self._index.efforts_of(desired, feed_forward, positions, rates)
 
     def _docked(self, X_WB: RigidTransform, v_WB: FloatArray) -> bool:
@@ -273,33 +256,16 @@ class SensorSuite(
 
     def _frames(self) -> FrameTree:
         """Builds the frame tree from odometry and joint encoders."""
-        links = self._frames_of_links()
+        plant, context, instance = self._body.plant, self._kinematics, self._body.instance
+        positions, body = plant.GetPositions(context), self._body.body.body_frame()
+        for name in (name for _, names in self._chains.values() for name in names):
+            positions[plant.GetJointByName(name, instance).position_start()] = self.joints.position_rad[name]
+        plant.SetPositions(context, positions)
         edges = {"body": ("odom", self.odometry.X_OB), "lidar": ("body", self._X_BL())}
-        edges |= {frame: ("body", X_BF) for frame, X_BF in links.values()}
+        for link, (frame, _) in self._chains.items():
+            link_frame = plant.GetBodyByName(link, instance).body_frame()
+            edges[frame] = ("body", plant.CalcRelativeTransform(context, body, link_frame))
         for camera in self._cameras.values():
-            frame = links[camera.spec.link][0] if camera.spec.link in links else "body"
+            frame = self._chains[camera.spec.link][0] if camera.spec.link in self._chains else "body"
             edges[camera.spec.frame] = (frame, camera.spec.X_link_camera())
         return FrameTree(edges)
-
-    def _X_BLinks(self, joint_names: tuple[str, ...], links: tuple[str, ...]) -> list[RigidTransform]:
-        """Poses of links in the body frame, with the named joints at their encoder positions."""
-        plant, instance = self._body.plant, self._body.instance
-        positions = plant.GetPositions(self._kinematics)
-        for name in joint_names:
-            positions[plant.GetJointByName(name, instance).position_start()] = self.joints.position_rad[name]
-        plant.SetPositions(self._kinematics, positions)
-        frames = [plant.GetBodyByName(link, instance).body_frame() for link in links]
-        body = self._body.body.body_frame()
-        return [plant.CalcRelativeTransform(self._kinematics, body, frame) for frame in frames]
-
-
-def _generators(seed: int, robot_name: str) -> Iterator[np.random.Generator]:
-    """Yields independent random generators; the same seed and name give the same ones."""
-    sequence = np.random.SeedSequence([seed, zlib.crc32(robot_name.encode())])
-    while True:
-        (child,) = sequence.spawn(1)
-        yield np.random.default_rng(child)
-
-
-def _array(values: object) -> FloatArray:
-    return np.asarray(values, dtype=np.float64)

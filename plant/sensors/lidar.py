@@ -70,7 +70,7 @@ def cast_rays(
         half = (half_extents[i, 0], half_extents[i, 1], half_extents[i, 2])
         first, count = _columns_spanned(X_LG, half, azimuths)
         for k in range(first, first + count):
-            column = k % columns
+            column = k - columns * (k >= columns) + columns * (k < 0)
             if farthest[column] <= nearest[i]:
                 continue
             c, s = cos_a[column], sin_a[column]

@@ -46,7 +46,7 @@ def _compiler() -> Any:
     """Imports numba and returns njit."""
     from numba import njit
 
-    # numba imports scipy.linalg, which takes 70 ms, to see whether it offers BLAS, which no loop here calls
+    # numba imports scipy.linalg, which takes 70 ms, to see whether it offers BLAS, which few loops call
     if sys.modules.setdefault("scipy.linalg", None) is None:  # type: ignore[arg-type]
         import numba.np.arraymath  # noqa: F401
 

@@ -231,8 +231,10 @@ def _passed(beams: Beams, places: FloatArray, cell_m: float) -> NDArray[np.bool_
     ranges, elevations, azimuths = beams
     count = azimuths.shape[0]
     spacing = azimuths[1] - azimuths[0]
-    ring_gap = abs(elevations[1] - elevations[0])
+    ring_gap = abs(elevations[1] - elevations[0]) if elevations.shape[0] > 1 else abs(spacing)
     lowest, highest = elevations.min() + 0.5 * ring_gap, elevations.max()
+    if elevations.shape[0] == 1:
+        lowest, highest = highest - ring_gap, highest + ring_gap
     free = np.zeros(places.shape[0], dtype=np.bool_)
     hidden = np.zeros(places.shape[0], dtype=np.bool_)
     for n in range(places.shape[0]):

@@ -70,7 +70,10 @@ def match(
     for iteration in range(options.iterations):
         outlier_m = options.coarse_outlier_m if iteration < coarse else options.outlier_m
         hessian, gradient, inliers = surfaces(points_F, pose, weight, outlier_m, options.inlier_m)
-        if _newton_step(hessian, gradient, information, mean, pose) < _CONVERGED and iteration > coarse:
+        hessian += information
+        step = np.linalg.solve(hessian, gradient + information @ (pose - mean))  # a compiled loop would import SciPy
+        pose -= step
+        if np.abs(step).sum() < _CONVERGED and iteration > coarse:
             break
     matched = Pose2D(float(pose[0]), float(pose[1]), wrap(float(pose[2])))
     return Match(matched, np.asarray(np.linalg.inv(hessian), dtype=np.float64), inliers / max(1, len(points_F)))
@@ -79,18 +82,6 @@ def match(
 def score_poses(grid: GridMap, points_F: FloatArray, poses: FloatArray, reach_m: float = 0.3) -> FloatArray:
     """Scores of poses (K, 3) x, y, yaw: 1 when all points lie on surfaces, 0 when none lies within reach_m of one."""
     return _score(grid.distance, grid.frame, points_F, poses, reach_m)
-
-
-@compiled
-def _newton_step(
-    hessian: FloatArray, gradient: FloatArray, information: FloatArray, mean: FloatArray, pose: FloatArray
-) -> float:
-    """Adds the prior to the hessian and gradient, and moves the pose, all in place; returns the size of the step."""
-    hessian += information
-    gradient += information @ (pose - mean)
-    step = np.linalg.solve(hessian, gradient)
-    pose -= step
-    return float(np.abs(step).sum())
 
 
 @compiled

@@ -82,8 +82,8 @@ class ParticleFilter:
     def __init__(self, grid: GridMap, options: FilterOptions) -> None:
         self._grid, self._options = grid, options
         self._rng = np.random.default_rng(options.seed)
-        self._field = _likelihood_field(grid, options)
-        self._standable = _standable(grid)
+        field, self._standable = _likelihood_field(grid, options), _standable(grid)
+        self._fields = field, float(field.min()), self._standable
         if not self._standable.any():
             raise InputError(
                 "the map has no free ground where a robot could be", hint="check its picture and thresholds"
@@ -163,7 +163,7 @@ class ParticleFilter:
 
     def log_likelihoods(self, poses: FloatArray, points_F: FloatArray) -> FloatArray:
         """The mean log likelihood (N,) of the beams at each pose."""
-        return _log_likelihoods(self._field, self._standable, self._grid.frame, poses, points_F)
+        return _log_likelihoods(self._fields, self._grid.frame, poses, points_F)
 
     def resample(self, injected: FloatArray | None = None) -> None:
         """Draws as many particles as the KL divergence requires; adds the `injected` ones (K, 3) with equal weights."""
@@ -265,11 +265,14 @@ def _spread(poses: FloatArray, weights: FloatArray) -> tuple[Pose2D, FloatArray]
 
 @compiled
 def _log_likelihoods(
-    field: NDArray[np.float32], standable: NDArray[np.bool_], geometry: Triple, poses: FloatArray, points: FloatArray
+    fields: tuple[NDArray[np.float32], float, NDArray[np.bool_]],
+    geometry: Triple,
+    poses: FloatArray,
+    points: FloatArray,
 ) -> FloatArray:
     """Compiled loop of `log_likelihoods`. A pose where no robot can stand loses _IN_WALL."""
+    field, least, standable = fields  # `least` is that of a beam that ends beyond the field
     rows, columns = field.shape
-    least = float(field.min())
     sums = np.empty(poses.shape[0])
     for k in range(poses.shape[0]):
         x0, y0 = (poses[k, 0] - geometry[1]) / geometry[0], (poses[k, 1] - geometry[2]) / geometry[0]

@@ -46,8 +46,7 @@ class ArmShape:
         self._q[self._numbers] = [joints.position_rad[name] for name in self._names]
         self._plant.SetPositions(self._context, self._q)
         poses = [link.CalcPose(self._context, self._body) for link in self._links]
-        tip = poses[-1] @ np.array([self._hand_m, 0.0, 0.0])
-        return np.array([*(pose.translation() for pose in poses), tip])
+        return np.array([*(pose.translation() for pose in poses), poses[-1] @ np.array([self._hand_m, 0.0, 0.0])])
 
 
 @dataclass(frozen=True)

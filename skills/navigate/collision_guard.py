@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from skills.api import ReturnsView, SkillContext
-from skills.navigate.footprint import Footprint, disc_centres
+from skills.navigate.footprint import Footprint, disc_centres, outline_distances_m
 from skills.navigate.path import progress_m
 from skills.perception.moving_objects import Moving, MovingOptions, MovingWatch
 from skills.quantities import Acceleration, Count, Delay, Duration, Length, Margin, Speed, Turn
@@ -74,13 +74,13 @@ class CollisionGuard:
         """
         velocity, options = self._velocity_W(here), self._options
         speed = math.hypot(velocity[0], velocity[1]) + abs(float(velocity[2])) * self.footprint.circumscribed_m
-        near = returns_W[np.hypot(returns_W[:, 0] - here.x_m, returns_W[:, 1] - here.y_m) < 1.5 + speed, :2]
+        near = np.ascontiguousarray(returns_W[np.hypot(*(returns_W[:, :2] - (here.x_m, here.y_m)).T) < 1.5 + speed, :2])
         if len(near) < options.least_points or speed < 0.05:
             return None
         until_s = options.reaction_s + 0.5 * speed / options.stop_m_s2
-        times = np.linspace(0.0, until_s, 1 + math.ceil(speed * until_s / 0.05))[1:]
-        then_m = self._apart_m(_coasting(here, velocity, times), near).min(axis=0, initial=math.inf)
-        now_m = self._apart_m(_coasting(here, velocity, np.zeros(1)), near)[0]
+        times = np.linspace(0.0, until_s, 1 + math.ceil(speed * until_s / 0.05))
+        apart_m = outline_distances_m(self.footprint.discs, _coasting(here, velocity, times), near)
+        now_m, then_m = apart_m[0], apart_m[1:].min(axis=0, initial=math.inf)
         hit = near[(then_m < options.touch_m) & (then_m < now_m - 0.02)]
         return None if len(hit) < options.least_points else tuple(hit.mean(axis=0).tolist())
 
@@ -121,12 +121,6 @@ class CollisionGuard:
         gained = np.minimum(speed + self._options.acceleration_m_s2 * times, max(most_m_s, speed))
         driven = np.concatenate([[0.0], np.cumsum(0.5 * (gained[1:] + gained[:-1]) * np.diff(times))])
         return np.asarray(path[np.minimum(np.searchsorted(progress_m(path), driven), len(path) - 1)])
-
-    def _apart_m(self, poses: FloatArray, points_W: FloatArray) -> FloatArray:
-        """Distances (N, points) from the outline at poses to points."""
-        centres = disc_centres(self.footprint.discs, poses)
-        x, y = (centres[:, :, None, axis] - points_W[:, axis] for axis in (0, 1))
-        return np.asarray(np.min(np.sqrt(x * x + y * y) - self.footprint.discs[None, :, 2:3], axis=1))
 
     def _velocity_W(self, here: Pose2D) -> FloatArray:
         """The body's velocity (vx, vy, wz) in world coordinates."""

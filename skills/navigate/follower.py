@@ -106,8 +106,7 @@ class PathFollower:
         here = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
         off_path_m = self._project(here)
         along = float(self._progress[self._index])
-        now_m = float(footprint_clearance_m(costmap, self._footprint, here[None, :])[0])
-        free_m, blocked_at = self._free_distance(costmap, now_m)
+        now_m, free_m, blocked_at = self._free_distance(costmap, here)
         in_time = math.sqrt(2.0 * self._options.braking_m_s2 * free_m)
         by_clearance = float(speed_by_clearance(now_m, self._options))
         speed = min(float(self._limits[self._index]), in_time, by_clearance, most_m_s)
@@ -163,24 +162,24 @@ class PathFollower:
         most = most * options.period_s * np.where(np.abs(velocity) < np.abs(last), 2.0, 1.0)
         return np.asarray(last + np.clip(velocity - last, -most, most))
 
-    def _free_distance(self, costmap: FreeSpace, now_m: float) -> tuple[float, tuple[float, float] | None]:
-        """Free distance (m) ahead, minus a reserve, and the position of the first obstacle within it.
+    def _free_distance(self, costmap: FreeSpace, here: FloatArray) -> tuple[float, float, tuple[float, float] | None]:
+        """Clearance (m), free distance (m) ahead, minus a reserve, and the position of the first obstacle within it.
 
-        When the present clearance `now_m` is small already, the path counts as blocked only where the clearance falls
-        below it.
+        When the present clearance is small already, the path counts as blocked only where the clearance falls below it.
         """
         options = self._options
         end = int(np.searchsorted(self._progress, self._progress[self._index] + options.look_m))
         poses = self._path.poses[self._index : end + 1 : 2]
-        clearance = footprint_clearance_m(costmap, self._footprint, poses)
-        blocked = np.flatnonzero(clearance < min(options.touch_m, now_m - 0.02))
+        clearance = footprint_clearance_m(costmap, self._footprint, np.vstack([here, poses]))
+        now_m = float(clearance[0])
+        blocked = np.flatnonzero(clearance[1:] < min(options.touch_m, now_m - 0.02))
         if len(blocked) == 0:
-            return options.look_m, None
+            return now_m, options.look_m, None
         first = int(blocked[0])
         free_m = self._progress[self._index + 2 * first] - self._progress[self._index]
         centres = disc_centres(self._footprint.discs, poses[first : first + 1])[0]
         worst = int(np.argmin(costmap.clearance_m(centres) - self._footprint.discs[:, 2]))
-        return max(0.0, float(free_m) - _RESERVE_M), (float(centres[worst, 0]), float(centres[worst, 1]))
+        return now_m, max(0.0, float(free_m) - _RESERVE_M), (float(centres[worst, 0]), float(centres[worst, 1]))
 
     def _brake(self, velocity: FloatArray, here: FloatArray, costmap: FreeSpace) -> FloatArray:
         """The velocity, or a fraction of it that keeps the outline clear of obstacles for the next half second.

@@ -95,16 +95,33 @@ def pose_array(poses: Sequence[Pose2D]) -> FloatArray:
     return np.array([(p.x_m, p.y_m, p.yaw_rad) for p in poses], dtype=np.float64).reshape(-1, 3)
 
 
+@compiled
 def disc_centres(discs: FloatArray, poses: FloatArray) -> FloatArray:
     """World (x, y) of all discs (N, discs, 2) at poses (N, 3)."""
-    c, s = np.cos(poses[:, 2:3]), np.sin(poses[:, 2:3])
-    x, y = discs[:, 0], discs[:, 1]
-    return np.stack([poses[:, 0:1] + c * x - s * y, poses[:, 1:2] + s * x + c * y], axis=-1)
+    centres = np.empty((poses.shape[0], discs.shape[0], 2))
+    for n in range(poses.shape[0]):
+        c, s = math.cos(poses[n, 2]), math.sin(poses[n, 2])
+        for k in range(discs.shape[0]):
+            centres[n, k, 0] = poses[n, 0] + c * discs[k, 0] - s * discs[k, 1]
+            centres[n, k, 1] = poses[n, 1] + s * discs[k, 0] + c * discs[k, 1]
+    return centres
+
+
+@compiled
+def outline_distances_m(discs: FloatArray, poses: FloatArray, points_W: FloatArray) -> FloatArray:
+    """Distances (N, M) in metres from the outline at poses (N, 3) to points (M, 2)."""
+    centres, least = disc_centres(discs, poses), np.full((poses.shape[0], points_W.shape[0]), np.inf)
+    for n in range(poses.shape[0]):
+        for k in range(discs.shape[0]):
+            for m in range(points_W.shape[0]):
+                x, y = centres[n, k, 0] - points_W[m, 0], centres[n, k, 1] - points_W[m, 1]
+                least[n, m] = min(least[n, m], math.sqrt(x * x + y * y) - discs[k, 2])
+    return least
 
 
 def footprint_clearance_m(costmap: FreeSpace, footprint: Footprint, poses: FloatArray) -> FloatArray:
     """Distance (m) from the outline to the nearest obstacle at (N, 3) poses x, y, yaw; negative in collision."""
-    centres = disc_centres(footprint.discs, poses)
+    centres = disc_centres(footprint.discs, np.ascontiguousarray(poses))
     clearance = costmap.clearance_m(centres.reshape(-1, 2)).reshape(centres.shape[:2])
     return np.asarray(np.min(clearance - footprint.discs[:, 2], axis=1))
 

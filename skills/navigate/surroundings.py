@@ -11,7 +11,7 @@ from skills.doorway import Doorway
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.cut_off import DoorOptions, DoorWatch
-from skills.navigate.footprint import Footprint, disc_centres, pose_array, with_discs
+from skills.navigate.footprint import Footprint, outline_distances_m, pose_array, with_discs
 from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
 from skills.navigate.path import progress_m
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, ScanHealthOptions, WatchOptions
@@ -53,9 +53,7 @@ class SpaceOptions:
 def outline_distance_m(footprint: Footprint, poses: FloatArray, people: Sequence[SeenPerson]) -> FloatArray:
     """Distances (N, people) in metres from the outline at poses (N, 3) to the axes of people."""
     places = np.array([one.place_W for one in people], dtype=np.float64).reshape(-1, 2)
-    centres = disc_centres(footprint.discs, poses)
-    offsets = np.linalg.norm(centres[:, :, None, :] - places[None, None, :, :], axis=3)
-    return np.asarray(np.min(offsets - footprint.discs[None, :, 2:3], axis=1))
+    return np.asarray(outline_distances_m(footprint.discs, np.ascontiguousarray(poses), places))
 
 
 def with_people(

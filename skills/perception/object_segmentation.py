@@ -309,7 +309,7 @@ def _covered(window: Window, inside: Mask) -> float:
     """Fraction of the box that the bounding box of the pixels `inside` fills."""
     if not np.any(inside):
         return 0.0
-    (left, right), (top, bottom) = np.percentile(window.u[inside], [1, 99]), np.percentile(window.v[inside], [1, 99])
+    (left, right), (top, bottom) = np.percentile([window.u[inside], window.v[inside]], [1, 99], axis=1).T
     u0, v0, u1, v1 = window.box
     return float(min((right - left) * (bottom - top) / max((u1 - u0) * (v1 - v0), 1e-6), 1.0))
 

@@ -189,14 +189,11 @@ def _cluster(points: PointCloud, surface: str, plane: LevelPlane, p_WC: FloatArr
 
 def matching_cluster(clusters: tuple[Cluster, ...], detected: Detection3D) -> Cluster | None:
     """Cluster near a detected object whose box overlaps the detection's box most; None when none does."""
-    near = [one for one in clusters if _apart(one, detected) < _SAME_OBJECT_M + 0.5 * one.shape.length_m]
+    centre, most_m = detected.position_W[:2], _SAME_OBJECT_M
+    near = [one for one in clusters if np.linalg.norm(centre - one.shape.centre) < most_m + 0.5 * one.shape.length_m]
     overlaps = {id(one): box_overlap(one.box, detected.detection.box) for one in near}
     best = max(near, key=lambda one: overlaps[id(one)], default=None)
     return best if best is not None and overlaps[id(best)] > _LEAST_OVERLAP else None
-
-
-def _apart(cluster: Cluster, detected: Detection3D) -> float:
-    return float(np.linalg.norm(np.array(cluster.shape.centre) - detected.position_W[:2]))
 
 
 def split_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:

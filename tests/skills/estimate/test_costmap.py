@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from planar_robot import Bench, Box
 
+from skills.estimate.costmap import clear_cells
 from skills.robot import Pose2D
 
 START = Pose2D(1.5, 5.4, 0.0)
@@ -85,3 +86,18 @@ def test_returns_from_a_reported_robot_are_left_out_but_unexplained():
     bench.costmap.exclude_robots(np.empty((0, 3)))
     ticked(bench)
     assert bench.costmap.clearance_m(AT_PERSON)[0] < 0.05
+
+
+@pytest.mark.parametrize(
+    ("range_m", "height_m", "is_cleared"), [(5.0, 0.4, True), (2.0, 0.4, False), (5.0, 0.2, False)]
+)
+def test_the_beams_of_a_single_ring_clear_the_cells_at_their_height(range_m, height_m, is_cleared):
+    azimuths = np.linspace(-np.pi, np.pi, 900, endpoint=False)
+    elevations = np.array([0.0, 1.0])[:1]  # the number behind it in memory is no ring
+    beams = np.full((1, 900), range_m, dtype=np.float32), elevations, azimuths
+    until_s, heights_m = np.full((100, 100), -np.inf), np.full((100, 100), height_m)
+    until_s[20, 60] = 12.0
+    sensor_pose, cells = (np.eye(3), np.array([0.0, 0.0, 0.4])), np.array([[20, 60]])
+    found = clear_cells(beams, sensor_pose, (1.0, 1.0, 0.0), (0.05, 0.0, 0.0), cells, until_s, heights_m)
+    assert found == is_cleared
+    assert (until_s[20, 60] < 0.0) == is_cleared

@@ -36,6 +36,8 @@ __all__ = ["Request", "check", "evaluate", "load_world", "parse", "run_mission"]
 
 for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"):
     os.environ.setdefault(_variable, "1")  # the same results on any number of cores, which missions share
+os.environ.setdefault("OPENCV_IPP", "disabled")  # its distance transform rounds one way or another from run to run
+os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # else it warns of that
 os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", "64000000")  # a small file may decompress to more than the memory
 
 

@@ -80,7 +80,9 @@ def running(nested):
     feed("activity", 2.0, {"t": 2.0, "robot": "Alice", "node": wait, "message": LONG})
     state = {"holding": True, "charge": 0.9, "localised": True, "position_sigma_m": 0.02, "speed_m_s": 0.4}
     feed("state", 2.0, {"robot": "Alice", **state})
-    with PageServer(PageContent(feed, {name: lambda values: "" for name in ("pause", "step", "cancel", "stop", "say", "queue")})) as server:
+    with PageServer(
+        PageContent(feed, {name: lambda values: "" for name in ("pause", "step", "cancel", "stop", "say", "queue")})
+    ) as server:
         yield server.url
 
 
@@ -116,7 +118,9 @@ def several(nested, knowledge):
         feed("state", 0.7, {"robot": name, **state})
     row = {"sentence": f"fetch it {LONG}", "robot": "Alice", "outcome": "running", "message": LONG, "reassigned": 2}
     feed("missions", 1.0, {"missions": [{"id": number, **row} for number in range(3)]})
-    with PageServer(PageContent(feed, {name: lambda values: "" for name in ("pause", "step", "cancel", "stop", "say")})) as server:
+    with PageServer(
+        PageContent(feed, {name: lambda values: "" for name in ("pause", "step", "cancel", "stop", "say")})
+    ) as server:
         yield server.url
 
 

@@ -217,7 +217,7 @@ _LONG_TEXT: Final = 100
 """Longest reason that fits on the line of its verdict, in characters."""
 _QUOTED: Final = r"""“[^”]*”|"[^"]*"|(?<!\w)'(?:[^']|(?<=\w)'(?=\w))*'(?!\w)"""
 """Quotation; an apostrophe within a word does not end it."""
-_SENTENCE: Final = re.compile(rf"(?:{_QUOTED}|\S|(?<![.!?;])\s)+")
+_SENTENCE: Final = re.compile(rf"(?:{_QUOTED}|\S|(?<![.!?;])\s|(?<=[.!?])\s(?=[a-z]))+")
 _MOST_NAMED: Final = 3
 """Number of missions that a title names."""
 NOT_JUDGED: Final = RefereeReport(None, "there is no referee", 0, 0)

@@ -52,7 +52,7 @@ def test_space_pauses_and_x_stops_until_the_key_is_pressed_again(control, key, m
 
 
 def test_s_steps_from_a_running_mission(control):
-    assert pressed(control, "s").mode is Mode.PAUSED
+    assert pressed(control, "s").mode is Mode.STEPPING
     assert control.poll().hold is None
     control.note_tick(changed=True)
     assert control.poll().hold == "stepping"

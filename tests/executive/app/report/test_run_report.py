@@ -40,6 +40,7 @@ def test_a_long_verdict_is_a_list_of_its_sentences():
         ('It said "Dinner is ready. Come!" It left.', ('It said "Dinner is ready. Come!" It left.',)),
         ("it said “One. Two; three.”; it left", ("it said “One. Two; three.”;", "it left")),
         ("it heard 'Stop. It's hot!' at 2 s. It stood.", ("it heard 'Stop. It's hot!' at 2 s.", "It stood.")),
+        ("Do you want a drink? no; greeted Robin", ("Do you want a drink? no;", "greeted Robin")),
         ('a stray " mark. Goes on', ('a stray " mark.', "Goes on")),
     ],
 )

@@ -234,7 +234,7 @@ def _cells(keys: NDArray[np.int64]) -> Cells:
 def add_view(views: Sequence[View], image: Image, X_WO: RigidTransform) -> tuple[View, ...]:
     """Returns the last views and a new one, with every eighth row and column of the image's depth."""
     lens, thin = image.depth_intrinsics, _STRIDE_PX
-    depth_m = image.depth_m[thin // 2 :: thin, thin // 2 :: thin]
+    depth_m = image.depth_m[thin // 2 :: thin, thin // 2 :: thin].copy()  # a slice would keep the whole image
     lens = Intrinsics(
         width=depth_m.shape[1],
         height=depth_m.shape[0],

@@ -120,6 +120,11 @@ def test_only_the_last_views_are_stored():
     assert len(views) == 32
 
 
+def test_a_view_does_not_keep_the_whole_image_in_memory():
+    ((view, _),) = add_view((), picture(), RigidTransform())
+    assert view.depth_m.base is None
+
+
 def grid_of(*rectangles):
     """A grid of 2 m x 2 m with occupied rectangles (x0, y0, x1, y1) in m."""
     occupied = np.zeros((80, 80), dtype=bool)

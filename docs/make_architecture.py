@@ -73,11 +73,12 @@ REFEREE = Box(40, 540, 340, 80, "referee", ("knows the truth and judges afterwar
 APP = Box(1010, ROW, 130, 550, "app", ("the application:", "one request,", "prepared for", "its robots;", "one loop of runs;", "dispatch, report,", "evaluate", "", "puts all three", "together"))  # fmt: skip  # noqa: E501
 CLI = Box(1160, ROW, 120, 550, "cli", ("commands,", "options, output", "", "parse, check,", "tree, run,", "queue, resume,", "log, replay,", "evaluate"))  # fmt: skip  # noqa: E501
 PLUGINS = (
-    Box(40, 716, 215, 80, "errand-spot", ("serves Spot's API in simulation;", "drives a real Spot: a backend")),
-    Box(275, 716, 260, 80, "errand-make", ("objects, worlds and robots of your own;", "maps that the robot makes")),
-    Box(555, 716, 225, 80, "errand-train", ("data sets, training, makers of the", "shipped models and worlds")),
-    Box(800, 716, 150, 80, "errand-ros2", ("writes logs", "as ROS 2 bags")),
-    Box(970, 716, 290, 80, "yours", ("commands, backends, skills, components,", "robots, classes, doors, triggers")),
+    Box(40, 716, 200, 80, "errand-spot", ("serves Spot's API in simulation;", "drives a real Spot: a backend")),
+    Box(255, 716, 250, 80, "errand-make", ("objects, worlds and robots of your own;", "maps that the robot makes")),
+    Box(520, 716, 212, 80, "errand-train", ("data sets, training, makers of the", "shipped models and worlds")),
+    Box(747, 716, 110, 80, "errand-ros2", ("writes logs", "as ROS 2 bags")),
+    Box(872, 716, 130, 80, "errand-teleop", ("a robot driven", "by hand")),
+    Box(1017, 716, 243, 80, "yours", ("commands, backends, skills, robots,", "components, classes, doors, triggers")),
 )
 WALL = "plug-ins: import the core's public names; the core imports none, and finds them by entry points"
 TALL = (APP, CLI)

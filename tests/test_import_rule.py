@@ -57,7 +57,7 @@ SKILL_ROOMS = (
     ("skills.small",),
     ("skills.manipulation",),
     ("skills.people",),
-    ("skills.faults", "skills.teleop", "skills.testing"),
+    ("skills.faults", "skills.testing"),
 )
 """The rooms of skills, the lowest first; the lowest is the interface: modules beside the rooms, and `skills.inputs`."""
 NAMES_ABOVE = {

@@ -22,12 +22,12 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1848,
     "executive/testing": 848,
-    "executive/app": 8260,
-    "executive/cli": 4009,
-    "skills": 28128,
+    "executive/app": 8119,
+    "executive/cli": 3867,
+    "skills": 27785,
     "plant": 11263,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 422, 60, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 418, 61, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -1,4 +1,4 @@
-"""`errand doctor` looks at what a run needs on this machine, and names the mend for what is missing."""
+"""`errand doctor` looks at what a run needs on this machine; `errand warm-up` compiles the numeric code for it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
@@ -18,8 +19,8 @@ import typer
 
 from executive.cli.defaults import runs_folder
 from executive.cli.options import AS_JSON
-from executive.cli.output import console_for, finish
-from skills.inputs.errors import InputError
+from executive.cli.output import console_for, finish, progress_bar
+from skills.inputs.errors import InputError, Problems, count_text
 from skills.inputs.plugins import OURS
 
 _PYTHONS: Final = ((3, 11), (3, 13))
@@ -54,6 +55,22 @@ def doctor(as_json: AS_JSON = False, render: Annotated[bool, typer.Option("--ren
             console.print(f"{each.text}; {each.mend}" if each.mend else each.text, markup=False)
     good = all(each.good is not False for each in found)
     finish({"good": good, "findings": [asdict(each) for each in found]}, as_json, good=good)
+
+
+def warm_up() -> None:
+    """Compiles the numeric code for this machine, so that the first run begins at once."""
+    from executive.app.kernels import kernel_steps, newly_compiled
+
+    begun_s = time.monotonic()
+    steps = kernel_steps()
+    with progress_bar(console_for(False), "steps", len(steps)) as advance:
+        failed = Problems()
+        for step in steps:
+            with failed:
+                step()
+            advance()
+    typer.echo(f"{count_text(newly_compiled(), 'function')} compiled in {time.monotonic() - begun_s:.0f} s")
+    failed.raise_any()
 
 
 def _python() -> Iterator[Finding]:

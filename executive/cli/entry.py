@@ -63,14 +63,13 @@ COMMANDS: Final[Mapping[str, _Command]] = {
         "Run an evaluation file, or a mission at many seeds; count claims and the referee's verdicts.",
     ),
     "report": _Command("evaluate_command", "Open the report of a run, or report the results of an evaluation."),
-    "teleop": _Command("robot_command", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
     "detect": _Command("detect_command", "Find objects of the nine classes in pictures."),
     "stack": _Command("plugins_command", "What a robot uses: localiser, planners, controller, detector."),
     "skills": _Command("plugins_command", "List the skills for mission files, with their inputs."),
     "plugins": _Command("plugins_command", "List the installed plug-ins, what each registers, and errors in them."),
     "shell": _Command("shell_command", "Take one command after another in one process, which starts them faster."),
     "doctor": _Command("doctor_command", "Look at what a run needs on this machine; names the mend of each fault."),
-    "warm-up": _Command("robot_command", "Compile the numeric code for this machine, so that runs begin at once."),
+    "warm-up": _Command("doctor_command", "Compile the numeric code for this machine, so that runs begin at once."),
     "new": _Command("new_command", "Write an installable package with a skill, or with a robot."),
 }
 """Commands of Errand by name, in the order of the help; commands of plug-ins follow them."""
@@ -98,6 +97,7 @@ PLUGIN_COMMANDS: Final[Mapping[str, _PluginCommand]] = {
     "new.robot": _PluginCommand("errand-make", "Write a package with a robot from a URDF."),
     "dataset": _PluginCommand("errand-train", "Labelled pictures for the detector; training and scores."),
     "ros2": _PluginCommand("errand-ros2", "Logs as ROS 2 bags."),
+    "teleop": _PluginCommand("errand-teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
 }
 """Commands of this project's plug-ins by name, listed by the help also where they are not installed."""
 

@@ -126,6 +126,7 @@ def nothing_installed(monkeypatch):
         ("new robot x", "new robot", "errand-make"),
         ("ros2 bag", "ros2", "errand-ros2"),
         ("sdk", "sdk", "errand-spot"),
+        ("teleop --world flat", "teleop", "errand-teleop"),
     ],
 )
 def test_a_command_of_a_missing_plug_in_says_how_to_install_it(words, command, plug_in, nothing_installed):

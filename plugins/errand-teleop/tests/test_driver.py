@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from table_robot import CAPABILITIES, GRIPPER, MODEL, TableRobot, context_of
 
-from skills.teleop.driver import AXES, KEYS, Teleop, TeleopOptions, axis_values, read_axis_values
+from errand_teleop.driver import AXES, KEYS, Teleop, TeleopOptions, axis_values, read_axis_values
 from skills.testing.blocks import Block
 from skills.testing.estimators import BlockCostmap
 from skills.testing.robot import ScriptedRobot

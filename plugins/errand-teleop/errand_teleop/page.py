@@ -4,23 +4,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from executive.app.runs.backend import Scene
-from executive.app.runs.page_view import scene_actions
+from errand_teleop.driver import KEYS, Teleop, read_axis_values
 from executive.record.announce import map_message
 from executive.record.event_log import compress_picture, plain_values
-from executive.record.schemas import CONTROL, MAP
-from executive.run.control_state import ControlState, Mode
+from executive.run.control import Control
 from executive.run.robot_log import RobotLog
 from executive.view.feed import Feed
-from executive.view.page_control import Action, RefusedError, control_json
+from executive.view.page_control import RefusedError, control_json
 from executive.words.knowledge import Knowledge
 from plant.worlds.world import World
 from skills.api import SkillContext
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from skills.perception.detector.camera_images import turn_upright
-from skills.teleop.driver import KEYS, Teleop, read_axis_values
 
+MAP: Final = "map"
+CONTROL: Final = "control"
 CAMERA_PERIOD_S: Final = 0.2
 """Time between two pictures; the cameras take turns."""
 _PRESSED: Final = "the stop button is pressed; release it to drive"
@@ -60,13 +59,12 @@ class TeleopPage:
             self._picture_due_s, source = now_s + CAMERA_PERIOD_S, self._cameras[0]
             self._cameras = [*self._cameras[1:], source]
             picture, _ = turn_upright(self._context.robot.image(source, depth=False), ())
-            self._feed.tell(f"camera/{source}", plain_values(compress_picture({"image": picture}, now_s)))
+            self._feed.tell(f"camera/{source}", compress_picture({"image": picture}, now_s))
 
-    def actions(self, scene: Scene | None) -> Mapping[str, Action]:
-        """Returns the page's actions: held keys and sticks, a saved pose, the stop button, and those on the scene."""
-        own = {"teleop": self._ask, "save_pose": self._save_as}
+    def actions(self) -> Mapping[str, Callable[[Mapping[str, Any]], str]]:
+        """Returns the page's actions: held keys and sticks, a saved pose, and the stop button."""
         buttons = {"stop": lambda _: self._press(True), "release": lambda _: self._press(False)}
-        return {**own, **buttons, **({} if scene is None else scene_actions(scene))}
+        return {"teleop": self._ask, "save_pose": self._save_as, **buttons}
 
     def _ask(self, values: Mapping[str, Any]) -> str:
         if self._stopped:
@@ -89,8 +87,9 @@ class TeleopPage:
     def _press(self, stopped: bool) -> str:
         """Presses or releases the stop button; while it is pressed, the page drives nothing."""
         self._hands.ask({})
-        mode, said = (Mode.STOPPED, "stopped") if stopped else (Mode.RUNNING, "stop button released")
-        self._feed.tell("control", control_json(ControlState(mode=mode, reason=_PRESSED if stopped else "")))
+        said = "stopped" if stopped else "stop button released"
+        state = {"mode": "stopped", "reason": _PRESSED} if stopped else {"mode": "running"}
+        self._feed.tell("control", {**control_json(Control().state), **state})
         if stopped or self._stopped:
             self._tell("stop button", said)
         self._stopped = stopped

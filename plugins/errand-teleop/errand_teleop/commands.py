@@ -1,4 +1,4 @@
-"""`errand teleop` drives body and arm by hand; `errand warm-up` compiles the numeric code for this machine."""
+"""`errand teleop` drives body and arm of a simulated robot by hand."""
 
 from __future__ import annotations
 
@@ -12,28 +12,27 @@ from typing import Annotated, Final
 
 import typer
 
-from executive.app.kernels import kernel_steps, newly_compiled
-from executive.app.prepare.mission_files import save_pose
+from errand_teleop.driver import Teleop, TeleopOptions, axis_values
+from errand_teleop.page import TeleopPage
+from errand_teleop.poses import save_pose
 from executive.app.prepare.placed_robots import only_robot, refuse_blocked
 from executive.app.prepare.worlds import knowledge_of, open_world
-from executive.app.runs.simulated import simulate
-from executive.app.runs.teleop_page import TeleopPage
+from executive.app.runs.page_view import scene_actions
+from executive.app.runs.simulated import compile_first, simulate
 from executive.cli.number_options import quantity_option
-from executive.cli.options import START
-from executive.cli.output import console_for, progress_bar
+from executive.cli.options import START, start_pose
+from executive.cli.output import console_for
 from executive.cli.run_keys import read_keys
-from executive.mission.request import parse_start
 from executive.run.worker import LockStepWorker
 from executive.view.feed import Feed
 from executive.view.server import PageContent, serve
 from plant.worlds.world import World
 from skills.api import SkillContext
 from skills.estimate.grid_map import load_grid_map
-from skills.inputs.errors import InputError, Problems, count_text
+from skills.inputs.errors import InputError
 from skills.quantities import Delay, Port, Seed
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack
-from skills.teleop.driver import Teleop, TeleopOptions, axis_values
 
 HOLDER: Final = "teleop"
 SAVE_KEY: Final = "p"
@@ -59,11 +58,9 @@ def teleop(
         if not _NAME.fullmatch(robot):
             raise InputError(f"'{robot[:60]}' is not a name for a robot", hint="use letters and digits, as in Alice")
         opened = open_world(world)
-        placed = only_robot(robot, opened, seed=seed, start=None if start is None else parse_start(start))
+        placed = only_robot(robot, opened, seed=seed, start="unknown" if start == "unknown" else start_pose(start))
         if start is not None:
             refuse_blocked(opened, placed.start)
-        from executive.app.runs.simulated import compile_first
-
         compile_first()
         simulation = simulate(opened, {robot: placed}, seed=seed, record=False)
         driven, clock = simulation.robots[robot], simulation.clock
@@ -78,7 +75,8 @@ def teleop(
         feed, scene = Feed(), simulation.show_live()
         page = TeleopPage(hands, context, feed, save)
         page.show_map(opened, knowledge_of(opened))
-        server = stack.enter_context(serve(PageContent(feed, page.actions(scene), scene.url), port))
+        actions = {**page.actions(), **scene_actions(scene)}
+        server = stack.enter_context(serve(PageContent(feed, actions, scene.url), port))
         console = console_for(False)
         stack.enter_context(read_keys(TerminalKeys(hands, save, console.print).press))
         console.print(f"The page: {server.url}\n{_HELP}", markup=False)
@@ -143,17 +141,3 @@ class TerminalKeys:
                 self._say(self._save(None))
             except InputError as error:
                 self._say(str(error))
-
-
-def warm_up() -> None:
-    """Compiles the numeric code for this machine, so that the first run begins at once."""
-    begun_s = time.monotonic()
-    steps = kernel_steps()
-    with progress_bar(console_for(False), "steps", len(steps)) as advance:
-        failed = Problems()
-        for step in steps:
-            with failed:
-                step()
-            advance()
-    typer.echo(f"{count_text(newly_compiled(), 'function')} compiled in {time.monotonic() - begun_s:.0f} s")
-    failed.raise_any()

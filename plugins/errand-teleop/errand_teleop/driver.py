@@ -11,14 +11,15 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
+from errand_teleop.poses import SavedPose
 from skills.api import SkillContext
 from skills.manipulation.arm.collision import ArmScene
-from skills.manipulation.arm.kinematics import ArmModel, arm_model
+from skills.manipulation.arm.kinematics import arm_model
 from skills.navigate.base import Base
 from skills.navigate.follower import FollowerOptions
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m
 from skills.quantities import Acceleration, Delay, Duration, Force, Margin, Speed, Turn, TurnAcceleration, TurnRate
-from skills.robot import ArmTrajectory, CommandId, CommandState, FloatArray, Pose2D
+from skills.robot import ArmTrajectory, Capabilities, CommandId, CommandState, FloatArray
 
 _TAIL_POINTS = 5
 """Points of a trajectory while the arm brakes."""
@@ -107,8 +108,8 @@ class ArmMotion:
 class HandControl:
     """Converts axis values to arm trajectories, each of which continues the previous one."""
 
-    def __init__(self, model: ArmModel, options: ArmOptions) -> None:
-        self._model, self._options = model, options
+    def __init__(self, capabilities: Capabilities, options: ArmOptions) -> None:
+        self._model, self._options = arm_model(capabilities), options
         self._motion: ArmMotion | None = None
         self.note = ""
 
@@ -203,15 +204,6 @@ class TeleopOptions:
     tilt_rad_s: TurnRate = 0.2
 
 
-@dataclass(frozen=True)
-class SavedPose:
-    """Pose of the body in the world, the arm's joints and the gripper's opening (rad)."""
-
-    base: Pose2D
-    joints_rad: tuple[float, ...]
-    opening: float
-
-
 class Teleop:
     """Teleoperation of one robot. Call `ask` when keys arrive, from any thread, and `tick` once each `period_s`."""
 
@@ -221,7 +213,7 @@ class Teleop:
         capabilities = context.robot.capabilities()
         self._base, self._footprint = Base(context), Footprint.of(capabilities)
         self._model = None if capabilities.arm is None else arm_model(capabilities)
-        self._hand = None if self._model is None else HandControl(self._model, self._options.arm)
+        self._hand = None if self._model is None else HandControl(capabilities, self._options.arm)
         self._scene: ArmScene | None = None
         self._asked: tuple[Mapping[str, float], float] = ({}, -math.inf)
         self._opening: float | None = None

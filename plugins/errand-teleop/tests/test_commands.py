@@ -1,20 +1,18 @@
-"""`errand teleop`: the plant's robot driven by hand, the page's actions, saved poses, a lease that another holds."""
+"""`errand teleop`: the plant's robot driven by hand, the page's actions, a lease that another holds, bad input."""
 
 import json
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw
 
-from executive.app.prepare.mission_files import save_pose
+from errand_teleop.commands import TerminalKeys, advance, context_for
+from errand_teleop.driver import Teleop, TeleopOptions
+from errand_teleop.page import TeleopPage
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.app.runs.simulated import simulate
-from executive.app.runs.teleop_page import TeleopPage
-from executive.cli.robot_command import TerminalKeys, advance, context_for
-from executive.mission.load import load_mission
 from executive.testing.bench import scripted_bench
 from executive.view.feed import Feed
 from executive.view.page_control import RefusedError
@@ -22,9 +20,8 @@ from plant.robots.spot.kind import spot_capabilities
 from skills.inputs.errors import InputError
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Pose2D
-from skills.teleop.driver import SavedPose, Teleop, TeleopOptions
+from tests.executive.cli.calls import refused_in_one_line
 
-POSE = SavedPose(Pose2D(5.2, 4.5, math.pi / 2), (0.1, -1.6, 1.8, 0.0, 0.4, 0.0), 0.5)
 OPTIONS = TeleopOptions()
 
 
@@ -67,7 +64,7 @@ def live_of(feed):
 
 def test_the_page_asks_and_nonsense_is_refused(bench):
     hands = Asked()
-    actions = TeleopPage(hands, bench.context(), Feed(), lambda name: f"saved {name}").actions(None)
+    actions = TeleopPage(hands, bench.context(), Feed(), lambda name: f"saved {name}").actions()
     actions["teleop"]({"keys": ["w"], "axes": {"turn": 0.5}})
     assert hands.last == {"forward": 1.0, "turn": 0.5}
     with pytest.raises(RefusedError, match="axis 'warp'"):
@@ -77,7 +74,7 @@ def test_the_page_asks_and_nonsense_is_refused(bench):
 
 def test_the_stop_button_of_the_page_holds_until_it_is_released(bench):
     hands, feed = Asked(), Feed()
-    actions = TeleopPage(hands, bench.context(), feed).actions(None)
+    actions = TeleopPage(hands, bench.context(), feed).actions()
     assert live_of(feed)[0]["control"]["mode"] == "running"
     actions["teleop"]({"keys": ["w"]})
     actions["stop"]({})
@@ -90,37 +87,6 @@ def test_the_stop_button_of_the_page_holds_until_it_is_released(bench):
     assert hands.last == {"forward": 1.0}
     told = [(data["what"], data["message"]) for topic, data in live_of(feed)[1] if topic == "control"]
     assert told == [("stop button", "stopped"), ("stop button", "stop button released")]
-
-
-def test_a_saved_pose_is_a_mission_file(tmp_path):
-    path = save_pose(tmp_path / "poses", "by_the_table", POSE, world="flat")
-    navigate, pose_arm = load_mission(path).steps
-    assert (navigate.skill, pose_arm.skill) == ("navigate", "pose_arm")
-    assert pose_arm.values["joints"] == list(POSE.joints_rad)
-
-
-def test_poses_without_a_name_are_numbered(tmp_path):
-    assert [save_pose(tmp_path, None, POSE, world="flat").name for _ in range(2)] == ["pose_1.yaml", "pose_2.yaml"]
-
-
-def test_a_pose_is_never_overwritten(tmp_path):
-    path = save_pose(tmp_path, "look", POSE, world="flat")
-    before = path.read_text()
-    with pytest.raises(InputError, match="a pose of this name exists"):
-        save_pose(tmp_path, "look", replace(POSE, opening=0.0), world="flat")
-    assert path.read_text() == before
-
-
-@pytest.mark.parametrize("name", ["../out", "a/b", ".hidden", "x" * 100, "a b"])
-def test_a_name_that_is_no_file_name_is_refused(tmp_path, name):
-    with pytest.raises(InputError, match="is no name for a pose"):
-        save_pose(tmp_path, name, POSE, world="flat")
-
-
-def test_a_folder_that_cannot_be_made_is_one_clear_line(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="cannot write it"):
-        save_pose(tmp_path / "file", "look", POSE, world="flat")
 
 
 @pytest.mark.mission
@@ -186,3 +152,15 @@ def test_the_plants_robot_is_driven_by_hand():
 
     with pytest.raises(InputError, match="the lease is held by 'teleop'"):
         context_for(world, robot, simulation.clock, simulation.starts["Alice"])
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--robot ''", "is not a name for a robot"),
+        ("--start 500 500 0", "stands in an obstacle or outside"),
+        ("--world nowhere", "unknown world 'nowhere'"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(words, message, tmp_path, monkeypatch):
+    refused_in_one_line({"input": f"teleop {words}", "message": message}, tmp_path, monkeypatch)

@@ -1,0 +1,1 @@
+"""Manual control of a simulated robot: keys, gamepad, live page, saved poses."""

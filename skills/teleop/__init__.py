@@ -1,1 +1,0 @@
-"""Teleoperation of body and arm."""

@@ -199,6 +199,9 @@ def show(
     folder: Annotated[str, typer.Argument(metavar="WORLD", help="A world by name or folder.")],
     out: Annotated[Path, typer.Option("--out", help="PNG file of the picture.")] = Path("world.png"),
     grid: Annotated[bool, typer.Option("--grid", help="Draw lines of coordinates each metre.")] = False,
+    view: Annotated[
+        bool, typer.Option("--view", help="Also write a page, in which a click gives a pose and the command for it.")
+    ] = False,
 ) -> None:
     """Draws the plan of a world with coordinates: rooms, doors, walls, surfaces, zones, people, dock and start."""
     from errand_make.worlds.plan_picture import draw_world
@@ -206,8 +209,15 @@ def show(
 
     drawn = open_world(folder)
     facts = knowledge_of(drawn)
+    picture = draw_world(drawn, facts, grid=grid)
     with writing(out):
-        save_png(out, draw_world(drawn, facts, grid=grid))
+        save_png(out, picture)
+        if view:
+            from errand_make.worlds.plan_page import plan_page
+
+            page = out.with_suffix(".html")
+            page.write_text(plan_page(drawn, folder, picture), encoding="utf-8")
+            typer.echo(f"{page}: open it in a browser")
     counts = ((facts.places, "room"), (facts.doors, "door"), (facts.surfaces, "surface"), (facts.zones, "zone"))
     typer.echo(f"{out}: {', '.join(count_text(len(each), noun) for each, noun in counts)}")
 

@@ -35,7 +35,7 @@ def draw_world(world: World, knowledge: Knowledge, *, grid: bool = False) -> Pic
     Rooms are tinted, doors are circles of their width with numbers that a list below explains, start and dock are
     arrows. Rooms, surfaces, zones and people have their names; people stand where seed 0 puts them.
     """
-    view = _plan(world)
+    view = plan_view(world)
     picture = view.picture
     zones = zone_messages(knowledge.known_zones())
     for zone in zones:
@@ -69,8 +69,8 @@ def draw_world(world: World, knowledge: Knowledge, *, grid: bool = False) -> Pic
     return np.vstack([with_legend(picture, view.pixels_per_m, entries), _door_list(knowledge, picture.shape[1])])
 
 
-def _plan(world: World) -> MapView:
-    """Draws walls, tinted rooms and surfaces, within a white rim for the coordinates."""
+def plan_view(world: World) -> MapView:
+    """View from above of walls, tinted rooms and surfaces, within a white rim for the coordinates."""
     grid = load_grid_map(world.surveyed.keepout_map_path)
     cells = grid.grey(free=255, unknown=150, occupied=0)
     rows, columns = cells.shape

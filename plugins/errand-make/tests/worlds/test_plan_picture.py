@@ -27,7 +27,7 @@ def places_of(picture, colour, view):
 
 def test_people_dock_and_surfaces_are_drawn_where_they_are(flat):
     world, knowledge = flat
-    picture, view = draw_world(world, knowledge), plan_picture._plan(world)
+    picture, view = draw_world(world, knowledge), plan_picture.plan_view(world)
     assert picture.shape[1] == plan_picture.WIDTH_PX
     assert places_of(picture, plan_picture._DOCK, view) == pytest.approx((10.9, 4.95), abs=0.15)
     assert places_of(picture, plan_picture._PERSON, view) == pytest.approx((10.4, 4.0), abs=0.15)
@@ -38,7 +38,7 @@ def test_people_dock_and_surfaces_are_drawn_where_they_are(flat):
 
 def test_zones_are_outlined_and_explained_in_the_legend(flat):
     world, knowledge = flat
-    picture, view = draw_world(world, knowledge), plan_picture._plan(world)
+    picture, view = draw_world(world, knowledge), plan_picture.plan_view(world)
     left, top = view.pixels(np.array([[0.12, 5.3]]))[0].round().astype(int)
     edge = picture[top - 6 : top + 6, left + 20 : left + 200]
     assert (edge == ZONE_COLOURS["silent"]).all(axis=2).any()
@@ -49,14 +49,14 @@ def test_zones_are_outlined_and_explained_in_the_legend(flat):
 def test_the_grid_has_a_line_at_each_metre(flat):
     world, knowledge = flat
     plain, lines = (draw_world(world, knowledge, grid=grid) for grid in (False, True))
-    view = plan_picture._plan(world)
+    view = plan_picture.plan_view(world)
     for x, y in ((3.0, 4.7), (2.5, 5.0), (9.0, 3.3)):
         column, row = view.pixels(np.array([[x, y]]))[0].round().astype(int)
         assert tuple(lines[row, column]) == plan_picture._LINE != tuple(plain[row, column])
 
 
 def test_each_metre_has_its_tick_at_the_rim(flat):
-    picture, view = draw_world(*flat), plan_picture._plan(flat[0])
+    picture, view = draw_world(*flat), plan_picture.plan_view(flat[0])
     bottom, zero = view.picture.shape[0] - plan_picture._RIM_PX, view.pixels(np.zeros((1, 2)))[0]
     ticks = (picture[bottom + 4] == plan_picture._INK).all(axis=1)
     starts = np.flatnonzero(np.diff(ticks.astype(int)) == 1)

@@ -16,7 +16,6 @@ from __future__ import annotations
 import os
 import sys
 from importlib import import_module
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -42,25 +41,22 @@ os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", "64000000")  # a small file 
 
 
 def _load_own(name: str) -> None:
-    """Loads a package of Errand where a folder of the user's project has its name; that folder extends the package.
+    """Loads a package of Errand, extended by folders of its name where the user's project lies.
 
-    Raises ImportError if the user's program has imported the folder before.
+    Raises ImportError if the user's program has imported such a folder before.
     """
-    root = os.path.dirname(os.path.dirname(__file__))  # noqa: PTH120 - pathlib takes a while to load
-    found = find_spec(name)
-    if found is not None and str(found.origin).startswith(os.path.join(root, name)):  # noqa: PTH118
-        return
-    if name in sys.modules:
-        folder = sys.modules[name].__path__[0]
-        raise ImportError(
-            f"{folder} stands for Errand's package '{name}': import executive first, or rename the folder"
-        )
+    root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120 - pathlib loads slowly
+    own = os.path.join(root, name)  # noqa: PTH118
     sys.path.insert(0, root)
     try:
         package = import_module(name)
     finally:
         sys.path.remove(root)
-    package.__path__ += found.submodule_search_locations or () if found is not None else ()
+    if package.__path__[0] != own:
+        found = package.__path__[0]
+        raise ImportError(f"{found} stands for Errand's package '{name}': import executive first, or rename the folder")
+    folders = {os.path.abspath(os.path.join(entry, name)) for entry in sys.path} - {own}  # noqa: PTH100, PTH118
+    package.__path__ += sorted(each for each in folders if os.path.isdir(each))  # noqa: PTH112
 
 
 for _name in ("skills", "plant"):

@@ -41,7 +41,8 @@ def test_the_command_line_and_pytest_work_in_the_project(project):
     assert (ended.returncode, "1 passed" in ended.stdout) == (0, True), ended.stdout
 
 
-def test_a_folder_that_was_imported_before_is_named(project):
+@pytest.mark.parametrize("project", [True], indirect=True)
+def test_a_package_that_was_imported_before_is_named(project):
     ended = python(project, "-c", "import skills.mine, executive")
     folder = project / "skills"
     assert f"ImportError: {folder} stands for Errand's package 'skills': import executive first" in ended.stderr

@@ -11,17 +11,17 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3403,
-    "executive/language": 8239,
+    "executive/words": 3428,
+    "executive/language": 8244,
     "executive/speech": 1570,
-    "executive/mission": 1657,
+    "executive/mission": 1656,
     "executive/tree": 8597,
     "executive/run": 3291,
     "executive/record": 1094,
     "executive/store": 1600,
     "executive/conversation": 595,
     "executive/view": 1848,
-    "executive/testing": 848,
+    "executive/testing": 856,
     "executive/app": 8119,
     "executive/cli": 3867,
     "skills": 27785,

@@ -189,6 +189,11 @@ class _Grounder:
         candidates = self._places(location.phrase, room, known)
         fitting = (name for name in candidates if room in (None, name, self.knowledge.room(name)))
         inside = [name for name in fitting if not self._left_over(location.phrase, name)]
+        exact = self.knowledge.place(location.phrase.text)
+        if not inside and exact is not None and room is not None:
+            own = self.knowledge.room(exact)
+            where = f"the {exact} is not {'in' if room in self.knowledge.places else 'on'} the {room}"
+            raise RefusalError(where if own == exact else f"{where}, but in the {own}", [location.phrase.text])
         if not inside:
             raise self._unknown(Slot.PLACE, (location.phrase.text, location.phrase.singular), known)
         return self._only(inside, Slot.PLACE, Phrase(location.phrase.tokens).text)

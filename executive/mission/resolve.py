@@ -373,8 +373,7 @@ class _Resolver:
             _refuse_top_keys(used, scope.file)
             return self.mission(used, (*chain, used_path.resolve()))
         except InputError as error:
-            here = None if step.place is None else step.place.line(("use",))
-            raise error if here is None else error.within(here.file, here.line) from error
+            raise step.within(("use",), error) from error
 
 
 def _group(step: Step, steps: Steps, name: str) -> Group:

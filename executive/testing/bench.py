@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 from xml.sax.saxutils import quoteattr
 
 import cv2
@@ -18,12 +19,12 @@ from py_trees.common import Status
 from executive.run.worker import LockStepWorker
 from executive.tree.board import Board, Constant
 from executive.tree.context import RunContext
-from executive.tree.nodes.skill_leaf import SkillLeaf
+from executive.tree.nodes.skill_leaf import ERROR_TOPIC, SkillLeaf
 from executive.words.knowledge import Knowledge
 from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
 from skills.detection import with_defaults
 from skills.doorway import Doorway
-from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
+from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind, InjectedFault
 from skills.faults.faulty_robot import Fault, inject_faults, parse_fault
 from skills.inputs.yaml_source import read_yaml
 from skills.robot import Capabilities, Clock, Robot
@@ -32,6 +33,7 @@ from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace, PlainColours
 from skills.testing.robot import ScriptedRobot, Start
 
+_LOG: Final = logging.getLogger(__name__)
 _FLOOR = Block(-2.1, -2.6, 4.1, 2.6, -0.1, 0.0, (150, 140, 130))
 _BANDS = {"scan": (0.7, 1.3), "keepout": (0.05, 1.0)}
 _RESOLUTION_M = 0.025
@@ -151,7 +153,7 @@ class SkillBench:
             worker=LockStepWorker(clock),
             localiser=localiser or KnownPlace(),
             costmap=costmap or BlockCostmap(),
-            publish=lambda topic, message: self.published.append((topic, message)),
+            publish=self._publish,
             seed=seed,
             board=Board(_PREFIX),
             detector=with_defaults(detector or PlainColours()),
@@ -218,6 +220,12 @@ class SkillBench:
         with suppress(Exception):
             self.robot.return_lease(self._context.lease)
 
+    def _publish(self, topic: str, message: Mapping[str, Any]) -> None:
+        """Keeps a message; logs the traceback of a skill that raises, except for an injected fault."""
+        self.published.append((topic, message))
+        if topic == ERROR_TOPIC and InjectedFault.__name__ not in message["traceback"]:
+            _LOG.error("%s", message["traceback"])
+
     def _sense(self, robot: Robot) -> None:
         """Updates the estimators, which keep their estimates if the robot's sensors raise an error."""
         context, self.sensing = self._context, True
@@ -225,7 +233,7 @@ class SkillBench:
             context.localiser.update(robot)
             context.costmap.update(robot, context.localiser.estimate())
         except Exception as defect:
-            context.publish("errors", {"node": "estimators", "traceback": repr(defect)})
+            self.published.append((ERROR_TOPIC, {"node": "estimators", "traceback": repr(defect)}))
         finally:
             self.sensing = False
 

@@ -164,6 +164,11 @@ class Placed(Policy):
         """Error in the value at a path below the step or mission, for instance ("world",)."""
         return InputError(message, hint=hint) if self._place is None else self._place.error(below, message, hint)
 
+    def within(self, below: KeyPath, error: InputError) -> InputError:
+        """Adds the line of the value at a path below, which refers to an erroneous file."""
+        line = None if self._place is None else self._place.line(below)
+        return error if line is None else error.within(line.file, line.line)
+
     def with_place(self, place: Place | None) -> Self:
         """Copies the step or mission with another location."""
         copy = self.model_copy()

@@ -9,7 +9,15 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self, Union
 
-from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    field_validator,
+    model_validator,
+)
 from typing_extensions import TypeAliasType
 
 from executive.words.command import parse_command
@@ -246,6 +254,10 @@ else:
     ]
 
 
+_TRUTHS: Final = {True: ("yes", "on", "true"), False: ("no", "off", "false")}
+"""Words that YAML reads as true and as false."""
+
+
 class Ask(Answering):
     """`ask`: asks the people around, or the operator.
 
@@ -267,6 +279,14 @@ class Ask(Answering):
     default: Scalar = Field(
         default=None, description="The answer when nobody answers in time; without one the step fails."
     )
+
+    @field_validator("default", mode="before")
+    @classmethod
+    def _as_written(cls, default: Any, info: ValidationInfo) -> Any:
+        """Reads a default as a choice is written: YAML reads `no` as false, and `2` as a number."""
+        words = _TRUTHS[default] if isinstance(default, bool) else (str(default),)
+        found = next((choice for choice in info.data.get("choices") or () if choice.lower() in words), default)
+        return words[0] if isinstance(found, bool) else found
 
     @model_validator(mode="after")
     def _one_kind_of_answer(self) -> Self:

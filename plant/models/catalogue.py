@@ -108,7 +108,7 @@ def read_imported(folder: Path) -> ImportedObject:
     """Reads the object in a folder. Raises InputError when the file is missing or damaged."""
     path = folder / FACTS_FILE
     if not path.exists():
-        raise InputError(f"there is no imported object ({FACTS_FILE} is missing)", hint=_AGAIN, file=folder)
+        raise InputError(f"{folder}: there is no imported object ({FACTS_FILE} is missing)", hint=_AGAIN)
     try:
         found = validate(ImportedObject, read_yaml(path))
     except InputError as error:

@@ -349,7 +349,7 @@ def load_world(name_or_path: str | Path) -> World:
     except WorldError as error:
         raise error if source is None else source.error(error.path, error.message) from error
     except InputError as error:
-        raise error if source is None else source.error(("imports",), str(error)) from error
+        raise error if source is None else error.within(source.path, source.line(("imports",))) from error
     return World(
         name=folder.name,
         folder=folder,

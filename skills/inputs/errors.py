@@ -172,9 +172,9 @@ def nearest_name(word: str, known: Iterable[str]) -> str | None:
 def suggestion(word: str, known: Iterable[str], otherwise: str | None = None, *, shown: Iterable[str] = ()) -> str:
     """Hint for an unknown word: the word that was probably meant, else `otherwise`, else the nearest known names.
 
-    `shown` are the names to list when `known` also contains other spellings.
+    `shown` are the names to list when `known` also contains other spellings. The word itself is no hint.
     """
-    names = list(known)
+    names = [name for name in known if name != word]
     near = nearest_name(word, names)
     return f"did you mean '{near}'?" if near else otherwise or known_names(word, list(shown) or names)
 

@@ -221,7 +221,7 @@ def _plain_hint(error: ErrorDetails, word: str | None = None) -> str:
         return f'put it in quotes: "{value if isinstance(value, float) else display_text(value)}"'
     if error["type"] == "invalid_key":
         return "put the key in quotes"
-    near = nearest_name(str(value), _allowed(error))
+    near = nearest_name(str(value), (word for word in _allowed(error) if word != str(value)))
     return f"it reads {display_text(value)} now" if near is None else f"did you mean '{near}'?"
 
 

@@ -208,7 +208,7 @@ def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
         try:
             world = open_world(loaded.world)
         except InputError as error:
-            raise loaded.error(("world",), error.message, error.hint) from error
+            raise loaded.within(("world",), error) from error
     knowledge = knowledge_of(world)
     return request, loaded, world if request.map is None else with_map(world, request.map), knowledge
 
@@ -392,7 +392,7 @@ def _with_imports(loaded: Mission, world: World) -> World:
         try:
             world = world.with_imports([folder])
         except InputError as error:
-            problems.add(loaded.error(("imports", index), str(error), ""))
+            problems.add(loaded.within(("imports", index), error))
     problems.raise_any()
     return world
 

@@ -57,7 +57,7 @@ def placed_robots(world: World, knowledge: Knowledge, configs: Sequence[RobotCon
                 _refuse_overlap(each, each.start, placed.values(), world)
             dock = _dock(each, knowledge) or (world.dock if each is configs[0] else start)
         except InputError as error:
-            raise InputError.at(each.source, error.message, hint=error.hint) from error
+            raise error if each.source is None else error.within(each.source.file, each.source.line) from error
         placed[each.name] = PlacedRobot(each.name, each.kind, start, dock, each.stack)
     return {each.name: placed[each.name] for each in configs}
 

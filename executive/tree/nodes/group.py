@@ -190,7 +190,7 @@ def _use_plan(assembler: Assembler, step: UseMission, builder: PlanBuilder) -> A
     try:
         steps = mission_plan(assembler, used, builder.path_id)
     except InputError as error:
-        raise error if step.source is None else error.within(step.source.file, step.source.line) from error
+        raise step.within((), error) from error
     body = builder.sequence(used.name, *steps.nodes)
     whole = under_policy(body, used, builder.at("whole"), used.name, may_skip=False)
     return Assembled((whole,), steps.parts)

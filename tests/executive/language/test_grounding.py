@@ -42,6 +42,20 @@ def test_any_member_serves_for_a_category_and_nothing_is_asked(understood, sente
 
 
 @pytest.mark.parametrize(
+    ("sentence", "reason"),
+    [
+        ("go to the workbench in the kitchen", "the workbench is not in the kitchen, but in the workshop"),
+        ("put the beer on the workbench in the lounge", "the workbench is not in the living room, but in the workshop"),
+        ("go to the workbench on the kitchen table", "the workbench is not on the kitchen table, but in the workshop"),
+        ("go to the kitchen in the bedroom", "the kitchen is not in the bedroom"),
+    ],
+)
+def test_a_known_place_said_to_be_elsewhere_is_refused_by_where_it_is(understood, sentence, reason):
+    answer = understood(sentence)
+    assert (answer.status, answer.question, answer.reason) == (Status.REFUSED, None, reason)
+
+
+@pytest.mark.parametrize(
     "sentence", ["fetch me a banana", "go to the cellar", "bring the hammer to Quentin", "fetch me a unicorn"]
 )
 def test_unknown_name_is_refused_with_the_known_ones(understood, sentence):

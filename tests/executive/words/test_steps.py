@@ -1,5 +1,7 @@
 """Steps written as YAML read back to the same steps."""
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -9,6 +11,7 @@ from executive.words.command import Command, Task
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
 from executive.words.leaf_steps import Awaited, Charging, Check, Do, Dock, Set, Speak, Wait, steps_of_commands
 from skills.api import ObjectKind
+from skills.inputs.yaml_source import parse_yaml
 
 texts = st.text(st.characters(exclude_characters="{}", exclude_categories=["C", "Z"]), min_size=1, max_size=12)
 names = texts
@@ -131,3 +134,21 @@ def test_data_are_plain():
 def test_document_without_steps_is_refused(lines):
     with pytest.raises(ValueError, match=r".+"):
         blocks.steps_from_yaml(lines)
+
+
+@pytest.mark.parametrize(
+    ("written", "answer"),
+    [
+        ("{choices: {yes: , no: }, default: no}", "no"),
+        ("{choices: {yes: , no: }, default: yes}", "yes"),
+        ('{choices: ["Yes", "No"], default: No}', "No"),
+        ("{choices: {on: , off: }, default: off}", "off"),
+        ('{choices: ["1", "2"], default: 2}', "2"),
+        ("{default: no}", "no"),
+        ("{match: number, default: 2}", 2),
+        ("{match: text, default: maybe}", "maybe"),
+    ],
+)
+def test_a_default_is_read_as_the_answer_that_is_written(written, answer):
+    data = parse_yaml(written, Path("m.yaml")).data
+    assert blocks.Ask.model_validate({"ask": "Really?", **data}).default == answer

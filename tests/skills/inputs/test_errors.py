@@ -1,6 +1,6 @@
 import pytest
 
-from skills.inputs.errors import MOST_LETTERS, InputError, definite, known_names, with_article
+from skills.inputs.errors import MOST_LETTERS, InputError, definite, known_names, suggestion, with_article
 
 
 def test_a_message_that_repeats_an_endless_name_is_cut_off():
@@ -12,6 +12,19 @@ def test_a_message_that_repeats_an_endless_name_is_cut_off():
 
 def test_a_message_escapes_control_characters():
     assert str(InputError("no 'a\x1b[31m\u202eb\nc\udcff'", hint="x\x07")) == r"no 'a\x1b[31m\u202eb c\udcff'; x\x07"
+
+
+@pytest.mark.parametrize(
+    ("said", "known", "hint"),
+    [
+        ("workbench", ["workbench", "hall"], "known are hall"),
+        ("workbench", ["workbench", "workbenches"], "did you mean 'workbenches'?"),
+        ("workbench", ["workbench"], "none is known"),
+        ("Workbench", ["workbench"], "did you mean 'workbench'?"),
+    ],
+)
+def test_a_suggestion_is_never_the_word_that_was_said(said, known, hint):
+    assert suggestion(said, known) == hint
 
 
 def test_without_a_known_name_none_is_listed():

@@ -14,8 +14,8 @@ from errand_make.worlds.wanted import Addition, Wanted
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, StartCommand, start_pose
-from executive.cli.output import new_folder
-from plant.worlds.world import WorldError
+from executive.cli.output import console_for, new_folder, show_table
+from plant.worlds.world import WorldError, known_worlds
 from skills.api import ZoneKind
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError, count_text
@@ -36,6 +36,35 @@ _ZONE: Final = typer.Argument(metavar="NAME", help="Name of the zone.", show_def
 @world.callback()
 def _group() -> None:
     """Worlds from any map."""
+
+
+@world.command("list")
+def list_worlds(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder whose worlds are listed, too.", show_default=".")
+    ] = Path(),
+) -> None:
+    """Lists the worlds that come with Errand, and those in a folder, with rooms and robots."""
+    own = sorted(str(file.parent) for file in folder.glob("*/world.dmd.yaml"))
+    rows = []
+    for name in (*known_worlds(), *own):
+        try:
+            rows.append(_facts_of(name))
+        except InputError as error:
+            typer.echo(f"errand: warning: {error}", err=True)
+    show_table(console_for(as_json=False), ("world", "metres", "surfaces", "robots", "people", "rooms"), rows)
+
+
+def _facts_of(name: str) -> tuple[str, ...]:
+    """Facts of a world for a list: extents, rooms, number of surfaces, robots and people. Raises InputError."""
+    opened = open_world(name)
+    facts = knowledge_of(opened)
+    across, along = (max(values) - min(values) for values in zip(*opened.corners, strict=True))
+    robots = {facts.robot.name: "spot"} if facts.robots is None else {n: each.kind for n, each in facts.robots.items()}
+    people = [rule.name for rule in opened.seed_rules.people]
+    said = ", ".join(f"{robot} ({kind})" for robot, kind in robots.items())
+    rooms = ", ".join(facts.places)
+    return name, f"{across:.0f} x {along:.0f}", str(len(facts.surfaces)), said, ", ".join(people), rooms
 
 
 @world.command(cls=StartCommand)
@@ -169,15 +198,26 @@ def from_cylinders(
 def show(
     folder: Annotated[str, typer.Argument(metavar="WORLD", help="A world by name or folder.")],
     out: Annotated[Path, typer.Option("--out", help="PNG file of the picture.")] = Path("world.png"),
+    grid: Annotated[bool, typer.Option("--grid", help="Draw lines of coordinates each metre.")] = False,
+    view: Annotated[
+        bool, typer.Option("--view", help="Also write a page, in which a click gives a pose and the command for it.")
+    ] = False,
 ) -> None:
-    """Draws the plan of a world: rooms, doors, walls, surfaces and the start."""
+    """Draws the plan of a world with coordinates: rooms, doors, walls, surfaces, zones, people, dock and start."""
     from errand_make.worlds.plan_picture import draw_world
     from plant.scene_pictures import save_png
 
     drawn = open_world(folder)
     facts = knowledge_of(drawn)
+    picture = draw_world(drawn, facts, grid=grid)
     with writing(out):
-        save_png(out, draw_world(drawn, facts))
+        save_png(out, picture)
+        if view:
+            from errand_make.worlds.plan_page import plan_page
+
+            page = out.with_suffix(".html")
+            page.write_text(plan_page(drawn, folder, picture), encoding="utf-8")
+            typer.echo(f"{page}: open it in a browser")
     counts = [(facts.rooms, "room"), (facts.doors, "door"), (facts.surfaces, "surface"), (facts.zones, "zone")]
     counts += [(facts.poses, "named pose")] if facts.poses else []
     typer.echo(f"{out}: {', '.join(count_text(len(each), noun) for each, noun in counts)}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -10,8 +11,9 @@ from errand_make.worlds import furnish
 from errand_make.worlds.rooms import BANDS_M
 from errand_make.worlds.site import Site, contains, restored
 from errand_make.worlds.wanted import Addition, Wanted
+from plant.models.catalogue import load_catalogue, read_imported
 from plant.worlds.world import WorldError
-from skills.inputs.errors import InputError, listing
+from skills.inputs.errors import InputError, listing, nearest_name
 from skills.robot import Pose2D
 
 
@@ -52,8 +54,28 @@ def _add_object(site: Site, wanted: Wanted) -> str:
     if found not in surfaces:
         what = f"there is no surface '{wanted.surface}'" if wanted.surface else "an object lies on a surface"
         raise InputError(what, hint=f"name it by --on: {listing(surfaces)}" if surfaces else "add a table first")
-    furnish.add_object(site.folder, wanted.name, wanted.name, str(found))
+    thing, folder = _model(site, wanted.name)
+    furnish.add_object(site.folder, wanted.name, str(found), thing=thing, model=folder)
     return f"{wanted.name} on the {found}"
+
+
+def _model(site: Site, name: str) -> tuple[str, Path | None]:
+    """Returns the class of a model, and the folder of one that the world does not import yet. Raises InputError."""
+    if name in site.world.imports or name in load_catalogue():
+        imported = site.world.imports.get(name)
+        return (name if imported is None else imported.object.class_name), None
+    found: dict[str, Path] = {}
+    for beside in (site.folder, site.folder.resolve().parent, Path.cwd()):
+        for folder in sorted(each for each in beside.iterdir() if each.is_dir()):
+            with suppress(InputError):
+                found.setdefault(read_imported(folder).name, folder)
+    if name not in found:
+        models = (*load_catalogue(), *site.world.imports, *found)
+        near = nearest_name(name, models)
+        meant = "" if near is None else f"did you mean '{near}'? "
+        hint = f"{meant}there are {listing(dict.fromkeys(models))}; `errand object import` makes others"
+        raise InputError(f"there is no model '{name}'", hint=hint)
+    return read_imported(found[name]).class_name, found[name]
 
 
 def _add_person(site: Site, wanted: Wanted) -> str:

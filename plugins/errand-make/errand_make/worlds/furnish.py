@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from os.path import relpath
 from pathlib import Path
 from typing import Any, Final
 
@@ -239,15 +240,19 @@ def _directives(file: Path, name: str, pose: Pose2D) -> str:
 """
 
 
-def add_object(folder: Path, name: str, model: str, surface: str) -> None:
-    """Adds an object that the seed places on a surface, and its usual place to the knowledge. Raises WorldError."""
-    known = read_yaml(open_world(_COMMON_FACTS).knowledge_path).data["things"].get(name, {})
-    facts = {**known, "usual": [surface]}
-    rule = {"name": name, "model": model, "surfaces": [surface]}
-    knowledge = with_entry(folder / "knowledge.yaml", "things", name, facts)
-    rules = with_entry(folder / "objects.yaml", "objects", None, rule, usual=_RULES)
-    write_text(folder / "knowledge.yaml", knowledge)
-    write_text(folder / "objects.yaml", rules)
+def add_object(folder: Path, name: str, surface: str, *, thing: str, model: Path | None) -> None:
+    """Adds an object that the seed places on a surface, and its usual place to the knowledge. Raises WorldError.
+
+    `thing` is the class of its model, and `model` a folder that the world is to import.
+    """
+    facts, rules = folder / "knowledge.yaml", folder / "objects.yaml"
+    if thing == name or thing not in (read_yaml(facts).data.get("things") or {}):
+        known = read_yaml(open_world(_COMMON_FACTS).knowledge_path).data["things"].get(thing, {})
+        write_text(facts, with_entry(facts, "things", thing, {**known, "usual": [surface]}))
+    if model is not None:
+        write_text(rules, with_entry(rules, "imports", None, relpath(model.resolve(), folder.resolve()), usual=_RULES))
+    rule = {"name": name, "model": name, "surfaces": [surface]}
+    write_text(rules, with_entry(rules, "objects", None, rule, usual=_RULES))
 
 
 def add_person(folder: Path, world: World, grid: Grid, name: str, place: str) -> None:
@@ -303,7 +308,7 @@ def with_entry(file: Path, key: str, name: str | None, value: Any, *, usual: str
     held = data.get(key) or ([] if name is None else {})
     if name is not None and name in held:
         raise WorldError(f"'{name}' is in {file.name} already")
-    entry = yaml_of([value] if name is None else {name: value})
+    entry = yaml_of([value] if name is None else {name: value}, flow_style=False if isinstance(value, str) else None)
     if held:
         begun = re.search(rf"^{key}:[^\n]*\n(?:\s*#[^\n]*\n|\s*\n)*( *)", text, re.MULTILINE)
         indent, at = (begun[1], begun.start(1)) if begun else ("", len(text))
@@ -312,7 +317,7 @@ def with_entry(file: Path, key: str, name: str | None, value: Any, *, usual: str
         at = len(text)
     new = text[:at] + "".join(f"{indent}{line}\n" for line in entry.splitlines()) + text[at:]
     expected: Any = [value, *held] if name is None else {name: value, **dict(held)}
-    if parse_yaml(new, file).data != {**dict(data), key: expected}:
+    if not _holds(new, file, {**dict(data), key: expected}):
         raise WorldError(f"{file.name} has a form that cannot be extended; add it there:\n{key}:\n{entry}")
     return new
 
@@ -330,13 +335,17 @@ def without_entry(file: Path, key: str, name: str) -> str:
     ends = (n for n in range(first + 1, len(lines)) if not lines[n].startswith((" " * (indent + 1), "\n")))
     new = "".join((*lines[:first], *lines[next(ends, len(lines)) :]))
     expected = {**source.data, key: left} if left else {one: data for one, data in source.data.items() if one != key}
-    try:
-        unchanged = parse_yaml(new, file).data == expected
-    except InputError:
-        unchanged = False
-    if not unchanged:
+    if not _holds(new, file, expected):
         raise WorldError(f"'{name}' stands in {file.name} in a form that cannot be changed; remove it there")
     return new
+
+
+def _holds(text: str, file: Path, data: Any) -> bool:
+    """Returns whether the text of a file reads as this data."""
+    try:
+        return bool(parse_yaml(text, file).data == data)
+    except InputError:
+        return False
 
 
 def with_room_name(file: Path, former: str, name: str) -> str:

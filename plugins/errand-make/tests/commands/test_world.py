@@ -129,3 +129,37 @@ def test_a_zone_in_one_line_with_others_is_not_removed(own):
     refused = zone("remove", own, "a")
     assert (refused.exit_code, "in a form that cannot be changed" in refused.stderr) == (2, True), refused.output
     assert file.read_text() == before
+
+
+def test_an_imported_model_is_added_and_imported_by_the_world(own, mesh, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    add("table", own, "rack")
+    for name in ("drill", "saw"):
+        done("object", "import", mesh, "--name", name)
+        assert add("object", "own", name, "--on", "rack") == f"own: {name} on the rack\n"
+    world = load_world(own)
+    assert {name: each.folder for name, each in world.imports.items()} == {n: tmp_path / n for n in ("drill", "saw")}
+    assert {each.name: each.surface for each in place_objects(world, 1)} == {"drill": "rack", "saw": "rack"}
+    assert executive.check("fetch me the drill", world="own").ok
+    hint = "there are beer, coke, extinguisher, hammer, screwdriver, wrench, person, cylinder, cube, saw and drill"
+    assert hint in refusal("world", "add", "object", "own", "rocket", "--on", "rack")
+
+
+def test_a_model_of_a_known_class_is_added_under_its_own_name(own, mesh, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    add("table", own, "rack")
+    done("object", "import", mesh, "--name", "my_wrench", "--class", "wrench")
+    add("object", "own", "my_wrench", "--on", "rack")
+    assert [(each.name, each.class_name) for each in place_objects(load_world(own), 1)] == [("my_wrench", "wrench")]
+    assert load_knowledge(own / "knowledge.yaml").usual_surfaces("wrench") == ("rack",)
+
+
+def test_worlds_are_listed_with_rooms_and_robots(own, tmp_path):
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "world.dmd.yaml").write_text("directives: []\n")
+    listed = done("world", "list", tmp_path)
+    lines = {words[0]: " ".join(words[1:]) for words in map(str.split, listed.stdout.splitlines())}
+    assert list(lines) == ["world", "flat", "lab", "shop", str(own)]
+    assert lines["flat"].startswith("12 x 9 11 Alice (spot) Robin hall, kitchen, living room")
+    assert lines[str(own)].endswith("0 Alice (spot) Robin room 1, room 2")
+    assert f"warning: {tmp_path / 'broken' / 'knowledge.yaml'}: there is no such file" in listed.stderr

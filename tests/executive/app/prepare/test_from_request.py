@@ -225,3 +225,36 @@ def test_people_of_a_variation_walk_in_the_world(tmp_path):
     request = Request("bring me a beer", world="flat", seed=2, out=tmp_path, variation=Variation(people=2))
     walking = {each.name for each in place_people(prepare(request, ask=None).world, 2) if each.route is not None}
     assert {"passer-by 1", "passer-by 2"} <= walking
+
+
+def broken_knowledge(world):
+    file = world / "knowledge.yaml"
+    file.write_text(file.read_text().replace("places:\n", "places:\n  pump: {pose: {x: 3.0, y: 4.0}}\n", 1))
+    return f"{file}:8: key 'polygon' is missing in places.pump (used by {{mission}}:2); add 'polygon'"
+
+
+def missing_knowledge(world):
+    (world / "knowledge.yaml").unlink()
+    return f"{world / 'knowledge.yaml'}: there is no such file (used by {{mission}}:2); every world needs this file"
+
+
+def broken_model(world):
+    (world / "gauge").mkdir()
+    (world / "gauge" / "object.yaml").write_text("name: [gauge]\n")
+    lines = (world / "objects.yaml").read_text().count("\n") + 1
+    with (world / "objects.yaml").open("a") as file:
+        file.write("imports: [gauge]\n")
+    users = f"(used by {world / 'objects.yaml'}:{lines}) (used by {{mission}}:2)"
+    return f"{world / 'gauge' / 'object.yaml'}:1: name: should be a text {users}; it reads a list now"
+
+
+@pytest.mark.parametrize("breaks", [broken_knowledge, missing_knowledge, broken_model])
+def test_a_fault_in_a_file_of_the_world_is_named_in_that_file(breaks, tmp_path):
+    world = tmp_path / "depot"
+    shutil.copytree(open_world("flat").folder, world)
+    mission = tmp_path / "round.yaml"
+    mission.write_text(f"name: round\nworld: {world}\nsteps: [{{to: hall}}]\n")
+    says = breaks(world).format(mission=mission)
+    with pytest.raises(InputError) as refused:
+        prepare(Request(file=mission))
+    assert str(refused.value).removesuffix(", or make it by `errand object import`") == says

@@ -1,5 +1,6 @@
 """The pytest plug-in as a user's tests meet it: fixtures, and skill tests collected from YAML."""
 
+import re
 import subprocess
 import sys
 import textwrap
@@ -127,3 +128,63 @@ def test_the_small_plant_has_a_robot_a_table_and_a_can(small_plant):
     observation = seen.outputs["observation"]
     assert isinstance(observation, ObjectObservation)
     assert observation.position_W[2] == pytest.approx(0.81, abs=0.03)
+
+
+def test_a_skill_that_crashes_shows_its_traceback_with_the_line(tmp_path):
+    words = write(
+        tmp_path,
+        crashing__py="""\
+        from dataclasses import dataclass
+
+        from skills.api import Skill
+
+
+        @dataclass(frozen=True)
+        class Nothing:
+            \"""No inputs.\"""
+
+
+        class Wave(Skill[Nothing]):
+            \"""Waves.\"""
+
+            name = "wave"
+            Inputs = Nothing
+
+            def begin(self, inputs):
+                self.times = 0
+
+            def step(self):
+                return 1 / self.times
+        """,
+        conftest__py="""\
+        import sys
+        from pathlib import Path
+
+        sys.path.insert(0, str(Path(__file__).parent))
+
+        def pytest_errand_skill_tests(settings):
+            from crashing import Wave
+
+            settings.skills["wave"] = Wave
+        """,
+        wave__skilltest__yaml="""\
+        skill: wave
+        suite: true
+        tests:
+          - {name: it waves, expect: {outcome: success}}
+          - {name: its driver fails, faults: [stop raises], expect: {outcome: failure, cause: ERROR}}
+        """,
+        test_wave__py="""\
+        from crashing import Nothing, Wave
+
+        def test_it_waves(skill_bench):
+            assert skill_bench.run(Wave, Nothing()).outcome == "success"
+        """,
+    )
+    done = subprocess.run([sys.executable, "-m", "pytest", *words], capture_output=True, text=True, timeout=120)
+    reports = re.split(r"^_{3,} (.*) _{3,}$", done.stdout, flags=re.MULTILINE)
+    said = dict(zip(reports[1::2], reports[2::2], strict=True))
+    assert {"it waves", "it waves: cancelled at every tick", "test_it_waves"} == said.keys(), done.stdout
+    for report in said.values():
+        assert re.search(r'crashing.py", line 21, in step\s+return 1 / self.times', report), report
+        assert "ZeroDivisionError: division by zero" in report

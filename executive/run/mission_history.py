@@ -23,6 +23,8 @@ from skills.api import Part
 from skills.robot import Clock
 
 MOST_CHARS: Final = 300
+BEFORE: Final = "before the restart"
+"""What the message of a step says that an earlier process has done."""
 _GO: Final = "go to "
 _JOINED: Final = (" and ", " or ")
 _WITHOUT_NEWS: Final = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN, GoalKind.MET)

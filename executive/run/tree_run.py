@@ -8,7 +8,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
-from executive.run.mission_history import Executions, Findings, achieved, claim, findings_in_words
+from executive.run.mission_history import BEFORE, Executions, Findings, achieved, claim, findings_in_words
 from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
 from executive.tree.behaviour import Explained, ExplainedNode, Hook, message_of, suspend
@@ -196,7 +196,9 @@ class TreeRun:
         if outcome is Outcome.SUCCESS:
             skipped = [omission for node in self._nodes if (omission := node.omission()) is not None]
             if findings or not skipped:
-                message = claim(achieved(self._reached(), "" if findings else message), findings, skipped)
+                whole = claim(achieved(self._reached(), "" if findings else message), findings, skipped)
+                again = message.endswith(f"({BEFORE})") and BEFORE not in whole
+                message = f"{whole} ({BEFORE})" if again else whole
         elif findings and outcome is Outcome.FAILURE:
             message = f"{message} (found out: {findings_in_words(findings)})"
         return RobotResult(

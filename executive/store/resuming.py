@@ -13,7 +13,7 @@ from typing import Any, Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.run.mission_history import history_keys
+from executive.run.mission_history import BEFORE, history_keys
 from executive.store.recollection import Memory, Recollection, StepRecord
 from executive.tree.behaviour import Conditional, ExplainedDecorator, ExplainedNode, MemoryComposite
 from executive.tree.compiler import CompiledTree, build, writes
@@ -22,7 +22,6 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.skill_leaf import SkillLeaf
 from skills.api import Cause, Failed, Running, Skill, SkillContext, Step, Succeeded
 
-BEFORE: Final = "before the restart"
 _MARK: Final = f" ({BEFORE})"
 _DECLARED: Final = tuple(name for name, hint in Skill.__annotations__.items() if str(hint).startswith("ClassVar"))
 

@@ -5,12 +5,13 @@ from collections import Counter
 import pytest
 
 from executive.mission.request import Request
+from executive.run.mission_history import BEFORE
 from executive.run.outcome import Outcome
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
-from executive.store.resuming import BEFORE, ended_tree, resumed_tree
+from executive.store.resuming import ended_tree, resumed_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.command import parse_command

@@ -208,7 +208,7 @@ def test_the_picture_of_a_nested_mission_has_the_size_of_a_page(page, nested, tm
 def report_page(tmp_path, nested):
     """The report of a run with everything that a report may have, with long texts."""
     whole = "x" * 120
-    why = f"The coke stands on the counter. Robin has no coke. {whole}"
+    why = f"The coke stands on the counter. Robin has no coke. X{whole}"
     referee = RefereeReport(False, why, 1, 2, events=("1.0 s: it fell",))
     done = Styles.SUCCESS.value
     names = ("go to the hall", "go to the hall", f"go to the hall {whole}", "go to the hall")

@@ -70,8 +70,8 @@ def test_an_answer_about_a_person_shows_the_person_and_not_an_object_of_an_earli
 def test_an_answer_of_a_person_has_no_picture_of_what_the_robot_saw_before():
     # a beer is seen on the way; the person then declines a drink
     artifacts = Artifacts()
-    ask = {"id": "alice/ask", "children": []}
-    artifacts.message("tree", {"robot": "", "root": {"id": "alice", "children": [ask]}})
+    ask = {"id": "alice/ask", "name": "ask", "children": []}
+    artifacts.message("tree", {"robot": "", "root": {"id": "alice", "name": "drinks", "children": [ask]}})
     artifacts.message("detections", looked((10, 10, 40, 30)))
     artifacts.message("object_destination", {"class_name": "beer"})
     began(artifacts, "alice/ask")

@@ -266,5 +266,5 @@ def _state(node: Explained) -> NodeState:
 
 
 _OUTCOMES = {Status.SUCCESS: Outcome.SUCCESS, Status.FAILURE: Outcome.FAILURE}
-_GOALS_WITHOUT_NEWS = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN, GoalKind.MET)
+_GOALS_WITHOUT_NEWS = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN, GoalKind.MET, GoalKind.PICTURED)
 """Goals of a last step after which the claim is the answers alone: it would repeat one, or say where the robot is."""

@@ -1,6 +1,7 @@
 """Pictures of a run: detections of the hand camera, answers to questions, grasps, hand-overs, and a map with paths."""
 
 import base64
+import json
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,6 +28,8 @@ DETECTIONS: Final = "detections"
 MOST_BYTES: Final = 1_500_000
 MOST_SHOWN: Final = 12
 """Number of pictures of skills in the report of a robot."""
+_FACTS: Final = ("of", "robot", "camera", "stamp_s", "pose")
+"""Facts on a picture that stand in `pictures.json`."""
 _MARGIN_M: Final = 0.3
 _WIDEST_PX: Final = 720
 _JPEG_QUALITY: Final = 78
@@ -79,7 +82,10 @@ class Artifacts(RunVisitor):
         if topic == DETECTIONS:
             own.looked.append(message)
             own.seen = message if message["detections"] else own.seen
-        if topic == PICTURES and len(own.shown) < MOST_SHOWN:
+        if topic == PICTURES and "of" in message:
+            own.looked.clear()
+            own.looked.append({**message, "detections": ()})
+        elif topic == PICTURES and len(own.shown) < MOST_SHOWN:
             own.shown.append((str(message["caption"]), to_jpeg(message["image"])))
         if topic == DESTINATION:
             own.confirmed = own.seen
@@ -93,14 +99,16 @@ class Artifacts(RunVisitor):
         return message
 
     def _with_picture(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
-        """Adds a picture to an answer: the view with the found object or person, or all views if nothing was found."""
+        """Adds a picture to an answer: that which was asked for, the view with the find, or all views without one."""
         looked = list(own.looked)
         own.looked.clear()
         if not looked:
             return message
         with_finds = [each for each in looked if each["detections"]]
         confirmed = [each for each in with_finds if each is own.confirmed]
-        if message["answer"] and with_finds:
+        if "of" in looked[-1]:
+            self.answer = detection_picture(looked[-1])
+        elif message["answer"] and with_finds:
             self.answer = detection_picture((confirmed or with_finds)[-1])
         else:
             self.answer = _sheet([detection_picture(each) for each in looked])
@@ -161,6 +169,21 @@ def draw_answer(artifacts: Artifacts, folder: Path) -> Path | None:
     path = folder / "answer.png"
     save_png(path, artifacts.answer)
     return path
+
+
+def save_pictures(events: Iterable[Event], folder: Path) -> Sequence[Path]:
+    """Writes the pictures that the robots took of something into `folder`, with `pictures.json` on them."""
+    taken = [event.data for event in events if event.topic == PICTURES and "of" in event.data]
+    if not taken:
+        return ()
+    folder.mkdir(exist_ok=True)
+    files, facts = [], []
+    for number, each in enumerate(taken, start=1):
+        files.append(folder / f"{number:02}-{slug(str(each['of']).removeprefix('the '))}.jpg")
+        files[-1].write_bytes(base64.b64decode(each["data"]))
+        facts.append({"file": files[-1].name, **{key: each[key] for key in _FACTS}})
+    (folder / "pictures.json").write_text(json.dumps(facts, indent=1), encoding="utf-8")
+    return files
 
 
 def to_jpeg(picture: Picture) -> bytes:

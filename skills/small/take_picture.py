@@ -6,7 +6,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from skills.api import PICTURES, Cause, ObjectObservation, Running, Succeeded
+from skills.api import PICTURES, Cause, ObjectObservation, Succeeded
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import overview_viewpoints
 from skills.perception.detector.camera_images import is_dark
@@ -57,7 +57,6 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         p_WT = inputs.point_W if inputs.object is None else inputs.object.position_W
         if p_WT is None:
             raise SkillFailure(Cause.PRECONDITION, f"no point of {inputs.of} is given")
-        yield Running(message)
         for camera in self._cameras(inputs.camera):
             self._camera, p_BT = camera, self.X_WB().inverse() @ np.array(p_WT)
             with PlanningAttempt() as attempt:
@@ -69,10 +68,7 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         raise SkillFailure(Cause.PLANNING, f"no view of {inputs.of} from here: {blocked[0].message}")
 
     def _cameras(self, named: str) -> Sequence[CameraCapabilities]:
-        """Returns the named camera, or all: first the one that searches for objects.
-
-        Raises SkillFailure with cause PRECONDITION when the robot has no such camera.
-        """
+        """Returns the named camera, or all, the usual one first. Raises SkillFailure with cause PRECONDITION."""
         cameras, self._camera = self.context.robot.capabilities().cameras, None
         if not named:
             first = self.object_camera

@@ -234,10 +234,7 @@ def run_entry(
 
 
 class Bystanders(RunVisitor):
-    """Visitor that lets people near the robots hear and answer; a question that nobody hears stays open.
-
-    The referee records what a picture shows at the time at which it is taken.
-    """
+    """Visitor that lets people near the robots hear and answer; a question that nobody hears stays open."""
 
     def __init__(self, simulation: Simulation, pipeline: Pipeline, control: Control) -> None:
         """`control` receives the answers and remarks; the `pipeline` steps the simulation."""

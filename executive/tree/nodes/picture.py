@@ -58,10 +58,7 @@ class PictureTaken(ExplainedDecorator):
 
 
 def _picture_plan(_: Assembler, step: TakePicture, builder: PlanBuilder) -> Assembled:
-    """Plans the pictures of what a step names, and the goal condition that they show it; stows the arm in the end.
-
-    Raises InputError for an unknown name.
-    """
+    """Plans the pictures of what a step names, and their goal condition. Raises InputError for an unknown name."""
     knowledge, of, at = builder.knowledge, step.subject.of, step.subject.at
     place, item = knowledge.place(of), parse_object(of)
     if place is None and knowledge.object_name(item.name) in (None, ANYTHING, EVERYTHING):

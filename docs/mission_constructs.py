@@ -171,6 +171,17 @@ SMALL = (
         "check",
     ),
     Construct(
+        "picture",
+        "Takes a picture `of` an object, a surface or a named pose, or four of a room, by the `camera` that is named, "
+        "from the place `at`. It stands in the answers of the report and in the folder `pictures/`.",
+        """- picture: {of: kitchen table, camera: hand}
+- picture: {of: desk, at: hall}
+""",
+        "SUCCESS when the picture is taken. FAILURE with the cause of the drive or the search, with PLANNING when no "
+        "camera sees it, and with EXECUTION when the camera shows nothing.",
+        "picture taken",
+    ),
+    Construct(
         "dock",
         "Goes to the dock and charges to `level` (0 to 1); by default as the knowledge file says.",
         """- dock: {level: 0.9}

@@ -15,6 +15,7 @@ from plant.engine import Engine
 from plant.events import Moves
 from plant.people.listeners import Listeners
 from plant.recording import LiveScene, Recorder, Steps, View, save_html
+from plant.referee.object_history import TakenPicture
 from plant.referee.referee import Referee
 from plant.rendering import render_parameters
 from plant.robots.robot_kind import PlacedRobot
@@ -93,6 +94,14 @@ class Simulation:
         """True pose of a robot's body, for judging afterwards. Raises KeyError for an unknown name."""
         body = self.engine.world.robots[robot_name].body
         return Pose2D.from_transform(self.engine.world.plant.EvalBodyPoseInWorld(self.engine.context, body))
+
+    def record_picture(self, robot_name: str, camera: str) -> None:
+        """Lets the referee record what a robot's camera sees now, before any fault. Raises KeyError or ValueError."""
+        image, world = self.robots[robot_name].image(camera, visual=False), self.engine.world
+        X_WB = world.plant.EvalBodyPoseInWorld(self.engine.context, world.robots[robot_name].body)
+        X_WC = X_WB @ image.frames.pose(image.camera_frame, "body")
+        taken = TakenPicture(robot_name, self.engine.now(), X_WC, image.depth_intrinsics, image.depth_m)
+        self.referee.record_picture(taken)
 
     def work(self) -> Mapping[str, int]:
         """Counters of the work so far by name; the same run gives the same counts on any machine."""

@@ -176,6 +176,7 @@ WRITTEN: Final[Mapping[str, str]] = {
     "recording.html": "the whole run in 3D",
     "map.png": "the world from above, with the path",
     "tree.svg": "executed nodes, with the cause of each failure",
+    "pictures": "the pictures that the mission asked for, and `pictures.json` with their poses and times",
     "answer.png": "what the robot saw for its last answer",
     "detection.png": "the first detection",
     "grasp.png": "the grasp",

@@ -208,10 +208,10 @@ def ask_until_clear(sentence: str, meant: Callable[[str], Understanding], answer
 
 _MOST_QUESTIONS: Final = 3
 _MENTIONED: Final = re.compile(
-    r"\b(?:is it|are you|house|whole|everywhere|all over|move|if|unless|in case|otherwise|else|every|each|all"
-    r"|everyone|everybody|twice|times|once|while|as long as|until"
-    r"|till|soon|when|wait|stay|say|tell|announce|ask|greet|know|inform|remind|whatever|matter|regardless|failing|fail"
-    r"|fails|should|whether|door|battery|charge|percent|repeat|holding|report|provided)\b",
+    r"\b(?:pictures?|photo\w*|snapshots?|look a?(?:round|bout)|is it|are you|house|whole|everywhere|all over|move|if"
+    r"|unless|in case|otherwise|else|every|each|all|everyone|everybody|twice|times|once|while|as long as|until|till"
+    r"|soon|when|wait|stay|say|tell|announce|ask|greet|know|inform|remind|whatever|matter|regardless|failing|fails?"
+    r"|should|whether|door|battery|charge|percent|repeat|holding|report|provided)\b",
     re.IGNORECASE,
 )
 """Words of structured sentences; other sentences have only plain commands, and do not load the rest."""

@@ -27,7 +27,7 @@ BEFORE: Final = "before the restart"
 """What the message of a step says that an earlier process has done."""
 _GO: Final = "go to "
 _JOINED: Final = (" and ", " or ")
-_WITHOUT_NEWS: Final = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN, GoalKind.MET)
+_WITHOUT_NEWS: Final = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN, GoalKind.MET, GoalKind.PICTURED)
 """Goals that change nothing: the answers tell them, or where the robot is."""
 _LET_GO: Final = (GoalKind.HANDED_OVER, GoalKind.PLACED)
 _DENIALS: Final = ("no ", "not ", "nobody ", "nothing ")

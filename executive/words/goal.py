@@ -21,6 +21,7 @@ class GoalKind(enum.Enum):
     FOLLOWED = "followed"  # the robot is near the person, who stands in a goal region, and never lost them for long
     GUIDED = "guided"  # the person stands in a goal region, and the robot near them
     MET = "met"  # the robot is close to the person
+    PICTURED = "pictured"  # pictures show the middle of a goal region or an object of a class, from a source region
     GREETED = "greeted"  # the robot spoke once beside each person who stood in the goal regions
 
 

@@ -73,6 +73,9 @@ class Place(Strict):
         default=None, description="outline of a room, corners (x, y); a place without one is a named pose"
     )
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
+    shows: tuple[Coordinate, Coordinate, Height] | None = Field(
+        default=None, description="the point (x, y, z) that a picture from a named pose shows; by default what is ahead"
+    )
 
 
 class Door(Strict):

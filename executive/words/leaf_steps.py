@@ -309,6 +309,28 @@ class OpenDoor(Step):
         return self.door.words
 
 
+class Subject(Strict):
+    """Subject of a picture, the place from which it is taken, and the camera."""
+
+    of: Text = Field(description="An object, a surface, a named pose; or a room, of which four pictures are taken.")
+    at: Text | None = Field(default=None, description="The place where the robot stands; by default a viewpoint.")
+    camera: Name | None = Field(
+        default=None, description="A camera of the robot, such as `hand`; by default that one, or one that sees it."
+    )
+
+
+class TakePicture(Step):
+    """`picture`: takes a picture, which stands in the answers and in the folder `pictures/` of the run."""
+
+    key: ClassVar[str] = "picture"
+    subject: Annotated[Subject, Field(alias="picture", description="Take a picture of something.")]
+
+    @property
+    def words(self) -> str:
+        """Words for what the picture shows."""
+        return f"take a picture of the {self.subject.of}"
+
+
 class Set(Step):
     """`set`: computes named values in order."""
 

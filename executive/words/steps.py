@@ -35,6 +35,7 @@ from executive.words.leaf_steps import (
     Say,
     Set,
     Speak,
+    TakePicture,
     UseMission,
     Wait,
     steps_of_commands,
@@ -319,7 +320,10 @@ class Ask(Answering):
 
 
 _BLOCKS: Final[Mapping[str, type[Step]]] = MappingProxyType(
-    {each.key: each for each in (Choose, Repeat, Try, Together, Wait, Check, Dock, OpenDoor, Group, Speak, Ask, Set)}
+    {
+        each.key: each
+        for each in (Choose, Repeat, Try, Together, Wait, Check, Dock, OpenDoor, TakePicture, Group, Speak, Ask, Set)
+    }
 )
 BLOCKS: Final = tuple(_BLOCKS)
 FORMS: Final = f"'say', some of 'take', 'to', 'do' and 'object', 'skill', 'use', or one of {listing(BLOCKS, last='or')}"

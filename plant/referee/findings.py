@@ -1,5 +1,6 @@
 """Findings of the referee, helpers of all judges, and the judges for following, guiding and greeting."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -8,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from executive.words.goal import GoalCondition, GoalKind, Region, When
-from plant.referee.object_history import TimedPath, Truth
+from plant.referee.object_history import HIDES_M, TakenPicture, TimedPath, Truth
 from skills.inputs.errors import count_text, definite
 from skills.robot import FloatArray
 
@@ -112,6 +113,29 @@ def _apart_m(condition: GoalCondition, robot: TimedPath, person: TimedPath, trut
     if condition.when is When.SOME_TIME:
         return min(distance_m(p_W, at_W) for p_W in robot.positions_between(condition.from_s, until_s))
     return distance_m(robot.position_at(until_s), at_W)
+
+
+def judge_pictured(condition: GoalCondition, truth: Truth) -> Finding:
+    """Judges whether enough pictures of the step show the wanted object or point, or were taken in the source."""
+    from_s, until_s = condition.from_s, step_end_s(condition, truth)
+    own = [each for each in truth.pictures if condition.robot in (None, each.robot)]
+    taken = [each for each in own if from_s <= each.time_s <= until_s]
+    right = sum(_shows(each, condition, truth) for each in taken)
+    what = definite(condition.wanted) if condition.wanted else where(condition.goal or condition.source)
+    if len(taken) == condition.needed == 1:
+        return Finding(right == 1, f"the picture {'shows' if right else 'does not show'} {what}.")
+    return Finding(right >= condition.needed, f"{right} of {max(len(taken), condition.needed)} pictures show {what}.")
+
+
+def _shows(taken: TakenPicture, condition: GoalCondition, truth: Truth) -> bool:
+    """Returns whether a picture shows what a condition wants; from a source it need only be in the field of view."""
+    if condition.source and region_at(condition.source, taken.X_WC.translation()) is None:
+        return False
+    if condition.classes:
+        return any(one.class_name in condition.classes and one.name in taken.seen for one in truth.histories)
+    hides_m = math.inf if condition.source else HIDES_M
+    middles = [(*np.mean(each.polygon_W, axis=0), 0.5 * (each.z_min_m + each.z_max_m)) for each in condition.goal]
+    return all(taken.shows(np.array(middle), hides_m) for middle in middles)
 
 
 def judge_greeted(condition: GoalCondition, truth: Truth) -> Finding:

@@ -10,6 +10,7 @@ from plant.referee.findings import (
     is_past,
     judge_company,
     judge_greeted,
+    judge_pictured,
     region_at,
     step_end_s,
     the,
@@ -321,6 +322,7 @@ _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth], Finding]] = {
     GoalKind.GUIDED: judge_company,
     GoalKind.MET: judge_company,
     GoalKind.GREETED: judge_greeted,
+    GoalKind.PICTURED: judge_pictured,
 }
 
 

@@ -8,11 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from plant.saved_state import Stateful
 from skills.inputs.errors import definite
-from skills.robot import FloatArray
+from skills.robot import FloatArray, Intrinsics
 
 LIFT_M = 0.03
 AWAY_M = 0.3
@@ -22,6 +23,8 @@ WITH_HAND_M_S = 0.2
 REST_S = 0.2
 FLICKER_S = 0.15
 SETTLE_S = 1.0
+HIDES_M = 0.3
+"""Depth before a point from which on something hides the point in a picture."""
 SET_DOWN_S = 0.3
 """Longest time from contact with the floor to the release of an object that was set down, not dropped."""
 
@@ -318,6 +321,30 @@ class TimedPath:
 
 
 @dataclass(frozen=True)
+class TakenPicture:
+    """Picture that a robot took: true pose, lens and depth (m; 0: unknown) of the camera, and the objects `seen` in it.
+
+    `depth_m` has every `step`-th pixel of the lens.
+    """
+
+    robot: str
+    time_s: float
+    X_WC: RigidTransform
+    lens: Intrinsics
+    depth_m: NDArray[np.float32]
+    step: int = 1
+    seen: frozenset[str] = frozenset()
+
+    def shows(self, p_W: FloatArray, hides_m: float = HIDES_M) -> bool:
+        """Returns whether a point is in the picture, with nothing more than `hides_m` before it."""
+        (x, y, z), k = self.X_WC.inverse() @ p_W, self.lens
+        column, row = (round(k.fx * x / z + k.cx), round(k.fy * y / z + k.cy)) if z > 0.0 else (-1, -1)
+        if not (0 <= column < k.width and 0 <= row < k.height):
+            return False
+        return not 0.0 < self.depth_m[row // self.step, column // self.step] < z - hides_m
+
+
+@dataclass(frozen=True)
 class Truth:
     """Record up to `now_s`: histories of the objects, and the paths of robots and people by name.
 
@@ -332,6 +359,7 @@ class Truth:
     persons: Mapping[str, TimedPath]
     given: Mapping[tuple[str, str], Sequence[tuple[float, float]]]
     doors: Mapping[Point, Sequence[tuple[float, float]]] = field(default_factory=dict)
+    pictures: Sequence[TakenPicture] = ()
 
 
 def extend_path(path: list[FloatArray], p_W: FloatArray, time_s: float, most: float = math.inf) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,16 @@ from pydrake.systems.framework import Context
 from executive.words.goal import GoalCondition, RefereeReport
 from plant.referee.entities import FLOOR_Z_M, Collision, CollisionCounter, Entities, Kind, Pair, contact_heights
 from plant.referee.judge import judge
-from plant.referee.object_history import Lift, ObjectHistory, ObjectSample, TimedPath, Truth, extend_path, extend_stays
+from plant.referee.object_history import (
+    Lift,
+    ObjectHistory,
+    ObjectSample,
+    TakenPicture,
+    TimedPath,
+    Truth,
+    extend_path,
+    extend_stays,
+)
 from plant.saved_state import State, Stateful
 from skills.robot import FloatArray
 
@@ -25,6 +35,8 @@ if TYPE_CHECKING:
     from plant.worlds.seeding import Placement
 
 PATH_VALUES = 4
+MOST_COLUMNS = 64
+"""Columns of the depth of a picture that is kept."""
 BEFORE_SAMPLES = 3
 MOST_POINTS = 20_000
 """Most points of a person's path, to bound the memory of a long run with a crowd."""
@@ -34,7 +46,7 @@ DoorHistories = Callable[[], Mapping[tuple[float, float], Sequence[tuple[float, 
 """Returns the changes of each door by its position, as in `Truth.doors`."""
 
 
-class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_bases", "_persons")):
+class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_bases", "_persons", "_pictures")):
     """Referee of one plant: call `observe` at about 20 Hz while it runs, and `judge` at any time.
 
     Its saved state is the whole record without the paths; `points` returns these growing arrays by name.
@@ -67,6 +79,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         self._persons: dict[str, FloatArray] = {}
         self._person_paths: dict[str, list[FloatArray]] = {name: [] for name in self._entities.persons}
         self._now_s = 0.0
+        self._pictures: tuple[TakenPicture, ...] = ()
         self._speeds_m_s: deque[Mapping[str, float]] = deque(maxlen=BEFORE_SAMPLES)
 
     @property
@@ -135,6 +148,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
             persons={name: TimedPath(_timed(path)) for name, path in self._person_paths.items()},
             given=dict(self._given),
             doors=self._doors(),
+            pictures=self._pictures,
         )
         return judge(conditions, truth, collisions=self._counter.collisions)
 
@@ -151,7 +165,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
 
     def forget_past(self) -> None:
         """Clears the record, so that only later events count for the next mission."""
-        self._counter.collisions, self._given = [], {}
+        self._counter.collisions, self._given, self._pictures = [], {}, ()
         self._paths = {name: [] for name in self._paths}
         self._person_paths = {name: [] for name in self._person_paths}
         for history in self._histories.values():
@@ -160,6 +174,13 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
     def record_move(self, name: str, plant_context: Context, time_s: float) -> None:
         """Records a person's move of an object to its present pose. Raises KeyError for an unknown object."""
         self._histories[name].record_move(self._position(plant_context, self._entities.objects[name]), time_s)
+
+    def record_picture(self, taken: TakenPicture) -> None:
+        """Records a picture that a robot has just taken, with the objects that it shows."""
+        seen = frozenset(name for name, each in self._histories.items() if taken.shows(each.last.p_WO))
+        step = max(1, taken.lens.width // MOST_COLUMNS)
+        coarse = replace(taken, depth_m=taken.depth_m[::step, ::step], step=step, seen=seen)
+        self._pictures = (*self._pictures, coarse)
 
     @property
     def names(self) -> tuple[str, ...]:

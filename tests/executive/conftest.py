@@ -241,7 +241,7 @@ class GraspInputs:
 
 SKILLS = (
     *("approach", "back_off", "charge", "clear_costmap", "detect", "find_people", "follow_person", "grasp"),
-    *("guide_person", "hand_over", "meet_person", "navigate", "place", "relocalise", "speak", "stow"),
+    *("guide_person", "hand_over", "meet_person", "navigate", "place", "relocalise", "speak", "stow", "take_picture"),
 )
 SELDOM = {"in_the_way", "released_W"}
 """Outputs of skills that the scripted ones lack."""

@@ -1,6 +1,7 @@
 """Pictures of a run: detections of the hand camera, answers to questions, grasps, hand-overs, and a map with paths."""
 
 import base64
+import json
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,6 +28,8 @@ DETECTIONS: Final = "detections"
 MOST_BYTES: Final = 1_500_000
 MOST_SHOWN: Final = 12
 """Number of pictures of skills in the report of a robot."""
+_FACTS: Final = ("of", "robot", "camera", "stamp_s", "pose")
+"""Facts on a picture that stand in `pictures.json`."""
 _MARGIN_M: Final = 0.3
 _WIDEST_PX: Final = 720
 _JPEG_QUALITY: Final = 78
@@ -92,7 +95,10 @@ class Artifacts(RunVisitor):
             own.looked.append((own.looks, message))
             own.looks += 1
             own.seen = message if message["detections"] else own.seen
-        if topic == PICTURES and len(own.shown) < MOST_SHOWN:
+        if topic == PICTURES and "of" in message:
+            own.looked.clear()
+            own.looked.append((own.looks, {**message, "detections": ()}))
+        elif topic == PICTURES and len(own.shown) < MOST_SHOWN:
             own.shown.append((str(message["caption"]), to_jpeg(message["image"])))
         if topic == DESTINATION:
             own.confirmed += [] if own.seen is None else [own.seen]
@@ -117,18 +123,20 @@ class Artifacts(RunVisitor):
     def _with_picture(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
         """Adds a picture to an answer: the views with the found objects or the person, or all views if none was found.
 
-        Only views since the answering node began count. A leaf, such as a question to a person, looks at nothing.
+        Only views since the answering node began count. A leaf, such as a question to a person, looks at nothing. The
+        answer to a wanted picture is that picture.
         """
         node, confirmed = str(message["node"]), own.confirmed
+        wanted = own.looked[-1][1] if own.looked and "of" in own.looked[-1][1] else None
         looked = [each for number, each in own.looked if number >= own.begun.get(node, own.looks)]
         own.confirmed = []
         own.looked.clear()
-        if not looked or any(_is_leaf(tree["root"], node) for tree in self.trees):
+        if wanted is None and (not looked or any(_is_leaf(tree["root"], node) for tree in self.trees)):
             return message
         finds = [each for each in looked if each["detections"]] if message["answer"] else []
         found = [each for each in finds if any(each is one for one in confirmed)] or finds[-1:]
-        pictures = [detection_picture(each) for each in found or looked]
-        self.answer = pictures[0] if len(found) == 1 else _sheet(pictures)
+        pictures = [detection_picture(each) for each in ([wanted] if wanted else found or looked)]
+        self.answer = pictures[0] if wanted or len(found) == 1 else _sheet(pictures)
         self._keep(message, self.answer)
         return {**message, "image": self.answer}
 
@@ -200,6 +208,21 @@ def draw_answer(artifacts: Artifacts, folder: Path) -> Path | None:
     path = folder / "answer.png"
     save_png(path, artifacts.answer)
     return path
+
+
+def save_pictures(events: Iterable[Event], folder: Path) -> Sequence[Path]:
+    """Writes the pictures that the robots took of something into `folder`, with `pictures.json` on them."""
+    taken = [event.data for event in events if event.topic == PICTURES and "of" in event.data]
+    if not taken:
+        return ()
+    folder.mkdir(exist_ok=True)
+    files, facts = [], []
+    for number, each in enumerate(taken, start=1):
+        files.append(folder / f"{number:02}-{slug(str(each['of']).removeprefix('the '))}.jpg")
+        files[-1].write_bytes(base64.b64decode(each["data"]))
+        facts.append({"file": files[-1].name, **{key: each[key] for key in _FACTS}})
+    (folder / "pictures.json").write_text(json.dumps(facts, indent=1), encoding="utf-8")
+    return files
 
 
 def to_jpeg(picture: Picture) -> bytes:

@@ -30,6 +30,7 @@ from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from plant.snapshot_file import SnapshotError
 from plant.worlds.world import World, WorldError
+from skills.api import PICTURES
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from skills.manipulation.arm.solid_cells import wall_columns
@@ -246,7 +247,10 @@ class Bystanders(RunVisitor):
         self._told = len(pipeline.words)
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Passes a robot's speech to the people near it."""
+        """Passes a robot's speech to the people near it, and its picture of something to the referee."""
+        if topic == PICTURES and "of" in message:
+            self._pipeline.settle()
+            self._simulation.record_picture(str(message["robot"]), str(message["camera"]))
         if topic == SPEECH and not self._simulation.engine.walkers.still:
             self._pipeline.settle()
             self._simulation.engine.walkers.hear(str(message["robot"]))

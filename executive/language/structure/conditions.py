@@ -17,6 +17,7 @@ from executive.language.structure.plain import IS, IT, PlainReader, SpokenCondit
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import DoorToOpen, OpenDoor
+from executive.words.steps import Steps
 from skills.inputs.errors import listing
 
 _SIGNS: Final = {
@@ -118,8 +119,8 @@ def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | No
     return found if opens != bool(match.groupdict().get("not")) else found.negate(words)
 
 
-def parse_opening(text: str, state: State, reader: PlainReader) -> tuple[OpenDoor, State] | None:
-    """Parses a request to have a door opened, and returns the state afterwards; None for other texts.
+def parse_opening(text: str, state: State, reader: PlainReader) -> tuple[Steps, State, tuple[str, ...]] | None:
+    """Parses a request to have a door opened: its step, the state afterwards, no notes; None for other texts.
 
     Raises RefusalError like `_between`, and if the robot would have to open a door that has no plug-in.
     """
@@ -132,7 +133,7 @@ def parse_opening(text: str, state: State, reader: PlainReader) -> tuple[OpenDoo
     if door is None or (own and all(set(door.door) != {*one.between} for one in doors)):
         said = match["door"] or "it"
         raise RefusalError(f"I cannot open {said} myself; say 'ask somebody to open {said}'", [text])
-    return OpenDoor(door=DoorToOpen(door=door.door)), replace(state, door=door, goal=None, at=None)
+    return (OpenDoor(door=DoorToOpen(door=door.door)),), replace(state, door=door, goal=None, at=None), ()
 
 
 def _between(match: re.Match[str], knowledge: Knowledge) -> tuple[str, str]:

@@ -23,7 +23,7 @@ from executive.language.structure.conditions import (
 from executive.language.structure.plain import PlainReader, PlainReading, State, phrase_of_name
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
-from executive.words.leaf_steps import Awaited, Charging, Dock, Wait, steps_of_commands
+from executive.words.leaf_steps import Awaited, Charging, Dock, Subject, TakePicture, Wait, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Steps
 from skills.inputs.errors import listing, with_article
@@ -97,6 +97,23 @@ def parse_charging(text: str, state: State) -> Done | None:
     if level is None:
         raise RefusalError(f"'{match['level']}' is no charge; say it in percent", [match["level"]])
     return (Dock(charging=Charging(level=level)),), replace(state, goal=None, at=None), ()
+
+
+def parse_pictures(text: str, state: State, reader: PlainReader) -> Done | None:
+    """Parses a request for pictures; None for other texts. Raises RefusalError for an unknown name."""
+    match = next((found for form in ACTS.each("pictured") if (found := form.fullmatch(text))), None)
+    if match is None:
+        return None
+    at = match.groupdict().get("at") and reader.go_to(match["at"], state).commands[0].goal
+    names = (_picture_of(of, state, reader) for of in re.split(r",? and |, ", match["of"]))
+    subjects = [Subject(of=of, at=at, camera=match["camera"]) for of in names]
+    return tuple(TakePicture(subject=each) for each in subjects), replace(state, goal=None, at=None), ()
+
+
+def _picture_of(text: str, state: State, reader: PlainReader) -> str:
+    """World's name of the place or object that a picture shows. Raises RefusalError."""
+    place = reader.knowledge.place(re.sub(r"^(?:the|a|an|my|our|your) ", "", text, flags=re.IGNORECASE))
+    return place or str(reader.read_commands(text, state, (verb("find"),)).commands[0].object)
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,7 @@ from executive.language.structure.requests import (
     is_clause,
     make_speech,
     parse_charging,
+    parse_pictures,
     parse_question,
     parse_speech,
     parse_wait,
@@ -102,7 +103,7 @@ class SentenceBuilder(DecisionBuilder):
             if (end := act(row, clauses, at)) is not None:
                 return end
         found = trailing_cue(text)
-        if found is not None and not ACTS.every_room.search(text):
+        if found is not None and (found.kind is Cue.EVERY or not ACTS.every_room.search(text)):
             self.modify(row, clause, found)
             return at + 1
         for act in (self._everyone, self._rooms):
@@ -112,14 +113,15 @@ class SentenceBuilder(DecisionBuilder):
         return at + 1
 
     def _opens(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
-        """Adds the opening of a door, if the clause asks for one."""
-        if not ACTS.opens.match(clauses[at].text):
-            return None
-        done = parse_opening(clauses[at].text, self._known(row), self.reader)
+        """Adds the opening of a door, or pictures, if the clause asks for them."""
+        text = clauses[at].text
+        pictures = ACTS.pictures.match(text) and not trailing_cue(text)
+        parse = parse_opening if ACTS.opens.match(text) else parse_pictures if pictures else None
+        done = parse and parse(text, self._known(row), self.reader)
         if done is None:
             return None
         self.flush(row)
-        self.put(row, *done)
+        self.put_done(row, done)
         return at + 1
 
     def _people(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:

@@ -13,6 +13,7 @@ from executive.tree.registry import installed_skills
 from executive.words.knowledge import load_knowledge
 
 ROOT = Path(__file__).parents[3]
+WORLDS = ROOT / "plant" / "worlds"
 
 
 @pytest.fixture(scope="session")
@@ -22,7 +23,18 @@ def parser():
 
 @pytest.fixture(scope="session")
 def flat():
-    return load_knowledge(ROOT / "plant" / "worlds" / "flat" / "knowledge.yaml")
+    return load_knowledge(WORLDS / "flat" / "knowledge.yaml")
+
+
+@pytest.fixture(scope="session")
+def knowledge_in(flat):
+    """Knowledge of a mission in its own world, with that of its file."""
+
+    def know(loaded):
+        own = flat if loaded.world == "flat" else load_knowledge(WORLDS / loaded.world / "knowledge.yaml")
+        return knowledge_of_mission(loaded, own)
+
+    return know
 
 
 @pytest.fixture(scope="session")
@@ -37,12 +49,12 @@ def missions():
 
 
 @pytest.fixture(scope="session")
-def compile_file(parser, flat, skills):
+def compile_file(parser, knowledge_in, skills):
     """Loads and compiles a file as `errand run` does before it runs."""
 
     def compile_path(path):
         loaded = load_mission(path)
-        knowledge = knowledge_of_mission(loaded, flat)
+        knowledge = knowledge_in(loaded)
         parts = [mission_of_robot(loaded, name, name) for name in loaded.parts or ()] or [loaded]
         missions = [mission_from_file(part, parser=parser, knowledge=knowledge) for part in parts]
         trees = [compile_mission(mission, knowledge=knowledge, registry=skills) for mission in missions]

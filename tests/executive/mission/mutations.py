@@ -85,7 +85,7 @@ def rename_key(text, rng):
         value = node.pop(key)
         node[key[:-1] + key[-1] * 2 if rng.random() < 0.5 else "x" + key] = value
 
-    return changed(text, rng, lambda p, v: isinstance(p[-1], str), rename)
+    return changed(text, rng, lambda p, v: isinstance(p[-1], str) and "set" not in p[:-1], rename)
 
 
 def delete_required(text, rng):

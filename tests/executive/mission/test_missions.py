@@ -1,8 +1,8 @@
-"""Shipped missions: each compiles for the flat and runs to its end with scripted skills."""
+"""Shipped missions: each compiles for its world and runs to its end with scripted skills."""
 
 import pytest
 
-from executive.mission.load import knowledge_of_mission, load_mission, mission_of_robot
+from executive.mission.load import load_mission, mission_of_robot
 from executive.mission.resolve import mission_from_file
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
@@ -11,9 +11,9 @@ from skills.api import Cause, Failed, Succeeded
 NAMES = (
     "beer_else_coke", "charge_then_go", "check_hammer", "clear_table", "count_drinks", "deliver", "fetch_drink",
     "find_hammer", "go_living_room", "go_to_pose", "greet_and_ask", "guarded_delivery", "guarded_round",
-    "guide_robin", "hammer_to_kitchen", "look_and_approach", "patrol", "patrol_and_report", "retry_elsewhere",
-    "speak_while_driving", "take_beer_to_bedroom", "tea_or_coffee", "tidy_cube", "tidy_table", "timed_visit",
-    "two_drinks", "two_robots", "visit_room", "wait_for_button", "watch_the_door", "welcome",
+    "guide_robin", "hammer_to_kitchen", "inspection_round", "look_and_approach", "patrol", "patrol_and_report",
+    "retry_elsewhere", "speak_while_driving", "take_beer_to_bedroom", "tea_or_coffee", "tidy_cube", "tidy_table",
+    "timed_visit", "two_drinks", "two_robots", "visit_room", "wait_for_button", "watch_the_door", "welcome",
 )  # fmt: skip
 SURFACES_WITH_THINGS = ("kitchen counter", "kitchen table", "workbench", "tool trolley")
 
@@ -23,7 +23,7 @@ def test_all_missions_are_named_here(missions):
 
 
 @pytest.fixture
-def run_mission(parser, flat, skills, run_tree, script, missions, make):
+def run_mission(parser, knowledge_in, skills, run_tree, script, missions, make):
     """Runs a mission file with scripted skills that have the real skills' ports."""
 
     def put_down(skill):
@@ -62,7 +62,7 @@ def run_mission(parser, flat, skills, run_tree, script, missions, make):
     def run_file(name, part=None):
         loaded = load_mission(next(path for path in missions if path.stem == name))
         loaded = loaded if part is None else mission_of_robot(loaded, "Alice", part)
-        knowledge = knowledge_of_mission(loaded, flat)
+        knowledge = knowledge_in(loaded)
         mission = mission_from_file(loaded, parser=parser, knowledge=knowledge)
         return run_tree(compile_mission(mission, knowledge=knowledge, registry=registry)).robots[0]
 

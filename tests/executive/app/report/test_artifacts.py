@@ -1,12 +1,16 @@
 """Which pictures of a run are kept for an answer."""
 
+import base64
+import json
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
-from executive.app.report.artifacts import MOST_SHOWN, Artifacts, draw_answer
+from executive.app.report.artifacts import MOST_SHOWN, Artifacts, draw_answer, save_pictures, to_jpeg
 from executive.app.report.report_page import _pictures
+from executive.record.history import Event
 from executive.testing.bench import scripted_bench
 from plant.robots.spot.kind import spot_capabilities
 
@@ -100,6 +104,35 @@ def test_a_count_shows_every_view_that_confirmed_an_object():
         artifacts.message("object_destination", {"class_name": "hammer"})
         artifacts.message("detections", looked())
     assert answered(artifacts, 2)["image"].shape == (240, 640, 3)
+
+
+def taken(of, **more):
+    facts = {"robot": "Alice", "of": of, "camera": "hand", "stamp_s": 4.0, "pose": {"position": {"x": 1.0}}}
+    return {"caption": of, **facts, **more}
+
+
+def test_the_answer_to_a_wanted_picture_is_that_picture_alone():
+    artifacts = Artifacts()
+    artifacts.message("detections", looked((10, 10, 40, 30)))
+    artifacts.message("pictures", taken("the stove", image=np.full((48, 64, 3), 17, np.uint8)))
+    told = artifacts.message("answer", {"node": "a/b", "robot": "Alice", "answer": "taken", "message": "m"})
+    assert np.array_equal(told["image"], np.full((48, 64, 3), 17))
+    assert artifacts.of_robot("Alice").shown == []
+
+
+def test_wanted_pictures_are_written_with_their_poses_and_times(tmp_path):
+    data = base64.b64encode(to_jpeg(np.full((48, 64, 3), 90, np.uint8))).decode()
+    events = [Event("pictures", 4.0, taken(of, data=data, format="jpeg")) for of in ("the stove", "the pump")]
+    others = [Event("pictures", 5.0, {"caption": "another", "data": data}), Event("answer", 5.0, {})]
+    files = save_pictures([*events, *others], tmp_path / "pictures")
+    assert [file.name for file in files] == ["01-stove.jpg", "02-pump.jpg"]
+    assert cv2.imread(str(files[1])).shape == (48, 64, 3)
+    facts = json.loads((tmp_path / "pictures" / "pictures.json").read_text())
+    assert [(each["file"], each["of"], each["stamp_s"]) for each in facts] == [
+        ("01-stove.jpg", "the stove", 4.0),
+        ("02-pump.jpg", "the pump", 4.0),
+    ]
+    assert save_pictures(others, tmp_path / "none") == () and not (tmp_path / "none").exists()
 
 
 def test_without_a_question_there_is_no_picture(tmp_path):

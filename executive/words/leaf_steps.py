@@ -319,7 +319,7 @@ class Subject(Strict):
     )
 
 
-class TakePicture(Step):
+class Picture(Step):
     """`picture`: takes a picture, which stands in the answers and in the folder `pictures/` of the run."""
 
     key: ClassVar[str] = "picture"

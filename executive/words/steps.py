@@ -32,10 +32,10 @@ from executive.words.leaf_steps import (
     Do,
     Dock,
     OpenDoor,
+    Picture,
     Say,
     Set,
     Speak,
-    TakePicture,
     UseMission,
     Wait,
     steps_of_commands,
@@ -322,7 +322,7 @@ class Ask(Answering):
 _BLOCKS: Final[Mapping[str, type[Step]]] = MappingProxyType(
     {
         each.key: each
-        for each in (Choose, Repeat, Try, Together, Wait, Check, Dock, OpenDoor, TakePicture, Group, Speak, Ask, Set)
+        for each in (Choose, Repeat, Try, Together, Wait, Check, Dock, OpenDoor, Picture, Group, Speak, Ask, Set)
     }
 )
 BLOCKS: Final = tuple(_BLOCKS)

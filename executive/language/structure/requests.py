@@ -23,7 +23,7 @@ from executive.language.structure.conditions import (
 from executive.language.structure.plain import PlainReader, PlainReading, State, phrase_of_name
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
-from executive.words.leaf_steps import Awaited, Charging, Dock, Subject, TakePicture, Wait, steps_of_commands
+from executive.words.leaf_steps import Awaited, Charging, Dock, Picture, Subject, Wait, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Steps
 from skills.inputs.errors import listing, with_article
@@ -107,7 +107,7 @@ def parse_pictures(text: str, state: State, reader: PlainReader) -> Done | None:
     at = match.groupdict().get("at") and reader.go_to(match["at"], state).commands[0].goal
     names = (_picture_of(of, state, reader) for of in re.split(r",? and |, ", match["of"]))
     subjects = [Subject(of=of, at=at, camera=match["camera"]) for of in names]
-    return tuple(TakePicture(subject=each) for each in subjects), replace(state, goal=None, at=None), ()
+    return tuple(Picture(subject=each) for each in subjects), replace(state, goal=None, at=None), ()
 
 
 def _picture_of(text: str, state: State, reader: PlainReader) -> str:

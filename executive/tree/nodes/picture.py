@@ -17,7 +17,7 @@ from executive.tree.plan import Assembled, PlanBuilder, StepPart, pose_2d
 from executive.words.command import parse_object
 from executive.words.goal import GoalCondition, GoalKind, Region, When
 from executive.words.knowledge import ANYTHING, EVERYTHING, Pose
-from executive.words.leaf_steps import Subject, TakePicture
+from executive.words.leaf_steps import Picture, Subject
 from skills.api import Publish
 from skills.geometry import compose
 from skills.inputs.errors import InputError, suggestion
@@ -57,7 +57,7 @@ class PictureTaken(ExplainedDecorator):
         return status
 
 
-def _picture_plan(_: Assembler, step: TakePicture, builder: PlanBuilder) -> Assembled:
+def _picture_plan(_: Assembler, step: Picture, builder: PlanBuilder) -> Assembled:
     """Plans the pictures of what a step names, and their goal condition. Raises InputError for an unknown name."""
     knowledge, of, at = builder.knowledge, step.subject.of, step.subject.at
     place, item = knowledge.place(of), parse_object(of)
@@ -137,4 +137,4 @@ def _shows(name: str, point_W: Point) -> GoalCondition:
     return replace(_PICTURED, goal=(replace(outline, z_min_m=z - _MIDDLE_M, z_max_m=z + _MIDDLE_M),))
 
 
-PLANS: Final[StepPlans] = {TakePicture: _picture_plan}
+PLANS: Final[StepPlans] = {Picture: _picture_plan}

@@ -4,7 +4,7 @@ import json
 import re
 
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
-from executive.words.leaf_steps import Check, Do, Dock, OpenDoor, Speak, TakePicture, Wait
+from executive.words.leaf_steps import Check, Do, Dock, OpenDoor, Picture, Speak, Wait
 from executive.words.steps import Ask, Choose, Group, Repeat, Together, Try
 
 
@@ -40,7 +40,7 @@ def _step(step):
             return "Dock" if step.level is None else f"Dock to {step.level:g}"
         case OpenDoor():
             return f"Open {_quoted(step.door.between[0])} - {_quoted(step.door.between[1])}"
-        case TakePicture(subject=subject):
+        case Picture(subject=subject):
             at, camera = subject.at and f" from {subject.at}", subject.camera and f" by {subject.camera}"
             return f"Picture of {subject.of}{at or ''}{camera or ''}"
         case Speak():

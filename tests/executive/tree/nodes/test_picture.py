@@ -10,7 +10,7 @@ from executive.tree.board import Constant, FromBoard
 from executive.tree.compiler import compile_mission
 from executive.words.goal import GoalKind
 from executive.words.knowledge import Place, Pose
-from executive.words.leaf_steps import Subject, TakePicture
+from executive.words.leaf_steps import Picture, Subject
 from executive.words.mission import Mission
 from skills.api import Cause, Failed, Succeeded
 from skills.robot import Pose2D
@@ -28,7 +28,7 @@ def pictured(knowledge, registry):
     """The tree of a mission with one picture."""
 
     def compile_picture(**subject):
-        steps = (TakePicture(subject=Subject(**subject)),)
+        steps = (Picture(subject=Subject(**subject)),)
         return compile_mission(Mission(name="look", robot="Alice", steps=steps), knowledge=knowledge, registry=registry)
 
     return compile_picture

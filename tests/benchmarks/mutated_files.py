@@ -61,12 +61,13 @@ class Kind:
 
 
 def missions():
-    """Reader that loads and compiles a mission; the world, the skills and the parser are loaded once."""
-    flat, skills, parser = load_knowledge(FLAT / "knowledge.yaml"), installed_skills(), load_parser()
+    """Reader that loads and compiles a mission in its world; the worlds, skills and the parser are loaded once."""
+    known = {file.parent.name: load_knowledge(file) for file in WORLDS_FOLDER.glob("*/knowledge.yaml")}
+    skills, parser = installed_skills(), load_parser()
 
     def compile_path(path):
         loaded = load_mission(path)
-        knowledge = knowledge_of_mission(loaded, flat)
+        knowledge = knowledge_of_mission(loaded, known.get(str(loaded.world), known["flat"]))
         for part in [mission_of_robot(loaded, name, name) for name in loaded.parts] if loaded.parts else [loaded]:
             mission = mission_from_file(part, parser=parser, knowledge=knowledge)
             compile_mission(mission, knowledge=knowledge, registry=skills)

@@ -68,7 +68,7 @@ def test_a_world_that_is_no_longer_used_leaves_no_plant_behind(directives):
 
     before = plants()
     build_diagram(DiagramConfig(directives=directives, render=False))
-    assert plants() == before
+    assert plants() <= before  # those of earlier tests may go meanwhile
 
 
 def test_a_bump_into_scenery_names_the_piece(directives):

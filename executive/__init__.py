@@ -41,12 +41,16 @@ os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", "64000000")  # a small file 
 
 
 def _load_own(name: str) -> None:
-    """Loads a package of Errand, extended by folders of its name where the user's project lies.
+    """Loads a package of Errand where the user's project has a folder of its name; that folder extends the package.
 
-    Raises ImportError if the user's program has imported such a folder before.
+    Raises ImportError if the user's program has imported the folder before.
     """
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120 - pathlib loads slowly
     own = os.path.join(root, name)  # noqa: PTH118
+    named = {os.path.abspath(os.path.join(entry, name)) for entry in sys.path} - {own}  # noqa: PTH100, PTH118
+    folders = sorted(each for each in named if os.path.isdir(each))  # noqa: PTH112
+    if not folders:
+        return
     sys.path.insert(0, root)
     try:
         package = import_module(name)
@@ -55,8 +59,7 @@ def _load_own(name: str) -> None:
     if package.__path__[0] != own:
         found = package.__path__[0]
         raise ImportError(f"{found} stands for Errand's package '{name}': import executive first, or rename the folder")
-    folders = {os.path.abspath(os.path.join(entry, name)) for entry in sys.path} - {own}  # noqa: PTH100, PTH118
-    package.__path__ += sorted(each for each in folders if os.path.isdir(each))  # noqa: PTH112
+    package.__path__ += folders
 
 
 for _name in ("skills", "plant"):

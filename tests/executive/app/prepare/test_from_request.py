@@ -229,8 +229,8 @@ def test_people_of_a_variation_walk_in_the_world(tmp_path):
 
 def broken_knowledge(world):
     file = world / "knowledge.yaml"
-    file.write_text(file.read_text().replace("places:\n", "places:\n  pump: {pose: {x: 3.0, y: 4.0}}\n", 1))
-    return f"{file}:8: key 'polygon' is missing in places.pump (used by {{mission}}:2); add 'polygon'"
+    file.write_text(file.read_text().replace("places:\n", "places:\n  pump: {polygon: [[1, 1], [2, 1], [2, 2]]}\n", 1))
+    return f"{file}:8: key 'pose' is missing in places.pump (used by {{mission}}:2); add 'pose'"
 
 
 def missing_knowledge(world):

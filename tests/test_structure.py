@@ -23,7 +23,7 @@ LINES = {
     "executive/view": 1848,
     "executive/testing": 856,
     "executive/app": 8147,
-    "executive/cli": 3868,
+    "executive/cli": 3872,
     "skills": 27882,
     "plant": 11347,
 }

@@ -54,6 +54,13 @@ def runs_folder() -> Path:
     return Path(default_map(Path()).get("run", {}).get("out", "out"))
 
 
+def last_run() -> Path:
+    """Returns the link to the last run, which may be missing. Raises InputError."""
+    from executive.app.runs.folders import LAST
+
+    return runs_folder() / LAST
+
+
 def _nearest(folder: Path) -> tuple[Path, Mapping[str, Any]]:
     """Returns the nearest file of defaults, in a folder or above it, with its values. Raises InputError."""
     for each in (folder, *folder.resolve().parents):

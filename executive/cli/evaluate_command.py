@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from executive.cli.defaults import runs_folder, typed_options, yielding
+from executive.cli.defaults import last_run, typed_options, yielding
 from executive.cli.number_options import quantity_option
 from executive.cli.options import ANYWAY, AS_JSON, REQUEST_OPTIONS, takes_request
 from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer
@@ -255,7 +255,7 @@ def report(
     if run is None or is_folder(run):
         if out is not None or against is not None:
             raise InputError("--out and --against are for an evaluation", hint="name its results.sqlite")
-        _open_report(run or runs_folder() / "last", as_json=as_json)
+        _open_report(run or last_run(), as_json=as_json)
         return
     from executive.app.evaluate.results import ResultsFile
     from executive.app.evaluate.summary import summary_json, to_page

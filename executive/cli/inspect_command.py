@@ -14,7 +14,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from executive.cli.defaults import runs_folder
+from executive.cli.defaults import last_run
 from executive.cli.number_options import quantity_option
 from executive.cli.options import takes_request
 from executive.cli.output import console_for, show_table, terminal_answerer
@@ -99,7 +99,7 @@ def _row(entry: Entry, prefix: str) -> tuple[str | Text, ...]:
 
 def _history(run: Path | None) -> History:
     """Returns the history of a run, by default of the last one. Raises InputError."""
-    last = runs_folder() / "last"
+    last = last_run()
     if run is None and not last.exists():
         raise InputError("no run has written there yet", hint="name a run's folder, or its log.mcap", file=last)
     return read_history(run or last)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +10,6 @@ import typer
 
 from executive.cli.options import AS_JSON
 from executive.cli.output import console_for, finish, show_table
-from executive.mission.request import Request
 from executive.mission.request_fields import command_of
 
 if TYPE_CHECKING:
@@ -57,8 +55,7 @@ def _values(kept: KeptRun) -> dict[str, Any]:
     from executive.app.report.run_report import VERDICTS
 
     asked, report = kept.request, kept.report or {"outcome": "running or interrupted"}
-    command = command_of(replace(asked, out=Request.out))
     verdict = "" if kept.report is None else VERDICTS[(report.get("referee") or {}).get("success")]
     values = {"run": asked.out.name, "mission": asked.name, "seed": asked.seed, "outcome": report["outcome"]}
     values |= {"verdict": verdict, "message": report.get("message", "")}
-    return values | {"begun": kept.begun.isoformat(), "version": kept.version, "command": command}
+    return values | {"begun": kept.begun.isoformat(), "version": kept.version, "command": command_of(asked)}

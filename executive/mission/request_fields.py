@@ -82,5 +82,5 @@ def request_arguments(request: Request) -> list[str]:
 
 
 def command_of(request: Request) -> str:
-    """Returns the command line that runs this request."""
-    return shlex.join(["errand", "run", *request_arguments(request)])
+    """Returns the command line that repeats the run of this request, whose `out` is that run's own folder."""
+    return shlex.join(["errand", "run", *request_arguments(dataclasses.replace(request, out=Request.out))])

@@ -15,7 +15,7 @@ from typing import Final
 
 import typer
 
-from errand_spot.adapter.connection import Address, Connection, LostError, WallClock
+from errand_spot.adapter.connection import SLOW_S, Address, Connection, LostError, WallClock
 from errand_spot.adapter.robot import PRESSED, ApiRobot
 from plant.robots.spot.kind import spot_capabilities
 from skills.inputs.errors import InputError
@@ -148,7 +148,7 @@ def connected(name: str, access: Access) -> Iterator[ReadyRobot]:
     connection = Connection(access.address, access.user, access.password)
     with ExitStack() as ending:
         with _errors_of_input():
-            connection.synchronise()
+            connection.synchronise(timeout_s=SLOW_S)
             clock = WallClock(connection)
             robot = ApiRobot(name, connection, clock, spot_capabilities(), padding_m=access.padding_m)
             made = ReadyRobot(robot, clock, Watch(robot), connection, access, ending)

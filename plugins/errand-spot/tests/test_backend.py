@@ -21,11 +21,12 @@ from lock_step import PASSWORD, USER, scripted_spot
 
 from errand_spot import backend as real_spot
 from errand_spot.adapter import heartbeat
-from errand_spot.adapter.connection import Address, Connection
+from errand_spot.adapter.connection import CALL_S, Address, Connection
 from errand_spot.backend import Access, connected
 from errand_spot.server import computer, identity, keepalive
 from errand_spot.server.computer import Motors
 from errand_spot.server.estop import Tablet
+from errand_spot.server.faults import Fault
 from skills.inputs.errors import InputError
 from skills.robot import Pose2D, RobotStoppedError
 
@@ -162,6 +163,12 @@ def test_a_robot_that_is_not_fit_is_one_error(serve, monkeypatch, spoil, said):
 def without_elbow(whole=real_spot.spot_capabilities):
     can = whole()
     return replace(can, arm=replace(can.arm, joint_names=(*can.arm.joint_names[:-1], "arm_knuckle")))
+
+
+def test_a_robot_that_answers_slowly_at_first_is_connected(serve):
+    slow = Fault(answer_s=1.2 * CALL_S)
+    with serve.server.faults.fault("bosdyn.api.TimeSyncService/TimeSyncUpdate", slow), connected("Alice", serve.access):
+        pass
 
 
 @pytest.mark.parametrize("serve", [{"tablet": Tablet.NONE}], indirect=True)

@@ -23,7 +23,8 @@ from skills.robot import CommandCause
 
 CLIENT: Final = "errand"
 CALL_S: Final = 0.5
-_SLOW_S: Final = 5.0
+SLOW_S: Final = 5.0
+"""Timeouts of a call, and of the first calls, before the robot moves."""
 _ROUND_TRIPS: Final = 5
 _FILES: Final[Mapping[str, str]] = {
     **{name: name.replace("-", "_") for name in ("estop", "image", "lease", "power", "robot-command", "robot-id")},
@@ -68,7 +69,7 @@ class Connection:
         self._robot.update_secure_channel_port(address.port)
         where = f"spot://{address.host}:{address.port}"
         try:
-            self._robot.authenticate(user, password, timeout=_SLOW_S)
+            self._robot.authenticate(user, password, timeout=SLOW_S)
             services = {entry.name: entry.type for entry in self._robot.list_services()}
         except bosdyn.client.auth.InvalidLoginError as error:
             hint = "check --user, and the password that was typed or stands in BOSDYN_CLIENT_PASSWORD"
@@ -114,13 +115,13 @@ class Connection:
 
     # -- clock -------------------------------------------------------------------------------------------------------
 
-    def synchronise(self, *, jumped: bool = False) -> None:
+    def synchronise(self, *, jumped: bool = False, timeout_s: float = CALL_S) -> None:
         """Measures how far the robot's clock is ahead of ours; forgets trips if it has `jumped`. Raises LostError."""
         trips, request = list[tuple[float, float]](), time_sync_pb2.TimeSyncUpdateRequest()
         request.clock_identifier = "" if jumped else self.clock_identifier
         for _ in range(_ROUND_TRIPS):
             sent_s = self._now_s()
-            answer = self.call("time-sync", "TimeSyncUpdate", request)
+            answer = self.call("time-sync", "TimeSyncUpdate", request, timeout_s)
             back_s = self._now_s()
             received, answered = answer.header.request_received_timestamp, answer.header.response_timestamp
             skew_s = 0.5 * (seconds(received) - sent_s + seconds(answered) - back_s)

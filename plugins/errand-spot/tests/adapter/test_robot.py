@@ -421,7 +421,7 @@ def test_a_wrong_password_is_one_error(step, credentials):
 
 
 def test_a_robot_that_is_not_there_is_one_error(monkeypatch, credentials):
-    monkeypatch.setattr(connection, "_SLOW_S", 0.5)
+    monkeypatch.setattr(connection, "SLOW_S", 0.5)
     with pytest.raises(InputError, match=r"spot://127\.0\.0\.1:9: the robot does not answer"):
         Connection(Address("127.0.0.1", 9, credentials.certificate), "user", "right")
 

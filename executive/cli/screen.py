@@ -6,7 +6,8 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -87,9 +88,9 @@ def page_of(console: Console, port: int, store: Path, out: Path) -> Callable[[Pr
     """Returns the function that builds the live page of a run, on which more missions are queued in the store."""
 
     def build(prepared: Prepared) -> PageView:
-        from executive.app.runs.page_view import PageView, queue_function
+        from executive.app.runs.page_view import PageView, add_to, queue_function
 
-        later = queue_function(prepared, store=store, out=out)
+        later = queue_function(replace(prepared.request, out=out), partial(add_to, store))
         return PageView(prepared, plain_lines(console), port=port, later=later)
 
     return build

@@ -141,6 +141,10 @@ class _Run:
     def _live(self) -> list[Session]:
         return [session for session in self._sessions.values() if session.result is None]
 
+    @property
+    def _limit_s(self) -> float:
+        return self._settings.time_limit_s + self._assigner.more_s
+
     def _has_work(self) -> bool:
         """Begins the missions that are assigned now; returns whether any mission is under way."""
         while not self._stopping and (assigned := self._assigner.assign()):  # once more where one cannot begin
@@ -206,7 +210,8 @@ class _Run:
         states = {name: session.states for name, session in self._sessions.items()}
         trees = {name: session.tree for name, session in self._sessions.items()}
         counts, seen = (self._ticks, self._overruns), dict(self._seen)
-        progress = Progress(self._clock.now(), *counts, states, trees, seen, notes, tick_wall_s)
+        left_s = self._limit_s - self._time.elapsed_s()
+        progress = Progress(self._clock.now(), *counts, states, trees, seen, notes, tick_wall_s, left_s)
         for each in self._visitors:
             each.tick(progress)
         self._report_ends()
@@ -230,8 +235,8 @@ class _Run:
         else:
             self._time.stop()
             self._control.extend_questions(self._settings.tick_period_s)
-        if self._time.elapsed_s() >= self._settings.time_limit_s:
-            message = f"the mission was not done within {self._settings.time_limit_s:g} s"
+        if self._time.elapsed_s() >= self._limit_s:
+            message = f"the mission was not done within {self._limit_s:g} s"
             self._stop(Ending(Outcome.FAILURE, Cause.TIMEOUT, message))
         return requests
 

@@ -41,17 +41,19 @@ def test_a_mission_from_the_page_is_done_by_the_fleet_and_a_refused_one_changes_
             found.groups() for line in lines if (found := re.search(r"(http://\S+)/\?token=(\S+)", line))
         )
 
-        def add(text):
+        def post(action, **values):
             headers = {"Content-Type": "application/json", "X-Errand-Token": token}
-            asked = Request(f"{page}/action/queue", json.dumps({"text": text}).encode(), headers)
+            asked = Request(f"{page}/action/{action}", json.dumps(values).encode(), headers)
             try:
                 with urlopen(asked, timeout=60) as answer:
                     return json.load(answer)
             except HTTPError as refusal:
                 return json.load(refusal)
 
-        assert "moon" in add("Go to the moon")["error"]
-        assert add("Bob, go to the kitchen") == {"said": "Mission 2 is queued: go kitchen"}
+        post("pause")
+        assert "moon" in post("queue", text="Go to the moon")["error"]
+        assert post("queue", text="Bob, go to the kitchen") == {"said": "Mission 2 is queued: go kitchen"}
+        post("resume")
         process.stderr.read()
         missions = json.loads(process.stdout.read().splitlines()[-1])["missions"]
     assert process.returncode == 0

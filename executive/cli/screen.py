@@ -23,6 +23,7 @@ from executive.cli.options import stay_s
 from executive.cli.output import plain_lines
 from executive.cli.run_keys import HELP, Keys, prompt_lines, read_keys
 from executive.language.parser import load_parser
+from executive.record.history import RECORDING
 from executive.record.schemas import SPEECH
 from executive.record.work import Profile
 from executive.run.control import Control
@@ -174,7 +175,7 @@ class ConsoleScreen:
 
 WRITTEN: Final[Mapping[str, str]] = {
     "report.html": "verdicts, answers with pictures, speech, steps, map; begin here",
-    "recording.html": "the whole run in 3D",
+    RECORDING: "the whole run in 3D",
     "map.png": "the world from above, with the path",
     "tree.svg": "executed nodes, with the cause of each failure",
     "pictures": "the pictures that the mission asked for, and `pictures.json` with their poses and times",

@@ -14,7 +14,7 @@ from executive.app.report.run_report import VERDICTS
 from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, VIEW, VIEW_PORT, StartCommand, stay_s, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, progress_bar, show_table
 from executive.mission.request import Request
-from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission, store_in
+from executive.store.missions import STORE, GivenMissions, MissionState, MissionStore, StoredMission, store_in
 from executive.words.robot_config import find_robot
 from skills.inputs.errors import InputError
 from skills.inputs.outside import is_folder
@@ -31,7 +31,7 @@ Queue = Annotated[Path, typer.Argument(metavar="QUEUE", help="The store of `erra
 def run(
     request: Request,
     queue: Queue,
-    out: Annotated[Path | None, typer.Option(help="Folder for the run's folder; by default that of the store.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the run's folder; by default the store's.")] = None,
     quiet: QUIET = False,
     view: VIEW = None,
     view_port: VIEW_PORT = 0,
@@ -45,7 +45,6 @@ def run(
     console = console_for(as_json)
     store, tell = _store(queue), plain_lines(console)
     with MissionStore(store, create=False) as missions, missions.claim():
-        from executive.app.fleet.dispatch import silence
         from executive.app.fleet.fleet_run import run_fleet, simulated_fleet
         from executive.app.runs.folders import new_run
         from executive.app.runs.page_view import PageView, queue_function
@@ -62,10 +61,11 @@ def run(
             world=request.world,
             seed=request.seed,
             faults=faults,
-            tell=silence if quiet else tell,
+            tell=(lambda line: None) if quiet else tell,
             record=request.record,
         )
-        asked = replace(request, name="fleet", out=out or (queue if is_folder(queue) else store.parent))
+        beside = store.parents[store.parent.name == STORE.parent.name]  # not in the hidden folder
+        asked = replace(request, name="fleet", out=out or beside)
         kept = new_run(asked, missions.now())
         first = next(iter(next(iter(dispatch.missions.values())).options.values()))
         later = queue_function(replace(first.request, robots=request.robots), dispatch.add)

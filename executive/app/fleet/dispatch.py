@@ -47,10 +47,6 @@ LEFT_M: Final = 1.5
 _NEXT_RUN: Final = "`errand queue add` queues it for the next run"
 
 
-def silence(line: str) -> None:
-    """Discards a line instead of showing it."""
-
-
 @dataclass
 class Dispatch(Assigner):
     """Dispatcher of a fleet: assigns the missions in a store to the robots of a backend.
@@ -67,7 +63,7 @@ class Dispatch(Assigner):
     backend: Backend
     prepare: Callable[[Request], tuple[Mapping[str, Prepared], float]]
     battery: BatteryFacts = field(default_factory=BatteryFacts)
-    tell: Callable[[str], None] = field(default=silence)
+    tell: Callable[[str], None] = lambda line: None
     log: EventLog | None = None
     left_out: Sequence[int] = ()
     each_s: float = 0.0
@@ -95,9 +91,7 @@ class Dispatch(Assigner):
         """
         options, duration_s = self.prepare(request)
         if duration_s > self._left_s + self.each_s:
-            what = (
-                f"the time limit ends the run in {self._left_s:.0f} s, and the mission takes about {duration_s:.0f} s"
-            )
+            what = f"the time limit ends the run in {self._left_s:.0f} s, and it takes about {duration_s:.0f} s"
             raise InputError(what, hint=_NEXT_RUN)
         with self._adding, MissionStore(self.store.path) as store:
             if self._over or self._stopped:

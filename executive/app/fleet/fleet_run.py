@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from executive.app.fleet.dispatch import Dispatch, silence
+from executive.app.fleet.dispatch import Dispatch
 from executive.app.fleet.fleet_mission import (
     NOT_GIVEN,
     FleetMission,
@@ -116,25 +116,14 @@ def simulated_fleet(
     world: str | None = None,
     seed: int = 1,
     faults: Mapping[str, Sequence[str]] | None = None,
-    tell: Callable[[str], None] = silence,
+    tell: Callable[[str], None] = lambda line: None,
     record: bool = False,
 ) -> Dispatch:
-    """Builds a fleet in the plant of a world.
+    """Builds a fleet for the `queued` missions in the plant of a world, by default that of the first one that exists.
 
-    A mission that these robots cannot do in this world stays in the queue, with the reason as its message.
-
-    Args:
-        store: the missions and their state.
-        queued: the missions to run.
-        configs: the robots.
-        world: name or folder; None: the world of the first mission whose world exists.
-        seed: seed of objects and noise.
-        faults: faults in words, by the robots' names.
-        tell: shows a line.
-        record: whether to write a recording and pictures.
-
-    Raises:
-        InputError: the robots do not fit into the world, or no mission can be run.
+    A mission that these robots cannot do in this world stays in the queue, with the reason as its message. The `faults`
+    are words, by the robots' names; `tell` shows a line; with `record` the run has a recording and pictures. Raises
+    InputError if the robots do not fit into the world, or no mission can be run.
     """
     where = _world_of(queued) if world is None else open_world(world)
     knowledge = knowledge_of(where)

@@ -626,7 +626,7 @@ def test_a_mission_that_the_time_limit_would_end_is_refused(fleet, answers):
     fleet.lines = [BEDROOM, BEDROOM]
     fleet.run(time_limit_s=60.0)
     (why,) = {re.sub(r"in \d+ s", "in N s", each) for each in answers[-1:]}
-    assert why.startswith("the time limit ends the run in N s, and the mission takes about 80 s")
+    assert why.startswith("the time limit ends the run in N s, and it takes about 80 s")
     assert len(fleet.store.missions()) == 3
 
 

@@ -45,6 +45,7 @@ def run(
     console = console_for(as_json)
     store, tell = _store(queue), plain_lines(console)
     with MissionStore(store, create=False) as missions, missions.claim():
+        from executive.app.fleet.dispatch import silence
         from executive.app.fleet.fleet_run import run_fleet, simulated_fleet
         from executive.app.runs.folders import new_run
         from executive.app.runs.page_view import PageView, queue_function
@@ -61,7 +62,7 @@ def run(
             world=request.world,
             seed=request.seed,
             faults=faults,
-            tell=(lambda line: None) if quiet else tell,
+            tell=silence if quiet else tell,
             record=request.record,
         )
         beside = store.parents[store.parent.name == STORE.parent.name]  # not in the hidden folder

@@ -47,6 +47,10 @@ LEFT_M: Final = 1.5
 _NEXT_RUN: Final = "`errand queue add` queues it for the next run"
 
 
+def silence(line: str) -> None:
+    """Discards a line instead of showing it."""
+
+
 @dataclass
 class Dispatch(Assigner):
     """Dispatcher of a fleet: assigns the missions in a store to the robots of a backend.
@@ -63,7 +67,7 @@ class Dispatch(Assigner):
     backend: Backend
     prepare: Callable[[Request], tuple[Mapping[str, Prepared], float]]
     battery: BatteryFacts = field(default_factory=BatteryFacts)
-    tell: Callable[[str], None] = lambda line: None
+    tell: Callable[[str], None] = silence
     log: EventLog | None = None
     left_out: Sequence[int] = ()
     each_s: float = 0.0

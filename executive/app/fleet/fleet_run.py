@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from executive.app.fleet.dispatch import Dispatch
+from executive.app.fleet.dispatch import Dispatch, silence
 from executive.app.fleet.fleet_mission import (
     NOT_GIVEN,
     FleetMission,
@@ -116,7 +116,7 @@ def simulated_fleet(
     world: str | None = None,
     seed: int = 1,
     faults: Mapping[str, Sequence[str]] | None = None,
-    tell: Callable[[str], None] = lambda line: None,
+    tell: Callable[[str], None] = silence,
     record: bool = False,
 ) -> Dispatch:
     """Builds a fleet for the `queued` missions in the plant of a world, by default that of the first one that exists.

@@ -14,7 +14,7 @@ from executive.app.report.run_report import VERDICTS
 from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, VIEW, VIEW_PORT, StartCommand, stay_s, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, progress_bar, show_table
 from executive.mission.request import Request
-from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission, store_in
+from executive.store.missions import STORE, GivenMissions, MissionState, MissionStore, StoredMission, store_in
 from executive.words.robot_config import find_robot
 from skills.inputs.errors import InputError
 from skills.inputs.outside import is_folder
@@ -31,7 +31,7 @@ Queue = Annotated[Path, typer.Argument(metavar="QUEUE", help="The store of `erra
 def run(
     request: Request,
     queue: Queue,
-    out: Annotated[Path | None, typer.Option(help="Folder for the run's folder; by default that of the store.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the run's folder; by default the store's.")] = None,
     quiet: QUIET = False,
     view: VIEW = None,
     view_port: VIEW_PORT = 0,
@@ -46,10 +46,9 @@ def run(
     store, tell = _store(queue), plain_lines(console)
     with MissionStore(store, create=False) as missions, missions.claim():
         from executive.app.fleet.dispatch import silence
-        from executive.app.fleet.fleet_mission import missions_json
         from executive.app.fleet.fleet_run import run_fleet, simulated_fleet
         from executive.app.runs.folders import new_run
-        from executive.app.runs.page_view import PageView
+        from executive.app.runs.page_view import PageView, queue_function
         from executive.view.foxglove import serve_live
 
         if not request.robots:
@@ -66,25 +65,25 @@ def run(
             tell=silence if quiet else tell,
             record=request.record,
         )
-        asked = replace(request, name="fleet", out=out or (queue if is_folder(queue) else store.parent))
+        beside = store.parents[store.parent.name == STORE.parent.name]  # not in the hidden folder
+        asked = replace(request, name="fleet", out=out or beside)
         kept = new_run(asked, missions.now())
         first = next(iter(next(iter(dispatch.missions.values())).options.values()))
-        page = PageView(None, tell, port=view_port) if view is not None else None
+        later = queue_function(replace(first.request, robots=request.robots), dispatch.add)
+        page = PageView(None, tell, port=view_port, later=later) if view is not None else None
         run_in = partial(run_fleet, dispatch, out=kept.request.out, seed=request.seed, first=first, page=page)
         with serve_live(foxglove, tell) as live, progress_bar(console, "missions", len(dispatch.missions)) as ended:
-            run_in(live=live, ended=ended, time_limit_s=request.time_limit_s)
-        results = missions_json(missions, [each.id for each in queued])
+            verdict = run_in(live=live, ended=ended, time_limit_s=request.time_limit_s)
+        results = dispatch.rows
         left = resumable_lines(missions, queue)
-    achieved = [_achieved(each) for each in results if each["part_of"] is None]
-    told = f"{sum(achieved)} of {len(achieved)} missions achieved"
-    kept.end({"outcome": "success" if all(achieved) else "failure", "message": told, "missions": results})
-    for line in (told, *left, f"Written to {kept.request.out}"):
+    kept.end({"outcome": "success" if verdict.good else "failure", "message": verdict.word, "missions": results})
+    for line in (verdict.word, *left, f"Written to {kept.request.out}"):
         console.print(line, markup=False)
     if as_json:
         print_json({"missions": results})
     if page is not None and view is not None:
         page.stay(stay_s(view))
-    if not all(achieved):
+    if not verdict.good:
         raise typer.Exit(NOT_ACHIEVED)
 
 
@@ -165,11 +164,6 @@ def _faults(words: Sequence[str], robots: Sequence[str]) -> Mapping[str, Sequenc
         for name in robots if named is None else (named,):
             faults[name].append(said)
     return faults
-
-
-def _achieved(mission: Mapping[str, Any]) -> bool:
-    referee = mission["referee"]
-    return mission["outcome"] == MissionState.SUCCESS.value and (referee is None or referee["success"] is not False)
 
 
 def _row(mission: Mapping[str, Any], names: Mapping[int, str]) -> tuple[str, ...]:

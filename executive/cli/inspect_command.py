@@ -19,7 +19,7 @@ from executive.cli.number_options import quantity_option
 from executive.cli.options import takes_request
 from executive.cli.output import console_for, show_table, terminal_answerer
 from executive.mission.request import Request
-from executive.record.history import Entry, History, read_history, timeline
+from executive.record.history import RECORDING, Entry, History, read_history, timeline
 from executive.record.schemas import ERRORS
 from executive.tree.node_view import NodeView, node_view, to_json
 from executive.view.formats import to_btcpp, to_mermaid, to_svg
@@ -28,10 +28,7 @@ from skills.inputs.errors import InputError
 from skills.inputs.outside import is_file, is_folder, writing
 from skills.quantities import Count, Delay, Port, Tries, Wait
 
-RECORDING: Final = "recording.html"
 LOG_SUFFIX: Final = ".mcap"
-
-
 RUN: Final = typer.Argument(metavar="[RUN]", help="Folder or log.mcap; by default the last run.", show_default=False)
 
 

@@ -104,7 +104,8 @@ def groups() -> Sequence[str]:
 
 
 def _of_others() -> Sequence[EntryPoint]:
-    found = (entry for group in groups() for entry in entry_points(group=group))
+    every = entry_points()  # reads the files of all distributions
+    found = (entry for group in groups() for entry in every.select(group=group))
     return sorted((each for each in found if distribution_of(each) != OURS), key=_key)
 
 

@@ -6,7 +6,8 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -22,6 +23,7 @@ from executive.cli.options import stay_s
 from executive.cli.output import plain_lines
 from executive.cli.run_keys import HELP, Keys, prompt_lines, read_keys
 from executive.language.parser import load_parser
+from executive.record.history import RECORDING
 from executive.record.schemas import SPEECH
 from executive.record.work import Profile
 from executive.run.control import Control
@@ -87,9 +89,9 @@ def page_of(console: Console, port: int, store: Path, out: Path) -> Callable[[Pr
     """Returns the function that builds the live page of a run, on which more missions are queued in the store."""
 
     def build(prepared: Prepared) -> PageView:
-        from executive.app.runs.page_view import PageView, queue_function
+        from executive.app.runs.page_view import PageView, add_to, queue_function
 
-        later = queue_function(prepared, store=store, out=out)
+        later = queue_function(replace(prepared.request, out=out), partial(add_to, store))
         return PageView(prepared, plain_lines(console), port=port, later=later)
 
     return build
@@ -173,7 +175,7 @@ class ConsoleScreen:
 
 WRITTEN: Final[Mapping[str, str]] = {
     "report.html": "verdicts, answers with pictures, speech, steps, map; begin here",
-    "recording.html": "the whole run in 3D",
+    RECORDING: "the whole run in 3D",
     "map.png": "the world from above, with the path",
     "tree.svg": "executed nodes, with the cause of each failure",
     "pictures": "the pictures that the mission asked for, and `pictures.json` with their poses and times",

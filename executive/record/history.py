@@ -45,6 +45,7 @@ from skills.perception.class_forms import ANY_OBJECT
 
 MOST_BYTES = 100_000_000_000
 _EXISTS: Final = "name a log that exists"
+RECORDING: Final = "recording.html"
 _WRITTEN: Final = "name a log.mcap that a run has written"
 _ROS_1: Final = b"#ROSBAG V2"
 _SQLITE: Final = b"SQLite format 3"

@@ -111,6 +111,7 @@ class _Run:
         self._stopping = False
         self._paths_due_s = shared.clock.now()
         self._ticks = self._overruns = 0
+        self._left_s = shared.settings.time_limit_s
         self._begun_s, self._begun_wall_s = shared.clock.now(), time.perf_counter()
         self._time = StoppableTime(shared.clock)
 
@@ -206,7 +207,7 @@ class _Run:
         states = {name: session.states for name, session in self._sessions.items()}
         trees = {name: session.tree for name, session in self._sessions.items()}
         counts, seen = (self._ticks, self._overruns), dict(self._seen)
-        progress = Progress(self._clock.now(), *counts, states, trees, seen, notes, tick_wall_s)
+        progress = Progress(self._clock.now(), *counts, states, trees, seen, notes, tick_wall_s, self._left_s)
         for each in self._visitors:
             each.tick(progress)
         self._report_ends()
@@ -230,8 +231,10 @@ class _Run:
         else:
             self._time.stop()
             self._control.extend_questions(self._settings.tick_period_s)
-        if self._time.elapsed_s() >= self._settings.time_limit_s:
-            message = f"the mission was not done within {self._settings.time_limit_s:g} s"
+        limit_s = self._settings.time_limit_s + self._assigner.more_s
+        self._left_s = limit_s - self._time.elapsed_s()
+        if self._left_s <= 0.0:
+            message = f"the mission was not done within {limit_s:g} s"
             self._stop(Ending(Outcome.FAILURE, Cause.TIMEOUT, message))
         return requests
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -90,7 +91,7 @@ class Progress:
     """State of a run after a tick: node states, mission and status (at most 0.5 s old) of each robot.
 
     `notes` has the notes of the robots whose trees were ticked. The tick took `tick_wall_s` on the wall clock;
-    `overruns` counts the ticks that took too long so far.
+    `overruns` counts the ticks that took too long so far. The time limit ends the run in `left_s`.
     """
 
     now_s: float
@@ -101,6 +102,7 @@ class Progress:
     robots: Mapping[str, RobotStatus] = field(default_factory=dict)
     notes: Mapping[str, TickNote] = field(default_factory=dict)
     tick_wall_s: float = 0.0
+    left_s: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,9 @@ class RunVisitor:
 
 
 class Assigner(RunVisitor):
-    """Assigner of missions to robots during a run; the run's first visitor."""
+    """Assigner of missions to robots during a run, and the run's first visitor; extends the time limit by `more_s`."""
+
+    more_s: float = 0.0
 
     def assign(self) -> Sequence[RunEntry]:
         """Returns the missions that begin now, each for a robot without a mission; called before each tick.

@@ -1,6 +1,11 @@
 """A queue done by two robots in the plant."""
 
 import json
+import re
+import subprocess
+import sys
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import pytest
 from typer.testing import CliRunner
@@ -23,4 +28,34 @@ def test_each_robot_of_a_fleet_does_a_mission_and_the_referee_saw_it(tmp_path):
     missions = errand("fleet", "run", tmp_path, "--robots", robots, "--seed", 2, "--no-record")["missions"]
     assert [(each["robot"], each["outcome"]) for each in missions] == [("Alice", "success"), ("Bob", "success")]
     assert all(each["referee"]["success"] and not each["referee"]["collisions"] for each in missions)
+    assert errand("fleet", "status", tmp_path)["missions"] == missions
+
+
+def test_a_mission_from_the_page_is_done_by_the_fleet_and_a_refused_one_changes_nothing(tmp_path):
+    errand("queue", "add", "--say", "Go to the living room", "--no-wake", "--no-record", "--out", tmp_path)
+    robots = ["--robots", "alice=spot@8.7,4.0,1.57,bob=spot@8.4,6.5,1.57", "--no-record", "--json", "--view", "0.5"]
+    command = [sys.executable, "-m", "executive.cli", "fleet", "run", str(tmp_path), *robots]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        lines = iter(process.stderr.readline, "")
+        page, token = next(
+            found.groups() for line in lines if (found := re.search(r"(http://\S+)/\?token=(\S+)", line))
+        )
+
+        def post(action, **values):
+            headers = {"Content-Type": "application/json", "X-Errand-Token": token}
+            asked = Request(f"{page}/action/{action}", json.dumps(values).encode(), headers)
+            try:
+                with urlopen(asked, timeout=60) as answer:
+                    return json.load(answer)
+            except HTTPError as refusal:
+                return json.load(refusal)
+
+        post("pause")
+        assert "moon" in post("queue", text="Go to the moon")["error"]
+        assert post("queue", text="Bob, go to the kitchen") == {"said": "Mission 2 is queued: go kitchen"}
+        post("resume")
+        process.stderr.read()
+        missions = json.loads(process.stdout.read().splitlines()[-1])["missions"]
+    assert process.returncode == 0
+    assert [(each["robot"], each["outcome"]) for each in missions] == [("Alice", "success"), ("Bob", "success")]
     assert errand("fleet", "status", tmp_path)["missions"] == missions

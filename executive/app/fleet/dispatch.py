@@ -1,6 +1,8 @@
 """Assigns queued missions to the robots of a fleet by an auction; stores each mission's robot and outcome."""
 
 import math
+import threading
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -8,6 +10,7 @@ from typing import Any, Final
 from executive.app.fleet.auction import Auction
 from executive.app.fleet.chain import best_split, options_for
 from executive.app.fleet.fleet_mission import (
+    NOT_GIVEN,
     FleetMission,
     FleetRobot,
     MissionProgress,
@@ -26,6 +29,7 @@ from executive.app.report.report_page import EndedTree
 from executive.app.runs.backend import Backend
 from executive.app.runs.goal_conditions import Share
 from executive.app.runs.one_run import entry_for, robot_report
+from executive.mission.request import Request
 from executive.mission.scenario import Scenario
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
@@ -36,10 +40,11 @@ from executive.store.missions import GivenMissions, MissionState, MissionStore
 from executive.tree.board import Sign
 from executive.tree.node_view import node_view
 from executive.words.knowledge import BatteryFacts
-from skills.inputs.errors import listing
+from skills.inputs.errors import InputError, listing
 
 LEFT_M: Final = 1.5
 """Distance from a hand-over table beyond which a robot leaves space for the next one."""
+_NEXT_RUN: Final = "`errand queue add` queues it for the next run"
 
 
 def silence(line: str) -> None:
@@ -51,16 +56,22 @@ class Dispatch(Assigner):
     """Dispatcher of a fleet: assigns the missions in a store to the robots of a backend.
 
     A robot whose battery is low returns its mission once its gripper is empty, and charges by its mission `dock`.
-    `tell` shows a line; `offers` builds the bids of the robots.
+    `prepare` returns a request for each robot that may do it, and the shortest duration (s) of these; each added
+    mission extends the time limit by `each_s`. `tell` shows a line; `offers` builds the bids of the robots; `ended` is
+    called whenever a mission has ended. The queued missions `left_out` are only listed.
     """
 
     store: MissionStore
     missions: dict[int, FleetMission]
     robots: Mapping[str, FleetRobot]
     backend: Backend
+    prepare: Callable[[Request], tuple[Mapping[str, Prepared], float]]
     battery: BatteryFacts = field(default_factory=BatteryFacts)
-    tell: Callable[[str], None] = field(default=silence)
+    tell: Callable[[str], None] = silence
     log: EventLog | None = None
+    left_out: Sequence[int] = ()
+    each_s: float = 0.0
+    ended: Callable[[], None] = lambda: None
     offers: Callable[[Mapping[str, FleetRobot], BatteryFacts, Callable[[], float], Auction], Offers] = Offers
 
     def __post_init__(self) -> None:
@@ -73,14 +84,48 @@ class Dispatch(Assigner):
             follows = given[number].follows if number in given else None
             self._auction.add(number, after=follows if follows in self.missions else None)
         self._offers = self.offers(self.robots, self.battery, self.backend.clock.now, self._auction)
-        self._stopped = False
+        self._stopped = self._over = False
+        self._left_s = math.inf
+        self._adding, self._added = threading.Lock(), deque[FleetMission]()
+
+    def add(self, request: Request) -> str:
+        """Queues a checked request during the run, and returns the answer to show. Any thread may call it.
+
+        Raises InputError if no robot may do the mission, the time limit would end it, or the run is ending.
+        """
+        options, duration_s = self.prepare(request)
+        if duration_s > self._left_s + self.each_s:
+            what = f"the time limit ends the run in {self._left_s:.0f} s, and it takes about {duration_s:.0f} s"
+            raise InputError(what, hint=_NEXT_RUN)
+        with self._adding, MissionStore(self.store.path) as store:
+            if self._over or self._stopped:
+                raise InputError("the fleet has ended its last mission", hint=_NEXT_RUN)
+            mission = FleetMission(store.add(request, queued=True), options)
+            self._added.append(mission)
+        return f"Mission {mission.number} is queued: {request.name}"
+
+    def _take_added(self) -> None:
+        """Takes the added missions into the auction."""
+        while self._added:
+            mission = self._added.popleft()
+            self.missions[mission.number] = mission
+            self._auction.add(mission.number)
+            self.more_s += self.each_s
+            self._log_missions()
 
     def stop(self, reason: str) -> None:
         """Ends the run; missions under way stay in the queue. Signal handlers may call it."""
         self._stopped = True
 
     def assign(self) -> Sequence[RunEntry]:
-        """Runs a round of the auction; returns the missions that begin now."""
+        """Takes the added missions and runs a round of the auction; returns the missions that begin now."""
+        with self._adding:
+            self._take_added()
+            entries = self._round()
+            self._over = not (entries or self._auction.under_way or self._auction.waiting)
+        return entries
+
+    def _round(self) -> Sequence[RunEntry]:
         entries: list[RunEntry] = []
         self._release_following({})
         given = self._auction.assign(lambda number, name: self._offers.known(self.missions[number], name))
@@ -101,7 +146,7 @@ class Dispatch(Assigner):
             self.robots[name].to_dock = True
         if self._auction.waiting or self._auction.under_way:
             entries += [self._dock_entry(robot) for robot in self.robots.values() if robot.to_dock]
-        return entries if len(refused) == len(given.refused) else [*entries, *self.assign()]
+        return entries if len(refused) == len(given.refused) else [*entries, *self._round()]
 
     def _split(self, number: int) -> bool:
         """Splits a mission that no robot can do alone into two parts; returns whether two robots can do them."""
@@ -156,6 +201,7 @@ class Dispatch(Assigner):
 
     def tick(self, progress: Progress) -> None:
         """Updates the progress of each robot's mission with the changes of its tree."""
+        self._left_s = progress.left_s
         for name, note in progress.notes.items():
             journal = self.robots[name].journal
             if journal is not None:
@@ -244,6 +290,9 @@ class Dispatch(Assigner):
 
     def close(self) -> None:
         """Fails the missions that a robot returned and no other robot took; all others stay in the queue."""
+        with self._adding:
+            self._over = True
+            self._take_added()
         assigned = self._given.all()
         lost = {robot.name: robot.lost for robot in self.robots.values() if robot.lost is not None}
         for number in () if self._stopped else self._auction.waiting:
@@ -252,6 +301,11 @@ class Dispatch(Assigner):
                 why = {**lost, **self.missions[number].tried}
                 reasons = listing([f"{name}: {each}" for name, each in why.items()])
                 self._finish(number, MissionState.FAILURE, f"no robot went on with it ({reasons})")
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The missions of the run with robots and outcomes, as JSON values."""
+        return missions_json(self.store, [*self.missions, *self.left_out])
 
     @property
     def _now_s(self) -> float:
@@ -367,8 +421,11 @@ class Dispatch(Assigner):
             self._auction.drop(number)
         self._given.settle()
         self._log_missions()
+        whole = self._given.all().get(number, NOT_GIVEN).part_of or number
+        if self.store.mission(whole).state is not MissionState.RUNNING:
+            self.ended()
 
     def _log_missions(self) -> None:
         """Writes the assignments of the missions into the log."""
         if self.log is not None:
-            self.log(MISSIONS, missions_message(self.store, missions_json(self.store, list(self.missions))))
+            self.log(MISSIONS, missions_message(self.store, self.rows))

@@ -82,7 +82,7 @@ def fleet_mission(
     Raises InputError with the mission's number if none of the robots can do it.
     """
     try:
-        options = _options(stored, world, knowledge, robots)
+        options = options_for_fleet(stored.request, world, knowledge, robots)
         rests = {name: rest_of(each, given.done, given.last_known) for name, each in options.items()}
         return FleetMission(stored, rests)
     except InputError as error:
@@ -90,10 +90,10 @@ def fleet_mission(
         raise InputError(what, hint=error.hint or "it stays in the queue", file=error.file, line=error.line) from error
 
 
-def _options(
-    stored: StoredMission, world: World, knowledge: Knowledge, robots: Mapping[str, PlacedRobot]
+def options_for_fleet(
+    request: Request, world: World, knowledge: Knowledge, robots: Mapping[str, PlacedRobot]
 ) -> Mapping[str, Prepared]:
-    request = stored.request
+    """Prepares a request for each robot that may do it. Raises InputError if there is none."""
     if request.world_name != world.name:
         hint = f"run the missions of {request.world_name} in a run of their own"
         raise InputError(f"it is for the world {request.world_name}, and this run is in {world.name}", hint=hint)

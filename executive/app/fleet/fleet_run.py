@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -16,9 +16,10 @@ from executive.app.fleet.fleet_mission import (
     FleetRobot,
     charging_missions,
     fleet_mission,
-    missions_json,
     missions_message,
+    options_for_fleet,
 )
+from executive.app.prepare.feasibility import check_prepared
 from executive.app.prepare.placed_robots import placed_robots
 from executive.app.prepare.prepared import Prepared
 from executive.app.prepare.worlds import knowledge_of, open_world
@@ -39,11 +40,12 @@ from executive.app.runs.one_run import log_map
 from executive.app.runs.page_view import PageView
 from executive.app.runs.signals import ended_by_signals
 from executive.app.runs.simulated import SimulatedBackend, compile_first
+from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.record.history import Event, read_events
 from executive.run.control import Control
 from executive.run.runner import run
-from executive.run.visitor import MissionEnd, RunSettings, RunVisitor
+from executive.run.visitor import RunSettings
 from executive.run.worker import LockStepWorker
 from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission
 from executive.view.foxglove import LiveServer
@@ -65,15 +67,15 @@ def run_fleet(
     page: PageView | None = None,
     live: LiveServer | None = None,
     first: Prepared | None = None,
-    ended: Callable[[], None] | None = None,
-) -> None:
+    ended: Callable[[], None] = lambda: None,
+) -> Verdict:
     """Runs until no mission can be assigned; writes log, recording and report into the folder `out`.
 
     `page` shows the run, `live` sends the log's messages, and `ended` is called whenever a mission ends. The log begins
     with the map of the `first` mission. Raises InputError if the page or the log cannot be opened.
     """
     backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
-    watching = () if ended is None else (_EndedMissions(dispatch.store, (*dispatch.missions,), ended),)
+    dispatch.ended, dispatch.each_s = ended, TIME_LIMIT_S if time_limit_s is None else 0.0
     limit_s = TIME_LIMIT_S * max(1, len(dispatch.missions)) if time_limit_s is None else time_limit_s
     with closing(EventLog(out / "log.mcap", backend.clock, apart=True)) as log:
         dispatch.log = log
@@ -89,7 +91,7 @@ def run_fleet(
                 dispatch,
                 clock=backend.clock,
                 worker=worker,
-                visitors=(artifacts, log, *watching, *([] if page is None else [page]), *backend.visitors(control)),
+                visitors=(artifacts, log, *([] if page is None else [page]), *backend.visitors(control)),
                 settings=RunSettings(seed=seed, time_limit_s=limit_s),
                 control=control,
                 spare=dispatch.spare(),
@@ -103,23 +105,7 @@ def run_fleet(
     )
     if page is not None:
         page.offer(recording, out / REPORT, [verdict])
-
-
-@dataclass
-class _EndedMissions(RunVisitor):
-    """Visitor that calls `ended` once for each of the numbered missions when it has ended."""
-
-    store: MissionStore
-    numbers: Sequence[int]
-    ended: Callable[[], None]
-    count: int = 0
-
-    def mission_ended(self, end: MissionEnd) -> None:
-        """Calls `ended` for each mission that has ended since the last call; the dispatcher stored the end before."""
-        states = [self.store.mission(number).state.value for number in self.numbers]
-        for _ in range(self.count, over := sum(state not in _OPEN for state in states)):
-            self.ended()
-        self.count = over
+    return verdict
 
 
 def simulated_fleet(
@@ -133,22 +119,11 @@ def simulated_fleet(
     tell: Callable[[str], None] = silence,
     record: bool = False,
 ) -> Dispatch:
-    """Builds a fleet in the plant of a world.
+    """Builds a fleet for the `queued` missions in the plant of a world, by default that of the first one that exists.
 
-    A mission that these robots cannot do in this world stays in the queue, with the reason as its message.
-
-    Args:
-        store: the missions and their state.
-        queued: the missions to run.
-        configs: the robots.
-        world: name or folder; None: the world of the first mission whose world exists.
-        seed: seed of objects and noise.
-        faults: faults in words, by the robots' names.
-        tell: shows a line.
-        record: whether to write a recording and pictures.
-
-    Raises:
-        InputError: the robots do not fit into the world, or no mission can be run.
+    A mission that these robots cannot do in this world stays in the queue, with the reason as its message. The `faults`
+    are words, by the robots' names; `tell` shows a line; with `record` the run has a recording and pictures. Raises
+    InputError if the robots do not fit into the world, or no mission can be run.
     """
     where = _world_of(queued) if world is None else open_world(world)
     knowledge = knowledge_of(where)
@@ -177,7 +152,13 @@ def simulated_fleet(
         for name, placed in robots.items()
     }
     backend = SimulatedBackend(where, robots, seed=seed, record=record)
-    return Dispatch(store, missions, fleet, backend, knowledge.battery, tell)
+
+    def prepare(request: Request) -> tuple[Mapping[str, Prepared], float]:
+        options = options_for_fleet(request, where, knowledge, robots)
+        return options, min(check_prepared(each).estimate.duration_s for each in options.values())
+
+    left = [each.id for each in queued if each.id not in missions]
+    return Dispatch(store, missions, fleet, backend, prepare, knowledge.battery, tell, left_out=left)
 
 
 def _world_of(queued: Sequence[StoredMission]) -> World:
@@ -193,9 +174,9 @@ def _world_of(queued: Sequence[StoredMission]) -> World:
 def _write_report(
     dispatch: Dispatch, out: Path, artifacts: Artifacts, events: Sequence[Event], facts: Sequence[tuple[str, str]]
 ) -> Verdict:
-    """Writes the report of a fleet's run into the folder `out`; returns how many of its missions are done."""
+    """Writes the report of a fleet's run into the folder `out`; returns how many of its missions are achieved."""
     kinds = {name: robot.placed.kind for name, robot in dispatch.robots.items()}
-    values = missions_json(dispatch.store, list(dispatch.missions))
+    values = dispatch.rows
     rows: list[MissionRow] = []
     for row, full in zip(missions_message(dispatch.store, values)["missions"], values, strict=True):
         seen = None if full["referee"] is None else full["referee"]["success"]
@@ -211,7 +192,8 @@ def _write_report(
             title = f"Mission {each.number}, {tree.robot_name} ({kind}): {tree.mission_name}"
             parts.append(part_of(each.ended, tuple(kinds), artifacts, own, title=title))
     asked = [each.stored.request for each in dispatch.missions.values()]
-    done = f"{sum(row.good is True for row in rows)} of {len(rows)} missions done"
+    wholes = [row.good is True for row, full in zip(rows, values, strict=True) if full["part_of"] is None]
+    done = f"{sum(wholes)} of {len(wholes)} missions achieved"
     page = ReportPage(
         title=title_of(each.name or each.sentence or "fleet" for each in asked),
         request=done,

@@ -28,7 +28,7 @@ from executive.app.report.run_report import (
 )
 from executive.mission.request_fields import command_of
 from executive.record.announce import PACKAGES, versions
-from executive.record.history import Event, seen_objects
+from executive.record.history import RECORDING, Event, seen_objects
 from executive.record.schemas import TRANSITIONS
 from executive.run.outcome import Finding, RunResult, Said
 from executive.tree.compiler import CompiledTree
@@ -45,7 +45,6 @@ from skills.api import ObjectObservation
 from skills.inputs.errors import InputError
 
 REPORT: Final = "report.html"
-RECORDING: Final = "recording.html"
 TREE: Final = "tree"
 _CAPTIONS: Final = {
     "detection": "The first detection",

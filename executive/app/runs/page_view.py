@@ -46,7 +46,7 @@ class PageView(RunVisitor):
         port: int = 0,
         later: Callable[[str], str] | None = None,
     ) -> None:
-        """Takes the request that the run was prepared from; without `prepared` the page takes no sentences.
+        """Takes the request that the run was prepared from; without `prepared` the page only queues sentences.
 
         `tell` shows a line. `later` queues a sentence and returns an answer; without `later` the page offers no queue.
         """
@@ -69,10 +69,11 @@ class PageView(RunVisitor):
         self._scene = scene
         sentences: dict[str, Action] = {}
         if self.conversations is not None:
-            load_ahead()
             sentences["say"] = sentence_action(self.hear)
         if (later := self._later) is not None:
             sentences["queue"] = sentence_action(lambda sentence, _: later(sentence))
+        if sentences:
+            load_ahead()
         actions = {**control_actions(self.control), **sentences, **({} if scene is None else scene_actions(scene))}
         content = PageContent(self._feed, actions, scene_url=None if scene is None else scene.url)
         self._server = serve(content, self._port)
@@ -134,26 +135,29 @@ def sentence_action(do: Callable[[str, str | None], str]) -> Action:
     return say
 
 
-def queue_function(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], str]:
-    """Returns a function that queues a typed sentence as `errand queue add` does, and returns the answer to show.
+def queue_function(before: Request, add: Callable[[Request], str]) -> Callable[[str], str]:
+    """Returns a function that checks a typed sentence as `errand queue add` does, adds it, and returns the answer.
 
-    World, seed and robots are those of the prepared request. In place of a sentence the function takes the name of a
-    shipped mission, with NAME=VALUE for the mission's parameters.
+    World, seed, robots and folder are those of the request `before`; `add` stores the checked request. In place of a
+    sentence the function takes the name of a shipped mission, with NAME=VALUE for the mission's parameters.
     """
-    before = prepared.request
 
     def later(text: str) -> str:
         named, *settings = text.split()
         world = before.world or before.world_name
-        asked = Request(text, world=world, seed=before.seed, out=out, robots=before.robots)
+        asked = Request(text, world=world, seed=before.seed, out=before.out, robots=before.robots)
         if named in shipped_missions():
             asked = replace(asked, sentence=None, file=Path(named), given=parse_values(settings))
-        request = prepare_checked(asked).request.from_anywhere()
-        with MissionStore(store) as missions:
-            number = missions.add(request, queued=True).id
-        return f"queued as mission {number}: {'; '.join(request.commands)} (errand queue run --out {out})"
+        return add(prepare_checked(asked).request.from_anywhere())
 
     return later
+
+
+def add_to(store: Path, request: Request) -> str:
+    """Queues a checked request in a store; returns the answer to show."""
+    with MissionStore(store) as missions:
+        number = missions.add(request, queued=True).id
+    return f"queued as mission {number}: {'; '.join(request.commands)} (errand queue run --store {store})"
 
 
 def scene_actions(scene: Scene) -> Mapping[str, Action]:

@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from executive.app.prepare.placed_robots import robot_stack, shared_detector
 from executive.app.report.artifacts import Artifacts, draw_artifacts
-from executive.app.report.report_page import RECORDING
 from executive.app.runs.backend import Durable, Scene
 from executive.app.runs.goal_conditions import Share, verdict_of
+from executive.record.history import RECORDING
 from executive.record.schemas import SPEECH
 from executive.record.work import Profile
 from executive.run.control import Control

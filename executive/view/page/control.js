@@ -14,6 +14,7 @@
       byId("stop").addEventListener("click", () => this.do(this.state && this.state.mode === "stopped" ? "release" : "stop"));
       byId("say").addEventListener("submit", (event) => { event.preventDefault(); this.say("say"); });
       byId("after").addEventListener("click", () => this.say("queue"));
+      byId("add").addEventListener("submit", (event) => { event.preventDefault(); this.add(); });
       document.addEventListener("keydown", (event) => this.key(event));
     }
 
@@ -23,9 +24,24 @@
       for (const id of ["pause", "step", "cancel"]) byId(id).hidden = !this.actions.has(id);
       byId("say").hidden = !this.actions.has("say");
       byId("after").hidden = !this.actions.has("queue");
+      byId("add").hidden = !this.actions.has("queue") || this.actions.has("say");
     }
 
-    async do(name, values = {}) {
+    // A mission for a fleet. What came of it stays in sight until the next one is typed.
+    async add() {
+      const input = byId("mission"), added = byId("added"), text = input.value.trim();
+      if (!text || this.adding) return;
+      this.adding = true;
+      added.classList.remove("bad");
+      added.textContent = "checking it …";
+      const { said, bad } = await this.ask("queue", { text });
+      added.textContent = said;
+      added.classList.toggle("bad", bad);
+      if (!bad) input.value = "";
+      this.adding = false;
+    }
+
+    async ask(name, values) {
       try {
         const answer = await fetch(`action/${name}`, {
           method: "POST",
@@ -33,12 +49,16 @@
           body: JSON.stringify(values),
         });
         const { said, error } = await answer.json();
-        this.tell(answer.ok ? said : error, !answer.ok);
-        return answer.ok;
+        return { said: answer.ok ? said : error, bad: !answer.ok };
       } catch {
-        this.tell("no answer from Errand: the connection may be lost", true);
-        return false;
+        return { said: "no answer from Errand: the connection may be lost", bad: true };
       }
+    }
+
+    async do(name, values = {}) {
+      const { said, bad } = await this.ask(name, values);
+      this.tell(said, bad);
+      return !bad;
     }
 
     tell(text, bad) {
@@ -112,6 +132,9 @@
       for (const id of ["pause", "step", "cancel", "stop"]) byId(id).disabled = over;
       for (const button of byId("buttons").children) button.disabled = over;
       byId("say").querySelector("[type=submit]").disabled = over;
+      const more = byId("add").querySelector("button");
+      more.disabled = byId("mission").hidden = over;
+      more.textContent = over ? "The fleet has ended" : "Add mission";
     }
 
     key(event) {

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from executive.app.fleet import fleet_run
+from executive.app.report.run_report import Verdict
 from executive.cli.fleet_command import _faults, _to_do
 from executive.mission.request import Request
 from executive.store.missions import GivenMissions, MissionState, MissionStore
@@ -90,10 +91,31 @@ def test_a_mission_that_cannot_be_prepared_is_left_out_with_its_cause_and_the_ot
         go = replace(REQUEST, commands=(GO,), world_name=world)
         store.add(go if world == "flat" else replace(go, commands=(), sentence="go to the kitchen"), queued=True)
     ran = []
-    monkeypatch.setattr(fleet_run, "run_fleet", lambda dispatch, **_: ran.extend(dispatch.missions))
+
+    def run(dispatch, **_):
+        ran.extend(dispatch.missions)
+        return Verdict("The fleet", False, "0 of 3 missions achieved", "")
+
+    monkeypatch.setattr(fleet_run, "run_fleet", run)
     command = ["fleet", "run", str(store.path), "--robots", "alice=spot", "--no-record"]
     shown = errand(*command)
     assert (shown.exit_code, ran) == (1, [2]), shown.output
     messages = [each.message for each in store.missions()]
     assert ["it is for the world" in message for message in messages] == [True, False, True]
     assert "2 missions are left in the queue" not in shown.output
+
+
+@pytest.mark.parametrize(("named", "folder"), [("out/.errand/missions.sqlite", "out"), ("out", "out"), ("own.db", "")])
+def test_the_folder_of_a_run_is_never_hidden(tmp_path, monkeypatch, named, folder):
+    outs = []
+
+    def run(dispatch, out, **_):
+        outs.append(out)
+        return Verdict("The fleet", True, "1 of 1 missions achieved", "")
+
+    monkeypatch.setattr(fleet_run, "run_fleet", run)
+    path = tmp_path / ("out/.errand/missions.sqlite" if named == "out" else named)
+    with MissionStore(path) as store:
+        store.add(replace(REQUEST, commands=(GO,), world_name="flat"), queued=True)
+    shown = errand("fleet", "run", str(tmp_path / named), "--robots", "alice=spot", "--no-record")
+    assert (shown.exit_code, [out.parent for out in outs]) == (0, [tmp_path / folder]), shown.output

@@ -1,6 +1,7 @@
 """Commands of other distributions: listed, run, and refused in one line where they cannot be used."""
 
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import entry_points
@@ -12,6 +13,7 @@ from executive.cli import entry
 from executive.cli.entry import PLUGIN_COMMANDS
 from tests.executive.cli.calls import done, errand
 from tests.executive.distribution import write_distribution
+from tests.sources import PRODUCT, modules
 
 ROOT = Path(__file__).parents[3]
 MODULE = """
@@ -125,6 +127,9 @@ def nothing_installed(monkeypatch):
         ("object import", "object", "errand-make"),
         ("new robot x", "new robot", "errand-make"),
         ("ros2 bag", "ros2", "errand-ros2"),
+        ("world show flat", "world", "errand-make"),
+        ("world zone add x", "world", "errand-make"),
+        ("serve", "serve", "errand-spot"),
         ("sdk", "sdk", "errand-spot"),
         ("teleop --world flat", "teleop", "errand-teleop"),
     ],
@@ -160,3 +165,12 @@ def test_a_plug_in_adds_a_command_to_a_group_of_errand(install):
     assert "ship" in errand("new", "--help").stdout
     ended = errand("new", "ship", "--ports", "2")
     assert (ended.stdout, ended.stderr) == ("ports: 2\n", "")
+
+
+NAMED = re.compile(r"(?:`|: |by )errand ([a-z][a-z0-9-]*)")
+
+
+def test_each_command_that_a_message_of_the_core_names_exists_or_says_which_plug_in_has_it():
+    named = {word for text in modules(*PRODUCT).values() for word in NAMED.findall(text)}
+    assert {"world", "object", "map", "dataset", "run"} <= named
+    assert named <= {*entry.COMMANDS, *PLUGIN_COMMANDS}

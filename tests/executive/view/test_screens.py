@@ -20,7 +20,7 @@ from executive.tree.node_view import node_view
 from executive.view.feed import Feed
 from executive.view.formats import to_svg
 from executive.view.html import render
-from executive.view.page_control import control_json
+from executive.view.page_control import RefusedError, control_json
 from executive.view.server import PageContent, PageServer
 from executive.view.text import Styles, readable
 from executive.words.goal import RefereeReport
@@ -102,8 +102,8 @@ def test_the_page_of_a_nested_mission_is_readable(page, running):
 
 
 @pytest.fixture
-def several(nested, knowledge):
-    """The address of the page of three robots at one place, with their missions, on a map with rooms and a dock."""
+def of_three(nested, knowledge):
+    """The feed of three robots at one place, with their missions, on a map with rooms and a dock."""
     feed, names = Feed(), ("Alice", "Bob", "Carol")
     known = knowledge.model_copy(update={"dock": Pose(x=0.5, y=0.5, yaw=0.0)})
     feed("map", 0.0, map_message(GridMap(np.eye(40, dtype=bool), 0.25, (-5.0, -5.0)), known, world="test"))
@@ -118,9 +118,26 @@ def several(nested, knowledge):
         feed("state", 0.7, {"robot": name, **state})
     row = {"sentence": f"fetch it {LONG}", "robot": "Alice", "outcome": "running", "message": LONG, "reassigned": 2}
     feed("missions", 1.0, {"missions": [{"id": number, **row} for number in range(3)]})
-    with PageServer(
-        PageContent(feed, {name: lambda values: "" for name in ("pause", "step", "cancel", "stop", "say")})
-    ) as server:
+    return feed
+
+
+@pytest.fixture
+def several(of_three):
+    """The address of the page of three robots."""
+    actions = {name: lambda values: "" for name in ("pause", "step", "cancel", "stop", "say")}
+    with PageServer(PageContent(of_three, actions)) as server:
+        yield server.url
+
+
+@pytest.fixture
+def fleet(of_three):
+    """The address of the page of a fleet, which refuses each mission with a long reason."""
+
+    def refuse(values):
+        raise RefusedError(f"I do not understand '{values['text']}': {LONG}")
+
+    actions = {name: lambda values: "" for name in ("pause", "step", "cancel", "stop")}
+    with PageServer(PageContent(of_three, {**actions, "queue": refuse})) as server:
         yield server.url
 
 
@@ -138,9 +155,13 @@ def test_the_page_of_several_robots_fits_and_no_name_on_the_map_covers_another(p
     page.wait_for_function(uncovered)  # the map is drawn once more when its panel has its size
 
 
-def test_the_page_of_a_fleet_fits_three_screens_of_a_telephone_and_its_stop_button_stays_in_view(page, several):
-    page.goto(several)
+def test_the_page_of_a_fleet_fits_three_screens_of_a_telephone_and_its_stop_button_stays_in_view(page, fleet):
+    page.goto(fleet)
     page.locator("#legend li").first.wait_for()
+    page.locator("#mission").fill("fly to the moon")
+    page.locator("#add button").click()
+    expect(page.locator("#added.bad")).to_contain_text("I do not understand 'fly to the moon'")
+    expect_fit(page)
     width, height = page.viewport_size["width"], page.viewport_size["height"]
     if width > 900:
         return

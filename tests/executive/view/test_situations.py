@@ -82,7 +82,7 @@ class Run:
     @property
     def events(self):
         found = defaultdict(list)
-        for event in read_history(self.out / "log.mcap").events:
+        for event in read_history(self.out / "last" / "log.mcap").events:
             found[event.topic].append(event)
         return found
 
@@ -303,9 +303,45 @@ def test_a_fleet_says_what_came_of_each_mission(start, tmp_path):
     said, report = run.finish()
     events = run.check()
     done = [each["outcome"] for each in events["missions"][-1].data["missions"]]
-    assert said == [f"The fleet: ✓ {done.count('success')} of 2 missions done"]
+    assert said == [f"The fleet: ✓ {done.count('success')} of 2 missions achieved"]
     assert report.locator("h1").inner_text().lower() == "go office and go kitchen"
     assert report.locator("table .pill").all_inner_texts() == [f"{each}, fulfilled" for each in done]
+
+
+def test_a_mission_that_is_added_on_the_page_of_a_fleet_is_done(start, tmp_path):
+    added = [
+        *ERRAND,
+        "queue",
+        "add",
+        "--say",
+        "wait in the office for 2 minutes",
+        "--out",
+        str(tmp_path / "queue"),
+    ]
+    subprocess.run(added, check=True, capture_output=True)
+    store = next((tmp_path / "queue").rglob("*.sqlite"))
+    out = tmp_path / "fleet"
+    run = start("fleet", "run", str(store), "--robots", "alice=spot,bob=spot", "--quiet", "--no-record", out=out)
+    run.page.click("#pause")
+    run.pill("paused")
+    box, button, told = (run.page.locator(f"#{each}") for each in ("mission", "add button", "added"))
+    box.fill("fly to the moon")
+    button.click()
+    expect(told).to_have_class("bad", timeout=30_000)
+    expect(told).to_contain_text("I do not understand 'fly to the moon'")
+    expect(box).to_have_value("fly to the moon")
+    box.fill("go to the kitchen")
+    button.click()
+    expect(told).to_have_text("Mission 2 is queued: go kitchen", timeout=30_000)
+    expect(box).to_have_value("")
+    expect(run.page.locator("#missions tr")).to_have_count(2)
+    run.page.click("#pause")
+    said, _ = run.finish()
+    assert said == ["The fleet: ✓ 2 of 2 missions achieved"]
+    expect(button).to_have_text("The fleet has ended")
+    expect(button).to_be_disabled()
+    missions = run.events["missions"][-1].data["missions"]
+    assert [each["outcome"] for each in missions] == ["success", "success"]
 
 
 def test_a_restarted_mission_reports_the_whole_of_it(start, tmp_path, browser):

@@ -5,13 +5,14 @@ import re
 import subprocess
 import sys
 from contextlib import closing, suppress
+from functools import partial
 
 import pytest
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
 from executive.app.prepare.from_request import prepare
-from executive.app.runs.page_view import PageView, queue_function, sentence_action
+from executive.app.runs.page_view import PageView, add_to, queue_function, sentence_action
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.run.control_state import Mode
@@ -74,8 +75,12 @@ def test_a_correction_takes_the_place_of_the_mission(page):
     assert (request.tree.commands[0].goal, request.instead_of) == ("bathroom", "go kitchen")
 
 
+def queue_in(store, prepared):
+    return queue_function(prepared.request, partial(add_to, store))
+
+
 def test_a_sentence_is_queued_for_later(prepared, tmp_path):
-    later = queue_function(prepared, store=tmp_path / "missions.sqlite", out=tmp_path)
+    later = queue_in(tmp_path / "missions.sqlite", prepared)
     assert later("go to the bathroom").startswith("queued as mission 1")
     with MissionStore(tmp_path / "missions.sqlite", create=False) as missions:
         (mission,) = missions.missions(MissionState.QUEUED)
@@ -84,7 +89,7 @@ def test_a_sentence_is_queued_for_later(prepared, tmp_path):
 
 
 def test_a_shipped_mission_is_queued_for_later_with_its_parameters(prepared, tmp_path):
-    later = queue_function(prepared, store=tmp_path / "missions.sqlite", out=tmp_path)
+    later = queue_in(tmp_path / "missions.sqlite", prepared)
     assert later("visit_room room=office thing=hammer").startswith("queued as mission 1")
     with pytest.raises(InputError, match="has no parameter 'rom'; did you mean 'room'"):
         later("visit_room rom=office")

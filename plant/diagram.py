@@ -47,6 +47,7 @@ from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, ModelInst
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from plant.events import add_panel
+from plant.people.arms import Arms
 from plant.rendering import Scene
 from plant.robots.robot_kind import PlacedRobot, RobotBody, robot_kind
 from plant.worlds.geometry_files import OWN_PACKAGE
@@ -251,8 +252,8 @@ class DiagramConfig:
 class WorldDiagram:
     """The finished Diagram built from a `config`, with its parts by name.
 
-    `models` includes the panels of doors. `trays` are the people's trays by name. `scenery` maps each collision shape
-    on the world body to its model's name. `scene` renders the Diagram if the config requests it.
+    `models` includes the panels of doors. `trays` are the people's trays by name; `arms` hold them. `scenery` maps each
+    collision shape on the world body to its model's name. `scene` renders the Diagram if the config requests it.
     """
 
     config: DiagramConfig
@@ -262,6 +263,7 @@ class WorldDiagram:
     robots: Mapping[str, RobotBody]
     models: Mapping[str, ModelInstanceIndex]
     trays: Mapping[str, RigidBody]
+    arms: Arms
     scenery: Mapping[GeometryId, str]
     scene: Scene | None
 
@@ -298,11 +300,14 @@ def build_diagram(config: DiagramConfig, meshcat: Meshcat | None = None) -> Worl
     walkers = [instances[model.name] for model in config.models if model.route is not None]
     moved = [*panels.values(), *walkers, *(tray.model_instance() for tray in trays.values())]
     _filter_collisions(plant, scene_graph, robots.values(), moved)
+    bodies = [plant.get_body(plant.GetBodyIndices(instances[name])[0]) for name in trays]
+    arms = Arms(builder, plant, scene_graph, [*zip(bodies, trays.values(), strict=True)])
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     diagram = builder.Build()
-    scene = Scene(diagram, plant, scene_graph, config.renderer_parameters) if config.render else None
-    return WorldDiagram(config, diagram, plant, scene_graph, robots, {**instances, **panels}, trays, scenery, scene)
+    scene = Scene(diagram, plant, scene_graph, config.renderer_parameters, arms.pose) if config.render else None
+    models = {**instances, **panels}
+    return WorldDiagram(config, diagram, plant, scene_graph, robots, models, trays, arms, scenery, scene)
 
 
 def _filter_collisions(

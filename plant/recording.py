@@ -153,6 +153,7 @@ def save_html(
     for frame in frames:
         root_context.SetTime(frame.time_s)
         shown.plant.SetPositions(context, frame.positions)
+        shown.arms.pose(root_context)
         shown.diagram.ForcedPublish(root_context)
         for name, track in tracks.items():
             if not track or frame.time_s - track[-1][0] >= _TRACK_PERIOD_S:
@@ -220,5 +221,6 @@ class LiveScene:
             set_camera(self._meshcat, camera)
             self._camera_at = camera
         self._shown.plant.SetPositions(self._shown_context, self._plant.GetPositions(self._context))
+        self._shown.arms.pose(self._root_context)
         self._shown.diagram.ForcedPublish(self._root_context)
         self._published_s = time.perf_counter()

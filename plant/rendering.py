@@ -9,7 +9,7 @@ import mmap
 import os
 import signal
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe
 from typing import Any, Final
@@ -29,7 +29,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Diagram
+from pydrake.systems.framework import Context, Diagram
 
 from executive.words.variation import DAY_LIGHT, Light
 
@@ -61,9 +61,10 @@ class Scene:
         plant: MultibodyPlant,
         scene_graph: SceneGraph,
         parameters: RenderEngineVtkParams | None = None,
+        pose: Callable[[Context], None] = lambda _: None,
     ) -> None:
-        """`parameters` set light and sky; the renderer's name is `RENDERER`."""
-        self._plant = plant
+        """`parameters` set light and sky; the renderer's name is `RENDERER`; `pose` poses what is only seen."""
+        self._plant, self._pose = plant, pose
         self._root_context = diagram.CreateDefaultContext()
         self._context = plant.GetMyMutableContextFromRoot(self._root_context)
         self._geometry_context = scene_graph.GetMyMutableContextFromRoot(self._root_context)
@@ -106,6 +107,7 @@ class Scene:
             os.environ.setdefault(MESA_THREADS, "0")
             self._scene_graph.AddRenderer(self._geometry_context, RENDERER, MakeRenderEngineVtk(self._parameters))
         self._plant.SetPositions(self._context, positions)
+        self._pose(self._root_context)
         query = self._query_port.Eval(self._geometry_context)
         assert isinstance(query, QueryObject)
         return query

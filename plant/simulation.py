@@ -95,12 +95,15 @@ class Simulation:
         body = self.engine.world.robots[robot_name].body
         return Pose2D.from_transform(self.engine.world.plant.EvalBodyPoseInWorld(self.engine.context, body))
 
-    def record_picture(self, robot_name: str, camera: str) -> None:
-        """Lets the referee record what a robot's camera sees now, before any fault. Raises KeyError or ValueError."""
+    def record_picture(self, robot_name: str, camera: str, stamp_s: float) -> None:
+        """Lets the referee record what a robot's camera sees now, before any fault, as the picture of time `stamp_s`.
+
+        Raises KeyError or ValueError.
+        """
         image, world = self.robots[robot_name].image(camera, visual=False), self.engine.world
         X_WB = world.plant.EvalBodyPoseInWorld(self.engine.context, world.robots[robot_name].body)
         X_WC = X_WB @ image.frames.pose(image.camera_frame, "body")
-        taken = TakenPicture(robot_name, self.engine.now(), X_WC, image.depth_intrinsics, image.depth_m)
+        taken = TakenPicture(robot_name, stamp_s, X_WC, image.depth_intrinsics, image.depth_m)
         self.referee.record_picture(taken)
 
     def work(self) -> Mapping[str, int]:

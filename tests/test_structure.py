@@ -15,19 +15,19 @@ LINES = {
     "executive/language": 8264,
     "executive/speech": 1570,
     "executive/mission": 1656,
-    "executive/tree": 8737,
+    "executive/tree": 8745,
     "executive/run": 3302,
     "executive/record": 1095,
     "executive/store": 1599,
     "executive/conversation": 595,
     "executive/view": 1848,
     "executive/testing": 856,
-    "executive/app": 8189,
+    "executive/app": 8190,
     "executive/cli": 3866,
     "skills": 27882,
-    "plant": 11347,
+    "plant": 11471,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 420, 61, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 421, 61, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -16,8 +16,10 @@ name: round
 knowledge:
   places:
     window: {pose: {x: 9.8, y: 6.9, yaw: 1.57}, shows: [9.8, 8.3, 0.8]}
+    socket: {pose: {x: 9.8, y: 6.9, yaw: 1.57}, shows: [9.8, 8.3, 0.4]}
 steps:
   - picture: {of: window, camera: hand}
+  - picture: {of: socket, camera: back}
   - picture: {of: coke}
 """
 
@@ -27,14 +29,17 @@ def test_the_pictures_show_what_they_are_of(tmp_path):
     request = Request(file=tmp_path / "round.yaml", seed=1, out=tmp_path / "out", record=False)
     report = run_request(prepare(request)).report
     assert report.achieved, (report.message, report.referee.why)
-    assert report.referee.why == "The picture shows the window. The picture shows the coke."
+    assert report.referee.why == (
+        "The picture shows the window. The picture shows the socket. The picture shows the coke."
+    )
     assert [(each.question, each.answer) for each in report.answers] == [
         ("A picture of the window", "taken"),
+        ("A picture of the socket", "taken"),
         ("A picture of the coke", "taken"),
     ]
-    assert [each.picture for each in report.answers] == [0, 1]
+    assert [each.picture for each in report.answers] == [0, 1, 2]
     facts = json.loads((tmp_path / "out" / "pictures" / "pictures.json").read_text(encoding="utf-8"))
-    for each in facts:
-        assert cv2.imread(str(tmp_path / "out" / "pictures" / each["file"])).shape == (480, 640, 3)
-    assert [each["camera"] for each in facts] == ["hand", "hand"]
+    shapes = [cv2.imread(str(tmp_path / "out" / "pictures" / each["file"])).shape[:2] for each in facts]
+    assert shapes == [(480, 640), (240, 320), (480, 640)]
+    assert [each["camera"] for each in facts] == ["hand", "back", "hand"]
     assert 0.0 < facts[0]["stamp_s"] < facts[1]["stamp_s"] < report.sim_time_s

@@ -250,7 +250,8 @@ class Bystanders(RunVisitor):
         """Passes a robot's speech to the people near it, and its picture of something to the referee."""
         if topic == PICTURES and "of" in message:
             self._pipeline.settle()
-            self._simulation.record_picture(str(message["robot"]), str(message["camera"]))
+            robot, camera, stamp_s = message["robot"], message["camera"], message["stamp_s"]
+            self._simulation.record_picture(str(robot), str(camera), float(stamp_s))
         if topic == SPEECH and not self._simulation.engine.walkers.still:
             self._pipeline.settle()
             self._simulation.engine.walkers.hear(str(message["robot"]))

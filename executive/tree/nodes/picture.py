@@ -1,7 +1,9 @@
 """Pictures of objects, surfaces, named poses and rooms, each reported as an answer of the mission."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -24,7 +26,7 @@ from skills.inputs.errors import InputError, suggestion
 from skills.robot import Pose2D
 
 _TURNS_RAD: Final = (0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi)
-"""Headings of the pictures of a room."""
+"""Headings of the pictures of a room, and turns of the body until a named camera sees a point."""
 _AHEAD_M: Final = (2.5, 0.9)
 """Distance before the body, and height above the floor, of the point to which a camera looks that looks ahead."""
 _ARM_M: Final = 0.9
@@ -73,13 +75,14 @@ def _picture_plan(_: Assembler, step: Picture, builder: PlanBuilder) -> Assemble
     elif place in knowledge.surfaces:
         facts = knowledge.surfaces[place]
         point, at = (*np.mean(facts.polygon, axis=0).tolist(), facts.height), subject.at
-        node = _from_views(builder, subject, point, facts.viewpoints if at is None else (knowledge.place_pose(at),))
+        views = facts.viewpoints if at is None else (knowledge.place_pose(at),)
+        node = _from_views(builder, subject, point, [*map(pose_2d, views)])
         goal = _shows(place, point)
     else:
         pose, shows = knowledge.place_pose(subject.at or place), knowledge.places[place].shows
         point = shows or _ahead(pose_2d(pose))
         near = () if shows else (square_region(place, pose, POSE_NEAR_M + _ARM_M),)
-        node, goal = _from_views(builder, subject, point, (pose,)), replace(_shows(place, point), source=near)
+        node, goal = _from_views(builder, subject, point, (pose_2d(pose),)), replace(_shows(place, point), source=near)
     node = builder.at("tidy").stow_after(node)
     return Assembled((node,), (StepPart(builder.path_id, goal=goal, node=node.path_id),))
 
@@ -101,20 +104,25 @@ def _of_room(builder: PlanBuilder, subject: Subject, room: str) -> tuple[NodeSpe
     for number, turn_rad in enumerate(_TURNS_RAD, start=1):
         view = compose(pose_2d(builder.knowledge.place_pose(at)), Pose2D(0.0, 0.0, turn_rad))
         title, below = f"{room} ({number} of {len(_TURNS_RAD)})", builder.at(f"view-{number}")
-        shot = _shot(below, subject, title, point_W=_ahead(view))
-        views.append(below.look_from(f"look around in the {title}", view, f"the {at}", shot))
+        views.append(_from_views(below, subject.model_copy(update={"at": at}), _ahead(view), (view,), title))
     outline = Region(room, builder.knowledge.rooms[builder.knowledge.room(at)])
     return builder.sequence(f"look around in the {room}", *views), replace(_PICTURED, source=(outline,), count=4)
 
 
-def _from_views(builder: PlanBuilder, subject: Subject, point_W: Point, views: tuple[Pose, ...]) -> NodeSpec:
-    """Takes a picture of a point from the first of some poses that can be reached and sees it."""
-    nodes = []
-    for number, pose in enumerate(views, start=1):
-        below, title = builder.at(f"view-{number}"), f"take a picture of the {subject.of}, view {number}"
-        drive = below.navigate(pose_2d(pose), f"the {subject.at or subject.of}", exactly=True)
-        nodes.append(below.sequence(title, drive, _shot(below, subject, point_W=point_W)))
-    return builder.first_of(f"a picture of the {subject.of}", *nodes) if len(nodes) > 1 else nodes[0]
+def _from_views(
+    builder: PlanBuilder, subject: Subject, point_W: Point, views: Sequence[Pose2D], title: str = ""
+) -> NodeSpec:
+    """Takes a picture of a point from the first of some poses that can be reached and sees it.
+
+    At each pose the body turns until a named camera sees the point. A picture with a title needs no exact pose.
+    """
+    what, nodes = title or subject.of, list[NodeSpec]()
+    for number, (view, turn_rad) in enumerate(product(views, _TURNS_RAD if subject.camera else (0.0,)), start=1):
+        below, pose = builder.at(f"view-{number}"), compose(view, Pose2D(0.0, 0.0, turn_rad))
+        drive = below.navigate(pose, f"the {subject.at or subject.of}", exactly=not title)
+        shot = _shot(below, subject, title, point_W=point_W)
+        nodes.append(below.sequence(f"take a picture of the {what}, view {number}", drive, shot))
+    return builder.first_of(f"a picture of the {what}", *nodes) if len(nodes) > 1 else nodes[0]
 
 
 def _shot(builder: PlanBuilder, subject: Subject, title: str = "", **ports: object) -> NodeSpec:

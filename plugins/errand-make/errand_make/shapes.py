@@ -140,7 +140,7 @@ _SMALL_KG_M2 = 5e-6
 class Model:
     """One rigid body: its visual geometry (a mesh file beside the SDF), collision shapes, mass and friction.
 
-    A model without mass properties must be welded to the world.
+    A model without mass properties must be welded to the world. `parts` are further meshes by name, with their poses.
     """
 
     name: str
@@ -150,11 +150,22 @@ class Model:
     friction: float = 0.8
     comment: str = field(default="")
     maker: str = "a builder script"
+    parts: Sequence[Part] = ()
+
+
+@dataclass(frozen=True)
+class Part:
+    """A further mesh of a model: its name, its file, and its pose (x, y, z, roll, pitch, yaw; m and rad)."""
+
+    name: str
+    mesh: str
+    pose: tuple[float, float, float, float, float, float]
 
 
 def model_sdf(model: Model) -> str:
     """Returns the SDF text of a model."""
     collisions = "".join(_collision(index, shape, model.friction) for index, shape in enumerate(model.collisions))
+    parts = "".join(map(_visual, model.parts))
     return f"""<?xml version="1.0"?>
 <!-- {model.comment or model.name}; made by {model.maker}, don't edit. -->
 <sdf version="1.9" xmlns:drake="drake.mit.edu">
@@ -163,7 +174,7 @@ def model_sdf(model: Model) -> str:
 {_inertial(model.mass)}      <visual name="visual">
         <geometry><mesh><uri>{model.mesh}</uri></mesh></geometry>
       </visual>
-{collisions}    </link>
+{parts}{collisions}    </link>
   </model>
 </sdf>
 """
@@ -182,6 +193,14 @@ def _inertial(mass: MassProperties | None) -> str:
         <mass>{number(mass.mass_kg)}</mass>
         <inertia>{moments}</inertia>
       </inertial>
+"""
+
+
+def _visual(part: Part) -> str:
+    return f"""      <visual name="{part.name}">
+        <pose>{" ".join(number(value) for value in part.pose)}</pose>
+        <geometry><mesh><uri>{part.mesh}</uri></mesh></geometry>
+      </visual>
 """
 
 

@@ -37,7 +37,8 @@ def build(folder: Path) -> None:
 def write_model(folder: Path, model: Model, appearance: Appearance) -> None:
     """Writes SDF, OBJ, material file and pictures of one model."""
     write_text(folder / f"{model.name}.sdf", model_sdf(model))
-    write_text(folder / f"{model.name}.obj", obj_text(appearance.mesh, f"{model.name}.mtl"))
+    for file_name, mesh in {model.mesh: appearance.mesh, **appearance.parts}.items():
+        write_text(folder / file_name, obj_text(mesh, f"{model.name}.mtl"))
     write_text(folder / f"{model.name}.mtl", mtl_text(appearance.mesh, "palette.png"))
     for name, picture in appearance.pictures.items():
         save_png(folder / name, picture, 9)

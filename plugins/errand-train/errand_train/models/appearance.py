@@ -19,10 +19,11 @@ LABEL_SHAPE = (192, 384)
 
 @dataclass(frozen=True)
 class Appearance:
-    """A mesh in the frame of its model and the pictures that its materials name."""
+    """A mesh in the frame of its model, the pictures that its materials name, and the meshes of parts by file name."""
 
     mesh: Mesh
     pictures: dict[str, Picture] = field(default_factory=dict)
+    parts: dict[str, Mesh] = field(default_factory=dict)
 
 
 def coke_appearance() -> Appearance:

@@ -1,14 +1,19 @@
-"""A standing person of about 1.75 m. The origin lies on the floor between the feet; the person faces x."""
+"""A standing person of about 1.75 m. The origin lies on the floor between the feet; the person faces x.
+
+The arms are meshes of their own, each along -z from its joint, which `plant.people.arms` can lift.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydrake.math import RollPitchYaw
 
 from errand_make.mesh import Material, Mesh
-from errand_make.shapes import Box, Cylinder, Model, Shape
+from errand_make.shapes import Box, Cylinder, Model, Part, Shape
 from errand_train.models.appearance import Appearance
 from errand_train.models.pictures import cloth, to_picture
+from plant.people.arms import LOWER_M, SIDES, UPPER_M, arm_poses
 
 MATERIALS = {
     "skin": Material((0.80, 0.62, 0.50)),
@@ -22,6 +27,8 @@ MATERIALS = {
     "sweater": Material((0.58, 0.48, 0.60), "knit.png"),
     "trousers": Material((0.30, 0.32, 0.37), "knit.png"),
 }
+HAND_M = 0.068
+"""Distance of the middle of the hand from the wrist."""
 
 
 def person() -> Model:
@@ -31,7 +38,17 @@ def person() -> Model:
     arms: list[Shape] = [Cylinder(radius=0.055, length=0.68, p=(0, y, 1.07)) for y in (-0.245, 0.245)]
     torso = Box(size=(0.22, 0.38, 0.60), p=(0, 0, 1.14))
     head = Cylinder(radius=0.10, length=0.31, p=(0.01, 0, 1.595))
-    return Model("person", "person.obj", [*legs, *feet, torso, *arms, head], comment="a standing person, welded")
+    shapes = [*legs, *feet, torso, *arms, head]
+    return Model("person", "person.obj", shapes, comment="a standing person, welded", parts=_arm_parts())
+
+
+def _arm_parts() -> list[Part]:
+    """The arms as they hang."""
+    return [
+        Part(f"{side}_{part}", f"{part}.obj", (*X_PA.translation(), *RollPitchYaw(X_PA.rotation()).vector()))
+        for side in SIDES
+        for part, X_PA in zip(("upper_arm", "lower_arm"), arm_poses(side), strict=True)
+    ]
 
 
 def person_appearance() -> Appearance:
@@ -40,10 +57,11 @@ def person_appearance() -> Appearance:
     _torso(mesh)
     for side in (-1, 1):
         _leg(mesh, side)
-        _arm(mesh, side)
     _head(mesh)
     knit = cloth(np.random.default_rng(21), (96, 96), (0.97, 0.97, 0.97), 0.04)
-    return Appearance(mesh, {"knit.png": to_picture(knit)})
+    return Appearance(
+        mesh, {"knit.png": to_picture(knit)}, {"upper_arm.obj": _upper_arm(), "lower_arm.obj": _lower_arm()}
+    )
 
 
 def _torso(mesh: Mesh) -> None:
@@ -61,14 +79,21 @@ def _leg(mesh: Mesh, side: int) -> None:
     mesh.add_box("sole", (-0.075, y - 0.046, 0.0), (0.175, y + 0.046, 0.025))
 
 
-def _arm(mesh: Mesh, side: int) -> None:
-    shoulder, elbow, wrist = (0.0, 0.205, 1.40), (-0.02, 0.252, 1.12), (0.045, 0.250, 0.87)
-    a, b, c = ((p[0], p[1] * side, p[2]) for p in (shoulder, elbow, wrist))
-    _ellipsoid(mesh, "sweater", a, (0.064, 0.056, 0.062))
-    _limb(mesh, "sweater", b, a, (0.048, 0.052, 0.056))
-    _ellipsoid(mesh, "sweater", b, (0.048, 0.048, 0.048))
-    _limb(mesh, "sweater", c, b, (0.036, 0.042, 0.047))
-    _ellipsoid(mesh, "skin", (c[0] + 0.02, c[1], c[2] - 0.065), (0.038, 0.024, 0.075))
+def _upper_arm() -> Mesh:
+    mesh = Mesh(MATERIALS)
+    _ellipsoid(mesh, "sweater", (0, 0, 0), (0.064, 0.056, 0.062))
+    _limb(mesh, "sweater", (0, 0, -UPPER_M), (0, 0, 0), (0.048, 0.052, 0.056))
+    return mesh
+
+
+def _lower_arm() -> Mesh:
+    """The lower arm with the hand."""
+    mesh = Mesh(MATERIALS)
+    wrist_m = LOWER_M - HAND_M
+    _ellipsoid(mesh, "sweater", (0, 0, 0), (0.048, 0.048, 0.048))
+    _limb(mesh, "sweater", (0, 0, -wrist_m), (0, 0, 0), (0.036, 0.042, 0.047))
+    _ellipsoid(mesh, "skin", (0, 0, -LOWER_M), (0.038, 0.024, 0.075))
+    return mesh
 
 
 def _head(mesh: Mesh) -> None:

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from executive.record.other_tools import pose_values
 from executive.record.schemas import DOORS, JOINTS, NAVIGATION, POSE, SCAN, STATE, stamp
 from skills.api import LocalisationEstimate, ObstacleLayerView, ParticleView, SkillContext
 from skills.doorway import Doorway, SeenDoor
@@ -44,7 +45,6 @@ class RobotLog:
 
     def _publish_pose(self, estimate: LocalisationEstimate) -> None:
         X_WB = self._context.X_WB()
-        p, q = X_WB.translation(), X_WB.rotation().ToQuaternion()
         flat = Pose2D.from_transform(X_WB)
         self._context.publish(
             POSE,
@@ -52,10 +52,7 @@ class RobotLog:
                 "timestamp": stamp(self._context.clock.now()),
                 "frame_id": "world",
                 "robot": self._name,
-                "pose": {
-                    "position": {"x": p[0], "y": p[1], "z": p[2]},
-                    "orientation": {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()},
-                },
+                "pose": pose_values(X_WB),
                 "yaw_rad": flat.yaw_rad,
                 "covariance": estimate.covariance.ravel().tolist(),
             },

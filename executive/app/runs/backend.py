@@ -15,6 +15,7 @@ from executive.run.visitor import RunEntry, RunVisitor
 from executive.store.journal import StoreJournal
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
+from skills.api import Publish
 from skills.robot import Clock, Pose2D
 
 if TYPE_CHECKING:
@@ -78,8 +79,8 @@ class Backend(Protocol):
     def happened(self) -> Sequence[tuple[float, str]]:
         """Returns the scenario's events so far, as times (s) and sentences; empty for a real robot."""
 
-    def visitors(self, control: Control) -> Sequence[RunVisitor]:
-        """Returns the visitors that the backend adds to a run with this control; empty for a real robot."""
+    def visitors(self, control: Control, log: Publish) -> Sequence[RunVisitor]:
+        """Returns the visitors that the backend adds to a run with this control and log; empty for a real robot."""
 
     @property
     def notes(self) -> Sequence[str]:

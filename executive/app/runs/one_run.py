@@ -106,7 +106,7 @@ def run_request(
             watching.append(DisturbanceLog(log, entries[0].robot, backend.happened))
         if profile is not None:
             watching.append(RunProfile(profile, backend, (artifacts, log), journals))
-        watching += backend.visitors(control := control or Control(pace=None))
+        watching += backend.visitors(control := control or Control(pace=None), log)
         with ended_by_signals(control.cancel) as ending, closing(worker or LockStepWorker(clock)) as jobs:
             at = jobs if profile is None else TimedWorker(jobs, partial(profile.timed, "planning"))
             result = run(

@@ -33,6 +33,7 @@ from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
 from executive.words.variation import NO_VARIATION
 from plant.worlds.world import World
+from skills.api import Publish
 from skills.inputs.errors import InputError, one_line
 from skills.inputs.yaml_source import scalar_of
 from skills.robot import Clock, ConnectedRobot, Pose2D, RobotStoppedError
@@ -76,7 +77,7 @@ class RealBackend:
         """Returns no events, because no simulation reports what happens around a real robot."""
         return ()
 
-    def visitors(self, control: Control) -> Sequence[RunVisitor]:
+    def visitors(self, control: Control, log: Publish) -> Sequence[RunVisitor]:
         """Returns no visitors, because people talk to the real robot themselves."""
         return ()
 

@@ -29,19 +29,12 @@
 
   // The lines of all plots, by plot and robot: points of time (s) and value.
   class Curves {
-    constructor() { Object.assign(this, { lines: new Map([...PLOTS.map(({ key }) => key), "error"].map((key) => [key, new Map()])), before: null, poses: new Map() }); }
+    constructor() { Object.assign(this, { lines: new Map([...PLOTS.map(({ key }) => key), "error_m"].map((key) => [key, new Map()])), before: null }); }
 
     take({ topic, data, t }) {
-      if (topic === "pose") this.poses.set(data.robot, [t, data.pose.position]);
-      if (topic === "truth") this.takeTruth(t, data);
+      if (topic === "truth") this.add("error_m", data.robot, t, 100 * data.error_m); // of a simulated run alone
       if (topic === "state") for (const { key, factor } of PLOTS) if (Number.isFinite(data[key])) this.add(key, data.robot, t, factor * data[key]);
       if (topic === "wall" && Number.isFinite(data.lasted_s)) this.takePace(t, data.lasted_s);
-    }
-
-    // The error of the pose that the robot estimates for the same time; only a simulated run has the truth.
-    takeTruth(t, { robot, pose: { position } }) {
-      const [when, estimate] = this.poses.get(robot) || [];
-      if (when === t) this.add("error", robot, t, 100 * Math.hypot(estimate.x - position.x, estimate.y - position.y));
     }
 
     takePace(t, lasted) {
@@ -72,7 +65,7 @@
     // Draws the lines, or the errors where they are known, with the lines dashed below.
     draw(curves, robots, t, end) {
       const style = getComputedStyle(document.documentElement), css = (name) => style.getPropertyValue(name).trim();
-      const { kind } = this, own = curves.lines.get(kind.key), errors = kind.error && curves.lines.get("error"), known = errors && errors.size > 0;
+      const { kind } = this, own = curves.lines.get(kind.key), errors = kind.error && curves.lines.get("error_m"), known = errors && errors.size > 0;
       const styled = (lines, dashes) => [...lines].sort(([one], [other]) => (one < other ? -1 : 1)).map(([name, points]) => ({ name, points, dashes, colour: css(name ? colourOf(robots, name) : "--text") }));
       const solid = styled(known ? errors : own, []), drawn = [...(known ? styled(own, DASHES) : []), ...solid];
       this.write(known ? kind.error : kind.title, solid, t);

@@ -950,11 +950,9 @@ def test_verdicts_are_shown_for_each_robot_and_for_all(page, two, control):
 
 
 def drive(feed, t, robot="Alice", error_m=None, **values):
-    """Feeds a state, and with `error_m` an estimated pose that is so far from the truth."""
+    """Feeds a state, and the error of the estimated pose if it is known."""
     if error_m is not None:
-        for topic, x in (("pose", error_m), ("truth", 0.0)):
-            turn, position = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}, {"x": x, "y": 0.0, "z": 0.0}
-            feed(topic, t, {"robot": robot, "pose": {"position": position, "orientation": turn}})
+        feed("truth", t, {"robot": robot, "error_m": error_m})
     feed("state", t, {**state(), "grip_n": 0.0, "robot": robot, **values})
 
 

@@ -59,13 +59,14 @@ class RobotLog:
         )
 
     def _publish_state(self, estimate: LocalisationEstimate) -> None:
-        """Logs the gripper, the battery, the speed, and the quality of the localisation."""
+        """Logs the robot's own faults, the gripper, the battery, the speed, and the quality of the localisation."""
         robot = self._context.robot
         gripper = robot.gripper()
         self._context.publish(
             STATE,
             {
                 "robot": self._name,
+                "faults": robot.faults(),
                 "holding": gripper.holding,
                 "grip_n": round(gripper.force_n, 1),
                 "charge": round(robot.battery().charge, 4),

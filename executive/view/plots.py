@@ -72,7 +72,7 @@ def to_plot(curve: Curve) -> str:
     scale = np.array([(_RIGHT - _LEFT) / end_s, (_TOP - _BOTTOM) / most])
     values: dict[str, Any] = {
         "lines": [
-            (ROBOT_COLOURS[number % len(ROBOT_COLOURS)], _points(_thinned(line) * scale + (_LEFT, _BOTTOM)), dashes)
+            (ROBOT_COLOURS[number % len(ROBOT_COLOURS)], _thinned(line) * scale + (_LEFT, _BOTTOM), dashes)
             for lines, dashes in ((curve.dashed, "3 3"), (curve.lines, "none"))
             for number, (_, line) in enumerate(sorted(lines.items()))
         ],
@@ -83,10 +83,6 @@ def to_plot(curve: Curve) -> str:
         ],
     }
     return render("plot.svg", curve=curve, w=_W, h=_H, left=_LEFT, right=_RIGHT, **values)
-
-
-def _points(line: Line) -> str:
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in line.tolist())
 
 
 def _thinned(line: Line) -> Line:

@@ -1042,3 +1042,13 @@ def test_nothing_moves_when_values_come_and_the_folded_plots_leave_their_room_to
     assert height("#map-panel") > empty[0] + 50
     page.reload()
     expect(page.locator("#plots")).to_be_hidden()
+
+
+def test_a_fault_that_the_robot_reports_is_an_event_and_stands_above_all(page, live, feed):
+    for t, faults in ((1.0, []), (2.0, ["motor too hot"]), (2.5, ["motor too hot"]), (3.0, [])):
+        feed("state", t, {**state(), "faults": faults})
+        if t == 2.5:
+            expect(page.locator("#state .bad")).to_have_text("reportsmotor too hot")
+    reports = page.locator("#events li", has_text="Alice reports")
+    expect(reports).to_have_text([re.compile("motor too hot"), re.compile("no more faults")])
+    expect(page.locator("#state .bad")).to_have_count(0)

@@ -21,7 +21,7 @@ import numpy as np
 from mcap.writer import Writer
 from pydantic_core import to_jsonable_python
 
-from executive.record.other_tools import grid_of, joints_message, pose_values, scan_message, scene_of, transform_of
+from executive.record.other_tools import grid_of, joints_message, scan_message, scene_of, transform_of
 from executive.record.schemas import (
     BOXES,
     DETECTIONS,
@@ -38,6 +38,7 @@ from executive.record.schemas import (
     WALL,
     ZONES,
     Schema,
+    pose_values,
     schema_of,
     stamp,
 )

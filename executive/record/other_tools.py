@@ -11,9 +11,8 @@ from typing import Any, Final
 
 import cv2
 import numpy as np
-from pydrake.math import RigidTransform
 
-from executive.record.schemas import stamp
+from executive.record.schemas import pose_values, stamp
 from executive.words.slug import slug
 from skills.map_drawing import ZONE_COLOURS
 from skills.robot import Joints, Scan
@@ -37,13 +36,6 @@ def ros_name(robot: str) -> str:
 def body_frame(robot: str) -> str:
     """Name of the frame that is fixed to a robot's body."""
     return f"{ros_name(robot)}/body"
-
-
-def pose_values(X_AB: RigidTransform) -> Message:
-    """Converts a pose to position and orientation."""
-    p, q = X_AB.translation(), X_AB.rotation().ToQuaternion()
-    turn = {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()}
-    return {"position": {"x": p[0], "y": p[1], "z": p[2]}, "orientation": turn}
 
 
 def scan_message(scan: Scan, robot: str) -> Message:

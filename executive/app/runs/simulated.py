@@ -15,8 +15,7 @@ from executive.app.report.artifacts import Artifacts, draw_artifacts
 from executive.app.report.report_page import RECORDING
 from executive.app.runs.backend import Durable, Scene
 from executive.app.runs.goal_conditions import Share, verdict_of
-from executive.record.other_tools import pose_values
-from executive.record.schemas import POSE, SPEECH, TRUTH
+from executive.record.schemas import POSE, SPEECH, TRUTH, pose_values
 from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.control_state import OpenQuestion

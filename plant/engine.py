@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
@@ -140,6 +141,10 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         """Calls `listener` after each advance, once the sensors of all robots are updated."""
         self._after_advance.append(listener)
 
+    def poses_W(self) -> Mapping[str, RigidTransform]:
+        """True poses X_WB of the robots, for the log and the referee; no robot may ask."""
+        return {name: robot.body.EvalPoseInWorld(self.context) for name, robot in self.world.robots.items()}
+
     def world_state(self) -> Mapping[str, FloatArray]:
         """Discrete state of the Diagram by group: positions and velocities of everything that moves."""
         groups = range(self.root_context.num_discrete_state_groups())
@@ -208,6 +213,8 @@ class Pipeline:
         self._engine, self._background = engine, background or _at_once
         self.robots = {name: PipelinedRobot(robot, self) for name, robot in engine.robots.items()}
         self._now_s: float | None = None
+        self.poses_W = engine.poses_W()
+        """True poses X_WB of the robots at the time of the last measurements."""
         self._under_way: Future[None] | None = None
 
     @property
@@ -237,7 +244,7 @@ class Pipeline:
         if left_s > dt_s / 2.0:
             self._engine.step(left_s)
         self._engine.sense()
-        self._now_s = self._engine.now()
+        self._now_s, self.poses_W = self._engine.now(), self._engine.poses_W()
         for robot in self.robots.values():
             robot.begin_commands()
         self._under_way = self._background(partial(self._engine.step, dt_s))

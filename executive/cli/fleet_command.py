@@ -15,7 +15,7 @@ from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, VIEW, VIEW_PORT, Sta
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, progress_bar, show_table
 from executive.mission.request import Request
 from executive.store.missions import STORE, GivenMissions, MissionState, MissionStore, StoredMission, store_in
-from executive.words.robot_config import find_robot
+from executive.words.robot_config import named_robot
 from skills.inputs.errors import InputError
 from skills.inputs.outside import is_folder
 
@@ -154,9 +154,7 @@ def _faults(words: Sequence[str], robots: Sequence[str]) -> Mapping[str, Sequenc
 
     faults: dict[str, list[str]] = {name: [] for name in robots}
     for each in words:
-        head, _, rest = each.partition(":")
-        named = find_robot(head, robots) if rest else None
-        said = rest.strip() if named is not None else each
+        named, said = named_robot(each, robots)
         try:
             parse_fault(said)
         except ValueError as error:

@@ -38,6 +38,7 @@ from executive.record.schemas import (
     WALL,
     ZONES,
     Schema,
+    pose_values,
     schema_of,
     stamp,
 )
@@ -45,7 +46,7 @@ from executive.run.outcome import RunResult
 from executive.run.visitor import Progress, RunSettings, RunVisitor
 from executive.words.slug import slug
 from skills.api import Worker
-from skills.robot import Clock, Joints, Scan
+from skills.robot import Clock, Joints, Pose2D, Scan
 
 FLUSH_EVERY_S: Final = 1.0
 TICKS_EVERY_S: Final = 1.0
@@ -270,13 +271,7 @@ def box_annotations(detections: Sequence[Message], now_s: float) -> Message:
     return {"circles": [], "points": points, "texts": texts}
 
 
-def planar_pose(x_m: float, y_m: float, yaw_rad: float) -> Message:
-    """Converts a planar pose to a position and an orientation in 3D."""
-    turn = {"x": 0.0, "y": 0.0, "z": math.sin(yaw_rad / 2), "w": math.cos(yaw_rad / 2)}
-    return {"position": {"x": x_m, "y": y_m, "z": 0.0}, "orientation": turn}
-
-
 def _path(message: Message, now_s: float) -> Message:
     rest = {key: value for key, value in message.items() if key != "frame"}
-    poses = [planar_pose(*map(float, pose)) for pose in message["poses"]]
+    poses = [pose_values(Pose2D(*map(float, pose)).transform()) for pose in message["poses"]]
     return {**rest, "timestamp": stamp(now_s), "frame_id": message.get("frame", "world"), "poses": poses}

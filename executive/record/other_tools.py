@@ -12,7 +12,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from executive.record.schemas import stamp
+from executive.record.schemas import pose_values, stamp
 from executive.words.slug import slug
 from skills.map_drawing import ZONE_COLOURS
 from skills.robot import Joints, Scan
@@ -42,15 +42,11 @@ def scan_message(scan: Scan, robot: str) -> Message:
     """Encodes the ring of a LiDAR scan that is nearest to the horizontal; range 0 is a beam without a return."""
     ring = int(np.argmin(np.abs(scan.elevations_rad)))
     ranges = scan.ranges_m[ring, ::_STEP] * np.cos(scan.elevations_rad[ring])
-    p, q = scan.X_BL.translation(), scan.X_BL.rotation().ToQuaternion()
     return {
         "timestamp": stamp(scan.stamp_s),
         "frame_id": body_frame(robot),
         "robot": robot,
-        "pose": {
-            "position": {"x": p[0], "y": p[1], "z": p[2]},
-            "orientation": {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()},
-        },
+        "pose": pose_values(scan.X_BL),
         "start_angle": float(scan.azimuths_rad[0]),
         "end_angle": float(scan.azimuths_rad[::_STEP][-1]),
         "ranges": [round(value, 2) for value in np.nan_to_num(ranges, nan=0.0).tolist()],

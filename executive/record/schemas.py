@@ -7,14 +7,18 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from skills.inputs.yaml_source import read_yaml
+
+if TYPE_CHECKING:
+    from pydrake.math import RigidTransform
 
 TREE: Final = "tree"
 TRANSITIONS: Final = "transitions"
 ACTIVITY: Final = "activity"
 POSE: Final = "pose"
+TRUTH: Final = "truth"
 STATE: Final = "state"
 OUTCOME: Final = "outcome"
 RUN: Final = "run"
@@ -85,3 +89,10 @@ def stamp(time_s: float) -> dict[str, int]:
     """Converts seconds to a time in the message formats: seconds and nanoseconds."""
     nanoseconds = round(time_s * 1e9)
     return {"sec": nanoseconds // 10**9, "nsec": nanoseconds % 10**9}
+
+
+def pose_values(X_AB: RigidTransform) -> dict[str, Any]:
+    """Converts a pose to position and orientation in the message formats."""
+    p, q = X_AB.translation(), X_AB.rotation().ToQuaternion()
+    turn = {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()}
+    return {"position": {"x": p[0], "y": p[1], "z": p[2]}, "orientation": turn}

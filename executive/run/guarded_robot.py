@@ -2,6 +2,7 @@
 
 import functools
 import math
+import reprlib
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -152,7 +153,7 @@ def _reading(kind: type[Any], more: Check = lambda reading: None) -> Check:
         if not reading.stamp_s >= 0.0:
             return f"a stamp of {reading.stamp_s} s"
         bad = next((name for name, good in numbers if not good(getattr(reading, name))), None)
-        return more(reading) if bad is None else f"{bad} is not finite: {getattr(reading, bad)!r:.60}"
+        return more(reading) if bad is None else f"{bad} is not finite: {reprlib.repr(getattr(reading, bad))}"
 
     return _typed(kind, check)
 

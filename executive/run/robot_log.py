@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from executive.record.schemas import DOORS, JOINTS, NAVIGATION, POSE, SCAN, STATE, stamp
+from executive.record.schemas import DOORS, JOINTS, NAVIGATION, POSE, SCAN, STATE, pose_values, stamp
 from skills.api import LocalisationEstimate, ObstacleLayerView, ParticleView, SkillContext
 from skills.doorway import Doorway, SeenDoor
 from skills.robot import Pose2D
@@ -44,7 +44,6 @@ class RobotLog:
 
     def _publish_pose(self, estimate: LocalisationEstimate) -> None:
         X_WB = self._context.X_WB()
-        p, q = X_WB.translation(), X_WB.rotation().ToQuaternion()
         flat = Pose2D.from_transform(X_WB)
         self._context.publish(
             POSE,
@@ -52,23 +51,21 @@ class RobotLog:
                 "timestamp": stamp(self._context.clock.now()),
                 "frame_id": "world",
                 "robot": self._name,
-                "pose": {
-                    "position": {"x": p[0], "y": p[1], "z": p[2]},
-                    "orientation": {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()},
-                },
+                "pose": pose_values(X_WB),
                 "yaw_rad": flat.yaw_rad,
                 "covariance": estimate.covariance.ravel().tolist(),
             },
         )
 
     def _publish_state(self, estimate: LocalisationEstimate) -> None:
-        """Logs the gripper, the battery, the speed, and the quality of the localisation."""
+        """Logs the robot's own faults, the gripper, the battery, the speed, and the quality of the localisation."""
         robot = self._context.robot
         gripper = robot.gripper()
         self._context.publish(
             STATE,
             {
                 "robot": self._name,
+                "faults": robot.faults(),
                 "holding": gripper.holding,
                 "grip_n": round(gripper.force_n, 1),
                 "charge": round(robot.battery().charge, 4),

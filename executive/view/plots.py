@@ -1,26 +1,29 @@
-"""Plots of a run over time, from its log: speed, battery, force of the gripper, position, and real-time factor."""
+"""Plots of a run over time, from its log: speed, battery, force of the gripper, error of the position, and pace."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from executive.record.history import Event
-from executive.record.schemas import STATE, WALL
+from executive.record.schemas import STATE, TRUTH, WALL
 from executive.view.html import render
 from executive.view.text import ROBOT_COLOURS
 
-_STATES: Final[Mapping[str, tuple[str, str, float]]] = {
+_CURVES: Final[Mapping[str, tuple[str, str, float]]] = {
     "speed_m_s": ("Speed", "m/s", 1.0),
     "charge": ("Battery", "%", 100.0),
     "grip_n": ("Force of the gripper", "N", 1.0),
     "position_sigma_m": ("Uncertainty of the position (robot's own)", "cm", 100.0),
+    "error_m": ("Position error (dashed: own uncertainty)", "cm", 100.0),
+    "pace": ("Real-time factor", "", 1.0),
 }
-"""Values of a robot's state with the title and unit of their plot, and the factor into this unit."""
+"""Title and unit of the plot of each logged value, and the factor into this unit."""
 _W, _H, _LEFT, _RIGHT, _TOP, _BOTTOM = 360.0, 190.0, 46.0, 346.0, 32.0, 160.0
 _MOST_POINTS: Final = 400
 """Most points of a line, to bound the size of the report of a long run."""
@@ -31,44 +34,47 @@ Line = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Curve:
-    """Values over time: the title and unit of the plot, and a line for each robot by its name."""
+    """Values over time: the title and unit of the plot, and each robot's line and dashed line by its name."""
 
     title: str
     unit: str
     lines: Mapping[str, Line]
+    dashed: Mapping[str, Line] = field(default_factory=dict)
 
 
 def curves_of(events: Iterable[Event]) -> tuple[Curve, ...]:
-    """Returns the curves of a run's events; omits those without values, or of a value that is always 0."""
-    found: dict[str, dict[str, list[tuple[float, float]]]] = {name: {} for name in (*_STATES, "pace")}
+    """Returns the curves of a run's events; omits those without values, or of a value that is always 0.
+
+    The error of the position is known in a simulated run alone.
+    """
+    found = {name: defaultdict[str, list[tuple[float, float]]](list) for name in _CURVES}
     before: tuple[float, float] | None = None
     for event in events:
-        if event.topic == STATE:
-            for name in _STATES.keys() & event.data.keys():
-                own = found[name].setdefault(str(event.data.get("robot", "")), [])
-                own.append((event.stamp_s, _STATES[name][2] * float(event.data[name])))
+        if event.topic in (STATE, TRUTH):
+            for name in _CURVES.keys() & event.data.keys():
+                own = found[name][str(event.data.get("robot", ""))]
+                own.append((event.stamp_s, _CURVES[name][2] * float(event.data[name])))
         elif event.topic == WALL and "lasted_s" in event.data:
             now = event.stamp_s, float(event.data["lasted_s"])
             if before is not None and now[1] > before[1]:
-                pace = (now[0] - before[0]) / (now[1] - before[1])
-                found["pace"].setdefault("", []).append((now[0], pace))
+                found["pace"][""].append((now[0], (now[0] - before[0]) / (now[1] - before[1])))
             before = now
-    titles = {**{name: each[:2] for name, each in _STATES.items()}, "pace": ("Real-time factor", "")}
-    curves = (
-        Curve(*titles[name], {one: np.array(line) for one, line in lines.items()}) for name, lines in found.items()
-    )
+    every = {name: {one: np.array(line) for one, line in lines.items()} for name, lines in found.items()}
+    dashed = {"error_m": every.pop("position_sigma_m")} if every["error_m"] else {}
+    curves = (Curve(*_CURVES[name][:2], lines, dashed.get(name, {})) for name, lines in every.items())
     return tuple(each for each in curves if any(np.any(line[:, 1]) for line in each.lines.values()))
 
 
 def to_plot(curve: Curve) -> str:
     """Draws a curve as SVG, with the colours of the robots."""
-    every = np.vstack([*curve.lines.values()])
+    every = np.vstack([*curve.lines.values(), *curve.dashed.values()])
     end_s, most = max(float(every[:, 0].max()), 1e-9), _round_up(float(every[:, 1].max()))
     scale = np.array([(_RIGHT - _LEFT) / end_s, (_TOP - _BOTTOM) / most])
     values: dict[str, Any] = {
         "lines": [
-            (ROBOT_COLOURS[number % len(ROBOT_COLOURS)], _points(_thinned(line) * scale + (_LEFT, _BOTTOM)))
-            for number, (_, line) in enumerate(sorted(curve.lines.items()))
+            (ROBOT_COLOURS[number % len(ROBOT_COLOURS)], _thinned(line) * scale + (_LEFT, _BOTTOM), dashes)
+            for lines, dashes in ((curve.dashed, "3 3"), (curve.lines, "none"))
+            for number, (_, line) in enumerate(sorted(lines.items()))
         ],
         "rows": [(_BOTTOM + share * (_TOP - _BOTTOM), f"{share * most:g}") for share in (0.0, 0.5, 1.0)],
         "columns": [
@@ -77,10 +83,6 @@ def to_plot(curve: Curve) -> str:
         ],
     }
     return render("plot.svg", curve=curve, w=_W, h=_H, left=_LEFT, right=_RIGHT, **values)
-
-
-def _points(line: Line) -> str:
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in line.tolist())
 
 
 def _thinned(line: Line) -> Line:

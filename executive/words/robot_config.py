@@ -84,6 +84,13 @@ def find_robot(said: str, names: Iterable[str]) -> str | None:
     return next((name for name in names if name_key(name) == name_key(said)), None)
 
 
+def named_robot(said: str, names: Iterable[str]) -> tuple[str | None, str]:
+    """Splits a text such as "bob: robot dies" into the robot that it names, None for no robot, and the rest."""
+    head, _, rest = said.partition(":")
+    robot = find_robot(head, names) if rest else None
+    return robot, said if robot is None else rest.strip()
+
+
 def name_clash(name: str, names: Iterable[str]) -> InputError | None:
     """Error if `name` is one of `names`, or differs only in case or separators; else None."""
     other = find_robot(name, names)

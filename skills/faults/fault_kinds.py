@@ -101,8 +101,8 @@ def verb_of(word: str) -> str:
     if verb not in VERBS:
         known = (*VERBS, *_OTHER_WORDS)
         near = difflib.get_close_matches(word, known, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
-        raise ValueError(f"'{word}' is no verb of the robot; {hint}")
+        hint = f"did you mean '{near[0]}'?" if near else f"name one such as {', '.join(_OTHER_WORDS)} or drive"
+        raise ValueError(f"'{word}' is no sensor or verb of the robot; {hint}")
     return verb
 
 

@@ -5,17 +5,21 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 import numpy as np
+from pydrake.math import RigidTransform
 
-from skills.api import PICTURES, Cause, ObjectObservation, Succeeded
+from skills.api import PICTURES, Cause, ObjectObservation, Running, Succeeded
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import overview_viewpoints
 from skills.perception.detector.camera_images import is_dark
+from skills.perception.point_cloud import project
 from skills.quantities import Coordinate, Height
 from skills.robot import CameraCapabilities, FloatArray, Image
-from skills.routine import PlanningAttempt, Routine, SkillFailure
+from skills.routine import Patience, PlanningAttempt, Routine, SkillFailure
 
 _ASIDE_RAD: Final = (0.0, 0.35, -0.35)
 """Turns about the shoulder of the hand camera's viewpoints, the best first."""
+_GOOD_HEALTH: Final = 0.5
+"""Least health of an estimate that confirms where the robot stood."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,7 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         Cause.PRECONDITION: "the robot has no such camera, or nothing is named to point it at",
         Cause.PLANNING: "the arm reaches no viewpoint, and no other camera sees it from here",
         Cause.EXECUTION: "the arm did not reach its viewpoint, or the camera shows nothing",
+        Cause.POSTCONDITION: "no scan after the picture confirms the robot's place, or the point is not in the picture",
     }
     default_timeout_s = 60.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 1.0, "joints": 0.5, "gripper": 0.5}
@@ -63,7 +68,13 @@ class TakePicture(LookingSkill[TakePictureInputs]):
                 yield from self.look_at(p_BT, self._viewpoints(p_BT), message)
             if attempt.failure is None:
                 image = yield from self.picture(message)
-                return self._taken(inputs.of, image)
+                X_WC = yield from self._confirmed_pose(image, message)
+                p_CT, lens = X_WC.inverse() @ np.array(p_WT), image.intrinsics
+                u, v = project(p_CT, lens)
+                if p_CT[2] <= 0.0 or not (0.0 <= u < lens.width and 0.0 <= v < lens.height):
+                    what = f"{inputs.of} is not in the picture: the robot was not where it believed to be"
+                    raise SkillFailure(Cause.POSTCONDITION, what)
+                return self._taken(inputs.of, image, X_WC)
             blocked.append(attempt.failure)
         raise SkillFailure(Cause.PLANNING, f"no view of {inputs.of} from here: {blocked[0].message}")
 
@@ -83,11 +94,19 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         turns_rad = _ASIDE_RAD if self.object_camera.on_hand else ()
         return [p_BC for turn_rad in turns_rad for p_BC in overview_viewpoints(self.model, p_BT, turn_rad)]
 
-    def _taken(self, of: str, image: Image) -> Succeeded:
+    def _confirmed_pose(self, image: Image, message: str) -> Routine[RigidTransform]:
+        """Returns the pose X_WC of a picture's camera once a later scan agrees with the map. Raises SkillFailure."""
+        patience, localiser = Patience(self.context.clock), self.context.localiser
+        while (now := localiser.estimate()).stamp_s < image.stamp_s or not now.localised or now.health < _GOOD_HEALTH:
+            if not patience.is_left():
+                raise SkillFailure(Cause.POSTCONDITION, "no scan confirms where the picture was taken")
+            yield Running(f"{message}; waits for a scan that confirms the place")
+        return now.X_WO @ image.frames.pose(image.camera_frame)
+
+    def _taken(self, of: str, image: Image, X_WC: RigidTransform) -> Succeeded:
         """Publishes a picture with the camera's pose and the time. Raises SkillFailure for a dark picture."""
         if is_dark(image):
             raise SkillFailure(Cause.EXECUTION, f"the {image.source} camera shows nothing: it is dark")
-        X_WC = self.context.localiser.estimate().X_WO @ image.frames.pose(image.camera_frame)
         x, y, z = p_WC = X_WC.translation().tolist()
         text = f"{of}, by the {image.source} camera at ({x:.2f}, {y:.2f}), {z:.2f} m high"
         pose = {"position_W": p_WC, "wxyz": X_WC.rotation().ToQuaternion().wxyz().tolist()}

@@ -8,6 +8,7 @@ import pytest
 from executive.app.prepare.from_request import prepare
 from executive.app.runs.one_run import run_request
 from executive.mission.request import Request
+from executive.mission.scenario import Scenario
 
 pytestmark = pytest.mark.mission
 
@@ -43,3 +44,13 @@ def test_the_pictures_show_what_they_are_of(tmp_path):
     assert shapes == [(480, 640), (240, 320), (480, 640)]
     assert [each["camera"] for each in facts] == ["hand", "back", "hand"]
     assert 0.0 < facts[0]["stamp_s"] < facts[1]["stamp_s"] < report.sim_time_s
+
+
+def test_no_picture_is_claimed_while_no_scan_confirms_where_the_robot_stands(tmp_path):
+    """Odometry jumps on the way while the LiDAR gives no scans: the robot does not stand where it believes to be."""
+    (tmp_path / "round.yaml").write_text(ROUND.partition("  - picture: {of: coke}")[0], encoding="utf-8")
+    faults = Scenario(("lidar is missing 7 s at 8 s", "odometry jumps -0.9 m at 9 s"))
+    request = Request(file=tmp_path / "round.yaml", seed=1, out=tmp_path / "out", record=False, scenario=faults)
+    report = run_request(prepare(request)).report
+    assert not report.false_claim, (report.message, report.referee.why)
+    assert report.achieved or report.cause == "POSTCONDITION", report.message

@@ -91,7 +91,7 @@ def run_fleet(
                 dispatch,
                 clock=backend.clock,
                 worker=worker,
-                visitors=(artifacts, log, *([] if page is None else [page]), *backend.visitors(control)),
+                visitors=(artifacts, log, *([] if page is None else [page]), *backend.visitors(control, log)),
                 settings=RunSettings(seed=seed, time_limit_s=limit_s),
                 control=control,
                 spare=dispatch.spare(),

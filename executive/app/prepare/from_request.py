@@ -177,7 +177,7 @@ class Setting:
         if request.scenario or request.scenario_files:
             from executive.app.prepare.scenarios import with_events, with_scenario
 
-            request = with_scenario(request, world, self.knowledge)
+            request = with_scenario(request, world, self.knowledge, {mission.robot_name, *self.robots})
             world = with_events(world, request.scenario, request.seed)
         if request.variation.people:
             from plant.worlds.seeding import add_passers_by

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from executive.mission.scenario import RandomFaults, Scenario
 from executive.words.knowledge import Knowledge
 from executive.words.mission import Manner, Route, Stop
 from executive.words.outlines import Corner
+from executive.words.robot_config import named_robot
 from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.seeding import add_answers, add_crowd
 from plant.worlds.world import DoorRule, MoveRule, World, WorldError
@@ -33,20 +34,20 @@ _STEP_M: Final = 0.01
 _BEYOND_M: Final = 0.5
 
 
-def with_scenario(request: Request, world: World, knowledge: Knowledge) -> Request:
+def with_scenario(request: Request, world: World, knowledge: Knowledge, robots: Collection[str]) -> Request:
     """Adds the content of a request's scenario files to its scenario, and draws the random faults.
 
-    Raises InputError with the line if a fault is unknown, or if the world lacks something that a file names.
+    Raises InputError with the line if a fault is unknown for these `robots`, or if the world lacks what a file names.
     """
     cameras = tuple(camera.source for camera in spot_capabilities().cameras)
     scenario = request.scenario
     for words in scenario.faults:
-        _check_fault(words, cameras, lambda what, hint: InputError(what, hint=hint))
+        _check_fault(words, robots, cameras, lambda what, hint: InputError(what, hint=hint))
     imported = {name: each.object.class_name for name, each in world.imports.items()}
     objects = {rule.name: imported.get(rule.model, rule.model) for rule in world.seed_rules.objects}
     people = {rule.name: rule.route is not None for rule in world.seed_rules.people}
     for path in request.scenario_files:
-        read = read_scenario(path, knowledge, cameras=cameras, objects=objects, people=people)
+        read = read_scenario(path, knowledge, robots=robots, cameras=cameras, objects=objects, people=people)
         twice = read.moving & scenario.moving
         if twice:
             raise InputError(f"another scenario has an event of {min(twice)}", hint="keep one of them", file=path)
@@ -184,27 +185,30 @@ class ScenarioFile(_Strict):
     )
 
 
-def _check_fault(words: str, cameras: tuple[str, ...], refusal: Callable[[str, str], InputError]) -> None:
+def _check_fault(
+    words: str, robots: Collection[str], cameras: tuple[str, ...], refusal: Callable[[str, str], InputError]
+) -> None:
     """Raises the error that `refusal` builds from a sentence and a hint, if there is no such fault."""
     try:
-        parse_fault(words, cameras=cameras)
+        parse_fault(named_robot(words, robots)[1], cameras=cameras)
     except ValueError as error:
         what, _, hint = str(error).partition("; ")
-        raise refusal(what, hint) from error
+        raise refusal(what, suggestion(words.partition(":")[0], robots, hint)) from error
 
 
 def read_scenario(
     path: Path,
     knowledge: Knowledge,
     *,
+    robots: Collection[str] = (),
     cameras: tuple[str, ...],
     objects: Mapping[str, str],
     people: Mapping[str, bool],
 ) -> Scenario:
     """Reads a scenario file for a world; resolves its places to points.
 
-    `cameras` are the robot's cameras, `objects` maps the world's objects to their classes, and `people` maps each
-    person to True if the world already gives the person a route.
+    `robots` are the names of the run's robots, `cameras` are the robot's cameras, `objects` maps the world's objects to
+    their classes, and `people` maps each person to True if the world already gives the person a route.
 
     Raises:
         InputError: a key is wrong, or a fault, place, door, object or person is unknown; with the line.
@@ -213,7 +217,7 @@ def read_scenario(
     file, problems = validate(ScenarioFile, source), Problems()
     for number, words in enumerate(file.faults):
         with problems:
-            _check_fault(words, cameras, partial(source.error, ("faults", number)))
+            _check_fault(words, robots, cameras, partial(source.error, ("faults", number)))
     reader = _EventReader(source, knowledge, objects, people)
     for number, event in enumerate(file.events):
         with problems:

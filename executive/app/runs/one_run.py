@@ -37,6 +37,7 @@ from executive.tree.nodes.skill_leaf import ERROR_TOPIC, SkillLeaf
 from executive.view.foxglove import LiveServer
 from executive.words.goal import RefereeReport
 from executive.words.knowledge import Knowledge
+from executive.words.robot_config import named_robot
 from plant.worlds.world import World
 from skills.api import PlanningError, Publish, Worker
 from skills.estimate.grid_map import load_grid_map
@@ -103,10 +104,10 @@ def run_request(
         journals = () if durable is None else durable.journals.values()
         watching = [files, artifacts, log, *journals, *visitors, *([] if page is None else [page])]
         if scenario:
-            watching.append(DisturbanceLog(log, entries[0].robot, backend.happened))
+            watching.append(DisturbanceLog(log, [each.robot for each in entries], backend.happened))
         if profile is not None:
             watching.append(RunProfile(profile, backend, (artifacts, log), journals))
-        watching += backend.visitors(control := control or Control(pace=None))
+        watching += backend.visitors(control := control or Control(pace=None), log)
         with ended_by_signals(control.cancel) as ending, closing(worker or LockStepWorker(clock)) as jobs:
             at = jobs if profile is None else TimedWorker(jobs, partial(profile.timed, "planning"))
             result = run(
@@ -174,8 +175,9 @@ def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> 
     """Returns the robot of a mission with its faults, after its numeric code is compiled."""
     entry, clock = backend.entry(prepared.tree, durable), backend.clock
     preload(entry)
-    every = map(parse_fault, prepared.request.scenario.faults)
-    faults = [each for each in every if not each.over_by(clock.now())]  # a resumed run may be past some faults
+    split = [(words, *named_robot(words, prepared.robots)) for words in prepared.request.scenario.faults]
+    own = (replace(parse_fault(said), words=words) for words, robot, said in split if robot in (None, entry.robot.name))
+    faults = [each for each in own if not each.over_by(clock.now())]  # a resumed run may be past some faults
     return replace(
         entry,
         robot=inject_faults(entry.robot, clock, faults, since_s=0.0),
@@ -341,10 +343,10 @@ EVENT: Final = "event"
 class DisturbanceLog(RunVisitor):
     """Logger of the faults that begin and end, and of the events in the world."""
 
-    def __init__(self, publish: Publish, robot: Robot, happened: Happened) -> None:
+    def __init__(self, publish: Publish, robots: Iterable[Robot], happened: Happened) -> None:
         """`happened` returns all events in the world since the run began, as times (s) and sentences."""
         self._publish, self._happened = publish, happened
-        self._robot = robot if isinstance(robot, FaultyRobot) else None
+        self._robots = [robot for robot in robots if isinstance(robot, FaultyRobot)]
         self._active: tuple[str, ...] = ()
         self._logged = len(happened())
 
@@ -353,13 +355,10 @@ class DisturbanceLog(RunVisitor):
         for now_s, sentence in self._happened()[self._logged :]:
             self._log(now_s, EVENT, sentence)
         self._logged = len(self._happened())
-        now = () if self._robot is None else self._robot.faults_at_work()
-        for words in now:
-            if words not in self._active:
-                self._log(progress.now_s, FAULT, f"{words}: begins")
-        for words in self._active:
-            if words not in now:
-                self._log(progress.now_s, FAULT, f"{words}: is over")
+        now = tuple(dict.fromkeys(words for robot in self._robots for words in robot.faults_at_work()))
+        for words in dict.fromkeys((*now, *self._active)):
+            if (words in now) != (words in self._active):
+                self._log(progress.now_s, FAULT, f"{words}: {'begins' if words in now else 'is over'}")
         self._active = now
 
     def _log(self, now_s: float, what: str, message: str) -> None:

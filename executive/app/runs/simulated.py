@@ -1,6 +1,7 @@
 """Simulated backend: robots with their estimators in the plant of a world, with people, referee and recorder."""
 
 import logging
+import math
 import subprocess
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -14,7 +15,7 @@ from executive.app.report.artifacts import Artifacts, draw_artifacts
 from executive.app.runs.backend import Durable, Scene
 from executive.app.runs.goal_conditions import Share, verdict_of
 from executive.record.history import RECORDING
-from executive.record.schemas import SPEECH
+from executive.record.schemas import POSE, SPEECH, TRUTH, pose_values
 from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.control_state import OpenQuestion
@@ -30,7 +31,7 @@ from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from plant.snapshot_file import SnapshotError
 from plant.worlds.world import World, WorldError
-from skills.api import PICTURES
+from skills.api import PICTURES, Publish
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from skills.manipulation.arm.solid_cells import wall_columns
@@ -118,9 +119,9 @@ class SimulatedBackend:
         """Events of doors, people and moved objects, as times (s) and sentences."""
         return self._pipeline.events
 
-    def visitors(self, control: Control) -> Sequence[RunVisitor]:
-        """Returns the people of the plant; they hear the robots and answer."""
-        return (Bystanders(self._simulation, self._pipeline, control),)
+    def visitors(self, control: Control, log: Publish) -> Sequence[RunVisitor]:
+        """Returns the people of the plant, who hear the robots and answer, and the logger of the true poses."""
+        return Bystanders(self._simulation, self._pipeline, control), TruthLog(self._pipeline, log)
 
     notes: Sequence[str] = ()
 
@@ -235,6 +236,22 @@ def run_entry(
         stack=stack,
         walls=wall_columns(scan_maps, tree.surfaces),
     )
+
+
+class TruthLog(RunVisitor):
+    """Logger of the true pose beside each estimated pose. It tells the log alone, so that no skill learns the truth."""
+
+    def __init__(self, pipeline: Pipeline, log: Publish) -> None:
+        self._pipeline, self._log = pipeline, log
+
+    def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Logs a robot's true pose, and the error of its estimated position in the plane."""
+        if topic == POSE:
+            true = pose_values(self._pipeline.poses_W[message["robot"]])
+            off_m = math.hypot(*(true["position"][axis] - message["pose"]["position"][axis] for axis in "xy"))
+            head = {key: message[key] for key in ("timestamp", "frame_id", "robot")}
+            self._log(TRUTH, {**head, "pose": true, "error_m": round(off_m, 4)})
+        return message
 
 
 class Bystanders(RunVisitor):

@@ -17,13 +17,14 @@
 
   class EventPanel {
     constructor(list, choice, store, onChoose) {
-      Object.assign(this, { list, choice, store, onChoose, taken: 0, rows: [] });
+      Object.assign(this, { list, choice, store, onChoose, taken: 0, rows: [], reported: new Map() });
       choice.addEventListener("change", () => this.rebuild());
     }
 
     rebuild() {
       this.taken = 0;
       this.rows = [];
+      this.reported.clear();
       this.wasFollowing = false;
       this.list.replaceChildren();
       this.draw(this.t, this.following);
@@ -36,9 +37,18 @@
         const look = data.outcome === "success" ? "success" : data.outcome === "cancelled" ? "cancelled" : "failure";
         return { t, look, what: `${data.robot}: ${data.outcome}`, why: [data.cause, data.message].filter(Boolean).join(": ") };
       }
+      if (topic === "state") return this.faults(data, t);
       if (!TEXTS[topic] || this.choice.value === "failures") return null;
       const [what, why] = TEXTS[topic](data);
       return { t, look: topic === "errors" ? "failure" : "idle", symbol: "·", what: topic === "speech" ? what : this.whose(data) + what, why: this.store.titled(why) };
+    }
+
+    // A robot's own faults, when they have changed.
+    faults(data, t) {
+      const now = (data.faults || []).join(", "), before = this.reported.get(data.robot) || "";
+      this.reported.set(data.robot, now);
+      if (now === before) return null;
+      return { t, look: now ? "failure" : "idle", symbol: now ? "!" : "·", what: `${data.robot} reports`, why: now || "no more faults" };
     }
 
     change(data, t) {

@@ -1,7 +1,7 @@
 "use strict";
 // Puts the page together: messages come from the server while a run is under way, or stand in the page itself.
 (() => {
-  const { Store, MapPanel, Header, ModePanel, VerdictPanel, isOver, modeOfAll, ScenePanel, EventPanel, Timeline, ControlPanel, TeleopPanel, RobotPanel, MissionsPanel, drawsSlowly, byId } = window.errand;
+  const { Store, MapPanel, Header, ModePanel, VerdictPanel, isOver, modeOfAll, ScenePanel, EventPanel, Timeline, ControlPanel, TeleopPanel, RobotPanel, MissionsPanel, PlotsPanel, drawsSlowly, byId } = window.errand;
   const recorded = byId("recorded") ? JSON.parse(byId("recorded").textContent) : null;
   const token = new URLSearchParams(location.search).get("token") || "";
   const feedAddress = `ws://${location.host}/feed?token=${encodeURIComponent(token)}`, GOING_AWAY = 1001, AGAIN_MS = 2000;
@@ -24,6 +24,7 @@
   const map = new MapPanel(byId("map"), byId("where"), byId("legend"));
   const scene = new ScenePanel(byId("scene"), byId("beside"));
   const timeline = new Timeline(store, () => schedule());
+  const plots = new PlotsPanel(byId("plots-panel"), () => schedule());
   const events = new EventPanel(byId("events"), byId("events-shown"), store, (t) => { timeline.hold(); timeline.go(t); });
 
   const delays = []; // ms from a change of a node to its pixels, the latest ones
@@ -96,6 +97,7 @@
       else for (const panel of shown()) panel.camera.draw(panel.view);
       events.draw(timeline.t, timeline.following);
       timeline.drawMarks();
+      plots.draw(store.robots, timeline.t, store.end);
       seekScene();
     }, Math.max(20, SLOW_MS - (performance.now() - drawn)));
   }
@@ -103,6 +105,7 @@
   function take(messages) {
     for (const message of messages) {
       store.add(message);
+      plots.take(message);
       if (greeted && message.topic === "transitions") fresh.push(message.sent_ms);
       if (greeted && message.topic === "speech") control.hear(message.data.robot, message.data.text);
       if (message.topic === "map") map.setMap(message.data, addressOf(message.data.picture)).catch(() => {});
@@ -186,5 +189,5 @@
   }
   // A recording that loads when all else is drawn follows, too, and shows textures that come still later.
   setInterval(seekScene, 500);
-  window.errand.page = { store, timeline, delays, map };
+  window.errand.page = { store, timeline, delays, map, plots };
 })();

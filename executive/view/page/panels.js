@@ -76,6 +76,7 @@
         ["battery", `${Math.round(100 * charge)} %`, charge < LOW_CHARGE],
         ["place", localised ? `known within ${Math.max(1, Math.round(200 * sigma_m))} cm` : "lost", !localised],
         ["speed", `${speed.toFixed(1)} m/s`, false],
+        ...(state.faults && state.faults.length ? [["reports", state.faults.join(", "), true]] : []),
       ];
     }
 

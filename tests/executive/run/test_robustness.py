@@ -262,5 +262,11 @@ def test_garbage_is_named(clock):
         GuardedRobot(Odd(), Watchdog()).battery()
 
 
+def test_garbage_in_many_values_is_shortened_to_whole_ones(clock):
+    robot = inject_faults(ScriptedRobot(clock, capabilities=spot_capabilities()), clock, ["joints returns garbage"])
+    with pytest.raises(GarbageError, match=r"position_rad is not finite: \{('\w+': nan, ){4}\.\.\.\}$"):
+        GuardedRobot(robot, Watchdog()).joints()
+
+
 def test_numpy_truth_and_numbers_are_no_garbage():
     assert CHECKS["gripper"](Gripper(1.0, np.float64(0.2), np.float32(3.0), np.bool_(True))) is None

@@ -947,3 +947,108 @@ def test_verdicts_are_shown_for_each_robot_and_for_all(page, two, control):
     expect(page.locator("#mode-text")).to_have_text("1 of 2 did it")
     expect(panel(page, "Alice").locator(".why")).to_have_text("no way")
     expect(panel(page, "Bob").locator(".mode")).to_contain_text("success")
+
+
+def drive(feed, t, robot="Alice", error_m=None, **values):
+    """Feeds a state, and the error of the estimated pose if it is known."""
+    if error_m is not None:
+        feed("truth", t, {"robot": robot, "error_m": error_m})
+    feed("state", t, {**state(), "grip_n": 0.0, "robot": robot, **values})
+
+
+def plot(page, title):
+    return page.locator(f"#plots canvas[aria-label^='{title}']")
+
+
+def plots_of(page):
+    """Shows the plots, which a low window folds."""
+    if page.locator("#plots-fold").get_attribute("aria-expanded") == "false":
+        page.locator("#plots-fold").click()
+    return page.locator("#plots")
+
+
+def test_the_plots_show_the_values_now_with_their_units(page, live, feed):
+    for number in range(3):
+        drive(feed, float(number), speed_m_s=0.25 * number, charge=0.8, grip_n=12.0)
+        feed("wall", float(number), {"lasted_s": number / 4, "overruns": 0})
+    assert plots_of(page).locator("figure").count() == 5
+    for label in (
+        "Speed, m/s: Alice 0.50",
+        "Battery, %: Alice 80",
+        "Force of the gripper, N: Alice 12",
+        "Uncertainty of the position, cm: Alice 2.0",
+        "Real-time factor: 4.0",
+    ):
+        expect(plot(page, label.split(":")[0])).to_have_attribute("aria-label", label)
+
+
+def test_the_plot_of_the_position_shows_the_error_where_the_truth_is_known(page, live, feed):
+    for number in range(2):
+        drive(feed, float(number), error_m=0.03 * number)
+    plots_of(page)
+    expect(plot(page, "Position error")).to_have_attribute("aria-label", re.compile(r"own σ\), cm: Alice 3\.0$"))
+
+
+def test_each_robot_has_a_line_of_its_colour_and_a_value_in_the_plots(page, two):
+    drive(two, 1.0, "Alice", speed_m_s=0.3)
+    drive(two, 1.0, "Bob", speed_m_s=0.7)
+    plots = plots_of(page)
+    expect(plot(page, "Speed")).to_have_attribute("aria-label", "Speed, m/s: Alice 0.30, Bob 0.70")
+    expect(page.locator("#plots-whose li")).to_have_text(["Alice", "Bob"])
+    colours = plots.locator("figure").first.locator("output span").evaluate_all("all => all.map((e) => e.style.color)")
+    assert len(set(colours)) == 2
+
+
+def test_the_plots_show_the_values_at_the_time_of_the_slider(page, live, feed):
+    for number in range(10):
+        drive(feed, float(number), speed_m_s=0.1 * number)
+    plots_of(page)
+    expect(plot(page, "Speed")).to_have_attribute("aria-label", "Speed, m/s: Alice 0.90")
+    page.evaluate("window.errand.page.timeline.go(4.2)")
+    expect(plot(page, "Speed")).to_have_attribute("aria-label", "Speed, m/s: Alice 0.40")
+    page.evaluate("window.errand.page.timeline.go(0)")
+    expect(plot(page, "Speed")).to_have_attribute("aria-label", "Speed, m/s: Alice 0.00")
+
+
+def test_the_lines_of_a_long_run_stay_bounded_and_keep_their_peak(page, live):
+    counted = page.evaluate(
+        """() => {
+        const { curves } = window.errand.page.plots;
+        for (let n = 0; n < 20000; n += 1) curves.add('speed_m_s', 'Alice', n, n === 5123 ? 9 : 1);
+        const points = curves.lines.get('speed_m_s').get('Alice');
+        return [points.length, Math.max(...points.map((each) => each[1])), points[points.length - 1][0]];
+        }"""
+    )
+    assert counted[0] <= 800
+    assert counted[1:] == [9, 19999]
+
+
+def test_nothing_moves_when_values_come_and_the_folded_plots_leave_their_room_to_the_map(page, live, feed):
+    plots_of(page)
+    drive(feed, 0.0)
+    page.locator("#state .facts").wait_for()
+
+    def height(selector):
+        return page.locator(selector).evaluate("each => each.getBoundingClientRect().height")
+
+    empty = height("#map-panel"), height("#plots-panel")
+    feed("wall", 0.0, {"lasted_s": 0.0, "overruns": 0})
+    feed("wall", 1.0, {"lasted_s": 0.5, "overruns": 0})
+    drive(feed, 1.0, error_m=0.3, speed_m_s=0.4)
+    expect(plot(page, "Position error")).to_have_attribute("aria-label", re.compile(r"Alice 30\.0$"))
+    assert (height("#map-panel"), height("#plots-panel")) == empty
+    page.locator("#plots-fold").click()
+    expect(page.locator("#plots")).to_be_hidden()
+    assert height("#map-panel") > empty[0] + 50
+    page.reload()
+    expect(page.locator("#plots")).to_be_hidden()
+
+
+def test_a_fault_that_the_robot_reports_is_an_event_and_stands_above_all(page, live, feed):
+    for t, faults in ((1.0, []), (2.0, ["motor too hot"]), (2.5, ["motor too hot"]), (3.0, [])):
+        feed("state", t, {**state(), "faults": faults})
+        if t == 2.5:
+            expect(page.locator("#state .bad")).to_have_text("reportsmotor too hot")
+    reports = page.locator("#events li", has_text="Alice reports")
+    expect(reports).to_have_text([re.compile("motor too hot"), re.compile("no more faults")])
+    expect(page.locator("#state .bad")).to_have_count(0)

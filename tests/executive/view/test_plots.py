@@ -33,6 +33,26 @@ def test_each_robot_has_its_line():
     assert to_plot(curve).count("<polyline") == 2
 
 
+def position_events(errors_m):
+    """A log in which a robot is so far from where it believes to be; without errors that of a real robot."""
+    states = events("state", [{"robot": "Alice", "position_sigma_m": 0.02} for _ in range(3)])
+    return states + events("truth", [{"robot": "Alice", "error_m": error_m} for error_m in errors_m])
+
+
+def test_the_error_of_the_position_is_plotted_above_the_dashed_uncertainty_where_the_truth_is_known():
+    (curve,) = curves_of(position_events([0.01, 0.04, 0.5]))
+    assert (curve.title, curve.unit) == ("Position error (dashed: own uncertainty)", "cm")
+    np.testing.assert_allclose(curve.lines["Alice"], [(0, 1), (1, 4), (2, 50)])
+    np.testing.assert_allclose(curve.dashed["Alice"], [(0, 2), (1, 2), (2, 2)])
+    assert re.findall(r'stroke-dasharray="([^"]*)"', to_plot(curve)) == ["3 3", "none"]
+
+
+def test_the_log_of_a_real_robot_shows_only_the_uncertainty():
+    (curve,) = curves_of(position_events([]))
+    assert curve.title == "Uncertainty of the position (robot's own)"
+    assert re.findall(r'stroke-dasharray="([^"]*)"', to_plot(curve)) == ["none"]
+
+
 # largest value, labels of the axis
 @pytest.mark.parametrize(
     ("largest", "labels"),

@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import pytest
 
+from executive.testing.bench import SkillBench
 from executive.testing.skill_test import PoseSetup, RobotSetup, WorldSetup, bench_of_setup
 from plant.robots.spot.kind import SPOT
 from skills.api import PICTURES, Cause
+from skills.robot import Pose2D
 from skills.small.take_picture import TakePicture, TakePictureInputs
+from skills.testing.estimators import KnownPlace
 
 SPOT_CAPABILITIES = SPOT.capabilities()
 BLIND = replace(SPOT_CAPABILITIES, cameras=SPOT_CAPABILITIES.body_cameras)
@@ -46,3 +49,48 @@ def test_a_camera_of_the_body_takes_the_picture_where_it_is_named_or_sees_it_alo
 def test_without_a_camera_that_sees_it_there_is_no_picture():
     run, pictures = picture_of((0.45, 0.0, 4.0), capabilities=BLIND)
     assert (run.cause, pictures) == (Cause.PLANNING, [])
+
+
+class SlippedPlace(KnownPlace):
+    """A localiser that notices, with the first scan after `at_s`, that odometry has jumped 1.5 m to the side."""
+
+    def __init__(self, start, at_s):
+        super().__init__(start)
+        self.at_s = at_s
+
+    def update(self, robot):
+        super().update(robot)
+        if self._stamp_s >= self.at_s:
+            self._X_WO = Pose2D(0.0, 1.5, 0.0).transform()
+
+
+def pictured_by(localiser):
+    """Result of the skill with this localiser, and the published pictures."""
+    bench, _ = bench_of_setup(SPOT_CAPABILITIES, RobotSetup(pose=PoseSetup(x=0.45)), WorldSetup())
+    bench.robot.return_lease(bench.context().lease)
+    bench = SkillBench(bench.robot, bench.clock, localiser=localiser)
+    run = bench.run(TakePicture, TakePictureInputs("the thing", (1.4, 0.0, 0.75)))
+    return run, [message for topic, message in bench.published if topic == PICTURES]
+
+
+def test_a_robot_that_does_not_know_its_place_claims_no_picture():
+    lost = KnownPlace()
+    lost.localised = False
+    run, pictures = pictured_by(lost)
+    assert (run.cause, pictures) == (Cause.POSTCONDITION, [])
+    assert "no scan confirms where the picture was taken" in run.message
+
+
+def test_an_estimate_from_before_the_picture_confirms_nothing():
+    old = KnownPlace()
+    old.update = lambda robot: None  # the LiDAR is off: no scan is newer than the picture
+    run, pictures = pictured_by(old)
+    assert (run.cause, pictures) == (Cause.POSTCONDITION, [])
+
+
+def test_a_picture_that_by_the_confirmed_pose_does_not_show_the_point_is_not_claimed():
+    run, pictures = pictured_by(SlippedPlace(None, 0.0))
+    assert run.outcome == "success"  # it knew all along, and pointed the camera anew
+    run, pictures = pictured_by(SlippedPlace(None, run.time_s - 0.05))
+    assert (run.cause, pictures) == (Cause.POSTCONDITION, [])
+    assert "the thing is not in the picture" in run.message

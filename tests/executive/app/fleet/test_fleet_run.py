@@ -125,7 +125,7 @@ class Fleet:
     def show_live(self):
         return None
 
-    def visitors(self, control):
+    def visitors(self, control, log):
         return ()
 
     def leave(self, artifacts, out):

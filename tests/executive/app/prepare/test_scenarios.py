@@ -35,7 +35,7 @@ def file(tmp_path):
 
 
 def understood(**asked):
-    return with_scenario(Request("go", **asked), WORLD, KNOWLEDGE)
+    return with_scenario(Request("go", **asked), WORLD, KNOWLEDGE, ["Alice", "Bob"])
 
 
 def test_random_faults_are_drawn_from_the_seed_and_only_once():
@@ -44,7 +44,7 @@ def test_random_faults_are_drawn_from_the_seed_and_only_once():
     other = understood(scenario=Scenario(("arm refuses",), random=2), seed=5)
     assert (asked, len(asked.scenario.faults)) == (again, 3)
     assert asked.scenario.faults != other.scenario.faults
-    assert with_scenario(asked, WORLD, KNOWLEDGE) == asked
+    assert with_scenario(asked, WORLD, KNOWLEDGE, ["Alice"]) == asked
 
 
 def test_a_fault_of_a_camera_that_spot_does_not_have_is_refused():
@@ -136,3 +136,19 @@ def test_all_that_is_wrong_is_said_at_once(read):
     with pytest.raises(InputError) as refused:
         read("faults: [camra freezes]\nevents:\n  - {person: Robin, at: 3, to: hal}\n")
     assert len(refused.value.others) == 1
+
+
+def test_a_fault_may_name_its_robot():
+    scenario = understood(scenario=Scenario(("bob: camera freezes at 3 s", "arm refuses"))).scenario
+    assert scenario.faults == ("bob: camera freezes at 3 s", "arm refuses")
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [("alise: camera freezes at 3 s", "did you mean 'Alice'?"),
+     ("odometry slips", "did you mean 'odometry jumps 0.5 m at 2 s'?")],
+)  # fmt: skip
+def test_a_misspelt_robot_or_fault_is_refused_with_the_likely_one(words, hint):
+    with pytest.raises(InputError, match="there is no fault") as error:
+        understood(scenario=Scenario((words,)))
+    assert error.value.hint == hint

@@ -32,7 +32,7 @@ class ScriptedBackend:
     def happened(self):
         return ()
 
-    def visitors(self, control):
+    def visitors(self, control, log):
         return ()
 
     def work(self):

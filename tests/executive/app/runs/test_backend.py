@@ -7,7 +7,7 @@ import pytest
 
 from executive.app.prepare.from_request import prepare
 from executive.app.report.run_report import RunReport
-from executive.app.runs.one_run import run_request
+from executive.app.runs.one_run import entry_for, run_request
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
 from executive.record.history import read_events
@@ -118,6 +118,17 @@ def test_a_fault_that_ends_is_logged_and_the_robot_goes_on(prepared):
     events = read_events(prepared.request.out / "log.mcap")
     told = [(round(event.stamp_s, 2), event.data["message"]) for event in events if event.topic == "control"]
     assert told == [(1.0, "lidar: dropout 0.5 s at 1 s: begins"), (1.5, "lidar: dropout 0.5 s at 1 s: is over")]
+
+
+@pytest.mark.parametrize(
+    ("fault", "charge"), [("alice: battery falls to 5 %", 0.05), ("bob: battery falls to 5 %", None)]
+)
+def test_a_fault_that_names_a_robot_is_at_work_in_this_robot_alone(prepared, fault, charge):
+    backend, robots = ScriptedBackend(), {**prepared.robots, "Bob": prepared.robots["Alice"]}
+    request = replace(prepared.request, scenario=Scenario((fault,)))
+    robot = entry_for(replace(prepared, request=request, robots=robots), backend, None).robot
+    assert robot.battery().charge == (charge or backend.robot.battery().charge)
+    assert fault in getattr(robot, "faults_at_work", lambda: fault)()
 
 
 def test_its_work_is_in_report_and_log_and_its_parts_are_timed(prepared):

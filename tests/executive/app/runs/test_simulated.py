@@ -5,11 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 from tiny_detector import CLASSES, model_bytes, write_model
 
 from executive.app.prepare.placed_robots import TURNING_M, refuse_blocked, shared_detector, stand_at
 from executive.app.runs import simulated
-from executive.app.runs.simulated import Bystanders, compile_first
+from executive.app.runs.simulated import Bystanders, TruthLog, compile_first
+from executive.record.schemas import schemas
 from executive.run.control import Control
 from executive.run.visitor import Progress
 from plant.worlds.seeding import place_people
@@ -154,3 +156,17 @@ def test_words_of_people_reach_the_skill_that_listens_once():
     second = stage.control.listen("Alice")
     stage.after(0.1)
     assert first.done() and first.result() == "thank you" and not second.done()
+
+
+def test_the_truth_is_logged_beside_an_estimate_and_added_to_no_message_of_the_robot():
+    logged, true = [], RigidTransform([1.0, 2.0, 0.5])
+    visitor = TruthLog(SimpleNamespace(poses_W={"Alice": true}), lambda topic, message: logged.append((topic, message)))
+    turn, place = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}, {"x": 1.3, "y": 2.4, "z": 0.1}
+    pose = {"timestamp": {"sec": 1, "nsec": 0}, "frame_id": "world", "robot": "Alice", "covariance": [0.0]}
+    pose["pose"] = {"position": place, "orientation": turn}
+    for topic, message in (("pose", pose), ("state", {"robot": "Alice"})):
+        assert visitor.message(topic, message) == message
+    ((topic, message),) = logged
+    assert (topic, message["robot"], message["error_m"]) == ("truth", "Alice", 0.5)
+    assert message["pose"]["position"] == {"x": 1.0, "y": 2.0, "z": 0.5}
+    assert message.keys() <= schemas()["truth"].properties.keys()

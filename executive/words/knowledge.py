@@ -9,13 +9,12 @@ from typing import Annotated, Any, Final
 from pydantic import Field, model_validator
 
 from executive.words.command import Task
-from executive.words.forms import Strict
 from executive.words.outlines import Corner, Polygon, distance_m
 from executive.words.robot_config import RobotsFile
 from executive.words.zone import ZoneFacts, with_files
 from skills.api import Tag, Zone
 from skills.inputs.errors import InputError, suggestion
-from skills.inputs.schema import Name, validate
+from skills.inputs.schema import Name, Strict, validate
 from skills.inputs.yaml_source import YamlSource, read_yaml
 from skills.perception.class_forms import ANY_OBJECT, class_forms
 from skills.quantities import Angle, Coordinate, Height, Opening, Quantity, TagNumber, TagSize, TopHeight

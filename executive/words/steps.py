@@ -23,7 +23,7 @@ from typing_extensions import TypeAliasType
 from executive.words.command import parse_command
 from executive.words.condition import Condition
 from executive.words.expression import Template
-from executive.words.forms import Forms, Strict
+from executive.words.forms import Forms
 from executive.words.leaf_steps import (
     COMMAND_KEYS,
     Answering,
@@ -43,7 +43,7 @@ from executive.words.leaf_steps import (
 from executive.words.step import Fault, Scalar, Step, unreadable
 from executive.words.zone import ZONES, Zones
 from skills.inputs.errors import InputError, listing
-from skills.inputs.schema import Name, Text
+from skills.inputs.schema import Name, Strict, Text
 from skills.inputs.yaml_source import parse_yaml, yaml_of
 from skills.quantities import Count, Duration
 

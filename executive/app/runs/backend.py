@@ -62,7 +62,10 @@ class Scene(Protocol):
 
 
 class Backend(Protocol):
-    """Interface of a backend: robots and their clock, perhaps with a referee, a recording and a live picture."""
+    """Interface of a backend: robots and their clock, perhaps with a referee, a recording and a live picture.
+
+    A subclass without these inherits methods that return nothing.
+    """
 
     @property
     def clock(self) -> Clock:
@@ -77,22 +80,28 @@ class Backend(Protocol):
 
     def happened(self) -> Sequence[tuple[float, str]]:
         """Returns the scenario's events so far, as times (s) and sentences; empty for a real robot."""
+        return ()
 
     def visitors(self, control: Control) -> Sequence[RunVisitor]:
         """Returns the visitors that the backend adds to a run with this control; empty for a real robot."""
+        return ()
 
     @property
     def notes(self) -> Sequence[str]:
         """Sentences for the report on how the robots sense; empty in a simulation."""
+        return ()
 
     def work(self) -> Mapping[str, int]:
         """Returns the backend's work counters by name; empty for a real robot."""
+        return {}
 
     def attach(self, profile: Profile) -> None:
         """Lets the profile time the backend's subsystems."""
+        return None
 
     def show_live(self) -> Scene | None:
         """Starts the live picture; None if there is none."""
+        return None
 
     def judge(
         self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
@@ -101,6 +110,8 @@ class Backend(Protocol):
 
         None if there is no referee.
         """
+        return None
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Writes recording and pictures into the folder `out`; returns the recording's path, None if there is none."""
+        return None

@@ -5,11 +5,10 @@ from __future__ import annotations
 import logging
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from threading import Event
 from typing import Any, Final
 from urllib.parse import unquote
@@ -18,19 +17,13 @@ from yaml import YAMLError
 
 from executive.app.prepare.placed_robots import robot_stack
 from executive.app.prepare.prepared import Prepared
-from executive.app.report.artifacts import Artifacts
-from executive.app.runs.backend import Durable
-from executive.app.runs.goal_conditions import Share
+from executive.app.runs.backend import Backend, Durable
 from executive.app.runs.one_run import FinishedRun, run_request
 from executive.app.runs.signals import ended_by_signals
 from executive.app.runs.simulated import compile_first, run_entry
-from executive.record.work import Profile
-from executive.run.control import Control
-from executive.run.outcome import RobotResult
-from executive.run.visitor import RunEntry, RunVisitor
+from executive.run.visitor import RunEntry
 from executive.run.worker import ThreadWorker
 from executive.tree.compiler import CompiledTree
-from executive.words.goal import RefereeReport
 from executive.words.variation import NO_VARIATION
 from plant.worlds.world import World
 from skills.inputs.errors import InputError, one_line
@@ -42,8 +35,8 @@ _ADDRESS: Final = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<place>[
 
 
 @dataclass
-class RealBackend:
-    """Backend with one connected robot in the map of a world.
+class RealBackend(Backend):
+    """Backend with one connected robot in the map of a world: without events, visitors, referee and recording.
 
     `start` is the robot's pose as the user gives it; without it the robot localises on the whole map.
     """
@@ -72,38 +65,10 @@ class RealBackend:
         self.connected.make_ready()
         return replace(entry, real=True)
 
-    def happened(self) -> Sequence[tuple[float, str]]:
-        """Returns no events, because no simulation reports what happens around a real robot."""
-        return ()
-
-    def visitors(self, control: Control) -> Sequence[RunVisitor]:
-        """Returns no visitors, because people talk to the real robot themselves."""
-        return ()
-
     @property
     def notes(self) -> Sequence[str]:
         """Sentences on the robot's sensors."""
         return self.connected.notes
-
-    def work(self) -> Mapping[str, int]:
-        """Returns no counters."""
-        return {}
-
-    def attach(self, profile: Profile) -> None:
-        """Times nothing."""
-
-    def show_live(self) -> None:
-        """Returns None: there is no scene."""
-
-    def judge(
-        self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
-    ) -> RefereeReport | None:
-        """Returns None: there is no referee."""
-        return None
-
-    def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
-        """Returns None: there is no recording."""
-        return None
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from typing import Any, Final
 from executive.app.prepare.placed_robots import robot_stack, shared_detector
 from executive.app.report.artifacts import Artifacts, draw_artifacts
 from executive.app.report.report_page import RECORDING
-from executive.app.runs.backend import Durable, Scene
+from executive.app.runs.backend import Backend, Durable, Scene
 from executive.app.runs.goal_conditions import Share, verdict_of
 from executive.record.schemas import SPEECH
 from executive.record.work import Profile
@@ -43,7 +43,7 @@ ANSWERS_AFTER_S: Final = 1.0
 """Time between a question and its answer, on the robots' clock."""
 
 
-class SimulatedBackend:
+class SimulatedBackend(Backend):
     """Backend with robots in the plant of a world."""
 
     def __init__(
@@ -121,8 +121,6 @@ class SimulatedBackend:
     def visitors(self, control: Control) -> Sequence[RunVisitor]:
         """Returns the people of the plant; they hear the robots and answer."""
         return (Bystanders(self._simulation, self._pipeline, control),)
-
-    notes: Sequence[str] = ()
 
     def work(self) -> Mapping[str, int]:
         """The plant's work counters by name."""

@@ -13,11 +13,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import Context
 
-from plant.robots.command_table import HeadGoal, Part, Velocity
 from plant.robots.commanded_robot import CommandedRobot
 from plant.robots.robot_kind import PlacedRobot, RobotBody, SensorOptions
 from plant.robots.sensor_suite import LidarMount, SensorSuite
-from plant.robots.servos import ActuatedJoints, GripperTolerances, clip, gripper_set_point
+from plant.robots.servos import ActuatedJoints, GripperTolerances, HeadGoal, Part, Velocity, clip, gripper_set_point
 from plant.robots.spot.floating_base import FloatingBase, FloatingBaseLimits
 from plant.robots.urdf_robot.description import Description
 from plant.robots.urdf_robot.urdf_file import PACKAGE

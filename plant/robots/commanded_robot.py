@@ -19,7 +19,6 @@ from plant.robots.servos import (
     GripperGoal,
     GripperServo,
     GripperTolerances,
-    HeadGoal,
     Part,
     Velocity,
 )
@@ -176,7 +175,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
                 f"point_head: pan {pan_rad:.2f} rad must lie in [{left}, {right}] "
                 f"and tilt {tilt_rad:.2f} rad in [{up}, {down}]"
             )
-        return self._begin(Part.HEAD, HeadGoal((pan_rad, tilt_rad)), until_s, lease)
+        return self._begin(Part.HEAD, (pan_rad, tilt_rad), until_s, lease)
 
     def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
         """Refuses: a simulated robot charges where it stands."""

@@ -36,13 +36,6 @@ class Velocity:
     wz: float = 0.0
 
 
-@dataclass(frozen=True)
-class HeadGoal:
-    """Angles that a head turns to: pan and tilt (rad)."""
-
-    angles_rad: tuple[float, float]
-
-
 class ActuatedJoints:
     """Actuated joints of a model instance, in the order of its actuators; after Finalize.
 

@@ -32,7 +32,10 @@ _LIMIT: Final = 'write <limit lower="..." upper="..." effort="..." velocity="...
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """Joint: X_PF is its frame in the parent link, `axis` (3,) a unit vector in F; limits in rad or m."""
+    """Joint: X_PF is its frame in the parent link, `axis` (3,) a unit vector in F; limits in rad or m.
+
+    `mimics` says whether it follows another joint.
+    """
 
     name: str
     kind: str
@@ -44,6 +47,7 @@ class UrdfJoint:
     upper: float
     effort: float
     velocity: float
+    mimics: bool
     line: int
 
     @property
@@ -116,8 +120,9 @@ class UrdfFile:
         ends = {key: self.numbers(limit, key, "0")[0] for key in ("lower", "upper", "effort", "velocity")}
         if kind not in ("revolute", "prismatic"):
             ends |= {"lower": -math.inf, "upper": math.inf}
+        mimics, line = element.find("mimic") is not None, int(element.get(_LINE, "1"))
         X_PF, axis_F = self.origin(element), axis_F / (length or 1.0)
-        return UrdfJoint(name, kind, parent, child, X_PF, axis_F, **ends, line=int(element.get(_LINE, "1")))
+        return UrdfJoint(name, kind, parent, child, X_PF, axis_F, **ends, mimics=mimics, line=line)
 
     def _named(self, element: Element, tag: str, key: str) -> str:
         """Link to which a joint refers. Raises InputError when it does not exist."""

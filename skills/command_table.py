@@ -86,7 +86,3 @@ class CommandTable(CommandStatuses, Generic[PartT]):
     def running(self, part: PartT) -> Active | None:
         """Running command of a part; None when there is none."""
         return self._running.get(part)
-
-    def part_of(self, command: CommandId) -> PartT | None:
-        """Part on which a command runs now; None when it has ended."""
-        return next((part for part, active in self._running.items() if active.id == command), None)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
+import inspect
 from collections.abc import Callable
-from typing import Any, Concatenate, Final, ParamSpec, TypeVar
+from typing import Any, Concatenate, Final, ParamSpec, TypeVar, cast
 
 from skills.robot import CommandId, Robot
 
@@ -18,12 +19,16 @@ def _forward(
     verb: Callable[Concatenate[Robot, VerbP], AnswerT], through: str = "_call"
 ) -> Callable[Concatenate[RobotWrapper, VerbP], AnswerT]:
     """Method that passes a verb to the wrapped robot through `RobotWrapper._call` or `RobotWrapper._command`."""
-    name = verb.__name__
+    name, signature = verb.__name__, inspect.signature(verb)
 
     @functools.wraps(verb)
     def method(self: RobotWrapper, /, *arguments: VerbP.args, **options: VerbP.kwargs) -> AnswerT:
-        answer: AnswerT = getattr(self, through)(name, getattr(self._robot, name), *arguments, **options)
-        return answer
+        call, make_call = getattr(self._robot, name), cast(Callable[..., AnswerT], getattr(self, through))
+        if not arguments and not options:
+            return make_call(name, call)
+        given = signature.bind(self, *arguments, **options)
+        given.apply_defaults()  # a call is the same however its caller writes it
+        return make_call(name, call, *given.args[1:], **given.kwargs)
 
     return method
 

@@ -218,9 +218,10 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         refusal = self._leases.refusal(lease)
         if refusal:
             return self._commands.refuse(f"stop: {refusal}", CommandCause.NO_LEASE)
-        part = self._commands.part_of(only) if only is not None else None
-        for candidate in Part if only is None else ([part] if part else []):
-            self._halt(candidate, "stopped by command", CommandCause.STOPPED)
+        for part in Part:
+            active = self._commands.running(part)
+            if only is None or (active is not None and active.id == only):
+                self._halt(part, "stopped by command", CommandCause.STOPPED)
         return self._commands.note(CommandState.DONE)
 
     def command_status(self, command: CommandId) -> CommandStatus:

@@ -21,10 +21,10 @@ from plant.events import Doors, Moves
 from plant.loose_objects import CarriedObjects, Sleepers
 from plant.people.receivers import Receivers
 from plant.people.walkers import Walkers
-from plant.robots.command_table import CommandStatuses
 from plant.robots.robot_kind import SensorOptions
 from plant.robots.servos import arm_set_point
 from plant.saved_state import State, Stateful
+from skills.command_table import CommandStatuses
 from skills.robot import ArmTrajectory, CommandId, CommandState, CommandStatus, FloatArray, Lease, Robot
 from skills.robot_wrapper import RobotWrapper
 

@@ -125,7 +125,7 @@ class Localiser(Protocol):
 
 
 @runtime_checkable
-class SearchingLocaliser(Protocol):
+class SearchingLocaliser(Localiser, Protocol):
     """Localiser that can search the whole map for the robot's pose, to recover from lost localisation."""
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:

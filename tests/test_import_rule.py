@@ -27,7 +27,10 @@ WORDS_MAY = (
     *("skills.world_model", "skills.perception.class_forms"),
 )
 """All that the words import: what things are, how files are read, and which numbers a quantity may have."""
-PLANT_MAY = ("executive.words", "skills.robot", "skills.robot_wrapper", "skills.inputs", "skills.map_drawing")
+PLANT_MAY = (
+    *("executive.words", "skills.command_table", "skills.robot", "skills.robot_wrapper", "skills.inputs"),
+    "skills.map_drawing",
+)
 """All that the plant imports of others."""
 HOMES = (
     ("executive.words", "executive.record.schemas", "executive.record.work"),

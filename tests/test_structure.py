@@ -11,21 +11,21 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3465,
-    "executive/language": 8264,
+    "executive/words": 3448,
+    "executive/language": 8259,
     "executive/speech": 1570,
-    "executive/mission": 1656,
-    "executive/tree": 8745,
-    "executive/run": 3300,
+    "executive/mission": 1655,
+    "executive/tree": 8725,
+    "executive/run": 3295,
     "executive/record": 1097,
     "executive/store": 1599,
     "executive/conversation": 595,
     "executive/view": 1850,
-    "executive/testing": 856,
-    "executive/app": 8191,
-    "executive/cli": 3869,
-    "skills": 27901,
-    "plant": 11478,
+    "executive/testing": 852,
+    "executive/app": 8167,
+    "executive/cli": 3864,
+    "skills": 27874,
+    "plant": 11344,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 421, 61, 7
 """All modules; those that one other imports; file names that stand more than once."""

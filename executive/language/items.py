@@ -48,11 +48,6 @@ class Adverb:
 
     here: bool
 
-    @property
-    def word(self) -> str:
-        """Word as spoken."""
-        return "here" if self.here else "there"
-
 
 @dataclass(frozen=True)
 class Being:

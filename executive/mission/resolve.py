@@ -19,7 +19,6 @@ from executive.mission.world_names import in_world_names, unknown_names
 from executive.words.command import START, Command, Task
 from executive.words.condition import CONDITIONS, RANGES, Condition, DoorOpen, Look, LookFor, Question, ValueIs
 from executive.words.expression import Expression, ExpressionError, Value, literal
-from executive.words.forms import Strict
 from executive.words.knowledge import ANYBODY, Knowledge
 from executive.words.leaf_steps import CallSkill, Do, Say, Set, UseMission
 from executive.words.mission import Mission, Parameter, QuestionPolicy
@@ -28,7 +27,7 @@ from executive.words.steps import ForEach, Group, Steps
 from executive.words.zone import ZoneFacts
 from skills.inputs.errors import InputError, Problems, listing, suggestion
 from skills.inputs.outside import is_file
-from skills.inputs.schema import validate
+from skills.inputs.schema import Strict, validate
 from skills.inputs.yaml_source import KeyPath
 
 if TYPE_CHECKING:

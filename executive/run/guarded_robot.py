@@ -53,12 +53,7 @@ class GuardedRobot(RobotWrapper):
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        watchdog: Watchdog,
-        *,
-        limit_s: float = VERB_LIMIT_S,
-        image_limit_s: float = IMAGE_LIMIT_S,
+        self, robot: Robot, watchdog: Watchdog, *, limit_s: float = VERB_LIMIT_S, image_limit_s: float = IMAGE_LIMIT_S
     ) -> None:
         super().__init__(robot)
         self._watchdog, self._limit_s, self._image_limit_s = watchdog, limit_s, image_limit_s

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from executive.testing.bench import SkillBench, SkillRun, room_knowledge, scripted_bench
 from executive.tree.port_values import (
@@ -30,7 +30,7 @@ from skills.doorway import Doorway
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.faulty_robot import parse_fault
 from skills.inputs.errors import with_article
-from skills.inputs.schema import validate
+from skills.inputs.schema import Strict, validate
 from skills.inputs.yaml_source import YamlSource, read_yaml
 from skills.quantities import Angle, Coordinate, Delay, Duration, Height, Length, Quantity, Share, Turn
 from skills.robot import Capabilities, Pose2D
@@ -44,11 +44,7 @@ _Size = tuple[Length, Length, Length]
 _Shade = Annotated[int, Quantity(ge=0, le=255)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-
-class PoseSetup(_Strict):
+class PoseSetup(Strict):
     """Planar pose in the world frame."""
 
     x: Coordinate = Field(default=0.0, description="metres")
@@ -56,7 +52,7 @@ class PoseSetup(_Strict):
     yaw: Angle = Field(default=0.0, description="radians, counter-clockwise from x")
 
 
-class RobotSetup(_Strict):
+class RobotSetup(Strict):
     """Robot and its state at the beginning."""
 
     kind: Literal["scripted", "plant"] = Field(
@@ -79,7 +75,7 @@ class RobotSetup(_Strict):
     lost: bool = Field(default=False, description="whether it is not localised (scripted only)")
 
 
-class BlockSetup(_Strict):
+class BlockSetup(Strict):
     """Upright block in the scripted robot's world."""
 
     at: _Place = Field(description="middle of its base: x, y, z in metres")
@@ -88,7 +84,7 @@ class BlockSetup(_Strict):
     loose: bool = Field(default=False, description="whether the robot can take it")
 
 
-class DoorSetup(_Strict):
+class DoorSetup(Strict):
     """Door that the scripted robot knows; blocks make it closed."""
 
     at: tuple[Coordinate, Coordinate] = Field(description="its middle (x, y) in metres")
@@ -111,7 +107,7 @@ class DoorSetup(_Strict):
         return Doorway(self.at, self.width, self.through, opener=opener)
 
 
-class WorldSetup(_Strict):
+class WorldSetup(Strict):
     """World in which a test takes place."""
 
     room: bool = Field(default=True, description="a room of 6 m by 5 m, with a table before the origin")
@@ -120,7 +116,7 @@ class WorldSetup(_Strict):
     doors: tuple[DoorSetup, ...] = Field(default=(), description="doors that the robot knows (scripted only)")
 
 
-class Expectation(_Strict):
+class Expectation(Strict):
     """Expected result of the skill."""
 
     outcome: Literal["success", "failure", "cancelled"] = Field(description="outcome")
@@ -144,7 +140,7 @@ class Expectation(_Strict):
         return self
 
 
-class SkillTest(_Strict):
+class SkillTest(Strict):
     """Test for a skill."""
 
     name: Annotated[str, Field(min_length=1, description="name of the test")]
@@ -158,7 +154,7 @@ class SkillTest(_Strict):
     expect: Expectation = Field(description="expected end")
 
 
-class SkillTestFile(_Strict):
+class SkillTestFile(Strict):
     """File with tests for one skill."""
 
     skill: Annotated[str, Field(min_length=1, description="registered name of the skill")]

@@ -216,6 +216,7 @@ class ExplainedLeaf(ExplainedNode, Behaviour):
     def _tick(self) -> Iterator[Behaviour]:
         """Runs one tick, like the method of py_trees, but without its debug texts and type checks."""
         if self.status != Status.RUNNING:
+            self.clear_explanation()
             self.initialise()
         status = self.update()
         if status != Status.RUNNING:

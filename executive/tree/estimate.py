@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Final, Protocol
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from executive.tree.node import NodeSpec
 from skills.api import Zone
 from skills.inputs.errors import InputError
-from skills.inputs.schema import validate
+from skills.inputs.schema import Strict, validate
 from skills.inputs.yaml_source import read_yaml
 from skills.robot import Pose2D
 
@@ -26,18 +26,14 @@ Positive = Annotated[float, Field(gt=0.0)]
 CHARGE: Final = "charge"
 
 
-class _Data(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-
-class DriveTimes(_Data):
+class DriveTimes(Strict):
     """Duration of a drive: `overhead_s`, and `per_metre_s` for each metre of progress along its path."""
 
     overhead_s: Positive
     per_metre_s: Positive
 
 
-class BatteryUse(_Data):
+class BatteryUse(Strict):
     """Charge per second that is drawn or restored, as a fraction of a full battery."""
 
     driving_per_s: Positive
@@ -45,7 +41,7 @@ class BatteryUse(_Data):
     charging_per_s: Positive
 
 
-class Estimates(_Data):
+class Estimates(Strict):
     """Schema of `estimates.yaml`: typical durations, and the charge that they draw."""
 
     drive: DriveTimes

@@ -20,7 +20,7 @@ from executive.tree.registry import missing_skill
 from executive.words.command import Command, Task
 from executive.words.expression import Value
 from executive.words.goal import GoalCondition
-from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
+from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge
 from executive.words.slug import slug
 from skills.api import Cause, ObjectKind, Part, Skill, Surface
 from skills.inputs.errors import InputError, SourceLine, suggestion
@@ -41,11 +41,6 @@ PICK_UPS: Final = 2
 def start_key(robot_name: str, mission_name: str) -> str:
     """Blackboard key for the pose at which a mission began."""
     return f"{slug(robot_name)}/{slug(mission_name)}/start-pose"
-
-
-def pose_2d(pose: Pose) -> Pose2D:
-    """Converts a pose from the knowledge file to the pose type of the skills."""
-    return Pose2D(pose.x, pose.y, pose.yaw)
 
 
 @dataclass(frozen=True)

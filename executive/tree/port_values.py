@@ -254,8 +254,7 @@ def _pose(value: Any, knowledge: Knowledge, path: Path) -> Pose2D:
     place = knowledge.place(name)
     if place is None:
         raise _unknown("place", name, knowledge.place_names(), knowledge, path)
-    pose = knowledge.place_pose(place)
-    return Pose2D(pose.x, pose.y, pose.yaw)
+    return knowledge.place_pose(place).pose_2d()
 
 
 def _surface(value: Any, knowledge: Knowledge, path: Path) -> Surface:

@@ -169,10 +169,7 @@ def _port_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
     inputs = getattr(skill, "Inputs", None)
     frozen = dataclasses.is_dataclass(inputs) and inputs.__dataclass_params__.frozen  # type: ignore[union-attr]
     if not (inspect.isclass(inputs) and frozen):
-        yield (
-            "its Inputs is no frozen dataclass",
-            "put @dataclass(frozen=True) above it, and set Inputs = the class",
-        )
+        yield "its Inputs is no frozen dataclass", "put @dataclass(frozen=True) above it, and set Inputs = the class"
         return
     try:
         field_types(skill.Inputs)

@@ -12,9 +12,9 @@ from typing_extensions import TypeAliasType
 
 from executive.words.command import Command, Task, command_of_parts, parts_of_command
 from executive.words.expression import Expression, Kind
-from executive.words.forms import Forms, Strict
+from executive.words.forms import Forms
 from skills.inputs.errors import listing
-from skills.inputs.schema import Name, Text
+from skills.inputs.schema import Name, Strict, Text
 from skills.quantities import Delay, Quantity, Share
 
 READINGS: Final[Mapping[str, Kind]] = MappingProxyType(

@@ -5,18 +5,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import InitErrorDetails
 
 from skills.inputs.errors import listing
-
-
-class Strict(BaseModel):
-    """Immutable model of a mapping; unknown keys are errors. Code uses field names, files use their aliases."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True, defer_build=True
-    )
+from skills.inputs.schema import Strict
 
 
 def aliases(model: type[BaseModel]) -> dict[str, str]:

@@ -9,16 +9,16 @@ from typing import Annotated, Any, Final
 from pydantic import Field, model_validator
 
 from executive.words.command import Task
-from executive.words.forms import Strict
 from executive.words.outlines import Corner, Polygon, distance_m
 from executive.words.robot_config import RobotsFile
 from executive.words.zone import ZoneFacts, with_files
 from skills.api import Tag, Zone
 from skills.inputs.errors import InputError, suggestion
-from skills.inputs.schema import Name, validate
+from skills.inputs.schema import Name, Strict, validate
 from skills.inputs.yaml_source import YamlSource, read_yaml
 from skills.perception.class_forms import ANY_OBJECT, class_forms
 from skills.quantities import Angle, Coordinate, Height, Opening, Quantity, TagNumber, TagSize, TopHeight
+from skills.robot import Pose2D
 from skills.world_model import PERSON
 
 ANYTHING: Final = "object"
@@ -40,6 +40,10 @@ class Pose(Strict):
     x: Coordinate = Field(description="metres")
     y: Coordinate = Field(description="metres")
     yaw: Angle = Field(default=0.0, description="radians")
+
+    def pose_2d(self) -> Pose2D:
+        """Returns the pose in the type of the skills."""
+        return Pose2D(self.x, self.y, self.yaw)
 
 
 class RobotFacts(Strict):

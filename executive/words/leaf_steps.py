@@ -19,9 +19,8 @@ from pydantic import (
 from executive.words.command import Command, Task, command_of_parts, parts_of_command
 from executive.words.condition import Condition, DoorOpen
 from executive.words.expression import Expression, Template, literal
-from executive.words.forms import Strict
 from executive.words.step import Fault, Scalar, Step, unreadable
-from skills.inputs.schema import Name, Text
+from skills.inputs.schema import Name, Strict, Text
 from skills.quantities import Duration, QuantityError, Share, clock_text
 
 COMMAND_KEYS: Final = ("take", "to", "do", "object")

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, StrictBool, field_validator, model_validator
 
 from executive.words.command import Command
-from executive.words.forms import Strict
 from executive.words.outlines import Corner
 from executive.words.robot_config import RobotsFile
 from executive.words.step import Given, OnFailure, OperatorQuestion, Placed, Policy, Scalar, Step
 from executive.words.steps import Branch, Group, Handler, Steps, While
 from executive.words.zone import ZONES, ZoneFacts, Zones
 from skills.inputs.errors import SourceLine
-from skills.inputs.schema import Name, Text
+from skills.inputs.schema import Name, Strict, Text
 from skills.inputs.yaml_source import YamlSource
 from skills.quantities import Delay, Margin, Quantity, Share, Speed
 

@@ -8,9 +8,8 @@ from typing import Annotated, Final
 
 from pydantic import BeforeValidator, Field
 
-from executive.words.forms import Strict
 from skills.inputs.errors import InputError, SourceLine, known_names, suggestion
-from skills.inputs.schema import Name
+from skills.inputs.schema import Name, Strict
 from skills.inputs.yaml_source import YamlSource
 from skills.quantities import Angle, Coordinate, QuantityError, number_in
 from skills.robot import Pose2D

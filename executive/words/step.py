@@ -11,9 +11,8 @@ from pydantic import Field, PrivateAttr, StrictBool, model_validator
 
 from executive.words.command import Command
 from executive.words.expression import ExpressionError
-from executive.words.forms import Strict
 from skills.inputs.errors import InputError, SourceLine
-from skills.inputs.schema import Text
+from skills.inputs.schema import Strict, Text
 from skills.inputs.yaml_source import KeyPath, YamlSource
 from skills.quantities import Duration, Number, Quantity, Share, Whole
 

@@ -23,7 +23,7 @@ from typing_extensions import TypeAliasType
 from executive.words.command import parse_command
 from executive.words.condition import Condition
 from executive.words.expression import Template
-from executive.words.forms import Forms, Strict
+from executive.words.forms import Forms
 from executive.words.leaf_steps import (
     COMMAND_KEYS,
     Answering,
@@ -43,7 +43,7 @@ from executive.words.leaf_steps import (
 from executive.words.step import Fault, Scalar, Step, unreadable
 from executive.words.zone import ZONES, Zones
 from skills.inputs.errors import InputError, listing
-from skills.inputs.schema import Name, Text
+from skills.inputs.schema import Name, Strict, Text
 from skills.inputs.yaml_source import parse_yaml, yaml_of
 from skills.quantities import Count, Duration
 
@@ -60,6 +60,9 @@ else:
     Steps = Annotated[tuple[AnyStep, ...], Field(min_length=1)]
     Branch = Annotated[Steps, WrapValidator(_none_is_empty, json_schema_input_type=Steps | None)]
 """Sequence of steps; a branch may be empty."""
+_ELSE: Final = Field(
+    alias="else", description="The steps when the condition of `if` does not hold, or when `try` failed."
+)
 
 
 class Choose(Step):
@@ -70,13 +73,7 @@ class Choose(Step):
         Condition, Field(alias="if", description="A condition that decides between `then` and `else`.")
     ]
     then: Annotated[Steps, Field(description="The steps when the condition of `if` holds.")]
-    otherwise: Annotated[
-        Branch,
-        Field(
-            alias="else",
-            description="The steps when the condition of `if` does not hold, or when `try` failed.",
-        ),
-    ] = ()
+    otherwise: Annotated[Branch, _ELSE] = ()
 
     @property
     def words(self) -> str:
@@ -151,13 +148,7 @@ class Try(Step):
 
     key: ClassVar[str] = "try"
     steps: Annotated[Steps, Field(alias="try", description="Steps; as soon as one fails, those of `else` are done.")]
-    otherwise: Annotated[
-        Steps,
-        Field(
-            alias="else",
-            description="The steps when the condition of `if` does not hold, or when `try` failed.",
-        ),
-    ]
+    otherwise: Annotated[Steps, _ELSE]
 
 
 class Together(Step):

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from executive.words.forms import Strict
 from executive.words.outlines import Polygon
 from skills.api import FilterType, Zone, ZoneKind, ZoneMask
 from skills.inputs.errors import InputError
 from skills.inputs.outside import file_beside, is_file
-from skills.inputs.schema import Name, validate
+from skills.inputs.schema import Name, Strict, validate
 from skills.inputs.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import Angle, Number, Quantity, Speed
 

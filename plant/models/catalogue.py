@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from skills.inputs.errors import InputError
 from skills.inputs.plugins import class_entries
-from skills.inputs.schema import validate
+from skills.inputs.schema import Strict, validate
 from skills.inputs.yaml_source import read_yaml, yaml_of
 from skills.robot import quantities
 
@@ -23,10 +23,8 @@ CATALOGUE: Final = "catalogue.yaml"
 MODELS_FOLDER = Path(__file__).resolve().parent
 
 
-class ModelForm(BaseModel):
+class ModelForm(Strict):
     """One form of a class: its SDF file, its outline from above, and its resting height (m)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     file: str
     half_extents_m: tuple[float, float]
@@ -38,10 +36,8 @@ class ModelForm(BaseModel):
         return MODELS_FOLDER / self.file
 
 
-class ModelClass(BaseModel):
+class ModelClass(Strict):
     """One class: its id (0 is Nothing), and its forms by name."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     id: int
     forms: dict[str, ModelForm] = Field(min_length=1)

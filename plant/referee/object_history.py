@@ -125,11 +125,6 @@ class ObjectHistory(Stateful):
         return self._grip_robot if self.last.time_s - self._grip_s <= FLICKER_S else None
 
     @property
-    def in_the_air(self) -> bool:
-        """Returns whether a gripper carries the object, and the object touches only the robot."""
-        return self._carried and self.holder is not None and not self._supported
-
-    @property
     def on_tray_of(self) -> str | None:
         """Person on whose tray the object rests; None when it rests on no tray."""
         return self._tray_of if self.resting and self.last.time_s - self._tray_s <= FLICKER_S else None

@@ -10,11 +10,20 @@ from uuid import uuid4
 import numpy as np
 from pydrake.systems.framework import Context
 
-from plant.robots.command_table import CommandTable, HeadGoal, Part, Velocity
 from plant.robots.robot_kind import RobotBody
 from plant.robots.sensor_suite import SensorSuite
-from plant.robots.servos import ActuatedJoints, ArmServos, Closing, GripperGoal, GripperServo, GripperTolerances
+from plant.robots.servos import (
+    ActuatedJoints,
+    ArmServos,
+    Closing,
+    GripperGoal,
+    GripperServo,
+    GripperTolerances,
+    Part,
+    Velocity,
+)
 from plant.saved_state import State, Stateful
+from skills.command_table import CommandTable
 from skills.robot import (
     ArmTrajectory,
     Battery,
@@ -96,7 +105,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         joints = self._joints()
         self._arm = ArmServos(index, joints)
         self._gripper = GripperServo(max(0.0, self._fingers_at(joints, joints)[0]), gripper)
-        self._commands, self._leases = CommandTable(), LeaseManager(body.name)
+        self._commands, self._leases = CommandTable[Part](), LeaseManager(body.name)
         self._now_s = 0.0
 
     # -- know and sense -------------------------------------------------------------------------------------------
@@ -166,7 +175,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
                 f"point_head: pan {pan_rad:.2f} rad must lie in [{left}, {right}] "
                 f"and tilt {tilt_rad:.2f} rad in [{up}, {down}]"
             )
-        return self._begin(Part.HEAD, HeadGoal((pan_rad, tilt_rad)), until_s, lease)
+        return self._begin(Part.HEAD, (pan_rad, tilt_rad), until_s, lease)
 
     def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
         """Refuses: a simulated robot charges where it stands."""
@@ -209,9 +218,10 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         refusal = self._leases.refusal(lease)
         if refusal:
             return self._commands.refuse(f"stop: {refusal}", CommandCause.NO_LEASE)
-        part = self._commands.part_of(only) if only is not None else None
-        for candidate in Part if only is None else ([part] if part else []):
-            self._halt(candidate, "stopped by command", CommandCause.STOPPED)
+        for part in Part:
+            active = self._commands.running(part)
+            if only is None or (active is not None and active.id == only):
+                self._halt(part, "stopped by command", CommandCause.STOPPED)
         return self._commands.note(CommandState.DONE)
 
     def command_status(self, command: CommandId) -> CommandStatus:
@@ -273,7 +283,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
     def power_up(self, now_s: float) -> None:
         """Starts the robot where it stands, without lease and commands, and updates the sensors."""
         self._now_s = now_s
-        self._commands, self._leases = CommandTable(), LeaseManager(self._name)
+        self._commands, self._leases = CommandTable[Part](), LeaseManager(self._name)
         self._sensors.power_up(now_s)
 
     # -- for the kinds of robots ----------------------------------------------------------------------------------
@@ -309,7 +319,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
     def _goal(self, part: Part, of: type[GoalT]) -> GoalT | None:
         """Goal of the part's running command if it has this class, else None."""
         active = self._commands.running(part)
-        return active.payload if active is not None and isinstance(active.payload, of) else None
+        return active.goal if active is not None and isinstance(active.goal, of) else None
 
     def _follow_arm(self, joints: FloatArray, rates: FloatArray) -> None:
         active, trajectory = self._commands.running(Part.ARM), self._goal(Part.ARM, ArmTrajectory)
@@ -323,7 +333,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
             reason = "" if closing is Closing.ARRIVED else "stopped by an object in the gripper"
             self._commands.finish(Part.GRIPPER, CommandState.DONE, reason)
 
-    def _begin(self, part: Part, payload: object, until_s: float, lease: Lease) -> CommandId:
+    def _begin(self, part: Part, goal: object, until_s: float, lease: Lease) -> CommandId:
         refusal = self._leases.refusal(lease)
         if refusal:
             return self._commands.refuse(f"{part.value}: {refusal}", CommandCause.NO_LEASE)
@@ -331,7 +341,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
             return self._commands.refuse(
                 f"{part.value}: expires at {until_s:.2f} s, and it is {self._now_s:.2f} s already", CommandCause.LATE
             )
-        return self._commands.begin(part, payload, self._now_s, until_s)
+        return self._commands.begin(part, goal, self._now_s, until_s)
 
     def _runs(self, command: CommandId) -> bool:
         return self._commands.status(command).state is CommandState.RUNNING

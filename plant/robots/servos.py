@@ -1,4 +1,4 @@
-"""The joints and servos of a robot: indices in the plant's state, and set points of arm and gripper."""
+"""The parts, joints and servos of a robot: goals, indices in the plant's state, and set points of arm and gripper."""
 
 from __future__ import annotations
 
@@ -15,6 +15,25 @@ from plant.saved_state import Stateful
 from skills.robot import ArmTrajectory, FloatArray
 
 Indices = NDArray[np.int64]
+
+
+class Part(enum.Enum):
+    """Part of a robot that a command moves; each part runs one command at a time."""
+
+    VELOCITY = "velocity"
+    POSTURE = "posture"
+    ARM = "arm"
+    GRIPPER = "gripper"
+    HEAD = "head"
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """A planar velocity in the body frame: m/s, m/s, rad/s."""
+
+    vx: float = 0.0
+    vy: float = 0.0
+    wz: float = 0.0
 
 
 class ActuatedJoints:

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import Field, ValidationError, field_validator
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from skills.inputs.schema import Strict
 from skills.inputs.yaml_source import YamlSource, read_yaml
 from skills.robot import Intrinsics
 
@@ -19,13 +20,11 @@ FAR_M = 40.0
 NEAR_M = 0.05
 
 
-class CameraSpec(BaseModel):
+class CameraSpec(Strict):
     """One camera. Its pose is in `link`: z forward, x right, y down; the intrinsics are those of the full picture.
 
     `picture_shrink` and `depth_shrink` divide the resolution of the picture and of the depth, which share the pose.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     name: str
     link: str

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from executive.words.knowledge import Knowledge, Pose
+from executive.words.knowledge import Knowledge
 from executive.words.mission import Route, Stop
 from plant.models.catalogue import ImportedObject, load_catalogue, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
@@ -353,8 +353,8 @@ def load_world(name_or_path: str | Path) -> World:
     return World(
         name=folder.name,
         folder=folder,
-        start=_pose(knowledge.start),
-        dock=None if knowledge.dock is None else _pose(knowledge.dock),
+        start=knowledge.start.pose_2d(),
+        dock=None if knowledge.dock is None else knowledge.dock.pose_2d(),
         rooms=knowledge.rooms,
         surfaces=surfaces,
         surface_places={name: top.place for name, top in knowledge.surfaces.items()},
@@ -378,10 +378,6 @@ def _with_imports(known: Mapping[str, Import], folders: Iterable[Path]) -> Mappi
                 f"{folder} and {other.folder} are both called {imported.name!r}; import one under another name"
             )
     return found
-
-
-def _pose(pose: Pose) -> Pose2D:
-    return Pose2D(pose.x, pose.y, pose.yaw)
 
 
 def _find_folder(name_or_path: str | Path) -> Path:

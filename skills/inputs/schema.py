@@ -6,7 +6,7 @@ from itertools import pairwise
 from types import MappingProxyType, UnionType
 from typing import Annotated, Any, Final, ForwardRef, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 from typing_extensions import TypeAliasType
 
@@ -50,6 +50,14 @@ _PLAIN_WORDS: Final[Mapping[str, str]] = MappingProxyType(
         "unexpected_keyword_argument": "is unknown",
     }
 )
+
+
+class Strict(BaseModel):
+    """Immutable model of a mapping; unknown keys are errors. Code uses field names, files use their aliases."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True, defer_build=True
+    )
 
 
 def validate(model: type[ModelT], source: YamlSource) -> ModelT:

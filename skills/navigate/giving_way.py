@@ -92,10 +92,6 @@ class GivingWay:
         self._traffic.release()
         self._traffic.claim()
 
-    def end(self) -> None:
-        """Releases the claim and the reserved path."""
-        self._traffic.release()
-
     def reserve_path(self, follower: LocalController, footprint: Footprint) -> None:
         """Reserves the rest of the path."""
         self._traffic.announce(follower.ahead(math.inf), footprint.discs)

@@ -8,10 +8,11 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, TypeAdapter
+from pydantic import TypeAdapter
 
 from skills.inputs.errors import InputError
 from skills.inputs.plugins import class_entries
+from skills.inputs.schema import Strict
 from skills.inputs.yaml_source import read_yaml
 
 FORMS_FILE: Final = "class_forms.yaml"
@@ -23,13 +24,11 @@ MEANS_BIG: Final[Mapping[str, bool]] = MappingProxyType(
 """Attributes of size: whether each says that an object is larger than usual in its class."""
 
 
-class ClassForm(BaseModel):
+class ClassForm(Strict):
     """One class: id in messages, form, ranges (from, to) in m of the two longest sides, and the usual length.
 
     `mass_kg` is from the lightest to the heaviest usual object; None when unknown.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     id: int
     form: Literal["round", "tank", "long", "box", "person"]
@@ -43,10 +42,8 @@ ANY_FORM: Final = ClassForm(id=0, form="round", length_m=(0.01, 0.6), width_m=(0
 """Form of objects of a class that has none, such as one that only its tag tells."""
 
 
-class ColourRange(BaseModel):
+class ColourRange(Strict):
     """A range of hue (degrees, may wrap past 360), saturation and value (0 to 1)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     hue_deg: tuple[float, float] = (0.0, 360.0)
     saturation: tuple[float, float] = (0.0, 1.0)

@@ -129,11 +129,10 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
                     yield from self._turn(self.options.turn_rad)
         raise SkillFailure(Cause.POSTCONDITION, "no place on the map fits what the robot sees")
 
-    def _found(self, localiser: Localiser) -> Routine[bool]:
+    def _found(self, localiser: SearchingLocaliser) -> Routine[bool]:
         """Searches with a new scan, adopts the pose found, and checks whether the next scans agree."""
         message = "searching the whole map"
         scan = yield from self._new_scan(message)
-        assert isinstance(localiser, SearchingLocaliser)
         belief = localiser.estimate()
         found: LocalisationEstimate | None = yield from self.compute(
             lambda: localiser.search(scan, belief, None),
@@ -146,9 +145,8 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
         localiser.accept(found)
         return (yield from self._agreed(localiser))
 
-    def _found_by_tag(self, localiser: Localiser) -> Routine[bool]:
+    def _found_by_tag(self, localiser: SearchingLocaliser) -> Routine[bool]:
         """Looks for tags on walls; adopts the pose that puts a tag where the map has it, if scans agree."""
-        assert isinstance(localiser, SearchingLocaliser)
         walls = {tag.id: tag for tag in self.context.tags if tag.on is None}
         sizes_m = {tag.id: tag.size_m for tag in walls.values()}
         for camera in self.context.robot.capabilities().body_cameras if walls else ():

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from skills.command_table import Active
 from skills.faults.fault_kinds import joints_under_pull
 from skills.geometry import compose
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
@@ -36,7 +37,7 @@ from skills.robot import (
 )
 from skills.testing.blocks import FRONT_CAMERAS, Block, can_at, mount_of, take_picture, take_scan
 from skills.testing.clock import VirtualClock
-from skills.testing.part_commands import ActiveCommand, Commands
+from skills.testing.part_commands import Commands
 
 _ACCELERATION_M_S2 = 2.5
 _BRAKING_M_S2 = 8.0
@@ -283,10 +284,9 @@ class ScriptedRobot:
         """Stops all motion, or only the given command; the gripper keeps its force."""
         self.calls.append("stop")
         if lease != self._lease:
-            gone = CommandStatus(CommandState.REFUSED, "the lease was taken away", CommandCause.NO_LEASE)
-            return self._commands.add(gone)
+            return self._commands.refuse("the lease was taken away", CommandCause.NO_LEASE)
         self._commands.stop(only)
-        return self._commands.add(CommandStatus(CommandState.DONE))
+        return self._commands.note(CommandState.DONE)
 
     def command_status(self, command: CommandId) -> CommandStatus:
         """Status of a command. Raises KeyError for an unknown id."""
@@ -335,7 +335,7 @@ class ScriptedRobot:
         )
         for cause, refusal in causes:
             if refusal:
-                return self._commands.add(CommandStatus(CommandState.REFUSED, refusal, cause))
+                return self._commands.refuse(refusal, cause)
         return self._commands.begin(part, goal, self._clock.now(), until_s)
 
     def _X_WB(self) -> RigidTransform:
@@ -354,14 +354,14 @@ class ScriptedRobot:
             self._move_base(dt_s)
         moves = self._move_body, self._move_arm, self._move_head, self._move_gripper
         for part, move in zip(("stand", "move_arm", "point_head", "set_gripper"), moves, strict=True):
-            if (active := self._commands.active(part)) is not None:
+            if (active := self._commands.running(part)) is not None:
                 move(active, dt_s)
         used = -dt_s / _CHARGING_S if self.docked else dt_s / _BATTERY_RUNTIME_S
         self.charge = min(1.0, max(0.0, self.charge - used))
 
     def _accelerate(self, dt_s: float) -> None:
         """Accelerates towards the commanded velocity; brakes harder without a command."""
-        active = self._commands.active("drive")
+        active = self._commands.running("drive")
         wanted = 0.0 if active is None else active.goal
         most = (_BRAKING_M_S2 if active is None else _ACCELERATION_M_S2) * dt_s
         self.velocity = self.velocity + (wanted - self.velocity).clip(-most, most)
@@ -373,18 +373,18 @@ class ScriptedRobot:
         scale, drift = self.odometry_scale, self.yaw_drift_rad_per_m * math.hypot(x, y)
         self.odometry_pose = compose(self.odometry_pose, Pose2D(scale * x, scale * y, turn + drift))
 
-    def _move_body(self, active: ActiveCommand, dt_s: float) -> None:
+    def _move_body(self, active: Active, dt_s: float) -> None:
         height_m, self.pitch_rad = active.goal
         off = height_m - self.height_m
         self.height_m += max(-_RISE_M_S * dt_s, min(_RISE_M_S * dt_s, off))
         if abs(height_m - self.height_m) < 1e-6:
             self._commands.finish("stand", CommandState.DONE)
 
-    def _move_head(self, active: ActiveCommand, dt_s: float) -> None:
+    def _move_head(self, active: Active, dt_s: float) -> None:
         self.head_rad = active.goal
         self._commands.finish("point_head", CommandState.DONE)
 
-    def _move_arm(self, active: ActiveCommand, dt_s: float) -> None:
+    def _move_arm(self, active: Active, dt_s: float) -> None:
         trajectory, q_before = active.goal
         times, positions = trajectory.times_s, trajectory.positions_rad
         if times[0] > 0.0:
@@ -398,7 +398,7 @@ class ScriptedRobot:
         if t >= times[-1]:
             self._commands.finish("move_arm", CommandState.DONE)
 
-    def _move_gripper(self, active: ActiveCommand, dt_s: float) -> None:
+    def _move_gripper(self, active: Active, dt_s: float) -> None:
         opening, self.clamp_force_n = active.goal
         if opening < self.opening and self.in_gripper_rad is None and self.clamp_force_n >= _LEAST_CLAMP_N:
             self._grasp()

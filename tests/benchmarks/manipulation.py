@@ -100,7 +100,8 @@ class Watch(RunVisitor):
         pose = self.simulation.true_pose(ROBOT)
         if math.dist((pose.x_m, pose.y_m), self._base_W) > MOVED_M:
             self._stands_since_s, self._base_W = now_s, (pose.x_m, pose.y_m)
-        if not self.simulation.referee.objects[TARGET].in_the_air:
+        history = self.simulation.referee.objects[TARGET]
+        if not (history._carried and history.holder is not None and not history._supported):
             self.lifted_since_s = None
             return
         self.pick_s = round(now_s - self._stands_since_s, 1) if self.pick_s is None else self.pick_s

@@ -34,7 +34,7 @@ def test_it_is_achieved_and_takes_about_as_long_as_estimated(name, seed, tmp_pat
     assert report.achieved, (report.message, report.referee.why)
     assert report.referee.collisions == 0
     if "skipped" not in report.message:
-        assert 0.6 < report.sim_time_s / Checker().check_file(file).estimate.duration_s < 1.6
+        assert 0.6 < report.sim_time_s / Checker().check(Request(file=file)).estimate.duration_s < 1.6
 
 
 KEPT, NEAR = "watch_the_door", Pose2D(4.8, 4.5, 0.0)

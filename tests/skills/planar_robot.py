@@ -69,7 +69,7 @@ class PlanarRobot(ScriptedRobot):
 
     @property
     def driving(self):
-        return self._commands.active("drive") is not None
+        return self._commands.running("drive") is not None
 
     def push(self, dx_m, dy_m, dyaw_rad):
         """Somebody shoves the robot, in the body frame; its odometry notices."""
@@ -92,7 +92,7 @@ class PlanarRobot(ScriptedRobot):
             self.least_clearance_m = min(self.least_clearance_m, self.true_clearance_m())
 
     def _accelerate(self, dt_s):
-        active = self._commands.active("drive")
+        active = self._commands.running("drive")
         wanted = 0.0 if active is None else active.goal
         self.velocity = self.velocity + (wanted - self.velocity) * min(1.0, dt_s / LAG_S)
         self.travelled_m += math.hypot(self.velocity[0], self.velocity[1]) * dt_s

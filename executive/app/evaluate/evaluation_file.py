@@ -8,7 +8,7 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from executive.app.evaluate.results import Evaluation, RunSpec
 from executive.app.prepare.mission_files import mission_file
@@ -21,7 +21,7 @@ from executive.words.variation import NORMAL_LIGHT, Brightness, Clutter, Frictio
 from plant.robots.robot_kind import robot_kinds
 from skills.inputs.errors import InputError
 from skills.inputs.outside import is_file, read_text
-from skills.inputs.schema import Name, Text, validate
+from skills.inputs.schema import Name, Strict, Text, validate
 from skills.inputs.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import LongDuration, Seed
 
@@ -254,11 +254,7 @@ def _uses(data: Any) -> Iterator[str]:
         yield from _uses(value)
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-
-class MissionEntry(_Strict):
+class MissionEntry(Strict):
     """Mission of an evaluation: exactly one of `say` and `file`."""
 
     say: Text | None = Field(None, description="A sentence.")
@@ -278,7 +274,7 @@ class MissionEntry(_Strict):
         return self
 
 
-class FaultsFile(_Strict):
+class FaultsFile(Strict):
     """Faults of one condition: in words, and drawn by the seed."""
 
     name: Name | None = Field(None, description="Name in the report.")
@@ -290,7 +286,7 @@ Light = Name | Brightness
 _SOME = Field(min_length=1)
 
 
-class VariationsFile(_Strict):
+class VariationsFile(Strict):
     """Lists of values, of which all combinations are tried."""
 
     light: Annotated[tuple[Light, ...], _SOME] = Field(
@@ -315,7 +311,7 @@ class VariationsFile(_Strict):
 Robots = Annotated[dict[Name, Name], _SOME]
 
 
-class EvaluationFile(_Strict):
+class EvaluationFile(Strict):
     """Evaluation file: missions, worlds, robots, seeds and variations, of which all combinations are run."""
 
     missions: Annotated[tuple[Text | MissionEntry, ...], _SOME] = Field(

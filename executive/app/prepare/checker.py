@@ -1,7 +1,7 @@
 """Checks missions without running them: errors, warnings, and estimates of time, path and charge."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from graphlib import TopologicalSorter
 from html import escape
 from pathlib import Path
@@ -68,14 +68,8 @@ class Checked:
 class Checker:
     """Checker of missions, which plans each route once for each pair of a world and a kind of robot."""
 
-    def __init__(self, like: Request | None = None) -> None:
-        """Takes a request whose world, stack, start, robots and parameter values apply to every checked file."""
-        self._like = like or Request()
+    def __init__(self) -> None:
         self._routes: dict[tuple[Path, str, Path | None], RoutePlanner] = {}
-
-    def check_file(self, file: Path) -> Checked:
-        """Checks one file; reports defects of the file as errors in the result instead of raising them."""
-        return self.check(replace(self._like, file=file))
 
     def check(self, request: Request) -> Checked:
         """Checks a request; reports defects of the mission as errors in the result instead of raising them."""

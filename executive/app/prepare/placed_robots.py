@@ -84,8 +84,7 @@ def _dock(robot: RobotConfig, knowledge: Knowledge) -> Pose2D | None:
     if place is None:
         known = ", ".join(sorted(knowledge.places))
         raise InputError(f"the dock of {robot.name}, '{robot.dock}', is no place", hint=f"known: {known}")
-    pose = knowledge.place_pose(place)
-    return Pose2D(pose.x, pose.y, pose.yaw)
+    return knowledge.place_pose(place).pose_2d()
 
 
 def _free_start(world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2D:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from executive.mission.request import Request
 from executive.mission.scenario import RandomFaults, Scenario
@@ -24,7 +24,7 @@ from plant.worlds.world import DoorRule, MoveRule, World, WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.faults.faulty_robot import parse_fault, random_faults
 from skills.inputs.errors import InputError, Problems, suggestion, with_article
-from skills.inputs.schema import Name, Text, validate
+from skills.inputs.schema import Name, Strict, Text, validate
 from skills.inputs.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import Coordinate, Delay, Height, Quantity
 from skills.robot import FloatArray
@@ -126,10 +126,6 @@ Spot = tuple[Coordinate, Coordinate, Height]
 Stops = Annotated[tuple[Corner | Name | Stop, ...], Field(min_length=1)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, defer_build=True)
-
-
 class EventFile(Manner):
     """Event that concerns exactly one person, door or object."""
 
@@ -171,7 +167,7 @@ class EventFile(Manner):
         return self
 
 
-class ScenarioFile(_Strict):
+class ScenarioFile(Strict):
     """Scenario file: faults and events of a run."""
 
     faults: tuple[Text, ...] = Field(default=(), description="Faults in words.")

@@ -87,6 +87,7 @@ class Backend(Protocol):
     @property
     def notes(self) -> Sequence[str]:
         """Sentences for the report on how the robots sense; empty in a simulation."""
+        return ()
 
     def work(self) -> Mapping[str, int]:
         """Returns the backend's work counters by name; empty for a real robot."""

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from executive.app.prepare.placed_robots import robot_stack, shared_detector
 from executive.app.report.artifacts import Artifacts, draw_artifacts
-from executive.app.runs.backend import Durable, Scene
+from executive.app.runs.backend import Backend, Durable, Scene
 from executive.app.runs.goal_conditions import Share, verdict_of
 from executive.record.history import RECORDING
 from executive.record.schemas import POSE, SPEECH, TRUTH, pose_values
@@ -44,7 +44,7 @@ ANSWERS_AFTER_S: Final = 1.0
 """Time between a question and its answer, on the robots' clock."""
 
 
-class SimulatedBackend:
+class SimulatedBackend(Backend):
     """Backend with robots in the plant of a world."""
 
     def __init__(
@@ -122,8 +122,6 @@ class SimulatedBackend:
     def visitors(self, control: Control, log: Publish) -> Sequence[RunVisitor]:
         """Returns the people of the plant, who hear the robots and answer, and the logger of the true poses."""
         return Bystanders(self._simulation, self._pipeline, control), TruthLog(self._pipeline, log)
-
-    notes: Sequence[str] = ()
 
     def work(self) -> Mapping[str, int]:
         """The plant's work counters by name."""

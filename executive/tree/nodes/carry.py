@@ -25,7 +25,7 @@ from executive.tree.nodes.guard import Holds
 from executive.tree.nodes.pick_up import go_near_plan, held_plan, pick_up_plan
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.nodes.search import BACK_M, HALF_M, detect_plan, place_phrase
-from executive.tree.plan import PlanBuilder, pose_2d
+from executive.tree.plan import PlanBuilder
 from executive.words.command import START
 from executive.words.outlines import Point, distance_m, inside
 from skills.api import FLOOR, Cause, Failed, ObjectKind, Surface
@@ -83,7 +83,7 @@ def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[N
 
 def _put_on_plan(builder: PlanBuilder, item: ObjectKind, surface: str, to: str) -> NodeSpec:
     """Carries the item to a surface and puts it down, with guards around both."""
-    view, carry = pose_2d(builder.knowledge.surfaces[surface].viewpoints[0]), builder.at("carry")
+    view, carry = builder.knowledge.surfaces[surface].viewpoints[0].pose_2d(), builder.at("carry")
     place = builder.skill("place", {"surface": builder.surface(surface)}, _released(builder, "place"))
     return builder.sequence(
         f"put it on the {surface}",
@@ -128,7 +128,7 @@ def goal_pose(builder: PlanBuilder, goal: str) -> Pose2D | FromBoard:
     person = builder.knowledge.person(goal)
     if person is not None:
         return person_pose(builder, person, builder.command.goal_at)
-    return pose_2d(builder.knowledge.place_pose(builder.place(goal)))
+    return builder.knowledge.place_pose(builder.place(goal)).pose_2d()
 
 
 def person_pose(builder: PlanBuilder, person: str, at: str | None) -> Pose2D:
@@ -137,7 +137,7 @@ def person_pose(builder: PlanBuilder, person: str, at: str | None) -> Pose2D:
     place = builder.place(at or facts.at)
     stand = builder.knowledge.place_pose(place)
     if facts.pose is None or builder.knowledge.room(place) != builder.knowledge.room(builder.place(facts.at)):
-        return pose_2d(stand)
+        return stand.pose_2d()
     return Pose2D(stand.x, stand.y, math.atan2(facts.pose.y - stand.y, facts.pose.x - stand.x))
 
 
@@ -203,7 +203,6 @@ class Fallen(ExplainedLeaf):
 
     def initialise(self) -> None:
         """Writes where to search for the object, from the robot's present pose."""
-        self.clear_explanation()
         self._end_s = self.context.clock.now() + self.settle_s
         pose = self.context.pose()
         here = (pose.x_m, pose.y_m)

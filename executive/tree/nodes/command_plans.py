@@ -203,8 +203,7 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     if item is not None and brought & set(surfaces_to_search(builder.knowledge, item.name, builder.place(get.goal))):
         hint = "name the surface that they are to be taken from"
         raise builder.error(
-            f"{several} that lie in the {get.goal} already look like those that are brought there",
-            hint,
+            f"{several} that lie in the {get.goal} already look like those that are brought there", hint
         )
     trips = []
     for number in range(1, count + 1):

@@ -9,7 +9,7 @@ from executive.tree.board import FromBoard
 from executive.tree.goals import command_goal
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.recovery import Recovery, Trigger
-from executive.tree.plan import Assembled, PlanBuilder, StepPart, pose_2d
+from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import leaf_steps as model
 from executive.words.command import Command, Task
 from executive.words.knowledge import DOCK
@@ -49,7 +49,7 @@ def charge_plan(builder: PlanBuilder) -> NodeSpec:
         raise builder.error("the robot charges itself, at its dock", "say 'do: charge' alone")
     if facts.dock is None:
         raise builder.error("this world has no dock to charge at", "add 'dock' to its knowledge")
-    return dock_plan(builder, pose_2d(facts.dock), facts.battery.charged)
+    return dock_plan(builder, facts.dock.pose_2d(), facts.battery.charged)
 
 
 def _plan(assembler: Assembler, block: model.Dock, builder: PlanBuilder) -> Assembled:
@@ -58,7 +58,7 @@ def _plan(assembler: Assembler, block: model.Dock, builder: PlanBuilder) -> Asse
         hint = "add 'dock' to its knowledge"
         raise InputError.at(builder.source, "this world has no dock to charge at", hint=hint)
     level = facts.battery.charged if block.level is None else block.level
-    node = dock_plan(builder, pose_2d(facts.dock), level)
+    node = dock_plan(builder, facts.dock.pose_2d(), level)
     command = Command(task=Task.CHARGE)
     return Assembled((node,), (StepPart(node.path_id, command, goal=command_goal(command, facts)),))
 

@@ -15,7 +15,7 @@ from executive.tree.behaviour import ExplainedLeaf, MemoryComposite
 from executive.tree.context import RunContext
 from executive.tree.goals import door_goal
 from executive.tree.node import NodeSpec
-from executive.tree.plan import Assembled, PlanBuilder, StepPart, pose_2d
+from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words.goal import GoalKind
 from executive.words.knowledge import Door, Knowledge
 from executive.words.leaf_steps import OpenDoor
@@ -109,7 +109,7 @@ def _looks(builder: PlanBuilder, door: Door, key: str) -> Iterator[NodeSpec]:
     ports = _ports(knowledge, door)
     sides = sorted(door.between, key=lambda room: -sum(room in other.between for other in knowledge.doors))
     views = [(room, view) for room in sides if (view := view_of(knowledge, door, room)) is not None]
-    views = views or [(room, pose_2d(knowledge.places[room].pose)) for room in sides]
+    views = views or [(room, knowledge.places[room].pose.pose_2d()) for room in sides]
     here = builder.at("here")
     look = here.skill(CHECK_DOOR, ports, {"open": key})
     yield here.node("before door", "look from here", look, door=doorway(knowledge, door))

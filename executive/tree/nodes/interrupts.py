@@ -21,7 +21,7 @@ from executive.tree.nodes.dock import dock_plan
 from executive.tree.nodes.guard import BatteryForWork, Condition, KnowsPlace, NoStopButton, OwnLease, Waiting
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.nodes.skill_leaf import SkillLeaf
-from executive.tree.plan import PlanBuilder, pose_2d
+from executive.tree.plan import PlanBuilder
 from executive.words.knowledge import Pose
 from skills.api import Cause, Failed
 
@@ -211,7 +211,7 @@ def watch_plan(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
 
 def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
     """Charges at the dock and returns to the earlier pose; urgent below half of the charge that triggers charging."""
-    facts, dock = builder.knowledge.battery, pose_2d(place)
+    facts, dock = builder.knowledge.battery, place.pose_2d()
     key = builder.key("where")
     work = builder.at("charge").sequence(
         f"charge to {facts.charged:.0%}",

@@ -22,7 +22,7 @@ from executive.tree.nodes.pick_up import go_near_plan
 from executive.tree.nodes.policies import FINAL_CAUSES
 from executive.tree.nodes.recovery import OnlyIfKnown
 from executive.tree.nodes.speech import AskPeople
-from executive.tree.plan import PlanBuilder, pose_2d
+from executive.tree.plan import PlanBuilder
 from executive.words.command import SPEAKER, START
 from executive.words.expression import Template, Value
 from executive.words.knowledge import ANYBODY, Place
@@ -91,7 +91,6 @@ class AskWhoItIs(AskPeople):
     def initialise(self) -> None:
         """Asks the person, unless there is no doubt."""
         self._asks = self.always or len(self.context.board.get(self.observations, ())) > 1
-        self.clear_explanation()
         if self._asks:
             super().initialise()
 
@@ -230,7 +229,7 @@ class NextRoom(ExplainedLeaf):
         """Chooses the next room."""
         board, here = self.context.board, self.context.pose()
         over = board.get(self.over, ())
-        left = {name: pose_2d(place.pose) for name, place in self.places.items() if name not in over}
+        left = {name: place.pose.pose_2d() for name, place in self.places.items() if name not in over}
         if not left:
             return self.fail(Failed(Cause.POSTCONDITION, "there is no other room"))
         room = min(left, key=lambda name: math.hypot(left[name].x_m - here.x_m, left[name].y_m - here.y_m))
@@ -326,7 +325,7 @@ def _meet_one_plan(
 
 def _in_room(builder: PlanBuilder, room: str, then: NodeSpec) -> NodeSpec:
     """Goes to a room, and then runs another node there."""
-    pose, area = pose_2d(builder.knowledge.place_pose(room)), Constant(builder.knowledge.rooms[room])
+    pose, area = builder.knowledge.place_pose(room).pose_2d(), Constant(builder.knowledge.rooms[room])
     to = _to_room(builder, pose, area, f"the {room}")
     return builder.sequence(f"in the {room}", to, then)
 

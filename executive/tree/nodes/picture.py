@@ -15,7 +15,7 @@ from executive.tree.board import FromBoard
 from executive.tree.goals import POSE_NEAR_M, square_region
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.search import ANSWER_TOPIC, search_plan
-from executive.tree.plan import Assembled, PlanBuilder, StepPart, pose_2d
+from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words.command import parse_object
 from executive.words.goal import GoalCondition, GoalKind, Region, When
 from executive.words.knowledge import ANYTHING, EVERYTHING, Pose
@@ -76,13 +76,13 @@ def _picture_plan(_: Assembler, step: Picture, builder: PlanBuilder) -> Assemble
         facts = knowledge.surfaces[place]
         point, at = (*np.mean(facts.polygon, axis=0).tolist(), facts.height), subject.at
         views = facts.viewpoints if at is None else (knowledge.place_pose(at),)
-        node = _from_views(builder, subject, point, [*map(pose_2d, views)])
+        node = _from_views(builder, subject, point, [each.pose_2d() for each in views])
         goal = _shows(place, point)
     else:
         pose, shows = knowledge.place_pose(subject.at or place), knowledge.places[place].shows
-        point = shows or _ahead(pose_2d(pose))
+        point = shows or _ahead(pose.pose_2d())
         near = () if shows else (square_region(place, pose, POSE_NEAR_M + _ARM_M),)
-        node, goal = _from_views(builder, subject, point, (pose_2d(pose),)), replace(_shows(place, point), source=near)
+        node, goal = _from_views(builder, subject, point, (pose.pose_2d(),)), replace(_shows(place, point), source=near)
     node = builder.at("tidy").stow_after(node)
     return Assembled((node,), (StepPart(builder.path_id, goal=goal, node=node.path_id),))
 
@@ -93,7 +93,7 @@ def _of_object(builder: PlanBuilder, subject: Subject) -> tuple[NodeSpec, GoalCo
     room = at and (at if knowledge.surfaces_in(at) else knowledge.room(at))
     steps = [search_plan(builder.at("find"), item, room, key, anywhere=at is None)]
     if at is not None and at not in knowledge.rooms:
-        steps.append(builder.navigate(pose_2d(knowledge.place_pose(at)), f"the {at}", exactly=True))
+        steps.append(builder.navigate(knowledge.place_pose(at).pose_2d(), f"the {at}", exactly=True))
     node = builder.sequence(f"a picture of the {item}", *steps, _shot(builder, subject, object=FromBoard(key)))
     return node, replace(_PICTURED, classes=builder.classes(item.name), wanted=item.name)
 
@@ -102,7 +102,7 @@ def _of_room(builder: PlanBuilder, subject: Subject, room: str) -> tuple[NodeSpe
     """Takes a picture in each of four directions, from the pose of the room or another place."""
     at, views = subject.at or room, list[NodeSpec]()
     for number, turn_rad in enumerate(_TURNS_RAD, start=1):
-        view = compose(pose_2d(builder.knowledge.place_pose(at)), Pose2D(0.0, 0.0, turn_rad))
+        view = compose(builder.knowledge.place_pose(at).pose_2d(), Pose2D(0.0, 0.0, turn_rad))
         title, below = f"{room} ({number} of {len(_TURNS_RAD)})", builder.at(f"view-{number}")
         views.append(_from_views(below, subject.model_copy(update={"at": at}), _ahead(view), (view,), title))
     outline = Region(room, builder.knowledge.rooms[builder.knowledge.room(at)])

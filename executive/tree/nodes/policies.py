@@ -294,7 +294,6 @@ class RememberPose(ExplainedLeaf):
 
     def initialise(self) -> None:
         """Starts to count the patience."""
-        self.clear_explanation()
         self._started_s = self.context.clock.now()
 
     def update(self) -> Status:

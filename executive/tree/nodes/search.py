@@ -14,7 +14,7 @@ from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import floor_square
 from executive.tree.nodes.pick_up import go_near_plan
-from executive.tree.plan import PlanBuilder, pose_2d
+from executive.tree.plan import PlanBuilder
 from executive.words.command import PEOPLE_TASKS, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
@@ -176,7 +176,7 @@ def look_plans(
             title = f"look at the {name} ({number})".removesuffix(" (1)")
             below = builder.at(f"{name}-{number}")
             look = detect_plan(below, item, (name,), key, extra, tallied=tallied)
-            plans.append((name, below.look_from(title, pose_2d(view), f"the {name}", look)))
+            plans.append((name, below.look_from(title, view.pose_2d(), f"the {name}", look)))
     return tuple(plans)
 
 
@@ -200,7 +200,7 @@ def people_looks(
         ports = {"area_W": area_W, "place": room, "person": person, "count": count, **moves}
         tally = {_TALLY: below.key("all")} if tallied else {}
         look = below.skill("find_people", ports, {"observation": key, **tally})
-        plans.append((room, below.look_from(f"look about the {room}", pose_2d(pose), f"the {room}", look)))
+        plans.append((room, below.look_from(f"look about the {room}", pose.pose_2d(), f"the {room}", look)))
     return tuple(plans)
 
 
@@ -292,7 +292,7 @@ def _looks_from_aside(
     single = [name for name in surfaces if len(facts[name].viewpoints) == 1]
     for name in single[:MOST_ASIDE]:
         room = builder.knowledge.rooms[facts[name].place]
-        view = pose_2d(facts[name].viewpoints[0])
+        view = facts[name].viewpoints[0].pose_2d()
         poses = (compose(view, Pose2D(0.0, left_m, 0.0)) for left_m in (ASIDE_M, -ASIDE_M))
         aside = next((pose for pose in poses if inside(room, (pose.x_m, pose.y_m))), None)
         if aside is not None:

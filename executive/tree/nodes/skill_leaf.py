@@ -132,7 +132,6 @@ class SkillLeaf(ExplainedLeaf):
 
     def initialise(self) -> None:
         """Begins a new attempt; `update` reports an error, since an exception here would leave the tree RUNNING."""
-        self.clear_explanation()
         self.progress = None
         self._false_start = self._guarded(self._begin)
 

@@ -70,7 +70,6 @@ class AskPeople(ExplainedLeaf):
 
     def initialise(self) -> None:
         """Asks the question."""
-        self.clear_explanation()
         self._false_start = None
         self._until_s = self.context.clock.now() + self.limit_s
         try:

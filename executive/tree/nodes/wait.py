@@ -31,7 +31,6 @@ class Pause(ExplainedLeaf):
 
     def initialise(self) -> None:
         """Starts to count the duration."""
-        self.clear_explanation()
         self._end_s = self.clock.now() + self.duration_s
 
     def update(self) -> Status:
@@ -107,7 +106,6 @@ class WaitUntilClock(ExplainedLeaf):
 
     def initialise(self) -> None:
         """Computes when the wait ends."""
-        self.clear_explanation()
         now_s = self.context.clock.now()
         ahead_s = (self.time_s - self.context.day_began_s - now_s) % DAY_S
         self._end_s = now_s + ahead_s if ahead_s <= DAY_S / 2 else now_s

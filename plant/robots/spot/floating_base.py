@@ -27,9 +27,8 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from plant.robots.command_table import Velocity
 from plant.robots.robot_kind import LocomotionLimits
-from plant.robots.servos import clip
+from plant.robots.servos import Velocity, clip
 from plant.saved_state import Stateful
 from skills.robot import FloatArray, Pose2D, quantities
 

@@ -59,16 +59,6 @@ class LegKinematics:
         """Length of the thigh (m) and its angle to the link's vertical (rad)."""
         return math.hypot(self.thigh_x_m, self.thigh_z_m), math.atan2(self.thigh_x_m, self.thigh_z_m)
 
-    def foot(self, hx_rad: float, hy_rad: float, kn_rad: float) -> FloatArray:
-        """Centre p_BFoot (3,) of the foot in the body frame."""
-        shin_x, shin_z = -self.shin_m * math.sin(kn_rad), -self.shin_m * math.cos(kn_rad)
-        u_x, u_z = self.thigh_x_m + shin_x, -self.thigh_z_m + shin_z
-        x = u_x * math.cos(hy_rad) + u_z * math.sin(hy_rad)
-        z = -u_x * math.sin(hy_rad) + u_z * math.cos(hy_rad)
-        y = self.side_m
-        c, s = math.cos(hx_rad), math.sin(hx_rad)
-        return np.array([x, c * y - s * z, s * y + c * z]) + self.p_BHip
-
     def joints(self, p_BFoot: Sequence[float]) -> tuple[float, float, float]:
         """Joint angles (hip x, hip y, knee; rad) for a foot position, with the knee bent backwards.
 
@@ -124,16 +114,11 @@ class LegServos(Stateful, saved=("_last",)):
 
 
 _PAIRS = ((0, 3), (1, 2))  # indices into LEGS: fl with hr, fr with hl
-
-
-@dataclass(frozen=True)
-class TrotParameters:
-    """Shape of the trot: time and height of a swing, and largest distance of a standing foot from its foothold."""
-
-    swing_s: float = 0.28
-    swing_height_m: float = 0.07
-    rest_tolerance_m: float = 0.025
-    foot_radius_m: float = 0.036
+_SWING_S = 0.28
+_SWING_HEIGHT_M = 0.07
+_REST_TOLERANCE_M = 0.025
+"""Largest distance of a standing foot from its foothold."""
+_FOOT_RADIUS_M = 0.036
 
 
 @dataclass(frozen=True)
@@ -162,10 +147,9 @@ class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_p
     Robots That Balance, 1986): a foot lands below the hip's position in the middle of its next stance.
     """
 
-    def __init__(self, nominal_B: FloatArray, parameters: TrotParameters | None = None) -> None:
+    def __init__(self, nominal_B: FloatArray) -> None:
         """`nominal_B` are the resting positions (4, 2) of the feet in the body frame."""
         self._nominal_B: list[list[float]] = nominal_B.tolist()
-        self._parameters = parameters or TrotParameters()
         self._feet_W = [[0.0, 0.0, 0.0] for _ in LEGS]
         self._lift_W = [[0.0, 0.0, 0.0] for _ in LEGS]
         self._swinging: int | None = None
@@ -174,15 +158,9 @@ class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_p
 
     def reset(self, motion: BodyMotion) -> None:
         """Sets all feet to rest below a body at a pose."""
-        self._feet_W = [[*self._place(foot, motion, 0.0), self._parameters.foot_radius_m] for foot in range(len(LEGS))]
+        self._feet_W = [[*self._place(foot, motion, 0.0), _FOOT_RADIUS_M] for foot in range(len(LEGS))]
         self._swinging = None
         self._progress_s = 0.0
-
-    @property
-    def stance(self) -> tuple[bool, ...]:
-        """Flags of the feet that stand on the floor."""
-        lifted = _PAIRS[self._swinging] if self._swinging is not None else ()
-        return tuple(foot not in lifted for foot in range(len(LEGS)))
 
     def step(self, motion: BodyMotion, dt_s: float) -> Sequence[Sequence[float]]:
         """Advances by dt_s; returns the centres (x, y, z) of the feet in the world, valid until the next step."""
@@ -196,7 +174,7 @@ class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_p
         moving = math.hypot(motion.vx, motion.vy) > 0.02 or abs(motion.wz) > 0.05
         if not moving:
             worst = [max(self._off_place_m(foot, motion) for foot in pair) for pair in _PAIRS]
-            if max(worst) < self._parameters.rest_tolerance_m:
+            if max(worst) < _REST_TOLERANCE_M:
                 return
             self._next_pair = worst.index(max(worst))
         self._swinging = self._next_pair
@@ -206,12 +184,11 @@ class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_p
 
     def _swing(self, motion: BodyMotion, dt_s: float) -> None:
         assert self._swinging is not None
-        p = self._parameters
         self._progress_s += dt_s
-        share = min(1.0, self._progress_s / p.swing_s)
-        ahead_s = p.swing_s - min(self._progress_s, p.swing_s) + p.swing_s / 2  # the middle of the next stance
+        share = min(1.0, self._progress_s / _SWING_S)
+        ahead_s = _SWING_S - min(self._progress_s, _SWING_S) + _SWING_S / 2  # the middle of the next stance
         blend = share * share * (3 - 2 * share)
-        height_m = p.foot_radius_m + p.swing_height_m * math.sin(math.pi * share)
+        height_m = _FOOT_RADIUS_M + _SWING_HEIGHT_M * math.sin(math.pi * share)
         for foot in _PAIRS[self._swinging]:
             (x, y), (lift_x, lift_y, _) = self._place(foot, motion, ahead_s), self._lift_W[foot]
             self._feet_W[foot] = [(1 - blend) * lift_x + blend * x, (1 - blend) * lift_y + blend * y, height_m]

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.math import RigidTransform
 
-from plant.robots.command_table import Part, Velocity
 from plant.robots.commanded_robot import CommandedRobot
 from plant.robots.robot_kind import SensorOptions
 from plant.robots.sensor_suite import LidarMount, SensorSuite
-from plant.robots.servos import GripperTolerances, gripper_set_point
+from plant.robots.servos import GripperTolerances, Part, Velocity, gripper_set_point
 from plant.robots.spot.description import CAMERAS, spot_facts
 from plant.robots.spot.legs import BodyMotion, LegServos, Trot, nominal_footholds
 from plant.robots.spot.model import JointIndex, SpotModel

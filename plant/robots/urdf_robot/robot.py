@@ -13,11 +13,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import Context
 
-from plant.robots.command_table import HeadGoal, Part, Velocity
 from plant.robots.commanded_robot import CommandedRobot
 from plant.robots.robot_kind import PlacedRobot, RobotBody, SensorOptions
 from plant.robots.sensor_suite import LidarMount, SensorSuite
-from plant.robots.servos import ActuatedJoints, GripperTolerances, clip, gripper_set_point
+from plant.robots.servos import ActuatedJoints, GripperTolerances, Part, Velocity, clip, gripper_set_point
 from plant.robots.spot.floating_base import FloatingBase, FloatingBaseLimits
 from plant.robots.urdf_robot.description import Description
 from plant.robots.urdf_robot.urdf_file import PACKAGE
@@ -241,10 +240,10 @@ class UrdfRobot(CommandedRobot, saved=("_finger_goals", "_head", "_head_goal", "
         return f"drive: two wheels cannot drive sideways, as {velocity.vy:.2f} m/s asks for"
 
     def _follow_head(self, joints: FloatArray, rates: FloatArray) -> None:
-        goal, head = self._goal(Part.HEAD, HeadGoal), self._index.head
+        goal, head = self._goal(Part.HEAD, tuple), self._index.head
         if goal is None:
             return
-        self._head_goal = np.array(goal.angles_rad)
+        self._head_goal = np.array(goal)
         there = float(np.abs(joints[head] - self._head_goal).max()) < _HEAD_ARRIVED_RAD
         if there and float(np.abs(rates[head]).max()) < _HEAD_STILL_RAD_S:
             self._commands.finish(Part.HEAD, CommandState.DONE)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
+from pydantic import Field, PrivateAttr
 
 from skills.inputs.errors import suggestion
-from skills.inputs.schema import Name, validate
+from skills.inputs.schema import Name, Strict, validate
 from skills.inputs.yaml_source import YamlSource, read_yaml
 from skills.robot import BaseKind, GripperKind, quantities
 
@@ -19,11 +19,7 @@ Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 Outline = Annotated[tuple[tuple[quantities.Coordinate, quantities.Coordinate], ...], Field(min_length=3)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-
-class WheelsFile(_Strict):
+class WheelsFile(Strict):
     """Driven wheels: their joints, the left one first, and the links of casters, which slide on the floor."""
 
     joints: tuple[Name, Name]
@@ -31,7 +27,7 @@ class WheelsFile(_Strict):
     casters: tuple[Name, ...] = ()
 
 
-class BaseFile(_Strict):
+class BaseFile(Strict):
     """Base: its link with frame B (x ahead, z up), and how it drives; on a floating base without `wheels`."""
 
     link: Name
@@ -44,14 +40,14 @@ class BaseFile(_Strict):
     runtime: quantities.Duration = 7200.0
 
 
-class LiftFile(_Strict):
+class LiftFile(Strict):
     """Lift: the joint that raises the base's link from the wheels, and its position while the robot drives."""
 
     joint: Name
     travelling: quantities.Coordinate = 0.0
 
 
-class LidarFile(_Strict):
+class LidarFile(Strict):
     """LiDAR: its link (x ahead, z up) and its beams."""
 
     link: Name
@@ -63,7 +59,7 @@ class LidarFile(_Strict):
     rate: Annotated[float, quantities.Quantity(gt=0.0, le=100.0, unit="Hz")] = 10.0
 
 
-class CameraFile(_Strict):
+class CameraFile(Strict):
     """Camera with depth: its link, and whether that link's z (`optical`) or x (`link`) is ahead."""
 
     link: Name
@@ -74,7 +70,7 @@ class CameraFile(_Strict):
     depth: tuple[quantities.Length, quantities.Length] = (0.3, 5.0)
 
 
-class HandFile(_Strict):
+class HandFile(Strict):
     """Hand frame: a link behind the last joint, and its axes along the fingers and along their closing direction."""
 
     link: Name
@@ -82,7 +78,7 @@ class HandFile(_Strict):
     closing: Axis
 
 
-class ArmFile(_Strict):
+class ArmFile(Strict):
     """Arm: its joints from the shoulder on, their stowed positions, and positions of the carrying hand (B, m)."""
 
     joints: Annotated[tuple[Name, ...], Field(min_length=2)]
@@ -102,7 +98,7 @@ class ArmFile(_Strict):
     tuck_x: tuple[quantities.Coordinate, ...] = ()
 
 
-class PadsFile(_Strict):
+class PadsFile(Strict):
     """Rubber on sliding fingers: spheres along x and y of the hand frame, and how far they pass the closing plane."""
 
     x: Annotated[tuple[quantities.Coordinate, ...], Field(min_length=1)]
@@ -110,7 +106,7 @@ class PadsFile(_Strict):
     proud: quantities.Coordinate = 0.001
 
 
-class GripperFile(_Strict):
+class GripperFile(Strict):
     """Gripper: its joints with their positions at an opening of 1, and its geometry in the hand frame (m)."""
 
     kind: GripperKind = GripperKind.PARALLEL
@@ -129,7 +125,7 @@ class GripperFile(_Strict):
     pads: PadsFile | bool = True
 
 
-class RobotFile(_Strict):
+class RobotFile(Strict):
     """A robot: the file of its URDF and its parts; an arm, gripper, head or camera that is not named does not exist.
 
     Joints that no part names are fixed, at `held` (rad, m) or 0.
@@ -140,11 +136,11 @@ class RobotFile(_Strict):
     base: BaseFile
     lift: LiftFile | None = None
     lidar: LidarFile
-    cameras: dict[Name, CameraFile] = {}
+    cameras: dict[Name, CameraFile] = Field({})
     head: tuple[Name, Name] | None = Field(None, description="joints of pan and tilt")
     arm: ArmFile | None = None
     gripper: GripperFile | None = None
-    held: dict[Name, quantities.Number] = {}
+    held: dict[Name, quantities.Number] = Field({})
     gains: dict[Name, tuple[quantities.Number, quantities.Number]] = Field(
         {}, description="stiffness and damping of joints' servos; by the limit of effort unless said"
     )

@@ -10,9 +10,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
-from plant.robots.command_table import Velocity
 from plant.robots.robot_kind import LocomotionLimits, PlacedRobot, SensorOptions
-from plant.robots.servos import clip
+from plant.robots.servos import Velocity, clip
 from plant.robots.urdf_robot.description import Description
 from plant.robots.urdf_robot.robot import UrdfBody, UrdfIndex, UrdfRobot, UrdfSensors
 from plant.saved_state import Stateful

@@ -1,7 +1,9 @@
 """Base of the skills that release the held object: they open the gripper, check its force, and draw back."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -10,6 +12,7 @@ from skills.api import Cause, Failed, InputsT, Running, Step
 from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import UP_B, towards_shoulder
+from skills.quantities import Coordinate, Height
 from skills.robot import FloatArray, GripperKind
 from skills.routine import Routine
 
@@ -43,6 +46,12 @@ class ReleasingSkill(LookingSkill[InputsT]):
     Its result has the output `released_W`, the point of the release. Every failure after the release has the cause
     POSTCONDITION, because the robot must then search for the object.
     """
+
+    outputs: ClassVar[Mapping[str, type]] = {"released_W": tuple[Coordinate, Coordinate, Height]}
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
+    changes_world = True
+    gripper_before = True
+    gripper_after = False
 
     def step(self) -> Step:
         """Continues the routine; adds the point of the release to its result."""

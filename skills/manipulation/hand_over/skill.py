@@ -20,7 +20,7 @@ from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
 from skills.navigate.surroundings import NavigateInputs
 from skills.perception.people import SeenPerson, people_in_scan
-from skills.quantities import Coordinate, Duration, Force, Height, Length
+from skills.quantities import Duration, Force, Height, Length
 from skills.robot import FloatArray
 from skills.routine import Patience, Routine, SkillFailure
 
@@ -77,7 +77,6 @@ class HandOver(HandOverVerification[HandOverInputs]):
 
     name = "hand_over"
     Inputs = HandOverInputs
-    outputs: ClassVar[Mapping[str, type]] = {"released_W": tuple[Coordinate, Coordinate, Height]}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held, there is no new scan, or nobody is seen near",
         Cause.PLANNING: "no free place before the person, or no free path for the arm",
@@ -86,10 +85,6 @@ class HandOver(HandOverVerification[HandOverInputs]):
         Cause.TIMEOUT: "the person did not take the object",
     }
     default_timeout_s = 180.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
-    changes_world = True
-    gripper_before = True
-    gripper_after = False
     Options: ClassVar[type] = HandOverOptions
     options: HandOverOptions
 

@@ -39,7 +39,7 @@ from skills.manipulation.place.verification import PlaceVerification
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.surroundings import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
-from skills.quantities import Coordinate, Height, Length, Tries, TurnRate
+from skills.quantities import Coordinate, Length, Tries, TurnRate
 from skills.robot import FloatArray, Pose2D
 from skills.routine import PlanningAttempt, Routine, SkillFailure
 
@@ -111,7 +111,6 @@ class Place(PlaceVerification[PlaceInputs]):
 
     name = "place"
     Inputs = PlaceInputs
-    outputs: ClassVar[Mapping[str, type]] = {"released_W": tuple[Coordinate, Coordinate, Height]}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held",
         Cause.PLANNING: "no free spot of the surface is seen within reach, or the arm finds no path to it",
@@ -119,10 +118,6 @@ class Place(PlaceVerification[PlaceInputs]):
         Cause.POSTCONDITION: "it was let go and is not seen at rest where it was put down, or is still in the gripper",
     }
     default_timeout_s = 240.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
-    changes_world = True
-    gripper_before = True
-    gripper_after = False
     Options: ClassVar[type] = PlaceOptions
     options: PlaceOptions
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from executive.app.prepare import checker
+from executive.mission.request import Request
 from tests.executive.cli.calls import errand, json_of
 from tests.executive.distribution import write_distribution
 
@@ -52,7 +53,7 @@ def test_the_parts_of_all_robots_are_checked(write):
 
 def test_robots_that_wait_for_each_other_take_as_long_as_one_after_the_other(write):
     def estimate(text):
-        return checker.Checker().check_file(write(text)).estimate
+        return checker.Checker().check(Request(file=write(text))).estimate
 
     robots, _, alice, bob = PARTS.replace("%s", "office").split("\n")[1:5]
     together = f"name: x\n{robots}\nparts:\n{alice}\n{bob}\n"

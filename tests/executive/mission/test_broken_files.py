@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from executive.app.prepare.checker import Checker
+from executive.mission.request import Request
 from skills.inputs.errors import InputError
 from tests.executive.mission import mutations
 
@@ -23,7 +24,7 @@ def checker(parser):
 
 
 def test_unchanged_files_compile(checker, missions):
-    faults = {path.name: list(map(str, checker.check_file(path).errors)) for path in missions}
+    faults = {path.name: list(map(str, checker.check(Request(file=path)).errors)) for path in missions}
     assert not any(faults.values()), faults
 
 
@@ -32,7 +33,7 @@ def test_every_broken_file_is_refused_with_a_place_and_a_hint(checker, mission_f
     for name, raw in mutations.broken_files(missions, COUNT, SEED):
         path = mission_folder / "mission.yaml"
         path.write_bytes(raw)
-        errors = checker.check_file(path).errors
+        errors = checker.check(Request(file=path)).errors
         if not errors:
             wrong.append((name, "accepted"))
         for error in errors:

@@ -1,51 +1,25 @@
-"""The command table of a robot: ids, statuses and expiry of commands."""
+"""The command table of a robot in software: ids, statuses and expiry of commands."""
 
 from __future__ import annotations
 
-import enum
+from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Final, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 from skills.robot import CommandCause, CommandId, CommandState, CommandStatus
 
-PayloadT = TypeVar("PayloadT")
+PartT = TypeVar("PartT", bound=Hashable)
 
 MOST_STATUSES: Final = 2000
 """Number of stored statuses, enough for the commands of ten seconds."""
 
 
-class Part(enum.Enum):
-    """Part of a robot that a command moves; each part runs one command at a time."""
-
-    VELOCITY = "velocity"
-    POSTURE = "posture"
-    ARM = "arm"
-    GRIPPER = "gripper"
-    HEAD = "head"
-
-
 @dataclass(frozen=True)
-class Velocity:
-    """A planar velocity in the body frame: m/s, m/s, rad/s."""
-
-    vx: float = 0.0
-    vy: float = 0.0
-    wz: float = 0.0
-
-
-@dataclass(frozen=True)
-class HeadGoal:
-    """Angles that a head turns to: pan and tilt (rad)."""
-
-    angles_rad: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Active(Generic[PayloadT]):
+class Active:
     """A running command: its goal, and its start and expiry on the robot's clock (s)."""
 
     id: CommandId
-    payload: PayloadT
+    goal: Any
     since_s: float
     until_s: float
 
@@ -79,40 +53,36 @@ class CommandStatuses:
         self._statuses[command] = status
 
 
-class CommandTable(CommandStatuses):
-    """Running command of each part, and the statuses of the latest commands."""
+class CommandTable(CommandStatuses, Generic[PartT]):
+    """Running command of each part of a robot, and the statuses of the latest commands."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._running: dict[Part, Active[object]] = {}
+        self._running: dict[PartT, Active] = {}
 
-    def begin(self, part: Part, payload: object, now_s: float, until_s: float) -> CommandId:
+    def begin(self, part: PartT, goal: Any, now_s: float, until_s: float) -> CommandId:
         """Begins a command, which replaces the running command of the part."""
         command = self.add(CommandStatus(CommandState.RUNNING))
         self.finish(part, CommandState.STOPPED, f"replaced by command {command}", CommandCause.STOPPED)
-        self._running[part] = Active(command, payload, now_s, until_s)
+        self._running[part] = Active(command, goal, now_s, until_s)
         return command
 
     def refuse(self, reason: str, cause: CommandCause = CommandCause.INVALID) -> CommandId:
         """Adds a refused command with its reason."""
         return self.add(CommandStatus(CommandState.REFUSED, reason, cause))
 
-    def note(self, state: CommandState, reason: str = "") -> CommandId:
+    def note(self, state: CommandState) -> CommandId:
         """Adds a command that has already ended."""
-        return self.add(CommandStatus(state, reason))
+        return self.add(CommandStatus(state))
 
     def finish(
-        self, part: Part, state: CommandState, reason: str = "", cause: CommandCause = CommandCause.NONE
+        self, part: PartT, state: CommandState, reason: str = "", cause: CommandCause = CommandCause.NONE
     ) -> None:
         """Ends the running command of a part; does nothing when none is running."""
         active = self._running.pop(part, None)
         if active is not None:
             self.change(active.id, CommandStatus(state, reason, cause))
 
-    def running(self, part: Part) -> Active[object] | None:
+    def running(self, part: PartT) -> Active | None:
         """Running command of a part; None when there is none."""
         return self._running.get(part)
-
-    def part_of(self, command: CommandId) -> Part | None:
-        """Part on which a command runs now; None when it has ended."""
-        return next((part for part, active in self._running.items() if active.id == command), None)

@@ -47,7 +47,7 @@ from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, ModelInst
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from plant.events import add_panel
-from plant.people.arms import Arms
+from plant.models.person_arms import Arms
 from plant.rendering import Scene
 from plant.robots.robot_kind import PlacedRobot, RobotBody, robot_kind
 from plant.worlds.geometry_files import OWN_PACKAGE

@@ -24,10 +24,10 @@ LINES = {
     "executive/testing": 852,
     "executive/app": 8167,
     "executive/cli": 3864,
-    "skills": 27874,
+    "skills": 27869,
     "plant": 11344,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 421, 61, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 420, 61, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.command_table import Active
+from skills.command_table import Active, ScriptedCommands
 from skills.faults.fault_kinds import joints_under_pull
 from skills.geometry import compose
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
@@ -37,7 +37,6 @@ from skills.robot import (
 )
 from skills.testing.blocks import FRONT_CAMERAS, Block, can_at, mount_of, take_picture, take_scan
 from skills.testing.clock import VirtualClock
-from skills.testing.part_commands import Commands
 
 _ACCELERATION_M_S2 = 2.5
 _BRAKING_M_S2 = 8.0
@@ -125,7 +124,7 @@ class ScriptedRobot:
         self.refuse_because: dict[str, str] = {}
         self.refusal_cause = CommandCause.REFUSED
         self.calls: list[str] = []
-        self._commands = Commands()
+        self._commands = ScriptedCommands()
         self._lease: Lease | None = None
         self._scan: Scan | None = None
         self._rng = np.random.default_rng(seed)

@@ -1,19 +1,19 @@
 """A standing person of about 1.75 m. The origin lies on the floor between the feet; the person faces x.
 
-The arms are meshes of their own, each along -z from its joint, which `plant.people.arms` can lift.
+The arms are meshes of their own, each along -z from its joint, which `plant.models.person_arms` can lift.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydrake.math import RollPitchYaw
+from pydrake.math import RollPitchYaw, RotationMatrix
 
 from errand_make.mesh import Material, Mesh
 from errand_make.shapes import Box, Cylinder, Model, Part, Shape
 from errand_train.models.appearance import Appearance
 from errand_train.models.pictures import cloth, to_picture
-from plant.people.arms import LOWER_M, SIDES, UPPER_M, arm_poses
+from skills.robot import FloatArray
 
 MATERIALS = {
     "skin": Material((0.80, 0.62, 0.50)),
@@ -27,8 +27,10 @@ MATERIALS = {
     "sweater": Material((0.58, 0.48, 0.60), "knit.png"),
     "trousers": Material((0.30, 0.32, 0.37), "knit.png"),
 }
-HAND_M = 0.068
-"""Distance of the middle of the hand from the wrist."""
+SHOULDER, ELBOW, HAND = (0.0, 0.205, 1.40), (-0.0164, 0.2573, 1.1213), (0.062, 0.25, 0.805)
+"""Joints of the left arm as it hangs, and the middle of its hand."""
+UPPER_M, LOWER_M, HAND_M = 0.284, 0.326, 0.068
+"""Lengths from the shoulder to the elbow, and from there to the middle of the hand; the last is beyond the wrist."""
 
 
 def person() -> Model:
@@ -44,11 +46,18 @@ def person() -> Model:
 
 def _arm_parts() -> list[Part]:
     """The arms as they hang."""
-    return [
-        Part(f"{side}_{part}", f"{part}.obj", (*X_PA.translation(), *RollPitchYaw(X_PA.rotation()).vector()))
-        for side in SIDES
-        for part, X_PA in zip(("upper_arm", "lower_arm"), arm_poses(side), strict=True)
-    ]
+    parts = list[Part]()
+    for name, side in (("left", 1.0), ("right", -1.0)):
+        shoulder, elbow, hand = ((x, side * y, z) for x, y, z in (SHOULDER, ELBOW, HAND))
+        parts.append(Part(f"{name}_upper_arm", "upper_arm.obj", (*shoulder, *_rpy_rad(elbow, shoulder))))
+        parts.append(Part(f"{name}_lower_arm", "lower_arm.obj", (*elbow, *_rpy_rad(hand, elbow))))
+    return parts
+
+
+def _rpy_rad(low: ArrayLike, high: ArrayLike) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of a limb whose z axis goes from its low to its high end."""
+    roll, pitch, yaw = RollPitchYaw(RotationMatrix(_axes(low, high))).vector()
+    return float(roll), float(pitch), float(yaw)
 
 
 def person_appearance() -> Appearance:
@@ -117,15 +126,17 @@ def _oval(mesh: Mesh, material: str, profile: list[tuple[float, float]], scale: 
 
 def _limb(mesh: Mesh, material: str, low: ArrayLike, high: ArrayLike, radii: tuple[float, float, float]) -> None:
     """A tapered limb between two points; radii at its low end, middle and high end."""
-    a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    z = b - a
-    length = float(np.linalg.norm(z))
-    z /= length
-    x = np.cross([0.0, 1.0, 0.0], z)
-    x /= np.linalg.norm(x)
+    length = float(np.linalg.norm(np.subtract(high, low)))
     part = Mesh(mesh.materials)
     part.add_lathe(material, [(0, 0), (radii[0], 0), (radii[1], length / 2), (radii[2], length)], sides=18)
-    mesh.add_mesh(part, np.column_stack([x, np.cross(z, x), z]), a)
+    mesh.add_mesh(part, _axes(low, high), low)
+
+
+def _axes(low: ArrayLike, high: ArrayLike) -> FloatArray:
+    """Rotation (3, 3) of a limb: z from its low to its high end, y to the left."""
+    z = np.subtract(high, low) / np.linalg.norm(np.subtract(high, low))
+    x = np.cross([0.0, 1.0, 0.0], z) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], z))
+    return np.column_stack([x, np.cross(z, x), z])
 
 
 def _ellipsoid(mesh: Mesh, material: str, centre: ArrayLike, radii: tuple[float, float, float]) -> None:

@@ -28,7 +28,7 @@ def test_mass_properties_without_mass_are_refused():
         join_masses([shape_mass(Cylinder(radius=0.01, length=0.2), 0.0)])
 
 
-@pytest.mark.parametrize(("write", "files"), [(build, 18), (write_forms, 3 * len(FORMS))])
+@pytest.mark.parametrize(("write", "files"), [(build, 20), (write_forms, 3 * len(FORMS))])
 def test_committed_files_equal_those_that_are_made(write, files, tmp_path, monkeypatch):
     monkeypatch.setattr("errand_train.models.__main__.save_png", lambda *_: None)  # its bytes are the library's
     write(tmp_path)

@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from plant.diagram import X_PT_HOME, DiagramConfig, LooseModel, build_diagram
 from plant.models.catalogue import load_catalogue
-from plant.people.arms import LOWER_M, SIDES, UPPER_M, arm_poses
+from plant.models.person_arms import LOWER_M, SIDES, UPPER_M, arm_poses
 from plant.worlds.seeding import Receiving
 
 PERSON = load_catalogue()["person"].forms["standing"]

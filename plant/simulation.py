@@ -159,9 +159,9 @@ class Simulation:
         return np.asarray(self.recorder.frame_at(time_s).positions)
 
     def show_live(self) -> LiveScene:
-        """Serves a live scene of the world for browsers. Raises RuntimeError when no port is free."""
+        """Returns a live scene of the world, which is refreshed after each step."""
         scene = LiveScene(self.engine.world, self.engine.context, self._overview())
-        self.engine.after_advance(lambda: scene(self.engine.now()))
+        self.engine.after_advance(scene)
         return scene
 
     def save_recording(self, path: Path, steps: Steps = MappingProxyType({})) -> None:

@@ -72,7 +72,7 @@ def open_port(host: str, port: int) -> socket.socket:
     """Opens a port of an address of this machine. Raises OSError if there is no such address, or the port is taken."""
     try:
         return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
-    except ValueError as error:
+    except (TypeError, ValueError) as error:
         raise OSError(errno.EADDRNOTAVAIL, "no host has this name") from error
 
 

@@ -30,7 +30,6 @@ _FEWEST_FRAMES = 400
 _OVERLAY = Path(__file__).parent / "recording_overlay.html"
 _SCENE_OVERLAY = Path(__file__).parent / "scene_overlay.html"
 _DIGITS = 4
-"""Digits of a pose behind the point in a live scene: a tenth of a millimetre."""
 _TRACK_PERIOD_S = 0.2
 _WIDE_RATIO = 1.4
 """Width of a window for its height in which the overview shows the whole world."""
@@ -173,10 +172,7 @@ _WRITE_PAGE = "from plant.recording import write_scene_page; write_scene_page()"
 
 
 class LiveScene:
-    """Live scene of the plant for a page; call it after every tick.
-
-    It only reads the plant's context, so a run is the same with and without it.
-    """
+    """Live scene of the plant for a page; call it after every tick. It only reads the plant: a run stays the same."""
 
     def __init__(self, world: WorldDiagram, context: Context, view: View | None = None) -> None:
         """Shows the plant of `context` from `view`."""
@@ -211,7 +207,7 @@ class LiveScene:
             self.publish()
 
     def publish(self) -> None:
-        """Refreshes the scene now: X_WB of each body (m), by columns and without the last row."""
+        """Refreshes the scene now: X_WB of each body, by columns, without the last row, to a tenth of a millimetre."""
         X_WB = {path: body.EvalPoseInWorld(self._context) for path, body in self._bodies.items()}
         poses = {path: X.GetAsMatrix34().T.round(_DIGITS).ravel().tolist() for path, X in X_WB.items()}
         if poses != self._sent:

@@ -45,9 +45,8 @@ _NOT_ALLOWED: Final = 4403
 
 _SCENE: Final = "sandbox allow-scripts; default-src 'unsafe-inline' data: blob:; frame-ancestors http://"
 """Policy of the scene, without the host: it has an origin, and in Chromium a process, of its own, and no server."""
-_OPEN: Final = """
-This link is all that protects the robot: whoever has it can command it. The other way is an SSH tunnel to a page
-with --view-host 127.0.0.1 --view-port {port}: ssh -L {port}:127.0.0.1:{port} USER@HOST"""
+_TUNNEL: Final = "ssh -L {port}:127.0.0.1:{port} USER@HOST"
+_OPEN: Final = f"\nThe link is all that protects the robot. The other way is --view-host {HOST} and a tunnel: {_TUNNEL}"
 Address = tuple[str, int]
 """Host and port at which a page is served; port 0 takes any free port."""
 
@@ -267,7 +266,7 @@ def serve(content: PageContent, address: Address) -> PageServer:
     try:
         return PageServer(content, address)
     except OSError as error:
-        what = f"cannot serve the page at {address[0][:60]} port {address[1]} ({error.strerror or error})"
+        what = f"cannot serve the page at {address[0][:60]} port {address[1]} ({error.strerror})"
         raise InputError(what, hint="name another --view-host or --view-port") from error
 
 

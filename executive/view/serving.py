@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import errno
 import logging
 import secrets
 import socket
@@ -72,8 +71,9 @@ def open_port(host: str, port: int) -> socket.socket:
     """Opens a port of an address of this machine. Raises OSError if there is no such address, or the port is taken."""
     try:
         return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
-    except (TypeError, ValueError) as error:
-        raise OSError(errno.EADDRNOTAVAIL, "no host has this name") from error
+    except (OSError, TypeError, ValueError) as error:
+        why = getattr(error, "strerror", None) or "no host has this name"
+        raise OSError(getattr(error, "errno", None), why.partition(" (while")[0]) from error
 
 
 def url_of(host: str, port: int) -> str:

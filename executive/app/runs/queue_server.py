@@ -214,7 +214,7 @@ class Listeners:
         try:
             server = CallServer(self._calls.called, token=token.text, host=host, port=port)
         except OSError as error:
-            what = f"cannot serve calls at {host} port {port} ({error.strerror or error})"
+            what = f"cannot serve calls at {host} port {port} ({error.strerror})"
             raise InputError(what, hint="name another --host or --port") from error
         self._tell(f"Calls: POST {server.url}NAME")
         if token.new:

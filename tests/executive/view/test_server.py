@@ -405,7 +405,9 @@ def test_a_page_for_other_machines_says_what_protects_the_robot(feed):
         link, *rest = server.lines.splitlines()
         host = urlsplit(link.removeprefix("The page: ")).hostname
         assert host not in ("0.0.0.0", "127.0.0.1", "localhost")
-        assert f"ssh -L {server.port}:127.0.0.1:{server.port} USER@HOST" in " ".join(rest)
+        (line,) = rest
+        assert "is all that protects the robot" in line
+        assert f"ssh -L {server.port}:127.0.0.1:{server.port} USER@HOST" in line
         asked = http.client.HTTPConnection(host, server.port, timeout=10)
         asked.request("GET", f"/?token={token_of(server)}")
         assert asked.getresponse().status == 200

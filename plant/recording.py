@@ -16,7 +16,7 @@ from types import MappingProxyType
 import numpy as np
 from pydrake.geometry import Box, Meshcat, MeshcatParams, Rgba
 from pydrake.math import RigidTransform
-from pydrake.multibody.tree import BodyIndex, RigidBody
+from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram, build_diagram
@@ -177,9 +177,10 @@ class LiveScene:
     def __init__(self, world: WorldDiagram, context: Context, view: View | None = None) -> None:
         """Shows the plant of `context` from `view`."""
         self._given, self._context = (replace(world.config, render=False, renderer_parameters=None), view), context
-        bodies = (world.plant.get_body(BodyIndex(index)) for index in range(1, world.plant.num_bodies()))
-        self._bodies = {_path(body): body for body in bodies}
-        self._followed = next((_path(robot.body) for _, robot in sorted(world.robots.items())), None)
+        robots = [robot.body for _, robot in sorted(world.robots.items())]
+        bodies = [*robots, *(world.plant.get_body(BodyIndex(index)) for index in range(1, world.plant.num_bodies()))]
+        self._bodies = {str(body.scoped_name()).replace("::", "/"): body for body in bodies}  # by Meshcat's path
+        self._followed = next(iter(self._bodies)) if robots else None
         self._tell: Callable[[Mapping[str, object]], None] = lambda _: None
         self._wanted: Callable[[], bool] = lambda: False
         self._sent: Mapping[str, object] = {}
@@ -213,11 +214,6 @@ class LiveScene:
         if poses != self._sent:
             self._tell({"followed": self._followed, "poses": poses})
         self._sent, self._published_s = poses, time.perf_counter()
-
-
-def _path(body: RigidBody) -> str:
-    """Path that Meshcat gives a body, below that of its visualizer."""
-    return str(body.scoped_name()).replace("::", "/")
 
 
 def write_scene_page() -> None:

@@ -139,11 +139,7 @@ class PageServer(Server):
         ]
 
     def _allowed(self, connection: HTTPConnection) -> bool:
-        """Trusts a connection if host, origin and token are right; browsers always send an origin with an action.
-
-        The host is an address or a name of this machine, so that no name of another site leads here. Its port may be
-        the other end of a tunnel.
-        """
+        """Trusts a connection if host (an address or a name of this machine, any port), origin and token are right."""
         headers = connection.headers
         here = headers.get("host", "")
         given = headers.get(TOKEN_HEADER) or connection.query_params.get("token")

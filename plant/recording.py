@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import gzip
 import json
+import pickle
+import subprocess
+import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -12,6 +16,7 @@ from types import MappingProxyType
 import numpy as np
 from pydrake.geometry import Box, Meshcat, MeshcatParams, Rgba
 from pydrake.math import RigidTransform
+from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram, build_diagram
@@ -22,9 +27,9 @@ _MOST_BYTES = 9.5e6
 _BODY_BYTES = 105.0
 _FEWEST_FRAMES = 400
 """A frame takes `_BODY_BYTES` of a file for each body; the shapes of a world take about ten megabytes."""
-BESIDE_M = (-0.4, -1.0, 3.6)
-"""Offset of the following camera from the robot, in the axes of the world: steep, to look over a wall behind it."""
 _OVERLAY = Path(__file__).parent / "recording_overlay.html"
+_SCENE_OVERLAY = Path(__file__).parent / "scene_overlay.html"
+_DIGITS = 4
 _TRACK_PERIOD_S = 0.2
 _WIDE_RATIO = 1.4
 """Width of a window for its height in which the overview shows the whole world."""
@@ -108,13 +113,6 @@ class View:
         size = float(np.linalg.norm(high - low))
         return View((x, y - 0.30 * size, 0.62 * size), (x, y, 0.0))
 
-    @staticmethod
-    def close_up(p_W: FloatArray) -> View:
-        """Returns a view of a point in which a robot of about a metre fills the picture."""
-        x, y, z = (float(value) for value in p_W)
-        dx, dy, dz = BESIDE_M
-        return View((x + dx, y + dy, z + dz), (x, y, z))
-
 
 def prepare_view(meshcat: Meshcat, view: View | None) -> None:
     """Removes the grid and the axes, lays ground below the world, sets the light, and sets the camera to `view`."""
@@ -124,12 +122,7 @@ def prepare_view(meshcat: Meshcat, view: View | None) -> None:
         meshcat.SetProperty(helper, "visible", False)
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.6)
     if view is not None:
-        set_camera(meshcat, view)
-
-
-def set_camera(meshcat: Meshcat, view: View) -> None:
-    """Sets the camera of all browsers to a view."""
-    meshcat.SetCameraPose(np.array(view.p_WCamera), np.array(view.p_WTarget))
+        meshcat.SetCameraPose(np.array(view.p_WCamera), np.array(view.p_WTarget))
 
 
 def save_html(
@@ -164,63 +157,75 @@ def save_html(
     overview = None if view is None else [view.p_WCamera, view.p_WTarget]
     values = {"tracks": tracks, "steps": {**steps}, "view": overview, "ratio": _WIDE_RATIO}
     told = json.dumps(values).replace("<", "\\u003c")
+    data = f'<script id="recorded-run" type="application/json">{told}</script>\n'
+    path.write_text(_page(meshcat, _OVERLAY, data), encoding="utf-8")
+
+
+def _page(meshcat: Meshcat, overlay: Path, data: str = "") -> str:
+    """Page of a scene that needs no server, with an overlay and its data."""
     page, end = meshcat.StaticHtml().rsplit("</body>", 1)
-    data = f'<script id="recorded-run" type="application/json">{told}</script>'
-    path.write_text(f"{page}{data}\n{_OVERLAY.read_text(encoding='utf-8')}</body>{end}", encoding="utf-8")
+    return f"{page}{data}{overlay.read_text(encoding='utf-8')}</body>{end}"
 
 
 HOST = "127.0.0.1"
 PERIOD_WALL_S = 0.1
-EASY_PERIOD_WALL_S = 0.7
+_WRITE_PAGE = "from plant.recording import write_scene_page; write_scene_page()"
 
 
 class LiveScene:
-    """Live scene of the plant in browsers; call it after every tick, from the thread that created it.
-
-    It only reads the plant's context, so a run is the same with and without it.
-    """
+    """Live scene of the plant for a page; call it after every tick. It only reads the plant: a run stays the same."""
 
     def __init__(self, world: WorldDiagram, context: Context, view: View | None = None) -> None:
-        """Shows the plant of `context` from `view`. Raises RuntimeError when no port is free."""
-        self._plant, self._context, self._view = world.plant, context, view
-        self._followed = next((robot.body for _, robot in sorted(world.robots.items())), None)
-        self._follows, self._camera_at = False, view
-        self._meshcat = Meshcat(MeshcatParams(host=HOST, port=0, show_stats_plot=False))
-        prepare_view(self._meshcat, view)
-        self._shown = build_diagram(replace(world.config, render=False), self._meshcat)
-        self._root_context = self._shown.diagram.CreateDefaultContext()
-        self._shown_context = self._shown.plant.GetMyMutableContextFromRoot(self._root_context)
-        self._period_s = PERIOD_WALL_S
-        self.publish()
+        """Shows the plant of `context` from `view`."""
+        self._given, self._context = (replace(world.config, render=False, renderer_parameters=None), view), context
+        robots = [robot.body for _, robot in sorted(world.robots.items())]
+        bodies = [*robots, *(world.plant.get_body(BodyIndex(index)) for index in range(1, world.plant.num_bodies()))]
+        self._bodies = {str(body.scoped_name()).replace("::", "/"): body for body in bodies}  # by Meshcat's path
+        self._followed = next(iter(self._bodies)) if robots else None
+        self._arms = world.arms
+        self._tell: Callable[[Mapping[str, object]], None] = lambda _: None
+        self._wanted: Callable[[], bool] = lambda: False
+        self._sent: Mapping[str, object] = {}
+        self._published_s = -np.inf
 
-    @property
-    def url(self) -> str:
-        """Address of the scene; its host name differs, so that a browser gives the scene a process of its own."""
-        return f"http://localhost:{self._meshcat.port()}"
+    def page(self) -> bytes:
+        """Builds the HTML page of the scene, compressed by gzip; callable from any thread. Raises RuntimeError.
 
-    def __call__(self, now_s: float) -> None:
-        """Refreshes the scene when a refresh is due in wall-clock time."""
-        if time.perf_counter() - self._published_s >= self._period_s:
-            self._root_context.SetTime(now_s)
+        A process of its own builds it, since Meshcat lets any number of clients in, and ends the process if another
+        thread than its own frees it.
+        """
+        command, given = (sys.executable, "-c", _WRITE_PAGE), pickle.dumps(self._given)
+        ended = subprocess.run(command, input=given, capture_output=True, check=False)
+        if ended.returncode:
+            raise RuntimeError(f"the 3D scene cannot be built: {ended.stderr.decode(errors='replace')[-500:]}")
+        return ended.stdout
+
+    def send(self, tell: Callable[[Mapping[str, object]], None], wanted: Callable[[], bool]) -> None:
+        """Sends the poses of the bodies by `tell` at each refresh, while they are `wanted`."""
+        self._tell, self._wanted = tell, wanted
+
+    def __call__(self) -> None:
+        """Refreshes the scene when a refresh is wanted, and due in wall-clock time."""
+        if time.perf_counter() - self._published_s >= PERIOD_WALL_S and self._wanted():
             self.publish()
 
-    def refresh_seldom(self) -> None:
-        """Refreshes less often, for a browser without a GPU; callable from any thread."""
-        self._period_s = EASY_PERIOD_WALL_S
-
-    def follow(self, wanted: bool) -> None:
-        """Lets the camera follow the first robot, or show the whole world; callable from any thread."""
-        self._follows = wanted
-
     def publish(self) -> None:
-        """Refreshes the scene now."""
-        camera = self._view
-        if self._follows and self._followed is not None:
-            camera = View.close_up(self._followed.EvalPoseInWorld(self._context).translation())
-        if camera is not None and camera != self._camera_at:
-            set_camera(self._meshcat, camera)
-            self._camera_at = camera
-        self._shown.plant.SetPositions(self._shown_context, self._plant.GetPositions(self._context))
-        self._shown.arms.pose(self._root_context)
-        self._shown.diagram.ForcedPublish(self._root_context)
-        self._published_s = time.perf_counter()
+        """Refreshes the scene now: X_WB of each body, by columns, without the last row, to a tenth of a millimetre."""
+        X_WB = {path: body.EvalPoseInWorld(self._context) for path, body in self._bodies.items()}
+        X_WB |= self._arms.poses(self._context)
+        poses = {path: X.GetAsMatrix34().T.round(_DIGITS).ravel().tolist() for path, X in X_WB.items()}
+        if poses != self._sent:
+            self._tell({"followed": self._followed, "poses": poses})
+        self._sent, self._published_s = poses, time.perf_counter()
+
+
+def write_scene_page() -> None:
+    """Writes the page of a scene to standard output, from a DiagramConfig and a View in standard input."""
+    config, view = pickle.load(sys.stdin.buffer)
+    meshcat = Meshcat(MeshcatParams(host=HOST, port=0, show_stats_plot=False))
+    prepare_view(meshcat, view)
+    shown = build_diagram(config, meshcat)
+    root_context = shown.diagram.CreateDefaultContext()
+    shown.arms.pose(root_context)
+    shown.diagram.ForcedPublish(root_context)
+    sys.stdout.buffer.write(gzip.compress(_page(meshcat, _SCENE_OVERLAY).encode(), compresslevel=1))

@@ -1,5 +1,6 @@
 """The simulation: a moving world with robots, objects and people, and the referee who observes the true state."""
 
+import gc
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -162,9 +163,9 @@ class Simulation:
         return np.asarray(self.recorder.frame_at(time_s).positions)
 
     def show_live(self) -> LiveScene:
-        """Serves a live scene of the world for browsers. Raises RuntimeError when no port is free."""
+        """Returns a live scene of the world, which is refreshed after each step."""
         scene = LiveScene(self.engine.world, self.engine.context, self._overview())
-        self.engine.after_advance(lambda: scene(self.engine.now()))
+        self.engine.after_advance(scene)
         return scene
 
     def save_recording(self, path: Path, steps: Steps = MappingProxyType({})) -> None:
@@ -172,7 +173,12 @@ class Simulation:
         if self.recorder is None:
             raise LookupError("nothing was recorded: build the simulation with record=True")
         self.recorder(self.engine.now())  # the only frame of a run that ends before its first step
-        save_html(self.engine.world, self.recorder.frames, path, self._overview(), steps)
+        gc.disable()
+        try:
+            save_html(self.engine.world, self.recorder.frames, path, self._overview(), steps)
+        finally:
+            gc.collect()  # in this thread: Meshcat ends the process when another one frees it
+            gc.enable()
 
     def _overview(self) -> View:
         return View.from_above(self.world.corners)

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from executive.app.report.run_report import VERDICTS
-from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, VIEW, VIEW_PORT, StartCommand, stay_s, takes_request
+from executive.cli.options import AS_JSON, FOXGLOVE, HOST, PORT, QUIET, VIEW, StartCommand, stay_s, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, progress_bar, show_table
 from executive.mission.request import Request
 from executive.store.missions import STORE, GivenMissions, MissionState, MissionStore, StoredMission, store_in
@@ -34,7 +34,8 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Folder for the run's folder; by default the store's.")] = None,
     quiet: QUIET = False,
     view: VIEW = None,
-    view_port: VIEW_PORT = 0,
+    view_port: PORT = 0,
+    view_host: HOST = "127.0.0.1",
     foxglove: FOXGLOVE = None,
     as_json: AS_JSON = False,
 ) -> None:
@@ -70,7 +71,7 @@ def run(
         kept = new_run(asked, missions.now())
         first = next(iter(next(iter(dispatch.missions.values())).options.values()))
         later = queue_function(replace(first.request, robots=request.robots), dispatch.add)
-        page = PageView(None, tell, port=view_port, later=later) if view is not None else None
+        page = PageView(None, tell, address=(view_host, view_port), later=later) if view is not None else None
         run_in = partial(run_fleet, dispatch, out=kept.request.out, seed=request.seed, first=first, page=page)
         with serve_live(foxglove, tell) as live, progress_bar(console, "missions", len(dispatch.missions)) as ended:
             verdict = run_in(live=live, ended=ended, time_limit_s=request.time_limit_s)

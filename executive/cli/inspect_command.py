@@ -16,7 +16,7 @@ from rich.text import Text
 
 from executive.cli.defaults import last_run
 from executive.cli.number_options import quantity_option
-from executive.cli.options import takes_request
+from executive.cli.options import HOST, PORT, takes_request
 from executive.cli.output import console_for, show_table, terminal_answerer
 from executive.mission.request import Request
 from executive.record.history import RECORDING, Entry, History, read_history, timeline
@@ -26,7 +26,7 @@ from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, printable, readable, style_of, to_text
 from skills.inputs.errors import InputError
 from skills.inputs.outside import is_file, is_folder, writing
-from skills.quantities import Count, Delay, Port, Tries, Wait
+from skills.quantities import Count, Delay, Tries, Wait
 
 LOG_SUFFIX: Final = ".mcap"
 RUN: Final = typer.Argument(metavar="[RUN]", help="Folder or log.mcap; by default the last run.", show_default=False)
@@ -108,7 +108,8 @@ def replay(
         Path | None, typer.Option("-o", "--out", help="Write one HTML file that needs no server, and end.")
     ] = None,
     scene: Annotated[bool, typer.Option(help="Show the 3D recording beside the log.")] = True,
-    port: Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.")] = 0,
+    view_port: PORT = 0,
+    view_host: HOST = "127.0.0.1",
     view_for: Annotated[float | None, quantity_option(Wait, help="End after this time, s.")] = None,
 ) -> None:
     """Shows a run at any time of it: tree, map, pictures, events, 3D recording."""
@@ -126,8 +127,8 @@ def replay(
     from executive.view.server import PageContent, serve, wait
 
     content = PageContent(feed_of(history.events), recording=recording)
-    with serve(content, port) as server:
-        console_for(False).print(f"{server.url}\n(Ctrl-C ends it)", markup=False)
+    with serve(content, (view_host, view_port)) as server:
+        console_for(False).print(f"{server.lines}\n(Ctrl-C ends it)", markup=False)
         wait(view_for)
 
 

@@ -57,10 +57,15 @@ VIEW = Annotated[
         _VIEW,
         metavar="[SECONDS]",
         parser=NumberReader(Wait),
-        help="Serve a live page on 127.0.0.1, which stays after the end: so long, or until Ctrl-C.",
+        help="Serve a live page, which stays after the end: so long, or until Ctrl-C.",
     ),
 ]
-VIEW_PORT = Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.", group=Group.PAGE)]
+PORT = Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.", group=Group.PAGE)]
+"""Type of a parameter `view_port` for the option `--view-port`, by default 0."""
+HOST = Annotated[
+    str, grouped(Group.PAGE, metavar="HOST", help="Address of the page; 0.0.0.0 lets other machines in by the link.")
+]
+"""Type of a parameter `view_host` for the option `--view-host`, by default 127.0.0.1."""
 
 ROBOT = Annotated[
     str | None,

@@ -13,7 +13,7 @@ import typer
 
 from executive.app.runs.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
-from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, STORE, VIEW, VIEW_PORT, StartCommand, takes_request
+from executive.cli.options import AS_JSON, FOXGLOVE, HOST, PORT, QUIET, STORE, VIEW, StartCommand, takes_request
 from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer
 from executive.cli.run_command import refuse_unaddressed
 from executive.mission.load import load_stack
@@ -119,7 +119,8 @@ def run(
     store: STORE = None,
     quiet: QUIET = False,
     view: VIEW = None,
-    view_port: VIEW_PORT = 0,
+    view_port: PORT = 0,
+    view_host: HOST = "127.0.0.1",
     foxglove: FOXGLOVE = None,
     as_json: AS_JSON = False,
 ) -> None:
@@ -127,7 +128,7 @@ def run(
     from executive.app.runs.queue import resumable_line
 
     console = console_for(as_json)
-    with _runs(store or store_in(out), out, console, quiet, view, view_port, foxglove) as (missions, runs):
+    with _runs(store or store_in(out), out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
         ended = _in_turn(missions, runs, console)
         resumable = resumable_line(missions)
     if ended:
@@ -146,7 +147,7 @@ def _runs(
     console: Console,
     quiet: bool,
     view: float | None,
-    view_port: int,
+    address: tuple[str, int],
     foxglove: str | None,
 ) -> Iterator[tuple[MissionStore, MissionRuns]]:
     """Claims a store while the block runs; yields the store with the runner for its missions.
@@ -158,7 +159,7 @@ def _runs(
         from executive.cli.screen import ConsoleScreen, page_of
         from executive.view.foxglove import serve_live
 
-        page = None if view is None else page_of(console, view_port, store, out)
+        page = None if view is None else page_of(console, address, store, out)
         with serve_live(foxglove, plain_lines(console)) as live:
             screen = ConsoleScreen(console, quiet=quiet, page=page, live=live)
             yield missions, MissionRuns(missions, screen, ask=terminal_answerer())
@@ -247,7 +248,8 @@ def serve(
     ] = None,
     quiet: QUIET = False,
     view: VIEW = None,
-    view_port: VIEW_PORT = 0,
+    view_port: PORT = 0,
+    view_host: HOST = "127.0.0.1",
     foxglove: FOXGLOVE = None,
     as_json: AS_JSON = False,
 ) -> None:
@@ -257,7 +259,7 @@ def serve(
 
     console = console_for(as_json)
     tell = plain_lines(console)
-    with _runs(store or store_in(out), out, console, quiet, view, view_port, foxglove) as (missions, runs):
+    with _runs(store or store_in(out), out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
         end = None if for_s is None else missions.now() + timedelta(seconds=min(for_s, _LONGEST_S))
         address = CallAddress(host, port, token)
         with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
@@ -283,12 +285,13 @@ def resume(
     as_json: AS_JSON = False,
     quiet: QUIET = False,
     view: VIEW = None,
-    view_port: VIEW_PORT = 0,
+    view_port: PORT = 0,
+    view_host: HOST = "127.0.0.1",
     foxglove: FOXGLOVE = None,
 ) -> None:
     """Resumes an interrupted or cancelled mission from its last finished step; then runs its queue."""
     console = console_for(as_json)
-    with _runs(store or store_in(out), out, console, quiet, view, view_port, foxglove) as (missions, runs):
+    with _runs(store or store_in(out), out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
         ended = _in_turn(missions, runs, console, _interrupted(missions, mission))
     values = {**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]}
     finish(values, as_json, good=all(each.achieved for each in ended))

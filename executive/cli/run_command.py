@@ -15,11 +15,12 @@ from executive.cli.options import (
     ANYWAY,
     AS_JSON,
     FOXGLOVE,
+    HOST,
+    PORT,
     QUIET,
     ROBOT,
     STORE,
     VIEW,
-    VIEW_PORT,
     grouped,
     takes_request,
 )
@@ -51,7 +52,8 @@ def run(
         bool, grouped(Group.OUTPUT, "--voice", help="Say aloud what the robot says, by espeak-ng.")
     ] = False,
     view: VIEW = None,
-    view_port: VIEW_PORT = 0,
+    view_port: PORT = 0,
+    view_host: HOST = "127.0.0.1",
     foxglove: FOXGLOVE = None,
     robot: ROBOT = None,
 ) -> None:
@@ -75,7 +77,7 @@ def run(
 
             request = replace(request, sentence=hear_request(listen_to, request, console=console))
         prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
-        page = None if view is None else page_of(console, view_port, kept_in, request.out)
+        page = None if view is None else page_of(console, (view_host, view_port), kept_in, request.out)
         screen = ConsoleScreen(console, quiet, whole_tree, voice, page, live, timing)
         connection = real_runner(prepared, robot) if robot is not None else nullcontext()
         with MissionStore(kept_in) as missions, missions.claim(), connection as runner:

@@ -85,14 +85,14 @@ class SpeechOutput(RunVisitor):
         self._said.clear()
 
 
-def page_of(console: Console, port: int, store: Path, out: Path) -> Callable[[Prepared], PageView]:
+def page_of(console: Console, address: tuple[str, int], store: Path, out: Path) -> Callable[[Prepared], PageView]:
     """Returns the function that builds the live page of a run, on which more missions are queued in the store."""
 
     def build(prepared: Prepared) -> PageView:
         from executive.app.runs.page_view import PageView, add_to, queue_function
 
         later = queue_function(replace(prepared.request, out=out), partial(add_to, store))
-        return PageView(prepared, plain_lines(console), port=port, later=later)
+        return PageView(prepared, plain_lines(console), address=address, later=later)
 
     return build
 

@@ -1,7 +1,7 @@
-"""HTTP server of the page on 127.0.0.1, in a thread of its own.
+"""HTTP server of the page, in a thread of its own; on 127.0.0.1 unless the user names another address.
 
-Each server draws a new token, which every request for data, actions or the websocket must contain. The server refuses
-requests from another origin or for another host, so that no other web page can control the robot.
+Each server draws a new token, which every request for data, actions, the scene or the websocket must contain. The
+server refuses requests from another origin or for another host, so that no other web page can control the robot.
 """
 
 from __future__ import annotations
@@ -9,14 +9,18 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+import re
 import secrets
 import socket
 import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from http import HTTPStatus
+from ipaddress import ip_address
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import FileResponse, JSONResponse, Response
@@ -27,7 +31,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from executive.view.feed import Feed
 from executive.view.html import PAGE_FOLDER
 from executive.view.page_control import Action, RefusedError
-from executive.view.serving import BODY_LIMITS, Server, body_of, trust
+from executive.view.serving import BODY_LIMITS, Server, body_of, open_port, trust, url_of
 from skills.inputs.errors import InputError
 from skills.inputs.outside import json_object
 
@@ -39,13 +43,34 @@ _GOING_AWAY: Final = 1001
 _NOT_ALLOWED: Final = 4403
 
 
+_SCENE: Final = "sandbox allow-scripts; default-src 'unsafe-inline' data: blob:; frame-ancestors http://"
+"""Policy of the scene, without the host: it has an origin, and in Chromium a process, of its own, and no server."""
+_TUNNEL: Final = "ssh -L {port}:127.0.0.1:{port} USER@HOST"
+_OPEN: Final = f"\nThe link is all that protects the robot. The other way is --view-host {HOST} and a tunnel: {_TUNNEL}"
+Address = tuple[str, int]
+"""Host and port at which a page is served; port 0 takes any free port."""
+
+
+class Scene(Protocol):
+    """Live 3D scene of the world, for the page."""
+
+    def page(self) -> bytes:
+        """Builds the HTML page of the scene, compressed by gzip; callable from any thread. Raises RuntimeError."""
+
+    def send(self, tell: Callable[[Mapping[str, Any]], None], wanted: Callable[[], bool]) -> None:
+        """Sends the poses of the bodies by `tell` at each refresh, while they are `wanted`."""
+
+    def publish(self) -> None:
+        """Refreshes the scene now."""
+
+
 @dataclass(frozen=True)
 class PageContent:
-    """Content of the page: feed, actions for the buttons, the address or recording of the 3D scene, and the report."""
+    """Content of the page: feed, actions for the buttons, the 3D scene or its recording, and the report."""
 
     feed: Feed
     actions: Mapping[str, Action] = field(default_factory=dict)
-    scene_url: str | None = None
+    scene: Scene | None = None
     recording: Path | None = None
     report: Path | None = None
 
@@ -53,12 +78,17 @@ class PageContent:
 class PageServer(Server):
     """Running server for the page."""
 
-    def __init__(self, content: PageContent, *, port: int = 0) -> None:
-        """Starts serving; `port` 0 takes any free port. Raises OSError if the port is taken."""
+    def __init__(self, content: PageContent, address: Address = (HOST, 0)) -> None:
+        """Starts serving. Raises OSError if this machine has no such address, or the port is taken."""
         self._content = content
         self._token = secrets.token_urlsafe(24)
-        opened = socket.create_server((HOST, port))
-        self.port: int = opened.getsockname()[1]
+        opened = open_port(*address)
+        self.host, self.port = (*opened.getsockname(),)[:2]
+        names = "|".join(map(re.escape, filter(None, ("localhost", socket.gethostname(), address[0]))))
+        self._own = re.compile(rf"({names}|[\d.]+|\[[\da-f:.]+\])(:\d+)?", re.ASCII | re.IGNORECASE)
+        self._scene_page, self._building = b"", asyncio.Lock()
+        if content.scene is not None:
+            content.scene.send(partial(content.feed.tell, "scene"), lambda: bool(self._wakers))
         self._closing = False
         self._wakers: set[asyncio.Event] = set()
         super().__init__(self._routes(), opened)
@@ -72,8 +102,14 @@ class PageServer(Server):
 
     @property
     def url(self) -> str:
-        """Address of the page with its token."""
-        return f"http://{HOST}:{self.port}/?token={self._token}"
+        """Address of the page with its token, which other machines can use if the server listens for them."""
+        host = _outer_host(self.host) if ip_address(self.host).is_unspecified else self.host
+        return f"{url_of(host, self.port)}?token={self._token}"
+
+    @property
+    def lines(self) -> str:
+        """Address of the page for the user and, if other machines can use it, what protects the robot."""
+        return f"The page: {self.url}{'' if ip_address(self.host).is_loopback else _OPEN.format(port=self.port)}"
 
     def close(self) -> None:
         """Stops serving; idempotent."""
@@ -94,6 +130,7 @@ class PageServer(Server):
         guarded = self._guarded
         return [
             Route("/", guarded(self._page)),
+            Route("/scene", guarded(self._scene)),
             Route("/picture/{number:int}", guarded(self._picture)),
             Route("/file/{token}/{name}", guarded(self._file)),
             Route("/action/{name}", guarded(self._act), methods=["POST"]),
@@ -102,15 +139,13 @@ class PageServer(Server):
         ]
 
     def _allowed(self, connection: HTTPConnection) -> bool:
-        """Trusts a connection if host, origin and token are right; browsers always send an origin with an action."""
-        here = {f"{HOST}:{self.port}", f"localhost:{self.port}"}
+        """Trusts a connection if host (an address or a name of this machine, any port), origin and token are right."""
         headers = connection.headers
-        origin = headers.get("origin")
+        here = headers.get("host", "")
         given = headers.get(TOKEN_HEADER) or connection.query_params.get("token")
         given = given or connection.path_params.get("token", "")
-        own_origin = origin is None or origin in {f"http://{host}" for host in here}
-        own_host = headers.get("host", "") in here
-        allowed = own_host and own_origin and secrets.compare_digest(given.encode(), self._token.encode())
+        own = self._own.fullmatch(here) is not None and headers.get("origin") in (None, f"http://{here}")
+        allowed = own and secrets.compare_digest(given.encode(), self._token.encode())
         if allowed:
             trust(connection)
         return allowed
@@ -129,11 +164,19 @@ class PageServer(Server):
     async def _page(self, request: Request) -> Response:
         response = FileResponse(PAGE_FOLDER / "index.html")
         response.headers["Content-Security-Policy"] = (
-            f"default-src 'self'; img-src 'self' data: blob:; connect-src 'self' ws://{HOST}:{self.port} "
-            f"ws://localhost:{self.port}; frame-src 'self' http://{HOST}:* http://localhost:*; "
-            "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+            f"default-src 'self'; img-src 'self' data: blob:; connect-src 'self' ws://{request.headers['host']}; "
+            "frame-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
         )
         return response
+
+    async def _scene(self, request: Request) -> Response:
+        """Sends the page of the scene, which is built for the first browser that asks for it."""
+        if (scene := self._content.scene) is None:
+            return JSONResponse({"error": "there is no scene here"}, HTTPStatus.NOT_FOUND)
+        async with self._building:
+            self._scene_page = self._scene_page or await asyncio.to_thread(scene.page)
+        headers = {"Content-Encoding": "gzip", "Content-Security-Policy": f"{_SCENE}{request.headers['host']}"}
+        return Response(self._scene_page, media_type="text/html", headers=headers)
 
     async def _picture(self, request: Request) -> Response:
         try:
@@ -199,7 +242,7 @@ class PageServer(Server):
         recording = self._content.recording
         return {
             "actions": sorted(self._content.actions),
-            "scene": self._content.scene_url,
+            "scene": self._content.scene is not None,
             "recording": recording.name if recording is not None and recording.is_file() else None,
         }
 
@@ -214,20 +257,29 @@ def _values(body: bytes | None) -> Mapping[str, Any]:
         raise RefusedError(str(error)) from error
 
 
-def serve(content: PageContent, port: int) -> PageServer:
-    """Starts a server for the content. Raises InputError if the port is taken."""
+def serve(content: PageContent, address: Address) -> PageServer:
+    """Starts a server for the content. Raises InputError if this machine has no such address, or the port is taken."""
     try:
-        return PageServer(content, port=port)
+        return PageServer(content, address)
     except OSError as error:
-        raise InputError(f"cannot serve at port {port} ({error.strerror})", hint="name another --port") from error
+        what = f"cannot serve the page at {address[0][:60]} port {address[1]} ({error.strerror})"
+        raise InputError(what, hint="name another --view-host or --view-port") from error
 
 
-def wait(limit_s: float | None, refresh: Callable[[], None] = lambda: None) -> None:
-    """Waits until Ctrl-C or the limit (s, wall time); calls `refresh` each second."""
+def _outer_host(every: str) -> str:
+    """Address of this machine for other machines, given the address for all of them; its name if it has no route."""
+    family, far = (socket.AF_INET6, "2001:db8::1") if ":" in every else (socket.AF_INET, "192.0.2.1")
+    with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as probe:
+        probe.connect((far, 9))  # sends nothing
+        return str(probe.getsockname()[0])
+    return socket.gethostname()
+
+
+def wait(limit_s: float | None) -> None:
+    """Waits until Ctrl-C or the limit (s, wall time)."""
     end_s = time.monotonic() + (math.inf if limit_s is None else limit_s)
     try:
         while (left_s := end_s - time.monotonic()) > 0.0:
-            refresh()
             time.sleep(min(1.0, left_s))
     except KeyboardInterrupt:
         return

@@ -67,6 +67,20 @@ def trust(connection: HTTPConnection) -> None:
     connection.scope["state"]["connection"].trust()
 
 
+def open_port(host: str, port: int) -> socket.socket:
+    """Opens a port of an address of this machine. Raises OSError if there is no such address, or the port is taken."""
+    try:
+        return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+    except (OSError, TypeError, ValueError) as error:
+        why = getattr(error, "strerror", None) or "no host has this name"
+        raise OSError(getattr(error, "errno", None), why.partition(" (while")[0]) from error
+
+
+def url_of(host: str, port: int) -> str:
+    """Returns the start of the URLs at an address."""
+    return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
+
+
 class Server:
     """Running server of routes in a thread of its own. Use it as a context manager, or call `close`.
 
@@ -162,16 +176,14 @@ class CallServer(Server):
     def __init__(self, handler: CallHandler, *, token: str, host: str, port: int) -> None:
         """Starts serving; `port` 0 takes any free port. Raises OSError if this machine cannot use the address."""
         self._handler, self._token = handler, token
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        opened = socket.create_server((host, port), family=family)
+        opened = open_port(host, port)
         self.host, self.port = host, int(opened.getsockname()[1])
         super().__init__([Route("/missions/{name}", self._call, methods=["POST"])], opened)
 
     @property
     def url(self) -> str:
         """Address for calls, without the name of the mission at the end."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"http://{host}:{self.port}/missions/"
+        return f"{url_of(self.host, self.port)}missions/"
 
     async def _call(self, request: Request) -> Response:
         scheme, _, given = request.headers.get("authorization", "").partition(" ")

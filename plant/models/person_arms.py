@@ -80,33 +80,42 @@ class Arms:
         people: Sequence[tuple[RigidBody, RigidBody]],
     ) -> None:
         """Replaces the fixed arms of the people, each given with the tray, before the Diagram is built."""
-        self._plant, self._arms = plant, list[tuple[str, FrameId, FrameId, RigidBody, RigidBody]]()
+        self._plant, self._frames = plant, dict[str, FrameId]()
+        self._arms = list[tuple[str, str, str, RigidBody, RigidBody]]()
         source, inspector = scene_graph.RegisterSource("arms"), scene_graph.model_inspector()
         poses = FramePoseVector()
         for body, tray in people:
             fixed = {inspector.GetName(each).split("::")[-1]: each for each in plant.GetVisualGeometriesForBody(body)}
             for side in (side for side in SIDES if f"{side}_lower_arm" in fixed):
-                frames = list[FrameId]()
+                names = list[str]()
                 for part in (f"{side}_upper_arm", f"{side}_lower_arm"):
-                    name = f"{tray.model_instance()}_{part}"
-                    frames.append(scene_graph.RegisterFrame(source, GeometryFrame(name)))
+                    name = f"{int(tray.model_instance())}_{part}"
+                    names.append(name)
+                    self._frames[name] = frame = scene_graph.RegisterFrame(source, GeometryFrame(name))
                     arm = GeometryInstance(RigidTransform(), inspector.GetShape(fixed[part]), name)
                     arm.set_illustration_properties(inspector.GetIllustrationProperties(fixed[part]))
                     arm.set_perception_properties(inspector.GetPerceptionProperties(fixed[part]))
-                    scene_graph.RegisterGeometry(source, frames[-1], arm)
-                    poses.set_value(frames[-1], RigidTransform())
+                    scene_graph.RegisterGeometry(source, frame, arm)
+                    poses.set_value(frame, RigidTransform())
                     for role in (Role.kIllustration, Role.kPerception):
                         scene_graph.RemoveRole(plant.get_source_id(), fixed[part], role)
-                self._arms.append((side, *frames, body, tray))
+                self._arms.append((side, names[0], names[1], body, tray))
         self._poses = builder.AddNamedSystem("arms", _source_of(Value[FramePoseVector](poses)))
         builder.Connect(self._poses.get_output_port(), scene_graph.get_source_pose_port(source))
 
-    def pose(self, root_context: Context) -> None:
-        """Poses the arms in a context by its people and trays."""
-        context, poses = self._plant.GetMyContextFromRoot(root_context), FramePoseVector()
+    def poses(self, plant_context: Context) -> Mapping[str, RigidTransform]:
+        """Poses X_WA of the arms by the names of their frames, as the people and the trays stand."""
+        poses = dict[str, RigidTransform]()
         for side, upper, lower, body, tray in self._arms:
-            X_WP, X_WT = (self._plant.EvalBodyPoseInWorld(context, each) for each in (body, tray))
-            for frame, X_PA in zip((upper, lower), arm_poses(side, X_WP.inverse() @ X_WT), strict=True):
-                poses.set_value(frame, X_WP @ X_PA)
+            X_WP, X_WT = (self._plant.EvalBodyPoseInWorld(plant_context, each) for each in (body, tray))
+            X_PU, X_PL = arm_poses(side, X_WP.inverse() @ X_WT)
+            poses |= {upper: X_WP @ X_PU, lower: X_WP @ X_PL}
+        return poses
+
+    def pose(self, root_context: Context) -> None:
+        """Poses the arms in a context of the whole Diagram."""
+        moved = FramePoseVector()
+        for name, X_WA in self.poses(self._plant.GetMyContextFromRoot(root_context)).items():
+            moved.set_value(self._frames[name], X_WA)
         own = self._poses.GetMyMutableContextFromRoot(root_context)
-        own.get_mutable_abstract_parameter(0).set_value(poses)
+        own.get_mutable_abstract_parameter(0).set_value(moved)

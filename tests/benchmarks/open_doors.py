@@ -3,9 +3,11 @@
     python -m tests.benchmarks.open_doors run|queue|foxglove [--half-open 1500] [--slow 300] [--sockets 200]
 
 Each client connects again when the server closes its connection. Half-open clients send nothing, slow ones a byte of a
-header each second, and the others ask for a websocket. `run` attacks the page of a mission that fetches a drink,
-`queue` the calls of a server with queued missions, `foxglove` the live log of a mission. Figures: lost missions,
-megabytes of standard error, the most open files of the process, and the slowest answer to a client with the token.
+header each second, and the others ask for a websocket. `run` attacks the page of a mission that fetches a drink, with
+`--scene` while a viewer with the token has its 3D scene open, `queue` the calls of a server with queued missions,
+`foxglove` the live log of a mission. Figures: lost missions, megabytes of standard error, the most open files of the
+process, and the slowest answer to a client with the token; with `--scene` also other ports of the process, and how
+often the viewer gets new poses.
 """
 
 import asyncio
@@ -19,8 +21,11 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 from tests.benchmarks.errand_process import ROOT, errand, report_of, run_errand
 from tests.benchmarks.harness import command
@@ -92,6 +97,31 @@ class Attack:
             ended.cancel()
 
 
+class Viewer:
+    """A client with the token that shows the scene of a page; use it as a context manager."""
+
+    def __init__(self, url):
+        self.scene_mb, self.poses = 0.0, 0
+        self._page, _, self._query = url.partition("?")
+        self._thread = threading.Thread(target=self._show, daemon=True)
+
+    def __enter__(self):
+        with urllib.request.urlopen(f"{self._page}scene?{self._query}", timeout=120.0) as answer:
+            self.scene_mb = round(len(answer.read()) / 1e6, 2)
+        self._feed = connect(f"{self._page.replace('http', 'ws')}feed?{self._query}", proxy=None, max_size=None)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._feed.close()
+        self._thread.join()
+
+    def _show(self):
+        with suppress(ConnectionClosed):
+            for text in self._feed:
+                self.poses += sum(each.get("live") == "scene" for each in json.loads(text))
+
+
 class Victim:
     """A process of `errand` with few open files, and what it prints; use it as a context manager."""
 
@@ -156,25 +186,23 @@ def answers(url, **settings):
 
 
 def run(half_open: int = 1500, slow: int = 300, sockets: int = 200, limit: float = 300.0, scene: bool = False):
-    """Attacks the page of a mission; with `--scene` also the server of its 3D scene."""
+    """Attacks the page of a mission; with `--scene` while a viewer has its 3D scene open."""
     counts = {"half_open": half_open, "slow": slow, "sockets": sockets}
     with tempfile.TemporaryDirectory(prefix="errand-doors-") as made:
         words = ["run", "--say", SENTENCE, "--view", "1", "--out", f"{made}/out", "--quiet", "--json"]
         with Victim(Path(made), *words) as victim:
             url = victim.printed(r"http://127.0.0.1:(\d+)/\?token=[\w-]+")
-            ports = [int(url[1]), *(scene_ports(victim, int(url[1])) if scene else [])]
-            attacks = [Attack(port, **counts) for port in ports]
-            for each in attacks:
-                each.__enter__()
-            figures = watch(victim, attacks, lambda: answers(url[0]), limit)
-            for each in attacks:
-                each.__exit__()
+            with Viewer(url[0]) if scene else nullcontext() as viewer, Attack(int(url[1]), **counts) as attack:
+                others = other_ports(victim, int(url[1]))
+                figures = watch(victim, [attack], lambda: answers(url[0]), limit)
             report = report_of(victim.out.read_text())
     told = {"lost": int(report.get("outcome") != "success"), "outcome": report.get("outcome", "no report")}
+    if scene:
+        figures |= {"scene_mb": viewer.scene_mb, "poses": viewer.poses, "other_ports": len(others)}
     return {**told, "message": report.get("message", ""), **figures}
 
 
-def scene_ports(victim, page):
+def other_ports(victim, page):
     """Other ports at which the process listens."""
     listed = subprocess.run(["ss", "-Hltnp"], capture_output=True, text=True, check=True).stdout
     own = [line.split()[3] for line in listed.splitlines() if f"pid={victim.process.pid}," in line]

@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -78,3 +80,22 @@ def test_a_long_recording_has_few_frames_mostly_of_motion(moved):
 def test_a_frame_that_lies_between_its_neighbours_goes_first():
     frames = [Frame(float(t), np.array([x])) for t, x in enumerate((0.0, 1.0, 2.0, 9.0, 4.0))]
     assert [frame.time_s for frame in thin_out(frames)] == [0.0, 2.0, 3.0, 4.0]
+
+
+def test_the_meshcat_of_a_recording_is_freed_in_the_thread_that_made_it(tmp_path):
+    # in another thread, such as that of the page's server, its end would end the process
+    script = f"""
+import gc, threading
+from pathlib import Path
+from plant.simulation import Simulation
+from plant.worlds.world import load_world
+simulation = Simulation(load_world("flat"), seed=1, visuals=False, record=True)
+simulation.save_recording(Path({str(tmp_path / "recording.html")!r}))
+assert gc.isenabled()
+collecting = threading.Thread(target=gc.collect)
+collecting.start()
+collecting.join()
+"""
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+    assert (tmp_path / "recording.html").is_file()

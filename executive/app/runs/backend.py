@@ -20,6 +20,7 @@ from skills.robot import Clock, Pose2D
 
 if TYPE_CHECKING:
     from executive.app.runs.goal_conditions import Share
+    from executive.view.server import Scene
 
 
 @dataclass(frozen=True)
@@ -43,23 +44,6 @@ class Durable:
     def troubles(self) -> tuple[str, ...]:
         """Messages on state that could not be stored."""
         return tuple(dict.fromkeys(trouble for each in self.journals.values() for trouble in each.troubles))
-
-
-class Scene(Protocol):
-    """Live 3D picture of the world, for the page."""
-
-    @property
-    def url(self) -> str:
-        """Address of the picture."""
-
-    def publish(self) -> None:
-        """Refreshes the picture now. A browser draws a texture at the first refresh after the texture has arrived."""
-
-    def refresh_seldom(self) -> None:
-        """Refreshes the picture less often."""
-
-    def follow(self, wanted: bool) -> None:
-        """Lets the camera follow the robot, or shows the whole world."""
 
 
 class Backend(Protocol):

@@ -9,7 +9,6 @@ from executive.app.prepare.from_request import prepare_checked
 from executive.app.prepare.mission_files import shipped_missions
 from executive.app.prepare.prepared import Prepared
 from executive.app.report.run_report import Verdict
-from executive.app.runs.backend import Scene
 from executive.app.runs.conversations import Conversations, load_ahead
 from executive.conversation import ReplyKind
 from executive.mission.parameters import parse_values
@@ -32,7 +31,7 @@ from executive.view.page_control import (
 from skills.inputs.errors import InputError
 
 if TYPE_CHECKING:
-    from executive.view.server import PageServer
+    from executive.view.server import Address, PageServer, Scene
 
 
 class PageView(RunVisitor):
@@ -43,14 +42,14 @@ class PageView(RunVisitor):
         prepared: Prepared | None,
         tell: Callable[[str], None],
         *,
-        port: int = 0,
+        address: "Address" = ("127.0.0.1", 0),
         later: Callable[[str], str] | None = None,
     ) -> None:
         """Takes the request that the run was prepared from; without `prepared` the page only queues sentences.
 
         `tell` shows a line. `later` queues a sentence and returns an answer; without `later` the page offers no queue.
         """
-        self._tell, self._port, self._later = tell, port, later
+        self._tell, self._address, self._later = tell, address, later
         self.control = Control(attended=True)
         self._feed = Feed()
         self._progress = ProgressWatch(self._feed)
@@ -61,8 +60,8 @@ class PageView(RunVisitor):
         self._watch: ControlWatch | None = None
         self._scene: Scene | None = None
 
-    def serve(self, log: EventLog, scene: Scene | None) -> None:
-        """Serves the page and shows its address. Raises InputError if the port is taken."""
+    def serve(self, log: EventLog, scene: "Scene | None") -> None:
+        """Serves the page and shows its address. Raises InputError if it cannot be served there."""
         from executive.view.server import PageContent, serve
 
         log.listen(lambda each: self._feed(each.topic, each.stamp_s, each.values))
@@ -74,11 +73,10 @@ class PageView(RunVisitor):
             sentences["queue"] = sentence_action(lambda sentence, _: later(sentence))
         if sentences:
             load_ahead()
-        actions = {**control_actions(self.control), **sentences, **({} if scene is None else scene_actions(scene))}
-        content = PageContent(self._feed, actions, scene_url=None if scene is None else scene.url)
-        self._server = serve(content, self._port)
+        actions = {**control_actions(self.control), **sentences}
+        self._server = serve(PageContent(self._feed, actions, scene), self._address)
         self._watch = ControlWatch(self.control, self._feed)
-        self._tell(f"The page: {self._server.url}")
+        self._tell(self._server.lines)
 
     def hear(self, sentence: str, robot: str | None) -> str:
         """Returns the robots' reply to a sentence. Raises InputError with the reason of a refusal."""
@@ -105,14 +103,11 @@ class PageView(RunVisitor):
         try:
             if self._server is not None:
                 self._tell("The page stays until Ctrl-C." if limit_s is None else f"The page: {limit_s:g} s more.")
-                wait(limit_s, self._refresh)
+                if self._scene is not None:
+                    self._scene.publish()  # for a page that is opened late
+                wait(limit_s)
         finally:
             self.close()
-
-    def _refresh(self) -> None:
-        """Publishes the scene of the ended run again, so that a page opened late gets its textures."""
-        if self._scene is not None:
-            self._scene.publish()
 
     def close(self) -> None:
         """Stops serving; idempotent."""
@@ -158,18 +153,3 @@ def add_to(store: Path, request: Request) -> str:
     with MissionStore(store) as missions:
         number = missions.add(request, queued=True).id
     return f"queued as mission {number}: {'; '.join(request.commands)} (errand queue run --store {store})"
-
-
-def scene_actions(scene: Scene) -> Mapping[str, Action]:
-    """Returns the page's actions on the scene: refresh more slowly for slow browsers, and choose the camera."""
-
-    def ease(_: Mapping[str, Any]) -> str:
-        scene.refresh_seldom()
-        return "the scene is refreshed less often"
-
-    def follow(values: Mapping[str, Any]) -> str:
-        wanted = values.get("wanted") is True
-        scene.follow(wanted)
-        return "the camera follows the robot" if wanted else "the camera shows the whole world"
-
-    return {"ease": ease, "follow": follow}

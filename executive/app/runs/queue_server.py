@@ -213,9 +213,8 @@ class Listeners:
         host, port = self._address.host, self._address.port
         try:
             server = CallServer(self._calls.called, token=token.text, host=host, port=port)
-        except (OSError, UnicodeError) as error:
-            why = error.strerror if isinstance(error, OSError) else "no host has this name"
-            what = f"cannot serve calls at {host} port {port} ({why or error})"
+        except OSError as error:
+            what = f"cannot serve calls at {host} port {port} ({error.strerror})"
             raise InputError(what, hint="name another --host or --port") from error
         self._tell(f"Calls: POST {server.url}NAME")
         if token.new:

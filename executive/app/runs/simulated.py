@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from executive.app.prepare.placed_robots import robot_stack, shared_detector
 from executive.app.report.artifacts import Artifacts, draw_artifacts
-from executive.app.runs.backend import Backend, Durable, Scene
+from executive.app.runs.backend import Backend, Durable
 from executive.app.runs.goal_conditions import Share, verdict_of
 from executive.record.history import RECORDING
 from executive.record.schemas import POSE, SPEECH, TRUTH, pose_values
@@ -26,6 +26,7 @@ from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
 from executive.words.variation import NO_VARIATION, Variation
 from plant.engine import Pipeline
+from plant.recording import LiveScene
 from plant.referee import Referee
 from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
@@ -136,7 +137,7 @@ class SimulatedBackend(Backend):
             profile.attach("LiDAR and other sensors", robot, "sense")
             profile.attach("rendering", robot, "image")
 
-    def show_live(self) -> Scene:
+    def show_live(self) -> LiveScene:
         """Starts the plant's live picture."""
         return self._simulation.show_live()
 

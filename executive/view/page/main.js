@@ -1,7 +1,7 @@
 "use strict";
 // Puts the page together: messages come from the server while a run is under way, or stand in the page itself.
 (() => {
-  const { Store, MapPanel, Header, ModePanel, VerdictPanel, isOver, modeOfAll, ScenePanel, EventPanel, Timeline, ControlPanel, TeleopPanel, RobotPanel, MissionsPanel, PlotsPanel, drawsSlowly, byId } = window.errand;
+  const { Store, MapPanel, Header, ModePanel, VerdictPanel, isOver, modeOfAll, ScenePanel, EventPanel, Timeline, ControlPanel, TeleopPanel, RobotPanel, MissionsPanel, PlotsPanel, byId } = window.errand;
   const recorded = byId("recorded") ? JSON.parse(byId("recorded").textContent) : null;
   const token = new URLSearchParams(location.search).get("token") || "";
   const feedAddress = `ws://${location.host}/feed?token=${encodeURIComponent(token)}`, GOING_AWAY = 1001, AGAIN_MS = 2000;
@@ -79,7 +79,7 @@
   }
 
   byId("beside").addEventListener("change", () => {
-    if (control.actions.has("follow")) control.do("follow", { wanted: byId("beside").checked });
+    scene.post();
     seekScene();
   });
 
@@ -109,6 +109,7 @@
       if (greeted && message.topic === "transitions") fresh.push(message.sent_ms);
       if (greeted && message.topic === "speech") control.hear(message.data.robot, message.data.text);
       if (message.topic === "map") map.setMap(message.data, addressOf(message.data.picture)).catch(() => {});
+      if (message.live === "scene") scene.move(message.data);
       if (message.live === "hello") greet(message.data);
       if (message.live === "recording" && message.data.address) {
         byId("camera-follows").hidden = false;
@@ -120,14 +121,12 @@
     schedule();
   }
 
-  function greet({ actions, scene: address, recording }) {
+  function greet({ actions, scene: shown, recording }) {
     control.allow(actions);
     timeline.setLive(actions.length > 0);
     if (recording) scene.show(fileOf(recording), true);
-    else scene.show(address, false);
-    byId("camera-follows").hidden = !(address || recording);
-    if (control.actions.has("follow")) control.do("follow", { wanted: byId("beside").checked });
-    if (control.actions.has("ease") && drawsSlowly()) control.do("ease");
+    else if (shown) scene.show(`scene?token=${encodeURIComponent(token)}`, false);
+    byId("camera-follows").hidden = !(shown || recording);
   }
 
   function connect() {

@@ -194,11 +194,11 @@
   }
 
   // The scene while it runs, or its recording, which follows the slider.
-  const BESIDE_M = [-0.4, 3.6, 1.0]; // steep, so that it looks over a wall half a metre behind the robot
+  const EASY_PERIOD_MS = 700, BESIDE_M = [-0.4, 3.6, 1.0]; // steep, so that it looks over a wall half a metre behind the robot
 
   class ScenePanel {
     constructor(box, follow) {
-      Object.assign(this, { box, follow, address: null, recorded: false, before: null });
+      Object.assign(this, { box, follow, address: null, recorded: false, before: null, frame: null, poses: null, due: null, period: drawsSlowly() ? EASY_PERIOD_MS : 0 });
     }
 
     show(address, recorded) {
@@ -206,6 +206,19 @@
       this.address = address;
       this.recorded = recorded;
       this.put({ title: recorded ? "3D recording of the run" : "3D scene", src: address });
+    }
+
+    // The newest poses of a running scene; a browser without a GPU draws few of them.
+    move(poses) {
+      this.poses = poses;
+      if (this.due === null) this.due = setTimeout(() => this.post(), this.period);
+    }
+
+    // The scene's frame has an origin of its own, which no address names.
+    post() {
+      clearTimeout(this.due);
+      this.due = null;
+      if (this.frame && this.poses && !this.recorded) this.frame.contentWindow.postMessage({ ...this.poses, follows: this.follow.checked }, "*");
     }
 
     // A recording that the page brings with it. As the frame's own text it has the page's origin, also in a page that
@@ -217,7 +230,7 @@
 
     put(properties) {
       const frame = Object.assign(element("iframe"), properties), loading = element("p", "nothing loading", "Loading the 3D scene …");
-      if (!this.recorded) frame.addEventListener("load", () => loading.remove());
+      if (!this.recorded) frame.addEventListener("load", () => { this.post(); loading.remove(); });
       this.box.closest("section").hidden = false;
       this.box.replaceChildren(frame, loading);
       Object.assign(this, { frame, loading, before: null });
@@ -297,5 +310,5 @@
     }
   }
 
-  Object.assign(window.errand, { Header, ModePanel, VerdictPanel, isOver, modeOf, modeOfAll, missionOf, StatePanel, decisive, CameraPanel, ScenePanel, QuestionPanel, drawsSlowly, byId });
+  Object.assign(window.errand, { Header, ModePanel, VerdictPanel, isOver, modeOf, modeOfAll, missionOf, StatePanel, decisive, CameraPanel, ScenePanel, QuestionPanel, byId });
 })();

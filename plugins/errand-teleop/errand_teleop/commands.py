@@ -17,10 +17,9 @@ from errand_teleop.page import TeleopPage
 from errand_teleop.poses import save_pose
 from executive.app.prepare.placed_robots import only_robot, refuse_blocked
 from executive.app.prepare.worlds import knowledge_of, open_world
-from executive.app.runs.page_view import scene_actions
 from executive.app.runs.simulated import compile_first, simulate
 from executive.cli.number_options import quantity_option
-from executive.cli.options import START, start_pose
+from executive.cli.options import HOST, PORT, START, start_pose
 from executive.cli.output import console_for
 from executive.cli.run_keys import read_keys
 from executive.run.worker import LockStepWorker
@@ -30,7 +29,7 @@ from plant.worlds.world import World
 from skills.api import SkillContext
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
-from skills.quantities import Delay, Port, Seed
+from skills.quantities import Delay, Seed
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack
 
@@ -48,7 +47,8 @@ def teleop(
     start: START = None,
     seed: Annotated[int, quantity_option(Seed, help="Seed of the objects and of all noise.")] = 1,
     poses: Annotated[Path, typer.Option("--poses", help="Folder for saved poses.")] = Path("poses"),
-    port: Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.")] = 0,
+    view_port: PORT = 0,
+    view_host: HOST = "127.0.0.1",
     limit: Annotated[
         float | None, quantity_option(Delay, "--for", help="End after this time (s) on the robot's clock.")
     ] = None,
@@ -75,11 +75,11 @@ def teleop(
         feed, scene = Feed(), simulation.show_live()
         page = TeleopPage(hands, context, feed, save)
         page.show_map(opened, knowledge_of(opened))
-        actions = {**page.actions(), **scene_actions(scene)}
-        server = stack.enter_context(serve(PageContent(feed, actions, scene.url), port))
+        content = PageContent(feed, page.actions(), scene)
+        server = stack.enter_context(serve(content, (view_host, view_port)))
         console = console_for(False)
         stack.enter_context(read_keys(TerminalKeys(hands, save, console.print).press))
-        console.print(f"The page: {server.url}\n{_HELP}", markup=False)
+        console.print(f"{server.lines}\n{_HELP}", markup=False)
         try:
             drive(hands, context, limit, page.report)
         except KeyboardInterrupt:

@@ -76,8 +76,8 @@ def test_waiting_ends_by_itself():
 def test_a_served_replay_answers_and_ends(log_path, monkeypatch, words, limit_s):
     answers, serve = [], server.serve
 
-    def noted(content, port):
-        server = serve(content, port)
+    def noted(content, address):
+        server = serve(content, address)
         with urllib.request.urlopen(server.url) as answer:
             answers.append(answer.status)
         return server

@@ -22,7 +22,7 @@ from tests.tables import yaml_beside
 GOLDEN: dict[str, Any] = yaml_beside(__file__, "request_options.yaml")
 NOT_OF_THE_REQUEST = {
     *("--listen", "--json", "--quiet", "--tree", "--profile", "--store", "--anyway", "--voice"),
-    *("--view", "--view-port", "--foxglove", "--help"),
+    *("--view", "--view-port", "--view-host", "--foxglove", "--help"),
     "--robot",
 }
 

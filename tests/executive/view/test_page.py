@@ -1,5 +1,6 @@
 """The page in a real browser: states, controls, keyboard, replay, and that changes are seen."""
 
+import gzip
 import http.server
 import json
 import re
@@ -813,11 +814,64 @@ def test_a_page_elsewhere_reaches_nothing(browser, live, control, elsewhere):
     assert control.state.mode is Mode.RUNNING
 
 
-def test_a_browser_that_draws_on_the_processor_asks_for_fewer_pictures_of_the_scene(page, serve):
-    eased = threading.Event()
-    serve({"ease": lambda values: str(eased.set())}, Feed())
-    page.wait_for_timeout(500)
-    assert eased.wait(5)
+SHOWN = b"""<!doctype html><title></title><script>
+let count = 0;
+addEventListener("message", ({ data }) => { document.title = JSON.stringify({ ...data, count: (count += 1) }); });
+</script>"""
+
+
+class Scene:
+    """A scene whose frame has, as its title, what the page has posted."""
+
+    def page(self):
+        return gzip.compress(SHOWN)
+
+    def send(self, tell, wanted):
+        self.tell = tell
+
+    def publish(self):
+        """Does nothing."""
+
+
+@pytest.fixture
+def scene(page, feed):
+    """The scene of an open page; `scene.posted()` is what its frame has got last."""
+    shown = Scene()
+    with PageServer(PageContent(feed, scene=shown)) as server:
+        page.goto(server.url)
+        expect(page.locator("#scene .loading")).to_have_count(0)
+        frame = page.frames[1]
+        shown.posted = lambda: json.loads(frame.title() or "{}")
+        shown.frame = frame
+        yield shown
+
+
+def test_the_scene_gets_the_poses_and_whether_its_camera_follows(page, scene):
+    scene.tell({"followed": "Alice/body", "poses": {"Alice/body": [1.0]}})
+    page.wait_for_timeout(1000)
+    assert scene.posted() == {"followed": "Alice/body", "poses": {"Alice/body": [1.0]}, "follows": True, "count": 1}
+    page.uncheck("#beside")
+    assert scene.posted()["follows"] is False
+
+
+def test_the_scene_has_an_origin_of_its_own_and_reaches_no_server(page, scene):
+    assert scene.frame.evaluate("origin") == "null"
+    reach = "() => fetch('/scene').then(() => 'reached', () => 'refused')"
+    assert scene.frame.evaluate(reach) == "refused"
+    kinds = {
+        each["type"] for each in page.context.browser.new_browser_cdp_session().send("Target.getTargets")["targetInfos"]
+    }
+    assert "iframe" in kinds  # a process of its own
+
+
+def test_a_browser_that_draws_on_the_processor_draws_fewer_poses(page, scene):
+    for number in range(20):
+        scene.tell({"followed": None, "poses": {"cup": [number]}})
+        page.wait_for_timeout(100)
+    page.wait_for_timeout(1000)
+    posted = scene.posted()
+    assert posted["poses"] == {"cup": [19]}
+    assert posted["count"] <= 5
 
 
 def test_speech_is_announced_and_in_the_list(page, live, feed, tree):

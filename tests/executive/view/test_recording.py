@@ -1,4 +1,7 @@
-"""The recording of a run in a browser: the camera follows the robot, a caption tells the step, the whole world fits."""
+"""Recording and live scene in a browser: the camera follows the robot, a caption tells the step, all the world fits."""
+
+import gzip
+import json
 
 import numpy as np
 import pytest
@@ -72,3 +75,39 @@ def test_the_whole_world_fits_into_the_window_above_the_caption(page, recording)
     box = page.locator("#recording").bounding_box()
     assert seen[:, 1].min() > 1.0 - 2.0 * box["y"] / page.viewport_size["height"]
     assert max(np.ptp(seen[:, 0]), np.ptp(seen[:, 1])) > 0.8
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """A page around the scene of a small room, and the state of the scene after the robot has moved by a metre."""
+    folder, sent = tmp_path_factory.mktemp("scene"), []
+    world = load_world(write_small_room(folder, can=False))
+    simulation = Simulation(world, seed=1, visuals=False)
+    shown = simulation.show_live()
+    shown.send(sent.append, lambda: True)
+    shown.publish()
+    (state,) = sent
+    state["poses"][state["followed"]][9] += 1.0
+    (folder / "scene.html").write_bytes(gzip.decompress(shown.page()))
+    (folder / "page.html").write_text("<iframe src='scene.html' width=800 height=600></iframe>")
+    return folder / "page.html", json.loads(json.dumps(state))
+
+
+def test_the_live_scene_moves_the_bodies_and_the_camera_as_the_page_posts(browser, scene):
+    address, state = scene
+    page = browser.new_page()
+    page.goto(address.as_uri(), timeout=60_000)
+    post = "state => document.querySelector('iframe').contentWindow.postMessage(state, '*')"
+    at = state["poses"][state["followed"]][9:]
+    frame, target, before = page.frames[1], [at[0], at[2], -at[1]], "viewer.controls.target.toArray()"
+    body = f"/drake/visualizer/{state['followed']}".split("/")[1:]
+    page.evaluate(post, {**state, "follows": False})
+    frame.wait_for_function(
+        "([path, x]) => Math.abs(viewer.scene_tree.find(path).object.position.x - x) < 1e-3", arg=[body, at[0]]
+    )
+    whole = frame.evaluate(before)
+    page.evaluate(post, {**state, "follows": True})
+    frame.wait_for_function(f"at => Math.hypot(...{before}.map((each, n) => each - at[n])) < 1e-3", arg=target)
+    page.evaluate(post, {**state, "follows": False})
+    frame.wait_for_function(f"at => Math.hypot(...{before}.map((each, n) => each - at[n])) < 1e-3", arg=whole)
+    page.close()

@@ -1,7 +1,9 @@
 """The page's server: nothing without the token, nothing from elsewhere, actions reach the control."""
 
+import gzip
 import http.client
 import json
+import socket
 import threading
 from contextlib import suppress
 from urllib.parse import parse_qs, urlsplit
@@ -24,8 +26,9 @@ from executive.view.page_control import (
     progress_json,
     text_of,
 )
-from executive.view.server import PageContent, PageServer
+from executive.view.server import PageContent, PageServer, serve
 from skills.api import Question
+from skills.inputs.errors import InputError
 from tests.hostile_values import DATA
 
 
@@ -41,12 +44,34 @@ def feed() -> Feed:
     return Feed()
 
 
+class Scene:
+    """A scene that counts how often its page is built."""
+
+    built = 0
+    tell = wanted = None
+
+    def page(self):
+        self.built += 1
+        return gzip.compress(b"<p>scene</p>")
+
+    def send(self, tell, wanted):
+        self.tell, self.wanted = tell, wanted
+
+    def publish(self):
+        self.tell({"poses": {}})
+
+
 @pytest.fixture
-def server(feed, control, tmp_path):
+def scene() -> Scene:
+    return Scene()
+
+
+@pytest.fixture
+def server(feed, control, scene, tmp_path):
     recording = tmp_path / "recording.html"
     recording.write_text("<p>recorded</p>")
     actions = {**control_actions(control), "say": lambda values: f"first: {text_of(values, 'text')}"}
-    with PageServer(PageContent(feed, actions, scene_url="http://127.0.0.1:7000", recording=recording)) as running:
+    with PageServer(PageContent(feed, actions, scene, recording)) as running:
         yield running
 
 
@@ -77,7 +102,7 @@ def test_each_server_has_a_token_of_its_own(feed, server):
         assert len(token_of(other)) >= 32
 
 
-@pytest.mark.parametrize("path", ["/", "/picture/0"])
+@pytest.mark.parametrize("path", ["/", "/picture/0", "/scene"])
 def test_nothing_of_the_run_is_shown_without_the_token(server, feed, path):
     feed("detections", 0.0, {"format": "png", "data": "AAAA"})
     assert ask(server, "GET", path)[0] == 403
@@ -142,7 +167,7 @@ def test_the_websocket_sends_all_messages_and_then_each_new_one(server, feed):
     address = f"ws://127.0.0.1:{server.port}/feed?token={token_of(server)}"
     with connect(address, origin=f"http://127.0.0.1:{server.port}", proxy=None) as socket:
         (hello,) = json.loads(socket.recv(timeout=5))
-        assert hello["data"]["scene"] == "http://127.0.0.1:7000"
+        assert hello["data"]["scene"] is True
         assert "pause" in hello["data"]["actions"]
         assert json.loads(socket.recv(timeout=5))[0]["data"] == {"x": 1}
         feed("pose", 0.6, {"x": 2})
@@ -274,13 +299,13 @@ def test_a_closed_server_frees_its_port_and_hangs_up(feed):
         with pytest.raises(WebSocketException):
             socket.recv(timeout=5)
     server.close()
-    with PageServer(PageContent(feed), port=server.port):
+    with PageServer(PageContent(feed), ("127.0.0.1", server.port)):
         pass
 
 
 def test_a_taken_port_is_an_error(feed, server):
     with pytest.raises(OSError, match="in use"):
-        PageServer(PageContent(feed), port=server.port)
+        PageServer(PageContent(feed), ("127.0.0.1", server.port))
 
 
 def test_the_page_needs_nothing_from_elsewhere(server):
@@ -298,3 +323,107 @@ def test_the_page_needs_nothing_from_elsewhere(server):
 def test_refusals_are_exceptions_with_a_plain_sentence():
     with pytest.raises(RefusedError, match="needs a text under 'text'"):
         text_of({"text": 3}, "text")
+
+
+def policy(server: PageServer, path: str, **headers: str) -> str:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    connection.request("GET", f"{path}?token={token_of(server)}", headers=headers)
+    answer = connection.getresponse()
+    answer.read()
+    return answer.headers["Content-Security-Policy"]
+
+
+def test_the_scene_is_built_once_for_all_browsers(server, scene):
+    address = f"/scene?token={token_of(server)}"
+    for _ in range(2):
+        assert gzip.decompress(ask(server, "GET", address)[1]) == b"<p>scene</p>"
+    assert scene.built == 1
+
+
+def test_a_page_without_a_scene_has_none_to_show(feed):
+    with PageServer(PageContent(feed)) as bare:
+        assert ask(bare, "GET", f"/scene?token={token_of(bare)}")[0] == 404
+
+
+def test_a_scene_that_cannot_be_built_is_an_error_of_that_request_only(server, scene, monkeypatch):
+    def fail():
+        raise RuntimeError("no memory")
+
+    monkeypatch.setattr(scene, "page", fail)
+    assert ask(server, "GET", f"/scene?token={token_of(server)}")[0] == 500
+    assert ask(server, "GET", f"/?token={token_of(server)}")[0] == 200
+
+
+def test_the_scene_is_wanted_while_a_page_is_open(server, scene):
+    assert not scene.wanted()
+    with connect(f"ws://127.0.0.1:{server.port}/feed?token={token_of(server)}", proxy=None) as socket:
+        socket.recv(timeout=5)
+        assert scene.wanted()
+        scene.publish()
+        assert json.loads(socket.recv(timeout=5))[-1] == {"live": "scene", "data": {"poses": {}}}
+
+
+def test_only_the_page_may_frame_the_scene_which_reaches_no_server(server):
+    scene, here = policy(server, "/scene"), f"127.0.0.1:{server.port}"
+    assert scene.endswith(f"frame-ancestors http://{here}")
+    assert scene.startswith("sandbox allow-scripts; ")
+    assert "'self'" not in scene
+    assert "allow-same-origin" not in scene
+    page = policy(server, "/")
+    assert "frame-ancestors 'none'" in page
+    assert f"connect-src 'self' ws://{here};" in page
+
+
+def test_a_tunnel_may_end_at_another_port(server, control):
+    there = "localhost:8080"
+    assert act(server, "pause", Host=there, Origin=f"http://{there}")[0] == 200
+    assert "ws://localhost:8080;" in policy(server, "/", Host=there)
+    assert act(server, "pause", Host=there)[0] == 403  # from the page of another port
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        ("192.168.1.5", 200),
+        ("192.168.1.5:8080", 200),
+        ("[fe80::1]:8080", 200),
+        (socket.gethostname(), 200),
+        ("evil.example", 403),
+        ("127.0.0.1.evil.example", 403),
+        ("127.0.0.1:80; script-src *", 403),
+        ("127.0.0.1:80:80", 403),
+        ("", 403),
+    ],
+)
+def test_a_request_names_this_machine_by_an_address_or_its_own_name(server, host, status):
+    # else a name of another site that leads here would have the page's origin
+    assert ask(server, "GET", f"/?token={token_of(server)}", Host=host)[0] == status
+
+
+def test_a_page_for_other_machines_says_what_protects_the_robot(feed):
+    with PageServer(PageContent(feed), ("0.0.0.0", 0)) as server:
+        link, *rest = server.lines.splitlines()
+        host = urlsplit(link.removeprefix("The page: ")).hostname
+        assert host not in ("0.0.0.0", "127.0.0.1", "localhost")
+        (line,) = rest
+        assert "is all that protects the robot" in line
+        assert f"ssh -L {server.port}:127.0.0.1:{server.port} USER@HOST" in line
+        asked = http.client.HTTPConnection(host, server.port, timeout=10)
+        asked.request("GET", f"/?token={token_of(server)}")
+        assert asked.getresponse().status == 200
+        asked.close()
+        asked.request("GET", "/")
+        assert asked.getresponse().status == 403
+
+
+def test_a_page_for_this_machine_has_its_address_alone(server):
+    assert server.lines == f"The page: {server.url}"
+
+
+@pytest.mark.parametrize("host", ["192.0.2.1", "nowhere.invalid", "a" * 70, "é" * 300, "::2"])
+def test_an_address_of_no_machine_here_is_refused_in_one_line(feed, host):
+    with pytest.raises(
+        InputError, match=r"cannot serve the page at .* port 0 \(.+\); name another --view-host"
+    ) as refusal:
+        serve(PageContent(feed), (host, 0))
+    assert "\n" not in str(refusal.value)

@@ -122,23 +122,23 @@ def test_a_mission_is_told_to_the_page_while_it_runs_and_after(tmp_path):
 class CountedScene:
     """A scene that counts its refreshes."""
 
-    url = "http://localhost:1"
     refreshes = 0
+
+    def page(self):
+        return b""
+
+    def send(self, tell, wanted):
+        self.tell = tell
 
     def publish(self):
         self.refreshes += 1
-
-    def refresh_seldom(self):
-        """Does nothing."""
-
-    def follow(self, wanted):
-        """Does nothing."""
+        self.tell({"poses": {}})
 
 
-def test_the_scene_of_an_ended_run_is_refreshed_as_long_as_the_page_stays(page, tmp_path, clock):
-    # browsers draw textures that arrive after the last refresh only with the next one
+def test_a_page_opened_after_the_run_gets_the_last_poses(page, tmp_path, clock):
     scene = CountedScene()
     with closing(EventLog(tmp_path / "log.mcap", clock)) as log:
         page.serve(log, scene)
-    page.stay(1.2)
-    assert scene.refreshes == 2
+    page.stay(0.1)
+    assert scene.refreshes == 1
+    assert [json.loads(text)["data"] for text in page._feed.since((0, 0))[1] if '"scene"' in text] == [{"poses": {}}]

@@ -1,7 +1,7 @@
 """Arms of people who receive objects: they hang, and hold the tray when it is out. They are only seen.
 
-No contact, range or joint knows the arms, and the stepped context never moves them: whoever renders the scene calls
-`Arms.pose` after setting the plant's positions.
+No contact, range or joint knows the arms, and the stepped context never moves them. A renderer calls `Arms.pose` after
+it has set the plant's positions.
 """
 
 from collections.abc import Mapping, Sequence

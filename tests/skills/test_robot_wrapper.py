@@ -57,7 +57,7 @@ def faulty(robot):
 
 def pipelined(robot):
     """Robot of an engine whose steps change nothing."""
-    nothing = {"now": lambda: 0.0, "step": lambda dt_s: None, "sense": lambda: None}
+    nothing = {"now": lambda: 0.0, "step": lambda dt_s: None, "sense": lambda: None, "poses_W": dict}
     return Pipeline(SimpleNamespace(robots={robot.name: robot}, **nothing)).robots["Alice"]
 
 

@@ -839,6 +839,7 @@ def scene(page, feed):
     shown = Scene()
     with PageServer(PageContent(feed, scene=shown)) as server:
         page.goto(server.url)
+        expect(page.locator("#scene iframe")).to_have_count(1)
         expect(page.locator("#scene .loading")).to_have_count(0)
         frame = page.frames[1]
         shown.posted = lambda: json.loads(frame.title() or "{}")

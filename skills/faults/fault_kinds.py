@@ -228,16 +228,19 @@ def _pull(match: re.Match[str]) -> Effect:
 
 
 def _jumps(match: re.Match[str]) -> Effect:
-    """Fault that shifts dead reckoning in odometry, scans and pictures."""
-    ahead = RigidTransform(np.array([float(match["metres"]), 0.0, 0.0]))
+    """Fault that shifts dead reckoning in odometry, scans and pictures, once and ahead; later motion is right."""
+    ahead_m = np.array([float(match["metres"]), 0.0, 0.0])
 
     def act(call: Call) -> Any:
         reading = call.proceed()
+        if "shift" not in call.memory:
+            call.memory["shift"] = RigidTransform(call.robot.odometry().X_OB.rotation() @ ahead_m)
+        shift = call.memory["shift"]
         if isinstance(reading, Image):
             edges = reading.frames.edges.items()
-            moved = {child: (parent, X_PC @ ahead if parent == "odom" else X_PC) for child, (parent, X_PC) in edges}
+            moved = {child: (parent, shift @ X_PC if parent == "odom" else X_PC) for child, (parent, X_PC) in edges}
             return replace(reading, frames=FrameTree(moved))
-        return None if reading is None else replace(reading, X_OB=reading.X_OB @ ahead)
+        return None if reading is None else replace(reading, X_OB=shift @ reading.X_OB)
 
     return Effect(frozenset(("odometry", "scan", "image")), act)
 

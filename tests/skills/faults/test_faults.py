@@ -157,6 +157,17 @@ def test_odometry_can_jump(faulty, clock):
     assert robot.image("left").frames.pose("body").translation()[0] == pytest.approx(0.5)
 
 
+def test_odometry_that_has_jumped_reports_later_motion_as_it_is(faulty, clock):
+    robot, lease = faulty("odometry jumps 0.5 m at 1 s")
+    clock.advance(1.0)
+    robot.odometry()
+    robot.drive(0.0, 0.0, 1.0, until_s=9.0, lease=lease)
+    clock.advance(1.5)
+    pose = robot.odometry().pose
+    assert pose.yaw_rad > 1.0
+    assert (pose.x_m, pose.y_m) == pytest.approx((0.5, 0.0), abs=1e-6)
+
+
 def test_battery_and_faults_can_be_set(faulty):
     robot, _ = faulty("battery falls to 5 %", "robot reports motor too hot")
     assert robot.battery().charge == 0.05

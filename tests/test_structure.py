@@ -24,7 +24,7 @@ LINES = {
     "executive/testing": 852,
     "executive/app": 8131,
     "executive/cli": 3876,
-    "skills": 27869,
+    "skills": 27872,
     "plant": 11364,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 420, 61, 7

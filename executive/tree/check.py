@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from executive.tree.plan import StepPart
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import area_m2
-from skills.api import FreeSpace, PlanningError, Zone, ZoneKind
+from skills.api import FreeSpace, Part, PlanningError, Zone, ZoneKind
 from skills.inputs.errors import InputError, listing, suggestion
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import Path, path_length
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 Fault = tuple[str, str]
 """Error in a part of a mission, and a hint."""
+_OTHER_KIND: Final = "choose another kind of robot"
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ class Abilities:
     `masses_kg` has the mass of each class with a model, `lift_kg` is the arm's payload. The detector recognises
     `classes` and `attributes`; a search for several objects fails for any others. `reaches_m` are the heights of the
     lowest and the highest reachable surface. `widths_m` has the least width of each class, `opens_m` is the gripper's
-    maximum opening; `gripper` is False without a gripper. `takers` are the people who take objects from the robot
+    maximum opening; `gripper` is False without a gripper, `arm` without an arm, `looks` without a camera for objects.
+    `takers` are the people who take objects from the robot
     (None: unknown). `taken_m2` is the covered area of each surface, `apart_m` the clearance around an object.
     """
 
@@ -51,6 +53,8 @@ class Abilities:
     widths_m: Mapping[str, float] = field(default_factory=dict)
     opens_m: float = math.inf
     gripper: bool = True
+    arm: bool = True
+    looks: bool = True
     takers: frozenset[str] | None = None
     taken_m2: Mapping[str, float] = field(default_factory=dict)
     apart_m: float = 0.0
@@ -188,7 +192,11 @@ def _objection(part: StepPart, held: InGripper | None, knowledge: Knowledge, abi
     if part.command is not None or skill is None:
         return None if part.command is None else objection(part.command, held, knowledge)
     if not abilities.gripper and (skill.gripper_before is not None or skill.gripper_after is not None):
-        return f"this kind of robot has no gripper, which {skill.name} needs", "choose another kind of robot"
+        return f"this kind of robot has no gripper, which {skill.name} needs", _OTHER_KIND
+    if not abilities.arm and skill.uses == {Part.ARM}:
+        return f"this kind of robot has no arm, which {skill.name} needs", _OTHER_KIND
+    if not abilities.looks and skill.needs_camera:
+        return f"this kind of robot has no camera, which {skill.name} needs", _OTHER_KIND
     if skill.gripper_before is True and held is None:
         return f"{skill.name} needs an object in the gripper, and no step before has grasped one", "grasp one first"
     if skill.gripper_before is False and held is not None and held.sure:
@@ -204,7 +212,10 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
     handles = command.item is not None or command.task in (Task.GRASP, Task.PLACE)
     if handles and not abilities.gripper:
         what = command.item or command.object
-        yield f"this kind of robot has no gripper to take the {what} with", "choose another kind of robot"
+        yield f"this kind of robot has no gripper to take the {what} with", _OTHER_KIND
+        return
+    if command.task is Task.FIND and not abilities.looks:
+        yield f"this kind of robot has no camera to look for the {command.object} with", _OTHER_KIND
         return
     yield from _nobody_takes(command, knowledge, abilities)
     if (command.item is not None or command.task is Task.GRASP) and command.goal is not None:

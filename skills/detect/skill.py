@@ -67,6 +67,7 @@ class Detect(LookingSkill[DetectInputs]):
     """Searches surfaces for objects without driving. Stows the arm when it finds too few."""
 
     name = "detect"
+    needs_camera = True
     Inputs = DetectInputs
     outputs: ClassVar[Mapping[str, type]] = {
         "observation": ObjectObservation,

@@ -36,6 +36,7 @@ class TakePicture(LookingSkill[TakePictureInputs]):
     """Points a camera at something and publishes one picture with the camera's pose. Does not drive."""
 
     name = "take_picture"
+    needs_camera = True
     Inputs = TakePictureInputs
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "the robot has no such camera, or nothing is named to point it at",

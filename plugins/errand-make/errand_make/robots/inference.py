@@ -20,7 +20,7 @@ from errand_make.robots.source import edited_text
 from errand_make.robots.tree import KinematicTree, planar_joints
 from plant.robots.urdf_robot.kind import urdf_kind
 from plant.robots.urdf_robot.robot_file import CameraFile, LidarFile
-from plant.robots.urdf_robot.urdf_file import UrdfFile, UrdfJoint
+from plant.robots.urdf_robot.urdf_file import UrdfFile, UrdfJoint, read_urdf_text
 from skills.inputs.errors import InputError, listing
 from skills.inputs.yaml_source import yaml_of
 from skills.robot import Capabilities, FloatArray
@@ -69,7 +69,7 @@ class Inference:
         Raises InputError for a robot that does not drive, and for impossible masses of links that move.
         """
         self.urdf, self.notes, self.links = urdf, Notes(), ""
-        self._sensors, self._text = source.sensors, source.text
+        self._sensors, self._text = source.sensors, source.text + read_urdf_text(source.path)
         self._base, tree, parts = self._placed()
         if parts.drive is Drive.NOTHING:
             what = "nothing drives: no wheel turns and no leg stands on the floor, so its arm is fixed to the world"
@@ -122,6 +122,10 @@ class Inference:
         if parts.drive is Drive.FREE and (posture := standing_legs(tree)):
             tree = replace(tree, posture=posture)
             parts = find_parts(tree)
+        for each in parts.wheels:
+            if not each.is_round:
+                what = f"the shape of {each.joint.child} is not round about the axis of {each.joint.name}"
+                self.notes.append(("base", f"{what}: check that axis"))
         if turn.IsExactlyIdentity():
             return base, tree, parts
         rpy = " ".join(f"{each:.7f}" for each in RollPitchYaw(turn).vector())
@@ -135,7 +139,8 @@ class Inference:
         arms = sorted(parts.arms, key=lambda arm: (why_no_gripper(tree, arm) != "", -len(arm.joints)))
         arm = arms[0] if arms else None
         held = dict(tree.posture)
-        for lift in parts.lifts:
+        telescopes = {each.name for chain in parts.sliding for each in chain}
+        for lift in (each for each in parts.lifts if each.name not in telescopes):
             held |= self._hold_lift(tree, lift, arm, ground_m)
         tree = replace(tree, posture=dict(held))
         chains = [list(each.joints) for each in arms[1:]] + [list(each) for each in parts.sliding]
@@ -233,9 +238,8 @@ class Inference:
         found = [*self._simulated("ray|lidar"), *(link for link in self.urdf.links if _LIDAR.search(link))]
         fixed = [link for link in dict.fromkeys(found) if tree.body_of[link] == tree.root and not is_camera(link)]
         fixed = [link for link in fixed if float(tree.X_BL[link].translation()[2]) - ground_m > _LEAST_LIDAR_M]
-        fixed.sort(
-            key=lambda link: (_NO_LIDAR.search(link) is not None, "mount" in link or "base" in link.split("_")[-1:])
-        )
+        ahead_m = {link: float(tree.X_BL[link].translation()[0]) for link in fixed}
+        fixed.sort(key=lambda link: (_NO_LIDAR.search(link) is not None, "mount" in link, ahead_m[link] < 0.0))
         if fixed:
             self.notes.append(
                 ("lidar", "its field of view (rad), range (m) and rate (Hz) are not in a URDF, and are a guess")
@@ -254,7 +258,8 @@ class Inference:
         behind_tilt = set(tree.links_below(head[1])) if head else set()
         tip = set() if arm is None else set(tree.links_of[arm.joints[-1].child])
         moved = set(tree.links_below(head[0])) if head else set()
-        moved |= set() if arm is None else set(_carried(tree, arm.joints))
+        for chain in (*(each.joints for each in self.found.parts.arms), *self.found.parts.sliding):
+            moved |= set(_carried(tree, chain))
         links.sort(key=lambda link: (link not in behind_tilt, link not in tip))
         lost = [link for link in links if link in moved - behind_tilt - tip]
         for link in links:
@@ -269,7 +274,7 @@ class Inference:
             note = "pixels, field of view (rad) and depth (m) are not in a URDF, and are a guess"
             self.notes.append(("cameras", note))
         if lost:
-            self.notes.append(("cameras", f"{listing(lost)} is left out: it is inside a chain, not at its end"))
+            self.notes.append(("cameras", f"left out, since no part points them: {listing(lost)}"))
         return cameras
 
     def _head(self) -> tuple[UrdfJoint, ...]:

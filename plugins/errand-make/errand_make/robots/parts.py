@@ -59,7 +59,10 @@ class Drive(Enum):
 
 @dataclass(frozen=True)
 class Wheel:
-    """Wheel on a joint; `swivel` is the vertical joint that carries it, and `trail_m` its distance behind that."""
+    """Wheel on a joint; `swivel` is the vertical joint that carries it, and `trail_m` its distance behind that.
+
+    `is_round` is False for a shape that is not round about the joint's axis.
+    """
 
     joint: UrdfJoint
     radius_m: float
@@ -67,6 +70,7 @@ class Wheel:
     axis_B: FloatArray
     swivel: UrdfJoint | None = None
     trail_m: float = 0.0
+    is_round: bool = True
 
     @property
     def is_caster(self) -> bool:
@@ -150,7 +154,11 @@ def _wheel(tree: KinematicTree, joint: UrdfJoint) -> Wheel | None:
     offset = points - p_B
     across = np.linalg.norm(offset - np.outer(offset @ axis_B, axis_B), axis=1)
     radius_m, below_m = float(across.max()), -float(offset[:, 2].min())
-    if radius_m < _GROUND_M / 3.0 or _out_of_round(offset, axis_B) or np.ptp(offset @ axis_B) > 4.0 * radius_m:
+    if radius_m < _GROUND_M / 3.0 or np.ptp(offset @ axis_B) > 4.0 * radius_m:
+        return None
+    is_round = _least_share(offset, axis_B) > _ROUND
+    level = float(offset[:, 2].max()) > _ROUND * below_m
+    if not is_round and (tree.before(joint) or rollers or not level or joint.kind != "continuous"):
         return None
     p_B = p_B + axis_B * float(np.mean([np.max(offset @ axis_B), np.min(offset @ axis_B)]))
     carriers = tree.before(joint)
@@ -162,7 +170,7 @@ def _wheel(tree: KinematicTree, joint: UrdfJoint) -> Wheel | None:
     if swivel is not None:
         ahead = np.cross(axis_B, [0.0, 0.0, 1.0])
         trail_m = abs(float((p_B - tree.place(swivel)) @ ahead))
-    return Wheel(joint, below_m, p_B, axis_B, swivel, trail_m)
+    return Wheel(joint, below_m, p_B, axis_B, swivel, trail_m, is_round)
 
 
 def standing_legs(tree: KinematicTree) -> dict[str, float]:
@@ -178,13 +186,11 @@ def standing_legs(tree: KinematicTree) -> dict[str, float]:
     return {each.name: min(_ANGLES_RAD, key=lambda angle: low_m(each, each.clipped(angle))) for each in chains}
 
 
-def _out_of_round(offset: FloatArray, axis_B: FloatArray) -> bool:
-    """True unless points (N, 3) about a wheel's axis reach as far up, down, ahead and back."""
-    ahead = np.cross(axis_B, [0.0, 0.0, 1.0])
-    reached = [
-        float((offset @ way).max()) for way in (ahead, -ahead, np.array([0.0, 0.0, 1.0]), np.array([0, 0, -1.0]))
-    ]
-    return min(reached) < _ROUND * max(reached)
+def _least_share(offset: FloatArray, axis_B: FloatArray) -> float:
+    """Least distance to which points (N, 3) about a wheel's axis reach up, down, ahead or back, over the largest."""
+    ahead, up = np.cross(axis_B, [0.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.0])
+    reached = [float((offset @ way).max()) for way in (ahead, -ahead, up, -up)]
+    return min(reached) / max(reached)
 
 
 def find_legs(tree: KinematicTree) -> tuple[UrdfJoint, ...]:

@@ -12,7 +12,7 @@ from errand_make.robots.tree import KinematicTree
 from plant.robots.urdf_robot.urdf_file import UrdfJoint
 from skills.robot import FloatArray
 
-_TRIES: Final = 1500
+_TRIES: Final = 3000
 _STICKS_OUT_M: Final = 0.02
 _CLEAR_M: Final = 0.05
 """Least height of a held chain over the floor."""
@@ -40,8 +40,9 @@ def held_postures(tree: KinematicTree, chain: Sequence[UrdfJoint], others: Float
     tries = lower + np.random.default_rng(0).random((_TRIES, len(chain))) * (upper - lower)
     tries[0] = zero
     best = tries[int(np.argmin(search.cost(tries, zero)))]
-    for width in (0.3, 0.15, 0.08, 0.04):
-        near = best + np.random.default_rng(1).normal(size=(_TRIES // 5, len(chain))) * width * (upper - lower)
+    rng = np.random.default_rng(1)
+    for width in (0.3, 0.2, 0.15, 0.1, 0.08, 0.05, 0.03, 0.02):
+        near = best + rng.normal(size=(_TRIES // 8, len(chain))) * width * (upper - lower)
         near = np.vstack([best, np.clip(near, lower, upper)])
         best = near[int(np.argmin(search.cost(near, zero)))]
     return np.asarray(near[np.argsort(search.cost(near, zero))])

@@ -257,7 +257,7 @@ class Assembly:
                 if copied.find("origin") is None:
                     _add_origin(copied, X_CS)
                 copied.append(geometry)
-                if (material := shape.find("material")) is not None:
+                if mesh is None and (material := shape.find("material")) is not None:
                     copied.append(self._with_colour(material))
                 if contact is not None:
                     copied.append(contact)

@@ -147,7 +147,7 @@ class Inference:
         away = {link for chain in (arms[0].joints if arms else (), *chains) for link in _carried(tree, chain)}
         own = tree.points(link for link in self.urdf.links if link not in away)
         for chain in chains if len(own) else ():
-            q = held_postures(tree, chain, own, ground_m)[0]
+            q = held_postures(tree, chain, own, ground_m, leave=away)[0]
             held |= {each.name: float(at) for each, at in zip(chain, q, strict=True)}
             tree = replace(tree, posture=dict(held))
         for arm_ in arms[1:]:

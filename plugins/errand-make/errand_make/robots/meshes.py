@@ -46,7 +46,7 @@ class MeshCopies:
 
     def copy(self, role: Role, shape: Element, mesh: Element) -> None:
         """Copies one mesh, unless it is copied yet, and names its copy. Raises InputError with the mesh's line."""
-        path, colour = self._path(mesh), shape.find("material/color")
+        path, colour = self._path(mesh), self._colour(shape)
         key = (path, role, "" if colour is None else colour.get("rgba", ""))
         if key not in self._names:
             name = f"{path.stem}_{role}_{len(self._names)}"
@@ -56,6 +56,13 @@ class MeshCopies:
             except ObjectImportError as error:
                 raise self.urdf.error(mesh, f"{path}: {error.message}", error.hint) from error
         mesh.set("filename", f"package://{PACKAGE}/{MESHES}/{self._names[key]}")
+
+    def _colour(self, shape: Element) -> Element | None:
+        """Colour of a shape, which may be defined at the top of the file."""
+        material, own = shape.find("material"), shape.find("material/color")
+        name = "" if material is None else material.get("name", "")
+        named = (each.find("color") for each in self.urdf.robot.findall("material") if each.get("name") == name)
+        return own if own is not None or material is None else next(named, None)
 
     def all_notes(self) -> list[str]:
         """Notes on the meshes that a person should check."""

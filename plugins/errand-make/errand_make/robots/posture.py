@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
@@ -12,7 +12,13 @@ from errand_make.robots.tree import KinematicTree
 from plant.robots.urdf_robot.urdf_file import UrdfJoint
 from skills.robot import FloatArray
 
-_TRIES: Final = 3000
+_TRIES: Final = 5000
+_STARTS, _NEAR = 8, 40
+"""Postures that are made better, and changed postures tried around each at a time."""
+_MOST: Final = 400
+"""Postures that are returned."""
+_WIDTHS: Final = (0.3, 0.2, 0.15, 0.1, 0.1, 0.07, 0.05, 0.05, 0.03, 0.03, 0.02, 0.02)
+"""Standard deviations of these changes, as parts of the joints' ranges."""
 _STICKS_OUT_M: Final = 0.02
 _CLEAR_M: Final = 0.05
 """Least height of a held chain over the floor."""
@@ -25,27 +31,38 @@ _FREE_JOINTS: Final = 2
 """Joints at a chain's root whose bodies overlap the robot's by their design."""
 
 
-def held_postures(tree: KinematicTree, chain: Sequence[UrdfJoint], others: FloatArray, ground_m: float) -> FloatArray:
+def held_postures(
+    tree: KinematicTree,
+    chain: Sequence[UrdfJoint],
+    others: FloatArray,
+    ground_m: float,
+    *,
+    leave: Collection[str] = (),
+) -> FloatArray:
     """Positions (K, J) of a chain, the best first, that stick out of `others` (N, 3) and hit things as little as found.
 
-    They are the zero posture alone unless that sticks out.
+    They are the zero posture alone unless that sticks out. The links `leave` will be elsewhere.
     """
     zero = np.array([each.clipped(0.0) for each in chain])
     low, high = outline(others)
-    search = _Search(tree, chain, low, high, ground_m)
+    search = _Search(tree, chain, (low, high), ground_m, leave)
     if search.overhang(zero[None])[0] <= _STICKS_OUT_M:
         return zero[None]
     lower, upper = (np.array([getattr(each, side) for each in chain]) for side in ("lower", "upper"))
     lower, upper = np.maximum(lower, -np.pi), np.maximum(np.minimum(upper, np.pi), np.maximum(lower, -np.pi))
-    tries = lower + np.random.default_rng(0).random((_TRIES, len(chain))) * (upper - lower)
+    rng = np.random.default_rng(0)
+    tries = lower + rng.random((_TRIES, len(chain))) * (upper - lower)
     tries[0] = zero
-    best = tries[int(np.argmin(search.cost(tries, zero)))]
-    rng = np.random.default_rng(1)
-    for width in (0.3, 0.2, 0.15, 0.1, 0.08, 0.05, 0.03, 0.02):
-        near = best + rng.normal(size=(_TRIES // 8, len(chain))) * width * (upper - lower)
-        near = np.vstack([best, np.clip(near, lower, upper)])
-        best = near[int(np.argmin(search.cost(near, zero)))]
-    return np.asarray(near[np.argsort(search.cost(near, zero))])
+    near = tries[np.argsort(search.cost(tries, zero))[:_STARTS]]
+    found = list[FloatArray]()
+    for width in _WIDTHS:
+        steps = rng.normal(size=(_NEAR, *near.shape)) * width * (upper - lower)
+        groups = np.concatenate([near[None], np.clip(near + steps, lower, upper)])
+        costs = search.cost(groups.reshape(-1, len(chain)), zero).reshape(groups.shape[:2])
+        near = groups[np.argmin(costs, axis=0), np.arange(len(near))]
+        found.append(groups.reshape(-1, len(chain)))
+    every = np.concatenate(found)
+    return np.asarray(every[np.argsort(search.cost(every, zero))[:_MOST]])
 
 
 def outline(points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -57,16 +74,22 @@ class _Search:
     """Costs of the postures of a chain."""
 
     def __init__(
-        self, tree: KinematicTree, chain: Sequence[UrdfJoint], low: FloatArray, high: FloatArray, ground_m: float
+        self,
+        tree: KinematicTree,
+        chain: Sequence[UrdfJoint],
+        within: tuple[FloatArray, FloatArray],
+        ground_m: float,
+        leave: Collection[str],
     ) -> None:
-        self._tree, self._chain, self._low, self._high, self._ground_m = tree, chain, low, high, ground_m
+        self._tree, self._chain, self._ground_m = tree, chain, ground_m
+        self._low, self._high = within
         bodies = [{each.child for each in tree.below(joint)} for joint in chain] + [set[str]()]
         links = [[link for body in one - two for link in tree.links_of[body]] for one, two in pairwise(bodies)]
         self._points = [
             _box_of((tree.X_BL[joint.child].inverse() @ tree.points(each).T).T)
             for joint, each in zip(chain, links, strict=True)
         ]
-        carried = {link for each in links for link in each}
+        carried = {*leave, *(link for each in links for link in each)}
         self._obstacles = [
             (tree.X_BL[link].inverse().GetAsMatrix34(), points.min(axis=0), points.max(axis=0))
             for link in tree.urdf.links
@@ -97,7 +120,8 @@ class _Search:
     def _overhang(self, points: FloatArray) -> FloatArray:
         if not points.shape[1]:
             return np.zeros(len(points))
-        beyond = np.maximum(points[..., :2] - self._high, self._low - points[..., :2]).max(axis=(1, 2))
+        sides = np.maximum(points[..., :2] - self._high, self._low - points[..., :2]).max(axis=1)
+        beyond = np.maximum(sides, 0.0).sum(axis=1)
         below = self._ground_m + _CLEAR_M - points[..., 2].min(axis=1)
         return np.asarray(np.maximum(0.0, np.maximum(beyond, 2.0 * below)))
 

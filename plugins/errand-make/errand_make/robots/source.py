@@ -32,27 +32,27 @@ def _expanded(path: Path, packages: Mapping[str, Path]) -> str:
     except ImportError as error:
         hint = f"install it by `pip install xacro`, or expand the file where ROS is: `xacro {path.name} > robot.urdf`"
         raise InputError("it is a xacro file, and the package xacro is not installed", hint=hint, file=path) from error
-    with _finding(arguments, packages, path):
+    missing = list[str]()
+    with _finding(arguments, packages, path, missing):
         try:
             return str(xacro.process_file(str(path)).toprettyxml(indent=" "))
-        except InputError:
-            raise
-        except Exception as error:
-            hint = f"try `xacro {path.name} > robot.urdf` where its packages are installed"
-            raise InputError(f"xacro does not expand it: {str(error)[:200]}", hint=hint, file=path) from error
+        except Exception as error:  # xacro evaluates the file's own expressions
+            what, hint = f"xacro does not expand it: {str(error)[:200]}", "correct it, or expand it where ROS is"
+            if missing:
+                what = f"there is no folder of package '{missing[0]}'"
+                hint = f"give its folder: --package {missing[0]}=DIR"
+            raise InputError(what, hint=hint, file=path) from error
 
 
 @contextmanager
-def _finding(arguments: Any, packages: Mapping[str, Path], path: Path) -> Iterator[None]:
-    """Lets `$(find NAME)` give the folder of a package, without an installation of ROS."""
+def _finding(arguments: Any, packages: Mapping[str, Path], path: Path, missing: list[str]) -> Iterator[None]:
+    """Lets `$(find NAME)` give the folder of a package without an installation of ROS; collects those `missing`."""
 
     def find(name: str) -> str:
-        if name in packages:
-            return str(packages[name])
-        found = package_folder(name, path)
+        found = packages.get(name) or package_folder(name, path)
         if found is None:
-            hint = f"give its folder: --package {name}=DIR"
-            raise InputError(f"there is no folder of package '{name}'", hint=hint, file=path)
+            missing.append(name)
+            raise LookupError(name)
         return str(found)
 
     before = arguments._eval_find

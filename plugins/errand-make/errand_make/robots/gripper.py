@@ -1,4 +1,4 @@
-"""Hand frame and geometry of a gripper, measured at the shapes of its fingers."""
+"""Hand frame and geometry of a gripper, measured at the shapes of its fingers, and working distances of its arm."""
 
 from __future__ import annotations
 
@@ -76,6 +76,39 @@ def measure_gripper(
     }
     names = [("-" if sign < 0 else "") + "xyz"[k] for k, sign in ((along, ahead[along]), (closing, apart))]
     return {"link": link, "along": names[0], "closing": names[1]}, gripper
+
+
+def hand_axes(tree: KinematicTree, last: UrdfJoint) -> dict[str, str]:
+    """Guess of a hand's axes: along what is behind the last joint, and across it."""
+    points = tree.body_points(last.child)
+    X_LB = tree.X_BL[last.child].inverse()
+    ahead = X_LB.rotation() @ tree.axis(last)
+    if len(points):
+        middle = X_LB @ points.mean(axis=0)
+        ahead = middle if float(np.linalg.norm(middle)) > 0.01 else ahead
+    k = int(np.argmax(np.abs(ahead)))
+    return {"link": last.child, "along": ("-" if ahead[k] < 0.0 else "") + "xyz"[k], "closing": "zxy"[k]}
+
+
+def arm_places(x_m: float, z_m: float, reach_m: float, tip_m: float, front_m: float) -> dict[str, Any]:
+    """Working distances of an arm with its shoulder at x_m and z_m of the body, as parts of its length.
+
+    They are those of Spot and Fetch: stands, nearer stands, carrying positions, and positions close to the body.
+    """
+    whole = reach_m + tip_m
+
+    def ahead(shares: Sequence[float]) -> list[float]:
+        return [rounded(max(front_m + 0.1, x_m + share * whole)) for share in shares]
+
+    return {
+        "max_reach": rounded(reach_m),
+        "max_payload": 2.0,
+        "standing": ahead((0.64, 0.675, 0.605, 0.71, 0.57, 0.535, 0.745, 0.78)),
+        "nearer": ahead((0.53, 0.495, 0.46, 0.425)),
+        "carry_x": [rounded(x_m + share * whole) for share in (0.42, 0.375, 0.33, 0.465, 0.51)],
+        "carry_z": [rounded(z_m + each) for each in (0.07, 0.13, 0.19, 0.25, 0.31, 0.39, 0.47)],
+        "tuck_x": [rounded(front_m + each) for each in (0.02, 0.07)],
+    }
 
 
 def rounded(value: float) -> float:

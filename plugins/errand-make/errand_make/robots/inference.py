@@ -12,7 +12,8 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from errand_make.robots.gripper import measure_gripper, rounded, why_no_gripper
+from errand_make.robots.base import LIDAR, floor_m, front_rotation, motion_of, outline_polygon
+from errand_make.robots.gripper import arm_places, hand_axes, measure_gripper, rounded, why_no_gripper
 from errand_make.robots.inertia import repair_masses
 from errand_make.robots.parts import Arm, Drive, Parts, find_parts, is_camera, standing_legs
 from errand_make.robots.posture import held_postures, positions
@@ -26,13 +27,10 @@ from skills.inputs.yaml_source import yaml_of
 from skills.robot import Capabilities, FloatArray
 
 ROBOT_FILE: Final = "robot.yaml"
-_LIDAR: Final = re.compile(r"lidar|laser|scan|hokuyo|velodyne|rplidar|ouster|sick|(^|_)lds", re.IGNORECASE)
 _NO_LIDAR: Final = re.compile(r"rgbd|depth|camera|tilt|virtual", re.IGNORECASE)
 _MOST_CAMERAS: Final = 4
 _NEAR_M: Final = 0.1
 """Distance within which two links are one camera."""
-_ROUND: Final = 0.08
-_CORNERS: Final = 12
 _LEAST_LIDAR_M: Final = 0.06
 _LIDAR_M: Final = 0.25
 """Height of a LiDAR that the file lacks."""
@@ -114,7 +112,7 @@ class Inference:
                 turn = _Z_AHEAD
                 self.notes.append(("base", "its legs stand towards -y: y is taken as up, and z as ahead"))
         elif parts.drive in (Drive.AXLE, Drive.STEERED) and abs(float(parts.mounted[0].axis_B[1])) < 0.95:
-            turn = _front(tree, parts)
+            turn = front_rotation(tree, parts)
             yaw_rad = float(RollPitchYaw(turn).yaw_angle())
             front = {90: "y", -90: "-y"}.get(round(math.degrees(yaw_rad)), f"at {math.degrees(yaw_rad):.0f} degrees")
             axis = "x" if abs(float(parts.mounted[0].axis_B[0])) > 0.95 else "a skew axis"
@@ -135,7 +133,7 @@ class Inference:
 
     def _hold(self, tree: KinematicTree, parts: Parts) -> Found:
         """Chooses the arm, and finds the posture in which all that no part drives is held."""
-        ground_m = _ground_m(tree, parts)
+        ground_m = floor_m(tree, parts)
         arms = sorted(parts.arms, key=lambda arm: (why_no_gripper(tree, arm) != "", -len(arm.joints)))
         arm = arms[0] if arms else None
         held = dict(tree.posture)
@@ -185,7 +183,7 @@ class Inference:
         if not len(points):
             points = np.array([[-0.25, -0.25, 0.0], [0.25, 0.25, 0.3]])
             self.notes.append(("base", "its links have no shapes: write footprint and height"))
-        motion, note = _motion(parts)
+        motion, note = motion_of(parts)
         data: dict[str, Any] = {"link": self._base, "motion": motion}
         data["height"] = rounded(max(0.0, -found.ground_m))
         data["footprint"] = outline_polygon(points[:, :2])
@@ -235,7 +233,7 @@ class Inference:
 
     def _lidar(self) -> str:
         tree, ground_m = self.found.tree, self.found.ground_m
-        found = [*self._simulated("ray|lidar"), *(link for link in self.urdf.links if _LIDAR.search(link))]
+        found = [*self._simulated("ray|lidar"), *(link for link in self.urdf.links if LIDAR.search(link))]
         fixed = [link for link in dict.fromkeys(found) if tree.body_of[link] == tree.root and not is_camera(link)]
         fixed = [link for link in fixed if float(tree.X_BL[link].translation()[2]) - ground_m > _LEAST_LIDAR_M]
         ahead_m = {link: float(tree.X_BL[link].translation()[0]) for link in fixed}
@@ -314,7 +312,7 @@ class Inference:
 
     def _add_arm(self, arm: Arm) -> None:
         tree, last = self.found.tree, arm.joints[-1]
-        hand, tip_m, gripper = _hand_axes(tree, last), 0.0, None
+        hand, tip_m, gripper = hand_axes(tree, last), 0.0, None
         why = why_no_gripper(tree, arm)
         if why:
             self.notes.append(("arm", f"no gripper is taken: {why}; the axes of the hand are a guess"))
@@ -355,104 +353,6 @@ def _fixed_link(name: str, parent: str, place: str, rpy: str) -> str:
 
 def _carried(tree: KinematicTree, chain: Sequence[UrdfJoint]) -> list[str]:
     return tree.links_below(chain[0]) if chain else []
-
-
-def _front(tree: KinematicTree, parts: Parts) -> RotationMatrix:
-    """Rotation of the base's frame to the front of wheels that do not turn about y."""
-    ahead = np.cross(parts.mounted[0].axis_B, [0.0, 0.0, 1.0])[:2]
-    ahead = ahead * (1.0 if ahead[np.argmax(np.abs(ahead))] > 0.0 else -1.0)
-    looking = [tree.X_BL[link].translation()[:2] for link in tree.urdf.links if is_camera(link) or _LIDAR.search(link)]
-    looking += [tree.place(arm.joints[0])[:2] for arm in parts.arms]
-    middle = np.mean([each.p_B[:2] for each in parts.mounted], axis=0)
-    if looking and float((np.mean(looking, axis=0) - middle) @ ahead) < -0.05:
-        ahead = -ahead
-    return RotationMatrix.MakeZRotation(math.atan2(float(ahead[1]), float(ahead[0])))
-
-
-def _ground_m(tree: KinematicTree, parts: Parts) -> float:
-    """Height of the floor in B: below wheels and legs, else below the body that stands on it."""
-    if parts.wheels:
-        return min(float(each.p_B[2]) - each.radius_m for each in parts.wheels)
-    if parts.legs:
-        return min(float(tree.points(tree.links_below(leg))[:, 2].min()) for leg in parts.legs)
-    if tree.drives_by_joints:
-        return float(tree.X_BL[tree.urdf.root].translation()[2])
-    points = tree.body_points(tree.root)
-    return float(points[:, 2].min()) if len(points) else 0.0
-
-
-def _motion(parts: Parts) -> tuple[str, str]:
-    """How a base drives, with a note on how that is known."""
-    count = len(parts.wheels)
-    if parts.drive is Drive.AXLE:
-        note = f"{len(parts.mounted)} wheels were found"
-        if len(parts.mounted) > 2:
-            note += ", which turn the base by skidding (with mecanum wheels, write motion: omnidirectional)"
-        across = [float(each.p_B[1]) for each in parts.mounted]
-        if max(across) - min(across) < 0.03:
-            note += ", all in one line, so that the real robot does not turn on the spot as Errand plans"
-        return "differential", note
-    if parts.drive is Drive.STEERED:
-        joints = listing([each.swivel.name for each in parts.wheels if each.swivel is not None and not each.is_caster])
-        what = f"{count} wheels were found, steered by {joints} as a car is"
-        return (
-            "differential",
-            f"{what}; Errand has no such base: it plans turns on the spot, which this robot does not make",
-        )
-    guess = "omnidirectional is a guess (else write motion: differential)"
-    if parts.drive is Drive.ROLLERS:
-        return "omnidirectional", f"{count} mecanum or omni wheels were found; {guess}"
-    if parts.drive is Drive.SWERVE:
-        return "omnidirectional", f"{count} wheels were found, all on swivels; {guess}"
-    if parts.drive is Drive.LEGS:
-        what = f"{len(parts.legs)} legs were found; they are held, and a floating base moves the robot as it does Spot"
-        return "omnidirectional", what
-    return "omnidirectional", f"0 wheels turn in this file; {guess}"
-
-
-def _hand_axes(tree: KinematicTree, last: UrdfJoint) -> dict[str, str]:
-    """Guess of a hand's axes: along what is behind the last joint, and across it."""
-    points = tree.body_points(last.child)
-    X_LB = tree.X_BL[last.child].inverse()
-    ahead = X_LB.rotation() @ tree.axis(last)
-    if len(points):
-        middle = X_LB @ points.mean(axis=0)
-        ahead = middle if float(np.linalg.norm(middle)) > 0.01 else ahead
-    k = int(np.argmax(np.abs(ahead)))
-    return {"link": last.child, "along": ("-" if ahead[k] < 0.0 else "") + "xyz"[k], "closing": "zxy"[k]}
-
-
-def arm_places(x_m: float, z_m: float, reach_m: float, tip_m: float, front_m: float) -> dict[str, Any]:
-    """Working distances of an arm with its shoulder at x_m and z_m of the body, as parts of its length.
-
-    They are those of Spot and Fetch: stands, nearer stands, carrying positions, and positions close to the body.
-    """
-    whole = reach_m + tip_m
-
-    def ahead(shares: Sequence[float]) -> list[float]:
-        return [rounded(max(front_m + 0.1, x_m + share * whole)) for share in shares]
-
-    return {
-        "max_reach": rounded(reach_m),
-        "max_payload": 2.0,
-        "standing": ahead((0.64, 0.675, 0.605, 0.71, 0.57, 0.535, 0.745, 0.78)),
-        "nearer": ahead((0.53, 0.495, 0.46, 0.425)),
-        "carry_x": [rounded(x_m + share * whole) for share in (0.42, 0.375, 0.33, 0.465, 0.51)],
-        "carry_z": [rounded(z_m + each) for each in (0.07, 0.13, 0.19, 0.25, 0.31, 0.39, 0.47)],
-        "tuck_x": [rounded(front_m + each) for each in (0.02, 0.07)],
-    }
-
-
-def outline_polygon(points: FloatArray) -> list[list[float]]:
-    """Footprint of points (N, 2) seen from above: a circle's polygon where they fit one well, else their rectangle."""
-    (left, back), (right, front) = points.min(axis=0), points.max(axis=0)
-    middle, half = np.array([(left + right) / 2.0, (back + front) / 2.0]), (right - left + front - back) / 4.0
-    radius = float(np.linalg.norm(points - middle, axis=1).max())
-    if radius < half * (1.0 + _ROUND) and float(np.linalg.norm(middle)) < _NEAR_M / 3.0:
-        out = radius / math.cos(math.pi / _CORNERS)
-        turns = (np.arange(_CORNERS) + 0.5) * math.tau / _CORNERS
-        return [[rounded(out * math.cos(a)), rounded(out * math.sin(a))] for a in turns]
-    return [[rounded(x), rounded(y)] for x, y in ((right, front), (left, front), (left, back), (right, back))]
 
 
 def write_robot_file(

@@ -82,7 +82,7 @@ class TakePicture(LookingSkill[TakePictureInputs]):
     def _viewpoints(self, p_BT: FloatArray) -> Sequence[FloatArray]:
         """Positions p_BC of the hand camera; none for another camera."""
         turns_rad = _ASIDE_RAD if self.object_camera.on_hand else ()
-        return [p_BC for turn_rad in turns_rad for p_BC in overview_viewpoints(self.model, p_BT, turn_rad)]
+        return [p_BC for turn_rad in turns_rad for p_BC in overview_viewpoints(self.p_BS, p_BT, turn_rad)]
 
     def _taken(self, of: str, image: Image) -> Succeeded:
         """Publishes a picture with the camera's pose and the time. Raises SkillFailure for a dark picture."""

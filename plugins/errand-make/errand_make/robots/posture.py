@@ -23,6 +23,8 @@ _STICKS_OUT_M: Final = 0.02
 _CLEAR_M: Final = 0.05
 """Least height of a held chain over the floor."""
 _INSIDE_M: Final = 0.005
+_WEIGHTS: Final = np.array([1.0, 4.0])
+"""Costs of a metre beyond the outline, ahead or behind, and to a side, which decides what doors the robot passes."""
 _HIT: Final = 3.0
 """Cost of a chain whose points are all inside the robot, in metres beyond the outline."""
 _UP: Final = 0.05
@@ -121,7 +123,7 @@ class _Search:
         if not points.shape[1]:
             return np.zeros(len(points))
         sides = np.maximum(points[..., :2] - self._high, self._low - points[..., :2]).max(axis=1)
-        beyond = np.maximum(sides, 0.0).sum(axis=1)
+        beyond = np.maximum(sides, 0.0) @ _WEIGHTS
         below = self._ground_m + _CLEAR_M - points[..., 2].min(axis=1)
         return np.asarray(np.maximum(0.0, np.maximum(beyond, 2.0 * below)))
 

@@ -41,7 +41,7 @@ def test_a_held_chain_counts_as_fixed(render):
 def test_a_driven_link_is_refused_with_its_line_and_the_moments_of_its_box(render, tmp_path):
     arm = list(cart.arm())
     arm[4] = arm[4].replace("ixx=", 'ixx="9" was=')
-    with pytest.raises(InputError, match="link arm_3 moves.* of no body") as refused:
+    with pytest.raises(InputError, match=r"link arm_3 moves.* of no body") as refused:
         render(cart.base(), cart.wheels(), arm)
     line = (tmp_path / "cart.urdf").read_text().splitlines()[refused.value.line - 1]
     assert 'name="arm_3"' in line and '<inertia ixx="' in refused.value.hint

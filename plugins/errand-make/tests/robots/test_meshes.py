@@ -52,7 +52,7 @@ def test_a_sticker_of_two_triangles_has_a_hull(render, tmp_path):
 
 @pytest.mark.parametrize("scale", ["", ' scale="1 1 1"'])
 def test_a_mesh_in_millimetres_without_a_scale_is_refused_with_its_line(render, scale):
-    with pytest.raises(InputError, match="hood.stl is 300 m long.*millimetre") as refused:
+    with pytest.raises(InputError, match=r"hood.stl is 300 m long.*millimetre") as refused:
         render(trimesh.creation.box((300, 200, 100)), "visual", scale=scale)
     assert refused.value.line and 'scale="0.001 0.001 0.001"' in refused.value.hint
 

@@ -16,7 +16,7 @@ from errand_make.robots.base import LIDAR, floor_m, front_rotation, motion_of, o
 from errand_make.robots.gripper import arm_places, hand_axes, measure_gripper, rounded, why_no_gripper
 from errand_make.robots.inertia import repair_masses
 from errand_make.robots.parts import Arm, Drive, Parts, find_parts, is_camera, standing_legs
-from errand_make.robots.posture import held_postures, positions
+from errand_make.robots.posture import SIDE_WEIGHTS, held_postures, positions
 from errand_make.robots.source import edited_text
 from errand_make.robots.tree import KinematicTree, planar_joints
 from plant.robots.urdf_robot.kind import urdf_kind
@@ -204,23 +204,23 @@ class Inference:
     def stowed(self, angles: FloatArray, free: Callable[[Sequence[FloatArray]], FloatArray]) -> FloatArray:
         """Angles of the stowed arm: the given ones, unless free ones are found that stick out less."""
         found, polygon = self.found, np.array(self.data["base"]["footprint"])
-        if self._overhang_m(self.arm_points(angles)) <= _OVERHANG_M or found.arm is None:
+        if self._overhang_m(self.arm_points(angles)).max() <= _OVERHANG_M or found.arm is None:
             return angles
         corners = np.column_stack([polygon, np.zeros(len(polygon))])
         tries = held_postures(found.tree, found.arm.joints, corners, found.ground_m)
         other = free(list(tries))
-        less = self._overhang_m(self.arm_points(other)) < self._overhang_m(self.arm_points(angles))
-        return other if less else angles
+        less = self._overhang_m(self.arm_points(other)) @ SIDE_WEIGHTS
+        return other if less < self._overhang_m(self.arm_points(angles)) @ SIDE_WEIGHTS else angles
 
-    def _overhang_m(self, points_B: FloatArray) -> float:
-        """Distance by which points stick out of the footprint."""
+    def _overhang_m(self, points_B: FloatArray) -> FloatArray:
+        """Distances (2,) by which points stick out of the footprint along x and y."""
         polygon = np.array(self.data["base"]["footprint"])
         low, high = polygon.min(axis=0), polygon.max(axis=0)
-        return float(np.maximum(points_B[:, :2] - high, low - points_B[:, :2]).max(initial=0.0))
+        return np.asarray(np.maximum(points_B[:, :2] - high, low - points_B[:, :2]).max(axis=0, initial=0.0))
 
     def widen_footprint(self, points_B: FloatArray) -> None:
         """Lets the footprint contain the stowed arm, where it sticks out."""
-        beyond_m = self._overhang_m(points_B)
+        beyond_m = float(self._overhang_m(points_B).max())
         if beyond_m > _OVERHANG_M:
             polygon = np.array(self.data["base"]["footprint"])
             self.data["base"]["footprint"] = outline_polygon(np.vstack([polygon, points_B[:, :2]]))

@@ -72,7 +72,7 @@ class MeshCopies:
     def _path(self, mesh: Element) -> Path:
         """File of a mesh. Raises InputError with the line when there is none."""
         name, urdf = mesh.get("filename", ""), self.urdf
-        package, _, rest = name.removeprefix("package://").partition("/")
+        package, _, rest = name.removeprefix("package://").lstrip("/").partition("/")
         if not name.startswith("package://"):
             path = urdf.path.parent / name.removeprefix("file://")
         elif package in self.packages:

@@ -316,6 +316,8 @@ def _head(tree: KinematicTree, taken: set[str]) -> tuple[UrdfJoint, UrdfJoint] |
         if not before or tilt.name in taken or before[-1].name in taken:
             continue
         pan = before[-1]
+        if any(each.name in taken for each in tree.below(pan)):
+            continue
         turn = all(each.kind in TURNS for each in (pan, tilt))
         looks = any(is_camera(link) for link in tree.links_below(tilt))
         if looks and turn and tree.is_vertical(pan) and abs(float(tree.axis(tilt)[1])) > 0.99:

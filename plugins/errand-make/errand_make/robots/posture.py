@@ -23,7 +23,7 @@ _STICKS_OUT_M: Final = 0.02
 _CLEAR_M: Final = 0.05
 """Least height of a held chain over the floor."""
 _INSIDE_M: Final = 0.005
-_WEIGHTS: Final = np.array([1.0, 4.0])
+SIDE_WEIGHTS: Final = np.array([1.0, 4.0])
 """Costs of a metre beyond the outline, ahead or behind, and to a side, which decides what doors the robot passes."""
 _HIT: Final = 3.0
 """Cost of a chain whose points are all inside the robot, in metres beyond the outline."""
@@ -62,9 +62,12 @@ def held_postures(
         groups = np.concatenate([near[None], np.clip(near + steps, lower, upper)])
         costs = search.cost(groups.reshape(-1, len(chain)), zero).reshape(groups.shape[:2])
         near = groups[np.argmin(costs, axis=0), np.arange(len(near))]
-        found.append(groups.reshape(-1, len(chain)))
-    every = np.concatenate(found)
-    return np.asarray(every[np.argsort(search.cost(every, zero))[:_MOST]])
+        found.append(groups)
+    best = [
+        each[np.argsort(search.cost(each, zero))[: _MOST // _STARTS]] for each in np.concatenate(found).swapaxes(0, 1)
+    ]
+    every = np.concatenate(best)
+    return np.asarray(every[np.argsort(search.cost(every, zero))])
 
 
 def outline(points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -123,7 +126,7 @@ class _Search:
         if not points.shape[1]:
             return np.zeros(len(points))
         sides = np.maximum(points[..., :2] - self._high, self._low - points[..., :2]).max(axis=1)
-        beyond = np.maximum(sides, 0.0) @ _WEIGHTS
+        beyond = np.maximum(sides, 0.0) @ SIDE_WEIGHTS
         below = self._ground_m + _CLEAR_M - points[..., 2].min(axis=1)
         return np.asarray(np.maximum(0.0, np.maximum(beyond, 2.0 * below)))
 

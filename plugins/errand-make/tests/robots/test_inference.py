@@ -202,6 +202,19 @@ def test_a_head_whose_tilt_turns_about_minus_y_is_turned_round(make):
     assert "the axis of tilt_joint is turned round" in made.notes
 
 
+def test_a_trunk_that_turns_an_arm_is_no_pan_of_a_head(make):
+    waist = [link("waist", 3, box("0.1 0.1 0.1")), joint("waist_joint", "revolute", "base_link", "waist", "0 0 0.3",
+             axis="0 0 1", limit=(-1, 1, 50, 1))]  # fmt: skip
+    nod = [
+        link("nod", 0.3, box("0.05 0.05 0.05")),
+        '<link name="eye_camera"/>',
+        joint("eye", "fixed", "nod", "eye_camera"),
+    ]
+    nod.append(joint("nod_joint", "revolute", "waist", "nod", "0 0 0.6", axis="0 1 0", limit=(-1, 1, 5, 1)))
+    made = make(cart.base(), cart.wheels(), waist, nod, cart.arm(parent="waist"))
+    assert "head" not in made.data and made.data["arm"]["joints"] == ARM
+
+
 def test_a_chain_without_a_camera_is_no_head(make):
     made = make(cart.base(), cart.wheels(), [part.replace("head_camera_optical_frame", "nose") for part in cart.head()])
     assert "head" not in made.data and "pan_joint" in made.data["held"]

@@ -262,7 +262,9 @@ def _next(tree: KinematicTree, joint: UrdfJoint, ground: frozenset[str]) -> Urdf
     long = [each for each in after if not each.mimics and _depth(tree, each) >= LEAST_ARM - 1]
     if len(after) == 1:
         return None if after[0].mimics else after[0]
-    return long[0] if len(long) == 1 and all(_depth(tree, each) == 1 for each in after if each is not long[0]) else None
+    others = [each for each in after if len(long) == 1 and each is not long[0]]
+    looks = any(is_camera(link) for each in others for link in tree.links_below(each))
+    return long[0] if others and not looks and all(_depth(tree, each) <= 1 for each in others) else None
 
 
 def _depth(tree: KinematicTree, joint: UrdfJoint) -> int:

@@ -365,8 +365,8 @@ class Skill(ABC, Generic[InputsT]):
     what is done. `gripper_before` says whether the gripper must hold an object when the skill begins (True), must be
     empty (False), or either (None). `gripper_after` says whether the gripper holds an object after success; None means
     that the skill does not change this. `uses` are the resources that the skill occupies: skills that share none may
-    run in parallel. `Options` is a frozen dataclass with the skill's settings in a stack file; every field has a
-    default.
+    run in parallel. `needs_camera`: the skill looks with the robot's camera. `Options` is a frozen dataclass with the
+    skill's settings in a stack file; every field has a default.
 
     `max_data_age_s` is the largest age (s) of the data on which a success rests. Its keys are sense verbs (not
     `image`), "localisation", or output ports whose values have a `stamp_s`. A success on older data is a failed
@@ -383,6 +383,7 @@ class Skill(ABC, Generic[InputsT]):
     gripper_before: ClassVar[bool | None] = None
     gripper_after: ClassVar[bool | None] = None
     uses: ClassVar[frozenset[Part]] = WHOLE_ROBOT
+    needs_camera: ClassVar[bool] = False
     Options: ClassVar[type] = NoOptions
     checkpoint: Mapping[str, Any] = MappingProxyType({})
 

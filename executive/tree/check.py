@@ -18,7 +18,7 @@ from executive.tree.plan import StepPart
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import area_m2
-from skills.api import FreeSpace, PlanningError, Zone, ZoneKind
+from skills.api import FreeSpace, Part, PlanningError, Zone, ZoneKind
 from skills.inputs.errors import InputError, SourceLine, listing, suggestion
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import Path, path_length
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 _TAKE_PICTURE: Final = "take_picture"
 Fault = tuple[str, str]
 """Error in a part of a mission, and a hint."""
+_OTHER_KIND: Final = "choose another kind of robot"
 
 
 @dataclass(frozen=True)
@@ -40,11 +41,12 @@ class Abilities:
     """Abilities of the robot and properties of the objects that are known before a run.
 
     `masses_kg` has the mass of each class with a model, `lift_kg` is the arm's payload. The detector recognises
-    `classes` and `attributes`; a search for several objects fails for any others. `reaches_m` are the heights of
-    the lowest and the highest reachable surface. `widths_m` has the least width of each class, `opens_m` is the
-    gripper's maximum opening; `gripper` is False without a gripper. `cameras` are the robot's cameras with their
-    heights in m (infinite for one that moves). `takers` are the people who take objects from the robot (None:
-    unknown). `taken_m2` is the covered area of each surface, `apart_m` the clearance around an object.
+    `classes` and `attributes`; a search for several objects fails for any others. `reaches_m` are the heights of the
+    lowest and the highest reachable surface. `widths_m` has the least width of each class, `opens_m` is the gripper's
+    maximum opening; `gripper` is False without a gripper, `arm` without an arm, `looks` without a camera for objects.
+    `cameras` are the robot's cameras with their heights in m (infinite for one that moves). `takers` are the people who
+    take objects from the robot (None: unknown). `taken_m2` is the covered area of each surface, `apart_m` the clearance
+    around an object.
     """
 
     masses_kg: Mapping[str, float]
@@ -55,6 +57,8 @@ class Abilities:
     widths_m: Mapping[str, float] = field(default_factory=dict)
     opens_m: float = math.inf
     gripper: bool = True
+    arm: bool = True
+    looks: bool = True
     takers: frozenset[str] | None = None
     taken_m2: Mapping[str, float] = field(default_factory=dict)
     apart_m: float = 0.0
@@ -194,7 +198,11 @@ def _objection(part: StepPart, held: InGripper | None, knowledge: Knowledge, abi
     if part.command is not None or skill is None:
         return None if part.command is None else objection(part.command, held, knowledge)
     if not abilities.gripper and (skill.gripper_before is not None or skill.gripper_after is not None):
-        return f"this kind of robot has no gripper, which {skill.name} needs", "choose another kind of robot"
+        return f"this kind of robot has no gripper, which {skill.name} needs", _OTHER_KIND
+    if not abilities.arm and skill.uses == {Part.ARM}:
+        return f"this kind of robot has no arm, which {skill.name} needs", _OTHER_KIND
+    if not abilities.looks and skill.needs_camera:
+        return f"this kind of robot has no camera, which {skill.name} needs", _OTHER_KIND
     if skill.gripper_before is True and held is None:
         return f"{skill.name} needs an object in the gripper, and no step before has grasped one", "grasp one first"
     if skill.gripper_before is False and held is not None and held.sure:
@@ -210,7 +218,10 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
     handles = command.item is not None or command.task in (Task.GRASP, Task.PLACE)
     if handles and not abilities.gripper:
         what = command.item or command.object
-        yield f"this kind of robot has no gripper to take the {what} with", "choose another kind of robot"
+        yield f"this kind of robot has no gripper to take the {what} with", _OTHER_KIND
+        return
+    if command.task is Task.FIND and not abilities.looks:
+        yield f"this kind of robot has no camera to look for the {command.object} with", _OTHER_KIND
         return
     yield from _nobody_takes(command, knowledge, abilities)
     if (command.item is not None or command.task is Task.GRASP) and command.goal is not None:
@@ -246,7 +257,7 @@ def _unseen(root: NodeSpec, abilities: Abilities) -> tuple[InputError, ...]:
         inputs = {name: each.value for name, each in node.options["inputs"].items() if isinstance(each, Constant)}
         camera, cameras = str(inputs.get("camera", "")).lower().replace(" ", ""), abilities.cameras
         if camera and camera not in cameras:
-            hint = suggestion(camera, cameras) if cameras else "choose another kind of robot"
+            hint = suggestion(camera, cameras) if cameras else _OTHER_KIND
             what = f"the robot has no camera '{inputs['camera']}'"
         elif camera and inputs.get("top") and cameras[camera] <= inputs["point_W"][2]:
             top_m, hint = inputs["point_W"][2], "leave the camera out, or name a higher one"

@@ -67,13 +67,14 @@ class Detect(LookingSkill[DetectInputs]):
     """Searches surfaces for objects without driving. Stows the arm when it finds too few."""
 
     name = "detect"
+    needs_camera = True
     Inputs = DetectInputs
     outputs: ClassVar[Mapping[str, type]] = {
         "observation": ObjectObservation,
         "observations": tuple[ObjectObservation, ...],
     }
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "a class, attribute or surface cannot be searched for from here, or there is no arm",
+        Cause.PRECONDITION: "a class, attribute or surface cannot be searched for from here, or there is no camera",
         Cause.PLANNING: "the arm reaches no viewpoint",
         Cause.EXECUTION: "the arm did not reach its viewpoint, or the camera shows nothing",
         Cause.POSTCONDITION: "no such object is seen, or fewer than asked for",
@@ -123,7 +124,7 @@ class Detect(LookingSkill[DetectInputs]):
             raise SkillFailure(Cause.PRECONDITION, f"I do not know what {', '.join(unknown)} looks like")
         if not inputs.surfaces:
             raise SkillFailure(Cause.PRECONDITION, "there is no surface to look at")
-        assert self.model is not None
+        _ = self.object_camera
 
     def _targets(self, inputs: DetectInputs, X_WB: RigidTransform) -> list[FloatArray]:
         """Points p_BT to view, in this order."""
@@ -133,7 +134,7 @@ class Detect(LookingSkill[DetectInputs]):
         nearest_first = sorted(
             inputs.surfaces, key=lambda s: float(np.min(np.linalg.norm(np.asarray(s.polygon_W) - here, axis=1)))
         )
-        return [target for surface in nearest_first for target in look_targets(surface, X_WB, self.model.p_BS)]
+        return [target for surface in nearest_first for target in look_targets(surface, X_WB, self.p_BS)]
 
     def _has_enough(self, inputs: DetectInputs) -> bool:
         return 0 < inputs.count <= len(self._sure(inputs))
@@ -194,7 +195,7 @@ class Detect(LookingSkill[DetectInputs]):
         if (track := self._old_result(inputs)) is not None:  # hidden from there: use the viewpoint of its last view
             X_BW = self.X_WB().inverse()
             p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
-            viewpoints = [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
+            viewpoints = [*viewpoints_beside(self.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
             with PlanningAttempt():
                 yield from self.look(inputs, p_BO, viewpoints)
 
@@ -234,10 +235,10 @@ class Detect(LookingSkill[DetectInputs]):
 
     def _viewpoints(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
         """Camera positions p_BC to view p_BT, rotated by shift_rad about the shoulder; near ones first if `close`."""
-        far = overview_viewpoints(self.model, p_BT, shift_rad, self._height_m)
+        far = overview_viewpoints(self.p_BS, p_BT, shift_rad, self._height_m)
         if abs(shift_rad) >= max(map(abs, self.options.around_rad)):
-            far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))
-        return [*close_viewpoints(self.model.p_BS, p_BT, shift_rad), *far] if close else far
+            far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.p_BS)[:2])))
+        return [*close_viewpoints(self.p_BS, p_BT, shift_rad), *far] if close else far
 
     def _confirming(self, track: Track, tries: int, *, close: bool) -> list[FloatArray]:
         """Camera positions for the first, second or third confirming view of a track.
@@ -247,8 +248,8 @@ class Detect(LookingSkill[DetectInputs]):
         X_BW = self.X_WB().inverse()
         p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
         if tries > len(self.options.confirm_shifts_rad):
-            return [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
-        seen_rad, bearing = _bearing(eye_B - self.model.p_BS), _bearing(p_BO - self.model.p_BS)
+            return [*viewpoints_beside(self.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
+        seen_rad, bearing = _bearing(eye_B - self.p_BS), _bearing(p_BO - self.p_BS)
         off = {shift: abs(wrap(bearing + shift - seen_rad)) for shift in self.options.confirm_shifts_rad}
         shifts_rad = sorted(self.options.confirm_shifts_rad, key=lambda shift: -off[shift])
         return self._viewpoints(p_BO, shifts_rad[tries - 1], close=close)

@@ -46,6 +46,8 @@ class Stow(ArmSkill[StowInputs]):
 
         On a raised body the arm moves first, because it would press on obstacles below while the body sinks.
         """
+        if self.context.robot.capabilities().arm is None:
+            return Succeeded("there is no arm to stow")
         yield from self.feel_arm("stowing the arm")
         usual_m = self.context.robot.capabilities().standing_height_m
         if self.context.robot.odometry().X_OB.translation()[2] > usual_m + _RAISED_M:

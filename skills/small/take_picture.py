@@ -47,6 +47,7 @@ class TakePicture(LookingSkill[TakePictureInputs]):
     """Points a camera at something and publishes one picture with the camera's pose. Does not drive."""
 
     name = "take_picture"
+    needs_camera = True
     Inputs = TakePictureInputs
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "the robot has no such camera, or nothing is named to point it at",
@@ -106,7 +107,7 @@ class TakePicture(LookingSkill[TakePictureInputs]):
     def _viewpoints(self, p_BT: FloatArray) -> Sequence[FloatArray]:
         """Positions p_BC of the hand camera; none for another camera."""
         turns_rad = _ASIDE_RAD if self.object_camera.on_hand else ()
-        return [p_BC for turn_rad in turns_rad for p_BC in overview_viewpoints(self.model, p_BT, turn_rad)]
+        return [p_BC for turn_rad in turns_rad for p_BC in overview_viewpoints(self.p_BS, p_BT, turn_rad)]
 
     def _confirmed_pose(self, image: Image, message: str) -> Routine[RigidTransform]:
         """Returns the pose X_WC of a picture's camera once a later scan agrees with the map. Raises SkillFailure."""

@@ -149,6 +149,8 @@ def abilities_of(kind: str) -> Abilities:
         {name: form.width_m[0] for name, form in class_forms().items()},
         math.inf if capabilities.gripper is None else capabilities.gripper.max_grasp_m,
         capabilities.gripper is not None and capabilities.arm is not None,
+        capabilities.arm is not None,
+        capabilities.object_camera is not None,
         cameras={each.source: _height_m(each, capabilities) for each in capabilities.cameras},
     )
 

@@ -257,7 +257,7 @@ class Assembly:
                 if copied.find("origin") is None:
                     _add_origin(copied, X_CS)
                 copied.append(geometry)
-                if (material := shape.find("material")) is not None:
+                if mesh is None and (material := shape.find("material")) is not None:
                     copied.append(self._with_colour(material))
                 if contact is not None:
                     copied.append(contact)
@@ -303,12 +303,12 @@ class Assembly:
 
     def _add_inertial(self, element: Element, carrier: str, members: list[str]) -> None:
         whole = _joined([mass for link in members if (mass := self._mass(link)) is not None])
-        line = int(self.urdf.links[members[0]].get("line", "1"))
         if whole is None:
             if carrier in self.casters:
                 return
-            hint = "write <inertial> with mass and inertia into it"
-            raise self.urdf.error(line, f"link {carrier} moves and has no mass", hint)
+            link = next((each for each in members if self.urdf.shapes(each, "visual")), members[0])
+            what, hint = f"link {link} has no mass", "write <inertial> with mass and inertia into it"
+            raise self.urdf.error(self.urdf.links[link], what, hint)
         inertial = ElementTree.SubElement(element, "inertial")
         ElementTree.SubElement(inertial, "origin", xyz=urdf_text.text(whole.com))
         ElementTree.SubElement(inertial, "mass", value=str(whole.mass_kg))

@@ -25,7 +25,8 @@ PACKAGE: Final = "robot"
 MOVING: Final = ("revolute", "continuous", "prismatic")
 MOST_BYTES: Final = 20_000_000
 _LINE: Final = "line"
-_XACRO: Final = re.compile(r"<xacro:|\$\{")
+_XACRO: Final = re.compile(r"""<xacro:|=\s*(?:"[^"]*|'[^']*)\$[{(]""")
+_COMMENT: Final = re.compile(r"<!--.*?-->", re.DOTALL)
 _EXPAND: Final = "expand it by `xacro FILE > robot.urdf`, and give that file"
 _LIMIT: Final = 'write <limit lower="..." upper="..." effort="..." velocity="..."/> into it'
 
@@ -71,11 +72,11 @@ class UrdfJoint:
 class UrdfFile:
     """URDF file whose errors name file and line."""
 
-    def __init__(self, path: Path) -> None:
-        """Reads the file. Raises InputError when it is no URDF, or its links form no tree."""
+    def __init__(self, path: Path, text: str | None = None) -> None:
+        """Reads the file, or `text` in its place. Raises InputError when it is no URDF, or its links form no tree."""
         self.path = path
-        text = read_text(path, most_bytes=MOST_BYTES, hint="check the path")
-        if path.suffix == ".xacro" or _XACRO.search(text) is not None:
+        text = read_urdf_text(path) if text is None else text
+        if is_xacro(text):
             raise InputError("it is a xacro file, not URDF", hint=_EXPAND, file=path)
         robot = _parse(path, text)
         if robot.tag != "robot":
@@ -155,14 +156,16 @@ class UrdfFile:
     @cached_property
     def order(self) -> Sequence[UrdfJoint]:
         """All joints, parents first. Raises InputError when joints form a loop."""
-        children, order, reached = list(self.joints.values()), list[UrdfJoint](), {self.root}
-        while children:
-            ready = [joint for joint in children if joint.parent in reached]
-            if not ready:
-                raise self.error(children[0].line, f"joint {children[0].name} is in a loop", "let the links be a tree")
-            order += ready
-            reached |= {joint.child for joint in ready}
-            children = [joint for joint in children if joint.child not in reached]
+        below = dict[str, list[UrdfJoint]]()
+        for joint in self.joints.values():
+            below.setdefault(joint.parent, []).append(joint)
+        order = list(below.get(self.root, ()))
+        for joint in order:
+            order += below.get(joint.child, ())
+        reached = {joint.child for joint in order}
+        for joint in self.joints.values():
+            if joint.child not in reached:
+                raise self.error(joint.line, f"joint {joint.name} is in a loop", "let the links be a tree")
         return tuple(order)
 
     def chain(self, link: str) -> list[UrdfJoint]:
@@ -208,6 +211,16 @@ class UrdfFile:
         lines = self.mesh_path(mesh).read_text(encoding="utf-8").splitlines()
         points = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], dtype=np.float64)
         return np.asarray(points * self.numbers(mesh, "scale", "1 1 1"))
+
+
+def read_urdf_text(path: Path) -> str:
+    """Text of a URDF or xacro file. Raises InputError."""
+    return read_text(path, most_bytes=MOST_BYTES, hint="check the path")
+
+
+def is_xacro(text: str) -> bool:
+    """True for text with elements or substitutions of xacro outside its comments."""
+    return _XACRO.search(_COMMENT.sub("", text)) is not None
 
 
 def _parse(path: Path, text: str) -> Element:

@@ -401,6 +401,8 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
         """Closes the empty gripper, if there is one, and folds the arm onto the body, unless it is folded already."""
+        if self.context.robot.capabilities().arm is None:
+            return
         stowed, reading = self.model.stowed_rad, self.context.robot.gripper()
         gripper = self.context.robot.capabilities().gripper
         is_open = gripper is not None and not reading.holding and reading.opening > gripper.like_turn(_OPEN_RAD)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from skills.api import Cause, InputsT, PlanningError
 from skills.estimate.scan_points import segment_distance
@@ -57,6 +58,15 @@ class LookingSkill(ArmSkill[InputsT]):
         if camera is None:
             raise SkillFailure(Cause.PRECONDITION, "the robot has no camera on hand or head, or ahead on its body")
         return camera
+
+    @property
+    def p_BS(self) -> FloatArray:
+        """Point (3,) about which viewpoints turn: the shoulder, or the camera of a robot without an arm."""
+        can, camera = self.context.robot.capabilities(), self.object_camera
+        if can.arm is not None:
+            return self.model.p_BS
+        X_BF = can.head.X_BF(0.0, 0.0) if can.head is not None and camera.mount is Mount.HEAD else RigidTransform()
+        return np.asarray((X_BF @ camera.X_FC).translation())
 
     def look_at(
         self,
@@ -124,7 +134,7 @@ class LookingSkill(ArmSkill[InputsT]):
                 break
             yield from self.pause(_ASK_AGAIN_S, f"the {camera.mount.value} camera shows nothing; {message}")
             self._doubted_s += self.context.clock.now() - begun_s
-        if not camera.on_hand:
+        if not camera.on_hand and robot.capabilities().arm is not None:
             image = mask_arm(image, self.arm_points_B(), _HELD_RADIUS_M if robot.gripper().holding else None)
         solid, X_WO = self.context.solid, self.context.localiser.estimate().X_WO
         solid.cells = add_picture(solid.cells, image, X_WO, self._outline())

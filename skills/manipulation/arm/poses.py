@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.manipulation.arm.collision import ArmScene
-from skills.manipulation.arm.kinematics import ArmModel, arm_model
+from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import ArmCapabilities, Capabilities, FloatArray, GripperCapabilities, Mount
 from skills.world_model import PlanningError
 
@@ -72,17 +72,17 @@ def look_configuration(
 
 
 def overview_viewpoints(
-    model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.0, height_m: float = 0.0
+    p_BS: FloatArray, p_BT: FloatArray, shift_rad: float = 0.0, height_m: float = 0.0
 ) -> list[FloatArray]:
-    """Camera positions above the shoulder towards p_BT, high ones first, rotated about the shoulder by shift_rad.
+    """Camera positions above the shoulder p_BS towards p_BT, high ones first, rotated about it by shift_rad.
 
     For an object too tall for the picture, viewpoints from farther back come first.
     """
     backs_m = (_BACK_M, 0.0) if height_m > TALL_M else (0.0,)
-    direction = np.arctan2(p_BT[1] - model.p_BS[1], p_BT[0] - model.p_BS[0]) + shift_rad
+    direction = np.arctan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0]) + shift_rad
     heading = np.array([np.cos(direction), np.sin(direction), 0.0])
     return [
-        model.p_BS + (radius - back_m) * heading + height * UP_B
+        p_BS + (radius - back_m) * heading + height * UP_B
         for back_m, height, radius in itertools.product(backs_m, (0.5, 0.44, 0.36), (0.22, 0.32, 0.42))
     ]
 

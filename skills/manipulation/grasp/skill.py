@@ -281,7 +281,7 @@ class Grasp(LookingSkill[GraspInputs]):
         if aside_rad != 0.0 or not self._looks_closely(p_BT):
             height_m = seen.size_m[2]
             near = close_viewpoints(self.model.p_BS, p_BT, aside_rad) if height_m < TALL_M else []
-            far = overview_viewpoints(self.model, p_BT, aside_rad, height_m)
+            far = overview_viewpoints(self.model.p_BS, p_BT, aside_rad, height_m)
             yield from self.look_at(p_BT, [*near, *far], message)
         image = yield from self.picture(message)
         place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector

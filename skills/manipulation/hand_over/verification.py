@@ -224,7 +224,7 @@ class HandOverVerification(ReleasingSkill[InputsT]):
         near = [[p_BC for p_BC in viewpoints if p_BC[2] < highest_m] for viewpoints in around]
         first = [*near[0], *near[1], *near[2]]
         second = [*near[1], *near[2], *near[0]]
-        return [(p_WT, first), (p_WT, second), (self.X_WB() @ p_BF, overview_viewpoints(self.model, p_BF))]
+        return [(p_WT, first), (p_WT, second), (self.X_WB() @ p_BF, overview_viewpoints(self.model.p_BS, p_BF))]
 
     def _turn_to(self, p_WT: FloatArray, viewpoints_B: Sequence[FloatArray], name: str, message: str) -> Routine[None]:
         """Points the camera at a point in the world; a hand without a path looks from where it is."""

@@ -135,7 +135,7 @@ class PlaceVerification(ReleasingSkill[InputsT]):
         self.boxes = [*surface_boxes([surface], X_WB), *beside]
         p_BT = X_WB.inverse() @ np.array([spot_W[0], spot_W[1], surface.height_m])
         low_BT = p_BS + (p_BT - p_BS) * [0.8, 0.8, 1.0]
-        viewpoints = close_viewpoints(p_BS, p_BT) if near else overview_viewpoints(self.model, low_BT)
+        viewpoints = close_viewpoints(p_BS, p_BT) if near else overview_viewpoints(self.model.p_BS, low_BT)
         yield from self.look_at(p_BT if near else low_BT, viewpoints, message, CARRY_SPEED_RAD_S)
         image = yield from self.picture(message)
         X_WO = self.context.localiser.estimate().X_WO

@@ -16,6 +16,7 @@ from executive.words.mission import Mission
 from executive.words.step import Place, Policy
 from executive.words.steps import Group, Loop, Repeat, Together
 from executive.words.zone import ZoneFacts
+from skills.api import Part
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap
 from skills.inputs.yaml_source import YamlSource
@@ -250,6 +251,7 @@ POINTED = CallSkill(skill="take_picture", values={"of": "it", "camera": "tail"})
 CAMERAS = {"cameras": {"hand": math.inf, "left": 0.56, "high": 1.2}}
 NARROW = {"widths_m": {"coke": 0.05, "beer": 0.1}, "opens_m": 0.09}
 NO_ROBIN = "Robin is not in this world, or takes nothing"
+NO_EYES = "this kind of robot has no camera"
 NO_HANDS, HIGH = "this kind of robot has no gripper", "the shelf is 1 m high, and the arm reaches"
 
 
@@ -279,12 +281,27 @@ def shot(camera):
         ((shot("Left"),), CAMERAS, 1, "the left camera, 0.56 m high, does not see a top 1 m high", "higher"),
         ((POINTED,), CAMERAS, 1, "the robot has no camera 'tail'", "hand, left"),
         ((shot("hand"),), {}, 1, "the robot has no camera 'hand'", "another kind of robot"),
+        ((GO.format("kitchen"), FIND.format("coke")), {"looks": False}, 2, f"{NO_EYES} to look for the coke with", ""),
     ],
 )
 def test_a_step_that_the_robot_or_the_world_does_not_allow_is_refused(check, steps, abilities, line, message, hint):
     checked = check(*steps, **abilities)
     assert errors_in(checked) == [(line, message)]
     assert hint in checked.errors[0].hint
+
+
+@pytest.mark.parametrize(
+    ("lacking", "needs", "message"),
+    [
+        ("arm", {"uses": frozenset({Part.ARM})}, "this kind of robot has no arm, which stow needs"),
+        ("looks", {"needs_camera": True}, f"{NO_EYES}, which stow needs"),
+    ],
+)
+def test_a_skill_that_needs_what_the_robot_lacks_is_refused(check, registry, lacking, needs, message):
+    registry["stow"] = type("Stow", (registry["stow"],), needs)
+    stow = CallSkill(skill="stow", values={})
+    assert errors_in(check(DRIVE, stow)) == []
+    assert errors_in(check(DRIVE, stow, **{lacking: False})) == [(2, message)]
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,14 @@ def test_a_stowed_arm_is_left_alone():
     assert robot.arm_commands == []
 
 
+def test_a_robot_without_an_arm_has_nothing_to_stow():
+    robot = TableRobot()
+    armless = replace(robot.capabilities(), arm=None, gripper=None)
+    robot.capabilities = lambda: armless
+    assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
+    assert robot.arm_commands == []
+
+
 @pytest.mark.parametrize("opening", [0.0, 1.4])
 def test_a_stretched_arm_is_stowed_with_its_gripper_closed(opening):
     robot = TableRobot(OUT, opening=opening)

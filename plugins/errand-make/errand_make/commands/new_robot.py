@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +15,7 @@ from skills.inputs.errors import InputError
 
 def robot(
     name: Annotated[str, typer.Argument(help="Name of the kind of robot: lower-case words joined by _.")],
-    urdf: Annotated[Path, typer.Option("--urdf", metavar="FILE", help="URDF of the robot; expand xacro first.")],
+    urdf: Annotated[Path, typer.Option("--urdf", metavar="FILE", help="URDF of the robot, or a xacro file.")],
     out: Annotated[Path | None, typer.Option("--out", help="New folder for the package; by default the name.")] = None,
     package: Annotated[
         list[str] | None,
@@ -24,6 +25,7 @@ def robot(
     """Writes an installable package with a robot from a URDF: its parts, meshes, tests and registration."""
     from errand_make.robots.package import check_robot_name, render_robot
 
+    logging.getLogger("drake").setLevel(logging.WARNING)  # Drake sets its own level when it is imported
     folder = Path(name) if out is None else out
     check_robot_name(name)
     with new_folder(folder) as made:

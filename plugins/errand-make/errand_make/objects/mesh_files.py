@@ -75,8 +75,8 @@ class MeshContent:
         return sum(len(patch.triangles) for patch in self.patches)
 
 
-def read_mesh(path: Path) -> MeshContent:
-    """Reads the triangles of a mesh file.
+def read_mesh(path: Path, most: int = MOST_TRIANGLES) -> MeshContent:
+    """Reads the triangles of a mesh file, at most so many.
 
     Raises:
         ObjectImportError: the file is missing, too large or no mesh, is empty, or has too many triangles.
@@ -88,15 +88,15 @@ def read_mesh(path: Path) -> MeshContent:
         what = f"files *{path.suffix[:20]} are not read" if path.suffix else "its name has no ending"
         raise ObjectImportError(what, f"export it as one of {', '.join(each.removeprefix('.') for each in FORMATS)}")
     try:
-        content = _read(path, suffix)
+        content = _read(path, suffix, most)
     except InputError as error:
         place = "" if error.file in (None, path) else f"{error.file.name}: "
         place += "" if error.line is None else f"line {error.line}: "
         raise ObjectImportError(f"{place}{error.message}", error.hint) from error
     if not content.triangles:
         raise ObjectImportError("it is no mesh: there are no triangles in it", "give a file with a surface")
-    if content.triangles > MOST_TRIANGLES:
-        raise _too_many(content.triangles)
+    if content.triangles > most:
+        raise _too_many(content.triangles, most)
     if not all(np.isfinite(patch.triangles).all() for patch in content.patches):
         raise ObjectImportError("some of its coordinates are not finite", "export it once more")
     if len({patch.colour for patch in content.patches}) > MOST_COLOURS:
@@ -105,7 +105,7 @@ def read_mesh(path: Path) -> MeshContent:
     return content
 
 
-def _read(path: Path, suffix: str) -> MeshContent:
+def _read(path: Path, suffix: str, most: int) -> MeshContent:
     """Reads a file of a known format. Raises InputError and ObjectImportError."""
     lacking = list[str]()
     plain_file(path, most_bytes=MAX_BYTES, hint="check the path")
@@ -122,7 +122,7 @@ def _read(path: Path, suffix: str) -> MeshContent:
         patches, up = _of_collada(path)
     else:
         scale = _unit_of_3mf(path) if suffix == THREE_MF else 1.0
-        patches = tuple(patch.transform(scale * np.eye(3), np.zeros(3)) for patch in _with_trimesh(path))
+        patches = tuple(patch.transform(scale * np.eye(3), np.zeros(3)) for patch in _with_trimesh(path, most))
     be = "is" if len(lacking) == 1 else "are"
     note = f"{listing(lacking)}, which it names, {be} missing, so it is grey there; put the files beside the mesh"
     return MeshContent(patches, up, (note,) if lacking else ())
@@ -176,15 +176,15 @@ def _unit_of_3mf(path: Path) -> float:
     return UNITS_M[unit]
 
 
-def _with_trimesh(path: Path) -> tuple[Patch, ...]:
+def _with_trimesh(path: Path, most: int) -> tuple[Patch, ...]:
     """Reads the triangles of a file with trimesh. Raises ObjectImportError."""
     trimesh = library("trimesh")
     try:
         scene = trimesh.load_scene(path, process=False)
         parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
         count = sum(len(part.faces) for part in parts)
-        if count > MOST_TRIANGLES:
-            raise _too_many(count)
+        if count > most:
+            raise _too_many(count, most)
         return tuple(patch for part in parts for patch in _patches(part))
     except ObjectImportError:
         raise
@@ -192,9 +192,9 @@ def _with_trimesh(path: Path) -> tuple[Patch, ...]:
         raise ObjectImportError(f"it is damaged ({type(error).__name__})", _AGAIN) from error
 
 
-def _too_many(count: int) -> ObjectImportError:
+def _too_many(count: int, most: int) -> ObjectImportError:
     hint = "make it coarser, for example by Decimate in Blender or by MeshLab"
-    return ObjectImportError(f"it has {count} triangles, and at most {MOST_TRIANGLES} are taken", hint)
+    return ObjectImportError(f"it has {count} triangles, and at most {most} are taken", hint)
 
 
 def _patches(part: Any) -> Iterator[Patch]:

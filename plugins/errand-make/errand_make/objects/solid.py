@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from errand_make.errors import ObjectImportError, library
@@ -73,6 +73,18 @@ def _pieces(faces: Faces) -> NDArray[np.int64]:
     index, count = _equal_edges(faces)
     triangle = np.tile(np.arange(len(faces)), 3)
     return _components(triangle, len(faces) + index, len(faces) + len(count))[: len(faces)]
+
+
+def bodies_apart(triangles: FloatArray) -> float:
+    """Widest gap (m) between the boxes of the bodies in triangles (T, 3, 3), each joined to its nearest one."""
+    points, faces = unique_points(triangles)
+    pieces = _pieces(faces)
+    if not 0 < pieces.max() < MOST_PIECES:
+        return 0.0
+    corners = [points[faces[pieces == piece]].reshape(-1, 3) for piece in range(pieces.max() + 1)]
+    low, high = (np.array([each(part, axis=0) for part in corners]) for each in (np.min, np.max))
+    gaps = np.linalg.norm(np.maximum(0.0, np.maximum(low[:, None] - high, low - high[:, None])), axis=2)
+    return float(minimum_spanning_tree(gaps).max())
 
 
 def _bounding(points: FloatArray, faces: Faces) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -4,305 +4,385 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
+from errand_make.robots.base import LIDAR, floor_m, front_rotation, motion_of, outline_polygon
+from errand_make.robots.gripper import arm_places, hand_axes, measure_gripper, rounded, why_no_gripper
+from errand_make.robots.inertia import repair_masses
+from errand_make.robots.parts import Arm, Drive, Parts, find_parts, is_camera, standing_legs
+from errand_make.robots.posture import SIDE_WEIGHTS, held_postures, positions
+from errand_make.robots.source import edited_text
+from errand_make.robots.tree import KinematicTree, planar_joints
 from plant.robots.urdf_robot.kind import urdf_kind
 from plant.robots.urdf_robot.robot_file import CameraFile, LidarFile
-from plant.robots.urdf_robot.urdf_file import UrdfFile, UrdfJoint
+from plant.robots.urdf_robot.urdf_file import UrdfFile, UrdfJoint, read_urdf_text
+from skills.inputs.errors import InputError, listing
 from skills.inputs.yaml_source import yaml_of
 from skills.robot import Capabilities, FloatArray
 
-_LIDAR: Final = re.compile(r"lidar|laser|scan|hokuyo|velodyne|rplidar|ouster|sick", re.IGNORECASE)
-_CAMERA: Final = re.compile(r"camera|kinect|realsense|rgbd|d4[35]5|zed|xtion", re.IGNORECASE)
-_LEAST_ARM: Final = 4
-_TURNS: Final = ("revolute", "continuous")
-_NEAR_M: Final = 0.03
-_ROUND: Final = 0.08
-_CORNERS: Final = 12
 ROBOT_FILE: Final = "robot.yaml"
-Notes = dict[str, str]
+_NO_LIDAR: Final = re.compile(r"rgbd|depth|camera|tilt|virtual", re.IGNORECASE)
+_MOST_CAMERAS: Final = 4
+_NEAR_M: Final = 0.1
+"""Distance within which two links are one camera."""
+_LEAST_LIDAR_M: Final = 0.06
+_LIDAR_M: Final = 0.25
+"""Height of a LiDAR that the file lacks."""
+_SHOULDER_M: Final = 0.9
+"""Height at which a lift holds a shoulder for tables and counters."""
+_OVERHANG_M: Final = 0.02
+_AHEAD: Final = "errand_ahead"
+_LIDAR_LINK: Final = "errand_lidar"
+_Z_AHEAD: Final = RotationMatrix(np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]))
+"""R_LB of a link L whose y is up and whose z is ahead."""
+Notes = list[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Found:
+    """The parts of a robot, with the tree that has its lifts and unused chains at their held positions."""
+
+    tree: KinematicTree
+    parts: Parts
+    arm: Arm | None
+    held: Mapping[str, float]
+    ground_m: float
 
 
 class Inference:
-    """Inference from a URDF: `data` of the robot's file, and `notes` by its keys on a person's decisions."""
+    """Inference from a URDF: `data` of the robot's file, and `notes` on a person's decisions, each with its key.
+
+    It repairs the URDF's attributes; `links` is the text of links that it adds.
+    """
 
     def __init__(self, urdf: UrdfFile, source: UrdfFile, name: str) -> None:
-        """`urdf` is what `copy_meshes` wrote, without the simulated sensors of `source`."""
-        self.urdf, self.notes, self._sensors = urdf, Notes(), source.sensors
-        self._X = urdf.poses({})
-        self._moving = {joint.child: joint for joint in urdf.order if joint.moves}
-        self._fixed = self._fixed_to(urdf.root)
-        self._base = next((link for link in ("base_link", "base_footprint") if link in self._fixed), urdf.root)
-        self._wheels = [joint for joint in self._moving.values() if self._is_wheel(joint)]
-        self._arm = self._arm_joints()
-        head = self._head()
-        camera_links = self._cameras()
+        """`urdf` has the copies of the meshes, and lacks the simulated sensors of `source`.
+
+        Raises InputError for a robot that does not drive, and for impossible masses of links that move.
+        """
+        self.urdf, self.notes, self.links = urdf, Notes(), ""
+        self._sensors, self._text = source.sensors, source.text + read_urdf_text(source.path)
+        self._base, tree, parts = self._placed()
+        if parts.drive is Drive.NOTHING:
+            what = "nothing drives: no wheel turns and no leg stands on the floor, so its arm is fixed to the world"
+            hint = "give a base: fix the arm to the URDF of a mobile base, and let its wheels turn (type continuous)"
+            raise InputError(what, hint=hint, file=source.path, line=int(urdf.links[urdf.root].get("line", "1")))
+        self.found = self._hold(tree, parts)
         self.data: dict[str, Any] = {"name": name, "urdf": "robot.urdf", "base": self._base_data()}
         self.data["lidar"] = LidarFile(link=self._lidar()).model_dump(mode="json")
-        if camera_links:
-            self.data["cameras"] = camera_links
+        head = self._head()
+        if cameras := self._cameras(head):
+            self.data["cameras"] = cameras
         if head:
-            self.data["head"] = head
-        if self._arm:
-            self._add_arm()
-        driven = {*(head or ()), *(joint.name for joint in self._arm), *self.data.get("gripper", {}).get("joints", ())}
-        rest = [each for each in self._moving.values() if each.name not in driven and each not in self._wheels]
-        if rest:
-            self.data["held"] = {joint.name: round(joint.clipped(0.0), 4) for joint in rest}
-            self.notes["held"] = "joints that no part names are fixed here (rad, m)"
+            self.data["head"] = [each.name for each in head]
+        if self.found.arm is not None:
+            self._add_arm(self.found.arm)
+        self._add_held()
+        driven = [*self.data.get("head", ()), *self.data.get("arm", {}).get("joints", ())]
+        if note := repair_masses(self.found.tree, [*driven, *self.data.get("gripper", {}).get("joints", ())]):
+            self.notes.append(("urdf", note))
 
-    # -- geometry -------------------------------------------------------------------------------------------------
+    def text(self) -> str:
+        """Text of the URDF with its repairs and added links."""
+        return edited_text(self.urdf, self.links)
 
-    def _fixed_to(self, link: str) -> set[str]:
-        """A link and all that is fixed to it."""
-        found = {link}
-        for joint in self.urdf.order:
-            if joint.parent in found and not joint.moves:
-                found.add(joint.child)
-        return found
+    # -- frame and posture ----------------------------------------------------------------------------------------
 
-    def _points(self, links: Iterable[str], of: str) -> FloatArray:
-        """Corners (N, 3) of the collision shapes of links, else of what is drawn, in the frame of a link."""
-        X_OR = self._X[of].inverse()
-        found = [np.empty((0, 3))]
-        for link in links:
-            for shape in self.urdf.shapes(link, "collision") or self.urdf.shapes(link, "visual"):
-                X = X_OR @ self._X[link] @ self.urdf.origin(shape)
-                found.append((X @ self._corners(shape).T).T)
-        return np.concatenate(found)
+    def _tree(self, base: str, turn: RotationMatrix) -> KinematicTree:
+        return KinematicTree(self.urdf, base, RigidTransform(turn, np.zeros(3)), text=self._text)
 
-    def _corners(self, shape: Any) -> FloatArray:
-        geometry, numbers = shape.find("geometry"), self.urdf.numbers
-        ball = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
-        if (box := geometry.find("box")) is not None:
-            return np.asarray(ball * np.array(numbers(box, "size", "0 0 0")) / 2.0)
-        if (sphere := geometry.find("sphere")) is not None:
-            return np.asarray(ball * numbers(sphere, "radius", "0")[0])
-        if (cylinder := geometry.find("cylinder")) is not None:
-            radius, length = (numbers(cylinder, key, "0")[0] for key in ("radius", "length"))
-            turns = np.linspace(0.0, math.tau, 24, endpoint=False)
-            ring = np.column_stack([radius * np.cos(turns), radius * np.sin(turns)])
-            return np.vstack([np.column_stack([ring, np.full(24, z)]) for z in (-length / 2.0, length / 2.0)])
-        return self.urdf.mesh_points(geometry.find("mesh"))
+    def _placed(self) -> tuple[str, KinematicTree, Parts]:
+        """Link of the base, with tree and parts in its frame B; adds a link where x is not ahead and z not up."""
+        planar = planar_joints(self.urdf)
+        base = planar[-1].child if planar else self.urdf.root
+        tree = self._tree(base, RotationMatrix())
+        near = [link for link in ("base_link", "base_footprint") if link in tree.links_of[tree.root]]
+        if near:
+            base = near[0]
+            tree = self._tree(base, RotationMatrix())
+        parts, turn = find_parts(tree), RotationMatrix()
+        if parts.drive in (Drive.FREE, Drive.NOTHING, Drive.LEGS) and len(parts.legs) < 4:
+            if len(find_parts(self._tree(base, _Z_AHEAD)).legs) >= 4:
+                turn = _Z_AHEAD
+                self.notes.append(("base", "its legs stand towards -y: y is taken as up, and z as ahead"))
+        elif parts.drive in (Drive.AXLE, Drive.STEERED) and abs(float(parts.mounted[0].axis_B[1])) < 0.95:
+            turn = front_rotation(tree, parts)
+            yaw_rad = float(RollPitchYaw(turn).yaw_angle())
+            front = {90: "y", -90: "-y"}.get(round(math.degrees(yaw_rad)), f"at {math.degrees(yaw_rad):.0f} degrees")
+            axis = "x" if abs(float(parts.mounted[0].axis_B[0])) > 0.95 else "a skew axis"
+            self.notes.append(("base", f"its wheels turn about {axis}, so the robot's front is {front} of {base}"))
+        if parts.drive is Drive.FREE and (posture := standing_legs(tree)):
+            tree = replace(tree, posture=posture)
+            parts = find_parts(tree)
+        for each in parts.wheels:
+            if not each.is_round:
+                what = f"the shape of {each.joint.child} is not round about the axis of {each.joint.name}"
+                self.notes.append(("base", f"{what}: check that axis"))
+        if turn.IsExactlyIdentity():
+            return base, tree, parts
+        rpy = " ".join(f"{each:.7f}" for each in RollPitchYaw(turn).vector())
+        self.links += _fixed_link(_AHEAD, base, "0 0 0", rpy)
+        tree = self._tree(base, turn)
+        return _AHEAD, tree, find_parts(tree)
+
+    def _hold(self, tree: KinematicTree, parts: Parts) -> Found:
+        """Chooses the arm, and finds the posture in which all that no part drives is held."""
+        ground_m = floor_m(tree, parts)
+        arms = sorted(parts.arms, key=lambda arm: (why_no_gripper(tree, arm) != "", -len(arm.joints)))
+        arm = arms[0] if arms else None
+        held = dict(tree.posture)
+        telescopes = {each.name for chain in parts.sliding for each in chain}
+        for lift in (each for each in parts.lifts if each.name not in telescopes):
+            held |= self._hold_lift(tree, lift, arm, ground_m)
+        tree = replace(tree, posture=dict(held))
+        chains = [list(each.joints) for each in arms[1:]] + [list(each) for each in parts.sliding]
+        away = {link for chain in (arms[0].joints if arms else (), *chains) for link in _carried(tree, chain)}
+        own = tree.points(link for link in self.urdf.links if link not in away)
+        for chain in chains if len(own) else ():
+            q = held_postures(tree, chain, own, ground_m, leave=away)[0]
+            held |= {each.name: float(at) for each, at in zip(chain, q, strict=True)}
+            tree = replace(tree, posture=dict(held))
+        for arm_ in arms[1:]:
+            names = ", ".join(each.name for each in arm_.joints)
+            self.notes.append(("arm", f"a further arm ({names}) is held; to drive it, name its joints here instead"))
+        for slides in parts.sliding:
+            self._note_sliding(slides)
+        return Found(tree, parts, arm, held, ground_m)
+
+    def _hold_lift(self, tree: KinematicTree, lift: UrdfJoint, arm: Arm | None, ground_m: float) -> dict[str, float]:
+        """Position at which a lift is held, with a note how it is driven instead."""
+        at = lift.clipped(0.0)
+        if arm is not None and arm.joints[0] in tree.below(lift):
+            shoulder_m = float(tree.place(arm.joints[0])[2]) - ground_m
+            at = lift.clipped(at + math.copysign(_SHOULDER_M - shoulder_m, float(tree.axis(lift)[2])))
+            at = at if abs(at) < 10.0 and shoulder_m < _SHOULDER_M else lift.clipped(0.0)
+        words = f"lift: {{joint: {lift.name}, travelling: {rounded(at)}}}"
+        what = f"lift {lift.name} is held at {rounded(at)} m; to drive it, write `{words}`"
+        self.notes.append(("held", f"{what} and a base.link that it carries, with x ahead and z up"))
+        return {lift.name: rounded(at)}
+
+    def _note_sliding(self, chain: Sequence[UrdfJoint]) -> None:
+        names = ", ".join(each.name for each in chain if each.kind == "prismatic")
+        turn = sum(each.kind != "prismatic" for each in chain)
+        what = f"no arm is taken: {names} slide (a telescopic arm), and {turn} of its joints turn"
+        self.notes.append(("held", f"{what}; Errand drives arms of 4 or more joints that turn, so this one is held"))
 
     # -- base -----------------------------------------------------------------------------------------------------
 
-    def _is_wheel(self, joint: UrdfJoint) -> bool:
-        axis = (self._X[self._base].inverse() @ self._X[joint.parent] @ joint.X_PF).rotation() @ joint.axis
-        leaf = not any(each.parent in self._fixed_to(joint.child) for each in self._moving.values())
-        return joint.kind == "continuous" and joint.parent in self._fixed and leaf and abs(float(axis[1])) > 0.9
-
     def _base_data(self) -> dict[str, Any]:
-        wheels = [each for joint in self._wheels for each in self._fixed_to(joint.child)]
-        points = self._points([*self._fixed, *wheels], self._base)
+        found, parts = self.found, self.found.parts
+        away = set() if found.arm is None else set(_carried(found.tree, found.arm.joints))
+        points = found.tree.points(link for link in self.urdf.links if link not in away)
+        points = points[points[:, 2] > found.ground_m - 0.01]
         if not len(points):
             points = np.array([[-0.25, -0.25, 0.0], [0.25, 0.25, 0.3]])
-            self.notes["base"] = "its links have no shapes: write footprint and height"
-        data: dict[str, Any] = {"link": self._base, "motion": "differential" if self._wheels else "omnidirectional"}
-        data["height"] = _rounded(max(0.0, -float(points[:, 2].min())))
-        data["footprint"] = _outline(points[:, :2])
+            self.notes.append(("base", "its links have no shapes: write footprint and height"))
+        motion, note = motion_of(parts)
+        data: dict[str, Any] = {"link": self._base, "motion": motion}
+        data["height"] = rounded(max(0.0, -found.ground_m))
+        data["footprint"] = outline_polygon(points[:, :2])
         data |= {"max_speed": 0.6, "max_turn_rate": 1.0, "runtime": 7200.0}
-        note = f"{len(self._wheels)} wheels were found; speeds (m/s, rad/s) and the battery's time (s) are a guess"
-        self.notes.setdefault("base", note)
+        self.notes.append(("base", f"{note}; speeds (m/s, rad/s) and the battery's time (s) are a guess"))
+        if parts.casters:
+            self.notes.append(("base", f"{len(parts.casters)} casters belong to the base and do not turn"))
         return data
+
+    def arm_points(self, angles: FloatArray) -> FloatArray:
+        """Corners (N, 3) of the arm and its hand in B at angles (J,)."""
+        found = self.found
+        assert found.arm is not None
+        names = (each.name for each in found.arm.joints)
+        tree = replace(found.tree, posture={**found.held, **dict(zip(names, map(float, angles), strict=True))})
+        return tree.points(_carried(tree, found.arm.joints))
+
+    def stowed(self, angles: FloatArray, free: Callable[[Sequence[FloatArray]], FloatArray]) -> FloatArray:
+        """Angles of the stowed arm: the given ones, unless free ones are found that stick out less."""
+        found, polygon = self.found, np.array(self.data["base"]["footprint"])
+        if self._overhang_m(self.arm_points(angles)).max() <= _OVERHANG_M or found.arm is None:
+            return angles
+        corners = np.column_stack([polygon, np.zeros(len(polygon))])
+        tries = held_postures(found.tree, found.arm.joints, corners, found.ground_m)
+        other = free(list(tries))
+        less = self._overhang_m(self.arm_points(other)) @ SIDE_WEIGHTS
+        return other if less < self._overhang_m(self.arm_points(angles)) @ SIDE_WEIGHTS else angles
+
+    def _overhang_m(self, points_B: FloatArray) -> FloatArray:
+        """Distances (2,) by which points stick out of the footprint along x and y."""
+        polygon = np.array(self.data["base"]["footprint"])
+        low, high = polygon.min(axis=0), polygon.max(axis=0)
+        return np.asarray(np.maximum(points_B[:, :2] - high, low - points_B[:, :2]).max(axis=0, initial=0.0))
+
+    def widen_footprint(self, points_B: FloatArray) -> None:
+        """Lets the footprint contain the stowed arm, where it sticks out."""
+        beyond_m = float(self._overhang_m(points_B).max())
+        if beyond_m > _OVERHANG_M:
+            polygon = np.array(self.data["base"]["footprint"])
+            self.data["base"]["footprint"] = outline_polygon(np.vstack([polygon, points_B[:, :2]]))
+            self.notes.append(("base", f"the stowed arm sticks out by {beyond_m:.2f} m, which the footprint contains"))
 
     # -- sensors --------------------------------------------------------------------------------------------------
 
-    def _sensor_links(self, kinds: re.Pattern[str], names: re.Pattern[str]) -> list[str]:
-        """Links with a simulated sensor of a kind, then links with such a name."""
-        found = [link for link, kind in self._sensors if link in self.urdf.links and kinds.search(kind)]
-        return [*found, *(link for link in self.urdf.links if names.search(link) and link not in found)]
+    def _simulated(self, kinds: str) -> list[str]:
+        return [link for link, kind in self._sensors if link in self.urdf.links and re.search(kinds, kind)]
 
     def _lidar(self) -> str:
-        found = [link for link in self._sensor_links(re.compile("ray|lidar"), _LIDAR) if link in self._fixed]
-        self.notes["lidar"] = "its field of view (rad), range (m) and rate (Hz) are not in a URDF, and are a guess"
-        if not found:
-            self.notes["lidar"] = "no link looks like a LiDAR: name one, whose x is ahead and z up"
-        return found[0] if found else self._base
+        tree, ground_m = self.found.tree, self.found.ground_m
+        found = [*self._simulated("ray|lidar"), *(link for link in self.urdf.links if LIDAR.search(link))]
+        fixed = [link for link in dict.fromkeys(found) if tree.body_of[link] == tree.root and not is_camera(link)]
+        fixed = [link for link in fixed if float(tree.X_BL[link].translation()[2]) - ground_m > _LEAST_LIDAR_M]
+        ahead_m = {link: float(tree.X_BL[link].translation()[0]) for link in fixed}
+        fixed.sort(key=lambda link: (_NO_LIDAR.search(link) is not None, "mount" in link, ahead_m[link] < 0.0))
+        if fixed:
+            self.notes.append(
+                ("lidar", "its field of view (rad), range (m) and rate (Hz) are not in a URDF, and are a guess")
+            )
+            return fixed[0]
+        place = f"0 0 {rounded(ground_m + _LIDAR_M)}"
+        self.links += _fixed_link(_LIDAR_LINK, self._base, place, "0 0 0")
+        what = f"no link looks like a LiDAR: link {_LIDAR_LINK} is added {_LIDAR_M} m above the floor"
+        self.notes.append(("lidar", f"{what}; name yours, whose x is ahead and z up"))
+        return _LIDAR_LINK
 
-    def _cameras(self) -> dict[str, Any]:
-        found = self._sensor_links(re.compile("camera|depth"), _CAMERA)
-        found.sort(key=lambda link: ("optical" not in link, "depth" in link))
-        cameras = dict[str, Any]()
-        taken = list[FloatArray]()
-        for link in found:
-            p = self._X[link].translation()
-            if all(float(np.linalg.norm(p - other)) > 3.0 * _NEAR_M for other in taken):
-                taken.append(p)
-                file = CameraFile(link=link, axes="optical" if "optical" in link else "link")
-                cameras[f"camera_{len(cameras)}"] = file.model_dump(mode="json")
-        self.notes["cameras"] = "pixels, field of view (rad) and depth (m) are not in a URDF, and are a guess"
+    def _cameras(self, head: Sequence[UrdfJoint]) -> dict[str, Any]:
+        found = [*self._simulated("camera|depth"), *(link for link in self.urdf.links if is_camera(link))]
+        links = sorted(dict.fromkeys(found), key=lambda link: ("optical" not in link, "depth" in link))
+        tree, arm, cameras, places = self.found.tree, self.found.arm, dict[str, Any](), list[FloatArray]()
+        behind_tilt = set(tree.links_below(head[1])) if head else set()
+        tip = set() if arm is None else set(tree.links_of[arm.joints[-1].child])
+        moved = set(tree.links_below(head[0])) if head else set()
+        for chain in (*(each.joints for each in self.found.parts.arms), *self.found.parts.sliding):
+            moved |= set(_carried(tree, chain))
+        links.sort(key=lambda link: (link not in behind_tilt, link not in tip))
+        lost = [link for link in links if link in moved - behind_tilt - tip]
+        for link in links:
+            p = tree.X_BL[link].translation()
+            apart = all(float(np.linalg.norm(p - other)) > _NEAR_M for other in places)
+            if link in lost or not apart or len(cameras) == _MOST_CAMERAS:
+                continue
+            places.append(p)
+            file = CameraFile(link=link, axes="optical" if "optical" in link else "link")
+            cameras[f"camera_{len(cameras)}"] = file.model_dump(mode="json")
+        if cameras:
+            note = "pixels, field of view (rad) and depth (m) are not in a URDF, and are a guess"
+            self.notes.append(("cameras", note))
+        if lost:
+            self.notes.append(("cameras", f"left out, since no part points them: {listing(lost)}"))
         return cameras
 
-    def _head(self) -> list[str] | None:
-        """Joints of pan and tilt, in this order."""
-        for tilt in self._moving.values():
-            before = [joint for joint in self.urdf.chain(tilt.parent) if joint.moves]
-            if not before or tilt in self._arm or before[-1] in self._arm or before[-1] in self._wheels:
-                continue
-            axes = [(self._X[each.parent] @ each.X_PF).rotation() @ each.axis for each in (before[-1], tilt)]
-            if all(each.kind in _TURNS for each in (before[-1], tilt)) and np.allclose(axes, [[0, 0, 1], [0, 1, 0]]):
-                return [before[-1].name, tilt.name]
-        return None
+    def _head(self) -> tuple[UrdfJoint, ...]:
+        """Joints of pan and tilt, with axes turned to z up and y to the left."""
+        head, tree = self.found.parts.head, self.found.tree
+        if head is None:
+            return ()
+        lacking = [
+            each.name for each in head if not (each.lower < each.upper and each.effort > 0.0 and each.velocity > 0.0)
+        ]
+        wanted = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+        axes = np.array([tree.axis(each) for each in head])
+        if lacking or not np.allclose(np.abs(axes), wanted, atol=1e-3):
+            why = f"{lacking[0]} has no limits of effort and velocity" if lacking else "its axes are not z and y"
+            self.notes.append(("held", f"the head ({head[0].name}, {head[1].name}) is held: {why}"))
+            return ()
+        turned = [each for each, axis in zip(head, axes, strict=True) if axis.sum() < 0.0]
+        for each in turned:
+            self._turn_axis(each)
+        if turned:
+            names = listing([each.name for each in turned])
+            self.notes.append(
+                ("head", f"the axis of {names} is turned round in robot.urdf, so that it is z up or y left")
+            )
+        return head
+
+    def _turn_axis(self, joint: UrdfJoint) -> None:
+        """Turns a joint's axis round, with its limits."""
+        element = next(each for each in self.urdf.robot.findall("joint") if each.get("name") == joint.name)
+        axis, limit = element.find("axis"), element.find("limit")
+        if axis is not None and limit is not None:
+            axis.set("xyz", " ".join(f"{each:.10g}" for each in -joint.axis))
+            limit.set("lower", f"{-joint.upper:.10g}")
+            limit.set("upper", f"{-joint.lower:.10g}")
 
     # -- arm ------------------------------------------------------------------------------------------------------
 
-    def _after(self, joint: UrdfJoint) -> list[UrdfJoint]:
-        """Moving joints that come next behind a joint."""
-        links = self._fixed_to(joint.child)
-        return [each for each in self._moving.values() if each.parent in links]
-
-    def _arm_joints(self) -> list[UrdfJoint]:
-        """The longest chain of revolute joints without branches."""
-        runs = list[list[UrdfJoint]]()
-        for first in self._moving.values():
-            run = [first]
-            while run[-1].kind in _TURNS and len(after := self._after(run[-1])) == 1 and after[0].kind in _TURNS:
-                run.append(after[0])
-            runs.append(run)
-        runs.sort(key=len, reverse=True)
-        best = runs[0] if runs else []
-        if sum(len(run) == len(best) for run in runs) > 1:
-            self.notes["arm"] = "there are several arms; this is the first"
-        return best if len(best) >= _LEAST_ARM else []
-
-    def _add_arm(self) -> None:
-        last = self._arm[-1]
-        fingers = [each for each in self._after(last) if each.kind == "prismatic"]
-        hand: dict[str, Any] = {"link": last.child, "along": "x", "closing": "z"}
-        tip_m = 0.0
-        if 1 <= len(fingers) <= 2:
-            hand, gripper = self._gripper(fingers)
-            self.data["gripper"], tip_m = gripper, gripper["tip_x"]
-            self.notes["gripper"] = (
-                "measured at the shapes of the fingers, in the hand frame (x along them, z their closing)"
-            )
+    def _add_arm(self, arm: Arm) -> None:
+        tree, last = self.found.tree, arm.joints[-1]
+        hand, tip_m, gripper = hand_axes(tree, last), 0.0, None
+        why = why_no_gripper(tree, arm)
+        if why:
+            self.notes.append(("arm", f"no gripper is taken: {why}; the axes of the hand are a guess"))
         else:
-            self.notes["hand"] = "no fingers that slide were found: the axes of the hand are a guess"
-        p_BJ = [self._frame(joint, self._base).translation() for joint in self._arm]
-        reach = float(np.linalg.norm(np.diff(p_BJ, axis=0), axis=1).sum())
-        gripper_data = self.data.pop("gripper", None)
-        places = arm_places(float(p_BJ[0][0]), float(p_BJ[0][2]), reach, tip_m, self._front_m())
+            hand, gripper = measure_gripper(tree, last, arm.fingers)
+            tip_m = gripper["tip_x"]
+        p_BJ = [tree.place(joint) for joint in arm.joints]
+        front_m = max(float(x) for x, _ in self.data["base"]["footprint"])
         self.data["arm"] = {
-            "joints": [joint.name for joint in self._arm],
-            "stowed": [0.0] * len(self._arm),
+            "joints": [joint.name for joint in arm.joints],
+            "stowed": [rounded(joint.clipped(0.0)) for joint in arm.joints],
             "hand": hand,
         }
-        self.data["arm"] |= places
-        self.data |= {} if gripper_data is None else {"gripper": gripper_data}
+        self.data["arm"] |= arm_places(float(p_BJ[0][0]), float(p_BJ[0][2]), arm.reach_m, tip_m, front_m)
         note = "stowed was found by a search; max_payload (kg) is a guess; distances (m) follow from the reach"
-        self.notes["arm"] = f"{self.notes['arm']}; {note}" if "arm" in self.notes else note
+        self.notes.append(("arm", note))
+        if gripper is not None:
+            self.data["gripper"] = gripper
+            note = "measured at the shapes of the fingers, in the hand frame (x along them, z their closing)"
+            self.notes.append(("gripper", note))
 
-    def _frame(self, joint: UrdfJoint, link: str) -> RigidTransform:
-        """Frame of a joint in the frame of a link."""
-        return self._X[link].inverse() @ self._X[joint.parent] @ joint.X_PF
-
-    def _front_m(self) -> float:
-        return max(float(x) for x, _ in self.data["base"]["footprint"])
-
-    def _gripper(self, fingers: Sequence[UrdfJoint]) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Hand frame and gripper of one or two fingers that slide; F is the frame of the first finger's link."""
-        link = fingers[0].child
-        X_FA = self._frame(self._arm[-1], link)
-        shapes = [self._points(self._fixed_to(each.child), link) for each in fingers]
-        shapes = [each if len(each) else np.zeros((1, 3)) for each in shapes]
-        axes_F = [self._frame(each, link).rotation() @ each.axis for each in fingers]
-        closing = int(np.argmax(np.abs(axes_F[0])))
-        apart = float((shapes[0].mean(axis=0) - shapes[-1].mean(axis=0))[closing]) or float(axes_F[0][closing])
-        ahead = np.concatenate(shapes).mean(axis=0) - X_FA.translation()
-        ahead[closing] = 0.0
-        along = int(np.argmax(np.abs(ahead)))
-        x_F, z_F = np.sign(ahead[along]) * np.eye(3)[along], np.sign(apart) * np.eye(3)[closing]
-        ways = [float(np.sign(side * axis @ z_F)) for side, axis in zip((1.0, -1.0), axes_F, strict=False)]
-        closed = [each.lower if way > 0.0 else each.upper for each, way in zip(fingers, ways, strict=True)]
-        R_HF = np.stack([x_F, np.cross(z_F, x_F), z_F])
-        moves = [(at - each.clipped(0.0)) * axis for at, each, axis in zip(closed, fingers, axes_F, strict=True)]
-        shut = [(each + move - X_FA.translation()) @ R_HF.T for each, move in zip(shapes, moves, strict=True)]
-        tip_m = min(float(each[:, 0].max()) for each in shut)
-        palm = ((self._points(self._fixed_to(self._arm[-1].child), link) - X_FA.translation()) @ R_HF.T)[:, 0]
-        behind = palm[palm < tip_m - _NEAR_M / 3.0]
-        tip = shut[0][shut[0][:, 0] > tip_m - _NEAR_M]
-        widest = len(fingers) * min(each.upper - each.lower for each in fingers)
-        gripper = {
-            "joints": {each.name: way / len(fingers) for each, way in zip(fingers, ways, strict=True)},
-            "closed": {each.name: round(at, 5) for each, at in zip(fingers, closed, strict=True)},
-            "widest": _rounded(widest),
-            "max_opening": _rounded(widest),
-            "max_force": _rounded(min(max(min(each.effort for each in fingers), 5.0), 200.0)),
-            "palm_x": _rounded(max(behind, default=min(float(each[:, 0].min()) for each in shut))),
-            "tip_x": _rounded(tip_m),
-            "closing_z": _rounded(tip[:, 2].min()),
-            "half_breadth": _rounded(max(0.003, float(np.ptp(tip[:, 1])) / 2.0)),
-            "tip_thickness": _rounded(max(0.003, float(np.ptp(tip[:, 2])))),
-        }
-        names = [("-" if sign < 0 else "") + "xyz"[k] for k, sign in ((along, ahead[along]), (closing, apart))]
-        return {"link": link, "along": names[0], "closing": names[1]}, gripper
+    def _add_held(self) -> None:
+        tree, parts = self.found.tree, self.found.parts
+        driven = {*self.data.get("head", ()), *self.data.get("arm", {}).get("joints", ())}
+        driven |= {*self.data.get("gripper", {}).get("joints", ()), *(each.joint.name for each in parts.wheels)}
+        rest = [each for each in tree.joint_of.values() if each.name not in driven]
+        if rest:
+            self.data["held"] = positions(rest, self.found.held)
+            self.notes.append(("held", "joints that no part names are fixed here (rad, m)"))
 
 
-def arm_places(x_m: float, z_m: float, reach_m: float, tip_m: float, front_m: float) -> dict[str, Any]:
-    """Working distances of an arm with its shoulder at x_m and z_m of the body, as parts of its length.
-
-    They are those of Spot and Fetch: stands, nearer stands, carrying positions, and positions close to the body.
-    """
-    whole = reach_m + tip_m
-
-    def ahead(shares: Sequence[float]) -> list[float]:
-        return [_rounded(max(front_m + 0.1, x_m + share * whole)) for share in shares]
-
-    return {
-        "max_reach": _rounded(reach_m),
-        "max_payload": 2.0,
-        "standing": ahead((0.64, 0.675, 0.605, 0.71, 0.57, 0.535, 0.745, 0.78)),
-        "nearer": ahead((0.53, 0.495, 0.46, 0.425)),
-        "carry_x": [_rounded(x_m + share * whole) for share in (0.42, 0.375, 0.33, 0.465, 0.51)],
-        "carry_z": [_rounded(z_m + each) for each in (0.07, 0.13, 0.19, 0.25, 0.31, 0.39, 0.47)],
-        "tuck_x": [_rounded(front_m + each) for each in (0.02, 0.07)],
-    }
+def _fixed_link(name: str, parent: str, place: str, rpy: str) -> str:
+    return (
+        f'<link name="{name}"/><joint name="{name}_mount" type="fixed"><parent link="{parent}"/><child link="{name}"/>'
+        f'<origin xyz="{place}" rpy="{rpy}"/></joint>'
+    )
 
 
-def _rounded(value: float) -> float:
-    return round(float(value), 4)
-
-
-def _outline(points: FloatArray) -> list[list[float]]:
-    """Footprint of points (N, 2) seen from above: a circle's polygon where they fit one well, else their rectangle."""
-    (left, back), (right, front) = points.min(axis=0), points.max(axis=0)
-    middle, half = np.array([(left + right) / 2.0, (back + front) / 2.0]), (right - left + front - back) / 4.0
-    radius = float(np.linalg.norm(points - middle, axis=1).max())
-    if radius < half * (1.0 + _ROUND) and float(np.linalg.norm(middle)) < _NEAR_M:
-        out = radius / math.cos(math.pi / _CORNERS)
-        turns = (np.arange(_CORNERS) + 0.5) * math.tau / _CORNERS
-        return [[_rounded(out * math.cos(a)), _rounded(out * math.sin(a))] for a in turns]
-    return [[_rounded(x), _rounded(y)] for x, y in ((right, front), (left, front), (left, back), (right, back))]
+def _carried(tree: KinematicTree, chain: Sequence[UrdfJoint]) -> list[str]:
+    return tree.links_below(chain[0]) if chain else []
 
 
 def write_robot_file(
-    source: UrdfFile, name: str, folder: Path, stow: Callable[[Capabilities], FloatArray]
+    source: UrdfFile, name: str, folder: Path, stow: Callable[[Capabilities, Sequence[FloatArray]], FloatArray]
 ) -> tuple[Capabilities, list[str]]:
     """Writes the `robot.yaml` of a robot whose `robot.urdf` is in a folder; `source` is the file it was made from.
 
-    `stow` finds the angles of the stowed arm. Returns the robot's capabilities and the points for a person to check.
+    `stow` finds the angles of the stowed arm, among some that it is given where one of them is free. Returns the
+    robot's capabilities and the points for a person to check.
     Raises InputError for impossible values.
     """
-    inference = Inference(UrdfFile(folder / "robot.urdf"), source, name)
+    path = folder / "robot.urdf"
+    inference = Inference(UrdfFile(path), source, name)
+    path.write_text(inference.text(), encoding="utf-8")
     _write(folder / ROBOT_FILE, inference)
     can = urdf_kind(folder / ROBOT_FILE).capabilities()
-    if can.arm is not None:
-        inference.data["arm"]["stowed"] = [_rounded(angle) for angle in stow(can)]
+    arm = inference.found.arm
+    if can.arm is not None and arm is not None:
+        stowed = inference.stowed(stow(can, []), lambda tries: stow(can, tries))
+        inference.data["arm"]["stowed"] = [rounded(angle) for angle in stowed]
+        inference.widen_footprint(inference.arm_points(stowed))
         _write(folder / ROBOT_FILE, inference)
         can = urdf_kind(folder / ROBOT_FILE).capabilities()
-    return can, [f"{key}: {note}" for key, note in inference.notes.items() if key in inference.data]
+    return can, [f"{key}: {note}" for key, note in inference.notes]
 
 
 def _write(path: Path, inference: Inference) -> None:
     """Writes a robot's file, with a comment before each part for a person to check."""
     lines = ["# A robot for Errand. SI units: m, rad, kg, N, s; `docs/how-to/own-robot.md` explains the keys.\n"]
     for key, value in inference.data.items():
-        lines += [f"# CHECK: {inference.notes[key]}.\n"] if key in inference.notes else []
+        lines += [f"# CHECK: {note}.\n" for at, note in inference.notes if at == key]
         lines.append(yaml_of({key: value}) if isinstance(value, dict) else f"{key}: {value}\n")
     path.write_text("".join(lines), encoding="utf-8")

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
 from errand_make.robots.inference import write_robot_file
-from errand_make.robots.meshes import copy_meshes
+from errand_make.robots.meshes import MESHES, MeshCopies
+from errand_make.robots.source import edited_text, read_source
 from executive.cli.new_command import PackageTemplates
 from executive.cli.output import console_for, progress_bar
 from plant.robots.robot_kind import robot_kinds
-from plant.robots.urdf_robot.urdf_file import UrdfFile
 from skills.inputs.errors import InputError
+from skills.manipulation.arm.collision import ArmScene
+from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.arm.poses import compact_configuration
+from skills.robot import Capabilities, FloatArray
 
 _TEMPLATES: Final = PackageTemplates("robot", Path(__file__).parent / "templates")
 _BAND_M: Final = 0.05
@@ -33,17 +36,22 @@ def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, 
     """
     home = folder / _TEMPLATES.package(name)
     home.mkdir(parents=True)
-    source = UrdfFile(urdf)
-    count = sum(1 for _ in source.robot.iter("mesh"))
-    with progress_bar(console_for(as_json=True), "meshes", count) as advance:
-        for _ in copy_meshes(source, packages, home):
+    source = read_source(urdf, packages)
+    copies = MeshCopies(source, packages, home)
+    (home / MESHES).mkdir()
+    meshes = copies.meshes()
+    with progress_bar(console_for(as_json=True), "meshes", len(meshes)) as advance:
+        for role, shape, mesh in meshes:
+            copies.copy(role, shape, mesh)
             advance()
+    (home / "robot.urdf").write_text(edited_text(source), encoding="utf-8")
     try:
-        can, notes = write_robot_file(source, name, home, compact_configuration)
+        can, notes = write_robot_file(source, name, home, _stowed)
     except InputError as error:
-        if error.file != home / "robot.urdf":
+        if error.file not in (home / "robot.urdf", home / "robot.yaml"):
             raise
-        raise InputError(error.message, hint=error.hint, file=urdf, line=error.line) from error
+        line = error.line if error.file == home / "robot.urdf" else None
+        raise InputError(error.message, hint=error.hint, file=urdf, line=line) from error
     height_m = can.lidar_height_m or 0.0
     words = {
         "controller": "mppi" if can.base_kind.value == "omnidirectional" else "path_follower",
@@ -55,4 +63,11 @@ def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, 
     lacking += [] if can.object_camera is not None else ["look"]
     lacking += [] if can.object_camera is not None and can.gripper is not None else ["take", "grasp"]
     _TEMPLATES.render(name, folder, words=words, without={f"{each}.skilltest.yaml" for each in lacking})
-    return notes
+    return [*notes, *(f"meshes: {note}" for note in copies.all_notes())]
+
+
+def _stowed(can: Capabilities, tries: Sequence[FloatArray]) -> FloatArray:
+    """The first of some arm configurations (J,) that is free of contact, else a compact one."""
+    scene = ArmScene(can, arm_model(can), {})
+    found = next((q for q in tries if scene.free(q)), None)
+    return compact_configuration(can) if found is None else found

@@ -1,5 +1,6 @@
 """A camera that is fixed to the body looks for objects: at what is in its view, from the only height."""
 
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -26,6 +27,16 @@ def look(rover_kind):
         return robot.calls
 
     return looked
+
+
+def test_a_robot_without_an_arm_looks_with_the_camera_of_its_body(rover_kind):
+    clock, armless = VirtualClock(), replace(rover_kind.capabilities(), arm=None, gripper=None)
+    robot = ScriptedRobot(clock, capabilities=armless, blocks=ROOM)
+    skill = Detect(SkillBench(robot, clock).context())
+    for _ in islice(skill.look_at(np.array([1.2, 0.0, 0.5]), [], "looking"), 200):
+        clock.advance(0.05)
+    assert "move_arm" not in robot.calls
+    assert np.allclose(skill.p_BS, armless.object_camera.X_FC.translation())
 
 
 def test_a_body_that_cannot_rise_stays_at_its_height(look):

@@ -41,6 +41,11 @@ def test_traces_of_xacro_and_the_axis_of_a_fixed_joint_do_no_harm(tmp_path):
     assert urdf.poses({})["b"].IsExactlyIdentity()
 
 
+def test_a_comment_that_speaks_of_xacro_is_no_xacro(tmp_path):
+    text = '<robot><!-- made by <xacro:arm/> with ${name} and x="$(arg x)" --><link name="a"/></robot>'
+    assert list(UrdfFile(written(tmp_path, text)).links) == ["a"]
+
+
 def test_links_in_a_loop_are_refused(tmp_path):
     loop = JOINT.replace('"j"', '"k"').replace('link="a"', 'link="c"').replace('child link="b"', 'child link="d"')
     text = "".join(f'<link name="{name}"/>' for name in "abcd") + JOINT + loop

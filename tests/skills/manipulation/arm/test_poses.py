@@ -85,6 +85,6 @@ def test_an_object_that_cannot_be_drawn_in_is_refused():
 def test_a_tall_object_is_seen_from_further_back_first():
     model = arm_model(spot_capabilities())
     p_BT = model.p_BS + np.array([0.7, 0.0, 0.0])
-    low, tall = (overview_viewpoints(model, p_BT, height_m=height_m) for height_m in (0.3, 0.6))
+    low, tall = (overview_viewpoints(model.p_BS, p_BT, height_m=height_m) for height_m in (0.3, 0.6))
     assert tall[0][0] < min(p_BC[0] for p_BC in low)
     assert np.allclose(tall[len(low) :], low)

@@ -1,6 +1,5 @@
 """Guarded reading of picture files: checks the number of pixels in the header before decoding."""
 
-import os
 import re
 import struct
 from collections.abc import Iterator
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.inputs.errors import InputError
-from skills.inputs.outside import read_bytes
+from skills.inputs.outside import native_stderr_dropped, read_bytes
 
 MOST_PIXELS: Final = 64_000_000
 """Limit that keeps a picture from filling the memory; `executive.cli` sets the same limit in OpenCV."""
@@ -151,14 +150,10 @@ def _too_large(file: Path, pixels: str, most_pixels: int) -> InputError:
 def _silent() -> Iterator[None]:
     """Silences OpenCV and the libraries below it, which write to the process's stderr about damaged files."""
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 2)
-        yield
+        with native_stderr_dropped():
+            yield
     finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)
-        os.close(nowhere)
         cv2.utils.logging.setLogLevel(level)
 
 

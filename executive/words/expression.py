@@ -95,13 +95,14 @@ class Expression:
     @property
     def names(self) -> frozenset[str]:
         """Names that the expression reads."""
-        functions = {id(node.func) for node in ast.walk(_parsed(self.text)) if isinstance(node, ast.Call)}
-        nodes = (node for node in ast.walk(_parsed(self.text)) if isinstance(node, ast.Name))
-        return frozenset(node.id for node in nodes if id(node) not in functions) - set(_CONSTANTS)
+        return _names(_parsed(self.text))
 
     def kind(self, kinds: Mapping[str, Kind]) -> Kind:
-        """Type of the value. Raises ExpressionError for an unknown name or types that do not fit."""
+        """Type of the value. Raises ExpressionError for an unknown name, types that do not fit, or a division by 0."""
         kind = _kind(_parsed(self.text).body, kinds)
+        for node in ast.walk(_parsed(self.text)):
+            if isinstance(node, ast.BinOp) and type(node.op) in _DIVISIONS and not _names(node.right):
+                _worked_out(node, _ARITHMETIC[type(node.op)], 1, _value(node.right, {}))
         if not self.names:
             self.value({})
         return kind
@@ -164,6 +165,13 @@ def _pieces(text: str) -> tuple[str | Expression, ...]:
             raise ExpressionError(f"a brace '{found}' stands alone", "write an expression in {braces}, or {{")
         pieces.append(found[0] if found in ("{{", "}}") else Expression(match[1]))
     return tuple(piece for piece in (*pieces, text[last:]) if piece != "")
+
+
+def _names(tree: ast.AST) -> frozenset[str]:
+    """Names in a part of an expression, without functions and constants."""
+    functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    nodes = (node for node in ast.walk(tree) if isinstance(node, ast.Name))
+    return frozenset(node.id for node in nodes if id(node) not in functions) - set(_CONSTANTS)
 
 
 @functools.lru_cache(maxsize=4096)
@@ -397,6 +405,7 @@ _ARITHMETIC: Final[Mapping[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
 }
+_DIVISIONS: Final = (ast.Div, ast.FloorDiv, ast.Mod)
 COMPARISONS: Final[Mapping[type[ast.cmpop], Callable[[Any, Any], Any]]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,

@@ -36,10 +36,7 @@ queue = typer.Typer(
 )
 
 Out = Annotated[Path, typer.Option(help="Folder for logs, with a folder for each mission.")]
-RunsOut = Annotated[
-    Path | None,
-    typer.Option("--out", help="As of `errand queue add`; by default each mission's own.", show_default="out"),
-]
+RunsOut = Annotated[Path | None, typer.Option("--out", help="Replaces the --out of the missions; 'out' for the store.")]
 Number = Annotated[
     int, quantity_argument(Count, metavar="NUMBER", help="Number of the mission in `errand queue list`.")
 ]

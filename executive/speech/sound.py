@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,14 +17,13 @@ import numpy.typing as npt
 
 from skills.inputs.errors import InputError
 from skills.inputs.outside import native_stderr_dropped, plain_file
+from skills.robot import FloatArray
 
 if TYPE_CHECKING:
     from soundfile import SoundFile
 
 Samples = npt.NDArray[np.float32]
 """Sound of one channel at RATE_HZ; full scale is -1 to 1."""
-Frames = npt.NDArray[np.float64]
-"""Samples of a file: a row for each time, a column for each channel."""
 
 RATE_HZ: Final = 16_000
 _CLIP_LEVEL: Final = 0.999
@@ -94,7 +94,7 @@ _HINT: Final = "save the recording as wav or FLAC"
 def read_sound(file: Path) -> Iterator[Samples]:
     """Reads a recording in blocks of one second at RATE_HZ, as one channel; the last block may be shorter.
 
-    Only a few blocks are in memory at a time: the file is read twice, first to measure its channels (`mixing`).
+    Only a few blocks are in memory at a time: the file is read twice, first to measure its channels.
 
     Raises:
         InputError: when the first or a later block is asked for: it cannot be read, is no recording, ends before its
@@ -125,9 +125,8 @@ def _opened(file: Path) -> Iterator[SoundFile]:
     if not file.stat().st_size:
         raise _unreadable(file, b"", "")
     with file.open("rb") as stream, mmap(stream.fileno(), 0, access=ACCESS_COPY) as memory:
-        finished = _finish_head(memory)
         with native_stderr_dropped():
-            sound = SoundFile(memory if finished else file)
+            sound = SoundFile(memory if _finish_head(memory) else file)
         with sound:
             yield sound
 
@@ -151,49 +150,46 @@ def _finish_head(memory: mmap) -> bool:
     return True
 
 
-def _blocks(file: Path, head: bytes, sound: SoundFile) -> Iterator[Frames]:
+def _blocks(file: Path, head: bytes, sound: SoundFile) -> Iterator[FloatArray]:
     """Blocks of one second, at the file's own rate."""
-    rate_hz, frames = sound.samplerate, 0
+    rate_hz, at, whole, there = sound.samplerate, 0, _size_of_head(head), file.stat().st_size
     if rate_hz not in _RATES_HZ:
         hint = "record at 16 kHz in one channel"
         raise InputError(f"{rate_hz} samples per second are not read", hint=hint, file=file)
-    whole, there = _size_of_head(head), file.stat().st_size
     if whole > there + 1:
         raise _cut_off(file, sound.frames / rate_hz, sound.frames / rate_hz * whole / there)
-    while (block := _read_block(file, frames, sound)).size:
+    while (block := _next_second(sound)).size:
         bad = np.flatnonzero(~np.isfinite(block).all(axis=1))
         if bad.size:
-            what = f"the sample at {(frames + bad[0]) / rate_hz:.3f} s is no number"
+            what = f"the sample at {(at + bad[0]) / rate_hz:.3f} s is no number"
             raise InputError(what, hint="record again, or export it again", file=file)
         yield block
-        frames += len(block)
-    if frames == 0:
+        at += len(block)
+    if at == 0:
         raise InputError("it holds no sound", hint="record again", file=file)
+    if sound.format == "FLAC" and at < sound.frames < _OPEN_END:
+        raise _cut_off(file, at / rate_hz, sound.frames / rate_hz)
 
 
-def _read_block(file: Path, at: int, sound: SoundFile) -> Frames:
-    """Samples of the next second, a row for each time."""
+def _next_second(sound: SoundFile) -> FloatArray:
+    """Samples of the next second, a row for each time; a decoder of FLAC fails at the end, and has given the rest."""
     from soundfile import LibsndfileError
 
     block = np.full((sound.samplerate, sound.channels), np.inf)
     try:
         with native_stderr_dropped():
             return np.asarray(sound.read(out=block))
-    except LibsndfileError as error:
+    except LibsndfileError:
         if sound.format != "FLAC":
             raise
-        if sound.frames > _OPEN_END:  # a stream without a length: its decoder fails at the end, and has given the rest
-            return block[: np.count_nonzero(np.isfinite(block[:, 0]))]
-        raise _cut_off(file, at / sound.samplerate, sound.frames / sound.samplerate) from error
+        return block[: np.count_nonzero(np.isfinite(block[:, 0]))]
 
 
 def _size_of_head(head: bytes) -> int:
     """Bytes of the whole file as its head says; 0 if it does not."""
-    little, big = int.from_bytes(head[4:8], "little"), int.from_bytes(head[4:8], "big")
-    after = {b"RIFF": (little, 8), b"RIFX": (big, 8), b"FORM": (big, 8)}
-    after[b".snd"] = (int.from_bytes(head[8:12], "big"), big)
-    after[b"riff"] = (int.from_bytes(head[16:24], "little"), 0)
-    size, more = after.get(head[:4], (0, 0))
+    little, big = struct.unpack_from("<4xI8xQ", head.ljust(24)), struct.unpack_from(">4xII", head.ljust(24))
+    sizes = {b"RIFF": (little[0], 8), b"FORM": (big[0], 8), b".snd": big[::-1], b"riff": (little[1], 0)}
+    size, more = sizes.get(head[:4], (0, 0))
     return size + more if size < _OPEN_END else 0
 
 
@@ -205,15 +201,14 @@ def _cut_off(file: Path, there_s: float, whole_s: float) -> InputError:
 _FRAMES_PER_S: Final = 50
 _MOST_CONTRAST_DB: Final = 40.0
 _WORSE_DB: Final = 12.0
-_OPPOSED: Final = -0.3
-"""Correlation with the best channel below which a channel would take away from it."""
+_OPPOSED: Final = -0.3  # correlation with the best channel below which a channel takes away from it
 
 
-def mixing(blocks: Iterable[Frames], rate_hz: int) -> Frames:
-    """Gain of each channel: the mean of the channels, without those that would harm the best one.
+def mixing(blocks: Iterable[FloatArray], rate_hz: int) -> FloatArray:
+    """Gain of each channel: the mean of those that do not harm the best one; a peak beyond 1 becomes 1.
 
-    The best channel is the one whose level varies most, as speech does and noise does not. Channels with much less
-    variation, clipped ones beside one that is not, and inverted ones are left out. A peak beyond 1 becomes 1.
+    The best channel's level varies most, as speech does and noise does not; much steadier channels, clipped ones beside
+    one that is not, and inverted ones are left out.
     """
     count, peaks, clipped, products, levels = zip(*(_measure(block, rate_hz) for block in blocks), strict=True)
     low, high = np.percentile(np.concatenate(levels), (10, 95), axis=0)
@@ -225,11 +220,8 @@ def mixing(blocks: Iterable[Frames], rate_hz: int) -> Frames:
     return np.asarray(heard / heard.sum() / max(1.0, np.max(peaks, axis=0)[heard].max()))
 
 
-def _measure(block: Frames, rate_hz: int) -> tuple[int, Frames, Frames, Frames, Frames]:
-    """Length, and for each channel: peak, clipped samples, products with the other channels, levels in decibels.
-
-    Products and levels are those of the samples' differences: without a constant offset, and with little hum.
-    """
+def _measure(block: FloatArray, rate_hz: int) -> tuple[int, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Length, and for each channel: peak, clipped samples; of the differences: products with others, levels in dB."""
     height, change = np.abs(block), np.diff(block, axis=0, prepend=block[:1])
     frames = np.array_split(change, -(-_FRAMES_PER_S * len(block) // rate_hz))
     levels = [10.0 * np.log10(np.square(frame).mean(axis=0) + 1e-10) for frame in frames]

@@ -11,6 +11,7 @@ import functools
 import operator
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
@@ -95,14 +96,20 @@ class Expression:
     @property
     def names(self) -> frozenset[str]:
         """Names that the expression reads."""
-        return _names(_parsed(self.text))
+        functions = {id(node.func) for node in ast.walk(_parsed(self.text)) if isinstance(node, ast.Call)}
+        nodes = (node for node in ast.walk(_parsed(self.text)) if isinstance(node, ast.Name))
+        return frozenset(node.id for node in nodes if id(node) not in functions) - set(_CONSTANTS)
 
     def kind(self, kinds: Mapping[str, Kind]) -> Kind:
         """Type of the value. Raises ExpressionError for an unknown name, types that do not fit, or a division by 0."""
         kind = _kind(_parsed(self.text).body, kinds)
         for node in ast.walk(_parsed(self.text)):
-            if isinstance(node, ast.BinOp) and type(node.op) in _DIVISIONS and not _names(node.right):
-                _worked_out(node, _ARITHMETIC[type(node.op)], 1, _value(node.right, {}))
+            if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div | ast.FloorDiv | ast.Mod):
+                divisor: Any = None
+                with suppress(ExpressionError):  # it has names
+                    divisor = _value(node.right, {})
+                if divisor == 0:
+                    _worked_out(node, operator.truediv, 1, divisor)
         if not self.names:
             self.value({})
         return kind
@@ -165,13 +172,6 @@ def _pieces(text: str) -> tuple[str | Expression, ...]:
             raise ExpressionError(f"a brace '{found}' stands alone", "write an expression in {braces}, or {{")
         pieces.append(found[0] if found in ("{{", "}}") else Expression(match[1]))
     return tuple(piece for piece in (*pieces, text[last:]) if piece != "")
-
-
-def _names(tree: ast.AST) -> frozenset[str]:
-    """Names in a part of an expression, without functions and constants."""
-    functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    nodes = (node for node in ast.walk(tree) if isinstance(node, ast.Name))
-    return frozenset(node.id for node in nodes if id(node) not in functions) - set(_CONSTANTS)
 
 
 @functools.lru_cache(maxsize=4096)
@@ -405,7 +405,6 @@ _ARITHMETIC: Final[Mapping[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
 }
-_DIVISIONS: Final = (ast.Div, ast.FloorDiv, ast.Mod)
 COMPARISONS: Final[Mapping[type[ast.cmpop], Callable[[Any, Any], Any]]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,

@@ -37,11 +37,6 @@ def inside(polygon: Sequence[Point], point: Point) -> bool:
     return bool(shapely.contains_xy(_outline(tuple(polygon)), *point))
 
 
-def is_simple(polygon: Sequence[Point]) -> bool:
-    """Returns whether an outline does not cross or touch itself."""
-    return bool(_outline(tuple(polygon)).is_valid)
-
-
 def area_m2(polygon: Sequence[Point]) -> float:
     """Area within the outline."""
     return float(_outline(tuple(polygon)).area)

@@ -111,14 +111,12 @@ def file_beside(naming: Path, name: str, *, home: Path | None = None) -> Path:
 @contextmanager
 def native_stderr_dropped() -> Iterator[None]:
     """Drops what a native library writes to the process's stderr about a file whose errors it also returns."""
-    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)
-        os.close(nowhere)
+    with os.fdopen(os.dup(2), "wb") as stderr, Path(os.devnull).open("wb") as nowhere:
+        try:
+            os.dup2(nowhere.fileno(), 2)
+            yield
+        finally:
+            os.dup2(stderr.fileno(), 2)
 
 
 @contextmanager

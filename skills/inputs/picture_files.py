@@ -19,8 +19,7 @@ MOST_PIXELS: Final = 64_000_000
 """Limit that keeps a picture from filling the memory; `executive.cli` sets the same limit in OpenCV."""
 MOST_BYTES: Final = 200_000_000
 _PNG: Final = b"\x89PNG\r\n\x1a\n"
-_WIDE_HEADS: Final = (b"II", b"MM", b"PF", b"Pf", b"#?")
-"""Of TIFF, PFM and HDR, whose values may be float."""
+_WIDE_HEADS: Final = (b"II", b"MM", b"PF", b"Pf", b"#?")  # of TIFF, PFM and HDR, whose values may be float
 _LIMIT_NAME: Final = "MAX_IMAGE_PIXELS"
 _JPEG_SIZES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _SPACE: Final = rb"(?:\s|#[^\n\r]*[\n\r])+"
@@ -153,11 +152,10 @@ def _narrowed(content: bytes) -> bytes:
     pixels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None or pixels.dtype in (np.uint8, np.uint16):
         return content
-    values = np.nan_to_num(pixels.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)
+    values = np.nan_to_num(pixels.astype(np.float64), posinf=0.0, neginf=0.0)
     least, most = min(float(values.min()), 0.0), float(values.max())
     white = next((full for full in (1.0, 255.0) if least == 0.0 and most <= full), most)
-    shares = (values - least) / max(white - least, 1e-300)
-    return bytes(cv2.imencode(".png", np.rint(255.0 * shares).astype(np.uint8))[1])
+    return bytes(cv2.imencode(".png", np.rint(255.0 / max(white - least, 1e-300) * (values - least)))[1])
 
 
 def _too_large(file: Path, pixels: str, most_pixels: int) -> InputError:

@@ -30,8 +30,7 @@ from skills.quantities import Coordinate, Delay, Height, Quantity
 from skills.robot import FloatArray
 
 DIRECTIONS: Final = 36
-MOST_PEOPLE: Final = 40
-"""The simulation takes minutes for the bodies of more."""
+MOST_PEOPLE: Final = 40  # the simulation takes minutes for the bodies of more
 _STEP_M: Final = 0.01
 _BEYOND_M: Final = 0.5
 
@@ -218,8 +217,8 @@ def read_scenario(
             _check_fault(words, robots, cameras, partial(source.error, ("faults", number)))
     walks = [number for number, event in enumerate(file.events) if event.person is not None]
     if len(walks) > MOST_PEOPLE:
-        what = f"{len(walks)} events are of people, and at most {MOST_PEOPLE} people walk in a scenario"
-        raise source.error(("events", walks[MOST_PEOPLE]), what, "leave some of them out")
+        what = f"{len(walks)} people have events, and at most {MOST_PEOPLE} can"
+        raise source.error(("events", walks[MOST_PEOPLE]), what, "leave some out")
     reader = _EventReader(source, knowledge, objects, people)
     for number, event in enumerate(file.events):
         with problems:

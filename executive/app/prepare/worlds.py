@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from executive.words.knowledge import Knowledge, load_knowledge
-from executive.words.outlines import is_simple
 from plant.worlds.world import WORLDS_FOLDER, UnknownWorldError, World, WorldError, known_worlds, load_world
 from skills.inputs.errors import InputError, Problems, known_names, suggestion
 from skills.inputs.yaml_source import KeyPath, read_yaml
@@ -35,8 +34,10 @@ def refuse_unusable(world: World) -> None:
     """Raises InputError unless a user's world, its maps and the imported models can be loaded."""
     is_ours = world.folder.is_relative_to(WORLDS_FOLDER)
     if not is_ours or world.maps is not None:
-        needed = (world.scan_map_path,) if world.keepout_map_path.is_file() else ()
-        _try_maps(tuple(dict.fromkeys((*needed, *world.scan_map_paths))))
+        from skills.estimate.grid_map import load_grid_map
+
+        for path in {*world.scan_map_paths, *([world.scan_map_path] if world.keepout_map_path.is_file() else ())}:
+            load_grid_map(path)
     if is_ours and not world.imports:
         return
     models = tuple(each.folder / f"{name}.sdf" for name, each in world.imports.items())
@@ -49,14 +50,6 @@ def _try(directives: Path | None, models: tuple[Path, ...]) -> None:
     from plant.diagram import try_geometry
 
     try_geometry(directives, models)
-
-
-@cache
-def _try_maps(paths: tuple[Path, ...]) -> None:
-    from skills.estimate.grid_map import load_grid_map
-
-    for path in paths:
-        load_grid_map(path)
 
 
 def with_map(world: World, folder: Path) -> World:
@@ -79,11 +72,11 @@ def knowledge_of(world: World) -> Knowledge:
 
 def crossing_rooms(world: World, knowledge: Knowledge) -> tuple[InputError, ...]:
     """Warnings on rooms whose outlines cross themselves, so that it is open what lies inside."""
-    crossing = [name for name, outline in knowledge.rooms.items() if not is_simple(outline)]
-    source = read_yaml(world.knowledge_path) if crossing else None
-    hint = "give the corners in order around the room"
-    whats = {name: f"places.{name}.polygon: the outline crosses itself" for name in crossing}
-    return tuple(source.error(("places", name, "polygon"), whats[name], hint) for name in crossing if source)
+    from shapely import Polygon
+
+    places = [("places", name, "polygon") for name, corners in knowledge.rooms.items() if not Polygon(corners).is_valid]
+    source, hint = read_yaml(world.knowledge_path) if places else None, "give the corners in order around the room"
+    return tuple(source.error(at, f"{'.'.join(at)}: the outline crosses itself", hint) for at in places if source)
 
 
 def refuse_blocked_poses(world: World, knowledge: Knowledge, error: Callable[[KeyPath, str, str], InputError]) -> None:

@@ -232,9 +232,8 @@ class MissionRuns:
         if prepared is None:
             prepared = prepare(mission.request, ask=self._ask)
             self._screen.tell(f"Mission {mission.id}: {name}", title=True)
-        out = mission.request.out if begun and holds_run(mission.request.out) else None
-        known = out is not None and self._out in (None, out.parent)
-        asked = prepared.request if self._out is None else replace(prepared.request, out=self._out)
+        known = begun and holds_run(out := mission.request.out) and self._out in (None, out.parent)
+        asked = replace(prepared.request, out=self._out or prepared.request.out)
         kept = kept_run(mission.request.out) if known else new_run(asked, self._missions.now())
         prepared = replace(prepared, request=replace(prepared.request, out=kept.request.out))
         with note_run(self._missions, mission, kept) as ended:

@@ -133,7 +133,7 @@ class Skip(ExplainedDecorator):
 
     def update(self) -> Status:
         """Returns the child's status, or SUCCESS instead of a failure that may be skipped."""
-        status = self._take_child()
+        status = self.pass_on()
         if status != Status.FAILURE or self.cause in FINAL_CAUSES:
             return status
         return self.skip()
@@ -143,10 +143,10 @@ class Skip(ExplainedDecorator):
         is_skipped = self.skipped is not None and self.status is Status.SUCCESS
         return f"{self.step} ({self.skipped})" if is_skipped else None
 
-    def _take_child(self) -> Status:
+    def pass_on(self) -> Status:
         """Returns the child's status; `achieved` stays True once the child has done something, also in later rounds."""
         self.achieved = self.achieved or (self.decorated.status == Status.SUCCESS and _achieves(self.decorated))
-        return self.pass_on()
+        return super().pass_on()
 
     def skip(self) -> Status:
         """Returns SUCCESS, and records the child's failure as the reason for the skip."""
@@ -179,7 +179,7 @@ class AskOperator(Skip):
 
     def update(self) -> Status:
         """Returns the child's status; asks the question when it fails."""
-        status = self._take_child()
+        status = self.pass_on()
         if status != Status.FAILURE or self.cause is None or self.cause in FINAL_CAUSES:
             return status
         before, self.before = self.before, None

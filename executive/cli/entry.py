@@ -310,8 +310,7 @@ def command_line() -> None:
 
     Refuses arguments that are not valid UTF-8, because no log, store or JSON can hold them.
     """
-    # a filter: pydrake sets the level of its logger when it is imported
-    logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.WARNING)
+    logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.WARNING)  # pydrake sets its level
     for argument in sys.argv[1:]:
         try:
             argument.encode()

@@ -88,7 +88,6 @@ MOST_BYTES: Final = 8_000_000_000
 _RATES_HZ: Final = range(4_000, 384_001)
 _CONTEXT: Final = 16
 """Samples of the neighbouring blocks, at the lower rate, that resampling of a block needs."""
-_HINT: Final = "save the recording as wav or FLAC"
 
 
 def read_sound(file: Path) -> Iterator[Samples]:
@@ -154,8 +153,7 @@ def _blocks(file: Path, head: bytes, sound: SoundFile) -> Iterator[FloatArray]:
     """Blocks of one second, at the file's own rate."""
     rate_hz, at, whole, there = sound.samplerate, 0, _size_of_head(head), file.stat().st_size
     if rate_hz not in _RATES_HZ:
-        hint = "record at 16 kHz in one channel"
-        raise InputError(f"{rate_hz} samples per second are not read", hint=hint, file=file)
+        raise InputError(f"{rate_hz} samples per second are not read", hint="record at 16 kHz", file=file)
     if whole > there + 1:
         raise _cut_off(file, sound.frames / rate_hz, sound.frames / rate_hz * whole / there)
     while (block := _next_second(sound)).size:
@@ -234,7 +232,9 @@ def _unreadable(file: Path, head: bytes, reason: str) -> InputError:
         return InputError("the file is empty", hint="record again", file=file)
     if head[:4] == b"RIFF" and len(head) < _HEAD_BYTES:
         return InputError("the file ends before its sound", hint="copy the whole file, or record again", file=file)
-    return InputError(f"this is no recording that can be read ({reason.rstrip('.')})", hint=_HINT, file=file)
+    return InputError(
+        f"this is no recording that can be read ({reason.rstrip('.')})", hint="save it as wav or FLAC", file=file
+    )
 
 
 def _resampled(blocks: Iterator[Samples], rate_hz: int) -> Iterator[Samples]:

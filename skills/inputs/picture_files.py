@@ -145,10 +145,7 @@ def _decoded(content: bytes, file: Path, flags: int) -> NDArray[Any]:
 
 
 def _narrowed(content: bytes) -> bytes:
-    """Picture with 8 bits a value, from black to white, of one whose values are float, signed or of 32 bits.
-
-    Full scale is 1 if no value is greater, 255 if none is, else the greatest value; a negative least value is black.
-    """
+    """Picture of 8 bits a value of one with float, signed or 32-bit values; white is 1, else 255, else the greatest."""
     pixels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None or pixels.dtype in (np.uint8, np.uint16):
         return content

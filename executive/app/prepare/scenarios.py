@@ -217,8 +217,9 @@ def read_scenario(
             _check_fault(words, robots, cameras, partial(source.error, ("faults", number)))
     walks = [number for number, event in enumerate(file.events) if event.person is not None]
     if len(walks) > MOST_PEOPLE:
-        what = f"{len(walks)} people have events, and at most {MOST_PEOPLE} can"
-        raise source.error(("events", walks[MOST_PEOPLE]), what, "leave some out")
+        raise source.error(
+            ("events", walks[MOST_PEOPLE]), f"at most {MOST_PEOPLE} people have events", "leave some out"
+        )
     reader = _EventReader(source, knowledge, objects, people)
     for number, event in enumerate(file.events):
         with problems:

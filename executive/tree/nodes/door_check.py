@@ -83,9 +83,7 @@ class BeforeDoor(MemoryComposite):
 def door_plan(
     builder: PlanBuilder, between: tuple[str, str], key: str, max_age_s: float = 0.0, *, closed: bool = False
 ) -> NodeSpec:
-    """Looks whether a door is open, or whether it is `closed`, and writes the answer to `key`.
-
-    Knowledge at most `max_age_s` old makes a look unnecessary.
+    """Looks whether a door is open or `closed`; writes the answer to `key`. Knowledge `max_age_s` old spares a look.
 
     Raises InputError when the world has no such door.
     """

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import logging
 import os
 import sys
 import threading
@@ -51,7 +52,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "init": _Command("missions_command", "Copy the missions that come with Errand into a folder."),
     "parse": _Command("parse_command", "Show the commands that a sentence means."),
     "tree": _Command("inspect_command", "Show the tree of a sentence, a mission file or a log."),
-    "listen": _Command("listen_command", "Recognise what is said in wav files or at the microphone, and its commands."),
+    "listen": _Command("listen_command", "Recognise what is said in recordings or at a microphone, and its commands."),
     "log": _Command("inspect_command", "Print what each node of a run did and why, detections and the outcome."),
     "replay": _Command("inspect_command", "Show a run at any time of it: tree, map, pictures, events, 3D."),
     "runs": _Command("runs_command", "List the runs whose files are kept; remove old ones."),
@@ -309,6 +310,7 @@ def command_line() -> None:
 
     Refuses arguments that are not valid UTF-8, because no log, store or JSON can hold them.
     """
+    logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.WARNING)  # pydrake sets its level
     for argument in sys.argv[1:]:
         try:
             argument.encode()

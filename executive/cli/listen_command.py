@@ -37,7 +37,7 @@ _QUIETEST_DB = -60.0
 @takes_request("world", "robots")
 def listen(
     request: Request,
-    files: Annotated[list[Path] | None, typer.Argument(metavar="FILE.wav...", show_default=False)] = None,
+    files: Annotated[list[Path] | None, typer.Argument(metavar="FILE...", show_default=False)] = None,
     mic: Annotated[bool, typer.Option("--mic", help="Listen to the microphone until Ctrl-C.")] = False,
     open_words: Annotated[bool, typer.Option("--open", help="Ground no names in a world.")] = False,
     no_wake: Annotated[bool, typer.Option("--no-wake", help="Take sentences without the robot's name.")] = False,
@@ -47,9 +47,9 @@ def listen(
     robot: Annotated[str | None, typer.Option(help="Name of the robot; by default the world's robot.")] = None,
     jsonl: Annotated[bool, typer.Option("--jsonl", help="One JSON object for each file.")] = False,
 ) -> None:
-    """Recognises sentences in wav files or at the microphone, and shows the commands that they mean."""
+    """Recognises sentences in recordings or at the microphone, and shows the commands that they mean."""
     if mic == bool(files):
-        raise InputError("errand listen takes wav files or --mic", hint="try: errand listen request.wav")
+        raise InputError("errand listen takes recordings or --mic", hint="try: errand listen request.wav")
     knowledge = knowledge_of(open_world(request.world or DEFAULT_WORLD))
     several = called_robots(request.robots, knowledge) if robot is None else ()
     if (robot is not None and request.robots) or (open_words and several):

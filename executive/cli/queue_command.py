@@ -36,6 +36,7 @@ queue = typer.Typer(
 )
 
 Out = Annotated[Path, typer.Option(help="Folder for logs, with a folder for each mission.")]
+RunsOut = Annotated[Path | None, typer.Option("--out", help="Replaces the --out of the missions; 'out' for the store.")]
 Number = Annotated[
     int, quantity_argument(Count, metavar="NUMBER", help="Number of the mission in `errand queue list`.")
 ]
@@ -115,7 +116,7 @@ def remove(number: Number, out: Out = Path("out"), store: STORE = None) -> None:
 
 @queue.command(cls=StartCommand)
 def run(
-    out: Out = Path("out"),
+    out: RunsOut = None,
     store: STORE = None,
     quiet: QUIET = False,
     view: VIEW = None,
@@ -128,7 +129,7 @@ def run(
     from executive.app.runs.queue import resumable_line
 
     console = console_for(as_json)
-    with _runs(store or store_in(out), out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
+    with _runs(store, out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
         ended = _in_turn(missions, runs, console)
         resumable = resumable_line(missions)
     if ended:
@@ -142,8 +143,8 @@ def run(
 
 @contextmanager
 def _runs(
-    store: Path,
-    out: Path,
+    store: Path | None,
+    out: Path | None,
     console: Console,
     quiet: bool,
     view: float | None,
@@ -154,15 +155,16 @@ def _runs(
 
     With `view` each mission has a live page, and the last page stays as `errand run --view` says.
     """
-    with MissionStore(store, create=False) as missions, missions.claim():
+    folder = out or Path("out")
+    with MissionStore(store or store_in(folder), create=False) as missions, missions.claim():
         from executive.app.runs.queue import MissionRuns
         from executive.cli.screen import ConsoleScreen, page_of
         from executive.view.foxglove import serve_live
 
-        page = None if view is None else page_of(console, address, store, out)
+        page = None if view is None else page_of(console, address, missions.path, folder)
         with serve_live(foxglove, plain_lines(console)) as live:
             screen = ConsoleScreen(console, quiet=quiet, page=page, live=live)
-            yield missions, MissionRuns(missions, screen, ask=terminal_answerer())
+            yield missions, MissionRuns(missions, screen, ask=terminal_answerer(), out=out)
     screen.stay(view)
 
 
@@ -234,7 +236,7 @@ def _trigger(at: str | None, every: str | None, on: str | None, missed: Missed |
 
 @queue.command(cls=StartCommand)
 def serve(
-    out: Out = Path("out"),
+    out: RunsOut = None,
     store: STORE = None,
     host: Annotated[str, typer.Option(help="Host name or address for HTTP calls.")] = "127.0.0.1",
     port: Annotated[int, quantity_option(Port, help="Port for HTTP calls; 0 takes a free one.")] = 8950,
@@ -259,7 +261,7 @@ def serve(
 
     console = console_for(as_json)
     tell = plain_lines(console)
-    with _runs(store or store_in(out), out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
+    with _runs(store, out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
         end = None if for_s is None else missions.now() + timedelta(seconds=min(for_s, _LONGEST_S))
         address = CallAddress(host, port, token)
         with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
@@ -276,7 +278,7 @@ def serve(
 
 
 def resume(
-    out: Out = Path("out"),
+    out: RunsOut = None,
     store: STORE = None,
     mission: Annotated[
         int | None,
@@ -291,7 +293,7 @@ def resume(
 ) -> None:
     """Resumes an interrupted or cancelled mission from its last finished step; then runs its queue."""
     console = console_for(as_json)
-    with _runs(store or store_in(out), out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
+    with _runs(store, out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
         ended = _in_turn(missions, runs, console, _interrupted(missions, mission))
     values = {**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]}
     finish(values, as_json, good=all(each.achieved for each in ended))

@@ -17,7 +17,7 @@ from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Ut
 from executive.speech.hearing import Reader
 from executive.speech.interpret import choose_opening, interpret
 from executive.speech.recogniser import Recogniser
-from executive.speech.sound import RATE_HZ, Loudness, Samples, concatenate, level_db, read_wav
+from executive.speech.sound import RATE_HZ, Loudness, Samples, concatenate, level_db, read_sound
 from executive.words.command import Command
 from skills.inputs.errors import InputError
 
@@ -50,13 +50,13 @@ class Listener:
         """Listens to a recording of any length, and holds only seconds of it in memory.
 
         Raises:
-            InputError: see `read_wav`.
+            InputError: see `read_sound`.
         """
         loudness = Loudness()
 
         def measured() -> Iterator[Samples]:
             nonlocal loudness
-            for block in read_wav(wav):
+            for block in read_sound(wav):
                 loudness = loudness.with_block(block)
                 yield block
 

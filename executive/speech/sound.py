@@ -1,11 +1,14 @@
-"""Reads sound as samples from wav files of any rate, width and channels, and measures its loudness."""
+"""Reads sound as samples from recordings of any kind, rate, width and channels, and measures its loudness."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator
-from contextlib import closing
+import re
+import struct
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import gcd
+from mmap import ACCESS_COPY, mmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -13,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from skills.inputs.errors import InputError
-from skills.inputs.outside import plain_file
+from skills.inputs.outside import native_stderr_dropped, plain_file
+from skills.robot import FloatArray
 
 if TYPE_CHECKING:
     from soundfile import SoundFile
@@ -82,57 +86,144 @@ _OPEN_END: Final = 0x7FFF_F000
 _HEAD_BYTES: Final = 44
 MOST_BYTES: Final = 8_000_000_000
 _RATES_HZ: Final = range(4_000, 384_001)
-_SAMPLE_BYTES: Final = {"PCM_U8": 1, "PCM_16": 2, "PCM_24": 3, "PCM_32": 4, "FLOAT": 4, "DOUBLE": 8}
 _CONTEXT: Final = 16
 """Samples of the neighbouring blocks, at the lower rate, that resampling of a block needs."""
-_HINT: Final = "save the recording as a plain wav file (PCM or float)"
 
 
-def read_wav(file: Path) -> Iterator[Samples]:
-    """Reads a wav file in blocks of one second at RATE_HZ, with averaged channels; the last block may be shorter.
+def read_sound(file: Path) -> Iterator[Samples]:
+    """Reads a recording in blocks of one second at RATE_HZ, as one channel; the last block may be shorter.
 
-    Only a few blocks are in memory at a time.
+    Only a few blocks are in memory at a time: the file is read twice, first to measure its channels.
 
     Raises:
-        InputError: when the first or a later block is asked for: it cannot be read, is no wav file, ends before its
+        InputError: when the first or a later block is asked for: it cannot be read, is no recording, ends before its
             head says, holds no sound, or holds samples that are no numbers.
     """
-    from soundfile import LibsndfileError, SoundFile
+    from soundfile import LibsndfileError
 
-    plain_file(file, most_bytes=MOST_BYTES, hint="name a wav file")
+    plain_file(file, most_bytes=MOST_BYTES, hint="name a recording")
     try:
         with file.open("rb") as stream:
             head = stream.read(_HEAD_BYTES)
-        with SoundFile(file) as sound, closing(_resampled(_blocks(file, head, sound), sound.samplerate)) as blocks:
-            yield from blocks
+        with _opened(file) as sound:
+            rate_hz, gains = sound.samplerate, mixing(_blocks(file, head, sound), sound.samplerate)
+        with _opened(file) as sound:
+            mixed = (np.asarray(np.clip(block @ gains, -1, 1), np.float32) for block in _blocks(file, head, sound))
+            yield from _resampled(mixed, rate_hz)
     except OSError as error:
-        raise InputError(f"cannot read it ({error.strerror})", hint="name a wav file", file=file) from error
+        raise InputError(f"cannot read it ({error.strerror})", hint="name a recording", file=file) from error
     except LibsndfileError as error:
         raise _unreadable(file, head, error.error_string) from error
 
 
-def _blocks(file: Path, head: bytes, sound: SoundFile) -> Iterator[Samples]:
+@contextmanager
+def _opened(file: Path) -> Iterator[SoundFile]:
+    """Opens a recording; sets the size of its sound in a copy when its recorder ended before it wrote the size."""
+    from soundfile import SoundFile
+
+    if not file.stat().st_size:
+        raise _unreadable(file, b"", "")
+    with file.open("rb") as stream, mmap(stream.fileno(), 0, access=ACCESS_COPY) as memory:
+        with native_stderr_dropped():
+            sound = SoundFile(memory if _finish_head(memory) else file)
+        with sound:
+            yield sound
+
+
+def _finish_head(memory: mmap) -> bool:
+    """Writes the size of the sound into the head of a wav or AU file that lacks it; returns whether it did."""
+    if memory[:4] == b".snd" and not any(memory[8:12]):
+        memory[8:12] = b"\xff" * 4
+        return True
+    at, endless = 12, memory[:4] == b"RF64" and not any(memory[28:36])
+    if memory[:4] != b"RIFF" and not endless:
+        return False
+    while memory[at : at + 4] not in (b"data", b""):
+        at += 8 + -(-int.from_bytes(memory[at + 4 : at + 8], "little") // 2) * 2
+    start, size = at + 8, int.from_bytes(memory[at + 4 : at + 8], "little")
+    after = memory[start + size : start + size + 8]
+    if (len(after) < 8 and not endless) or re.match(rb"[ -~]{4}", after):  # the file ends, or another chunk begins
+        return False
+    memory[:8] = b"RIFF" + b"\xff" * 4
+    memory[at + 4 : start] = min(len(memory) - start, _OPEN_END).to_bytes(4, "little")
+    return True
+
+
+def _blocks(file: Path, head: bytes, sound: SoundFile) -> Iterator[FloatArray]:
     """Blocks of one second, at the file's own rate."""
-    rate_hz, there_s = sound.samplerate, sound.frames / sound.samplerate
+    rate_hz, at, whole, there = sound.samplerate, 0, _size_of_head(head), file.stat().st_size
     if rate_hz not in _RATES_HZ:
-        hint = "record at 16 kHz in one channel"
-        raise InputError(f"{rate_hz} samples per second are not read", hint=hint, file=file)
-    size = int.from_bytes(head[4:8], "little")
-    missing = 0 if size >= _OPEN_END else size + 8 - file.stat().st_size
-    if missing > 1:
-        missing_s = missing / (rate_hz * sound.channels * _SAMPLE_BYTES.get(sound.subtype, 1))
-        what = f"it ends after {there_s:.1f} s, and its head says {there_s + missing_s:.1f} s"
-        raise InputError(what, hint="copy the whole file, or record again", file=file)
-    if sound.frames == 0:
-        raise InputError("it holds no sound", hint="record again", file=file)
-    for at_s, frames in enumerate(sound.blocks(rate_hz, dtype="float64", always_2d=True)):
-        block = frames.mean(axis=1)
-        bad = np.flatnonzero(~np.isfinite(block))
+        raise InputError(f"{rate_hz} samples per second are not read", hint="record at 16 kHz", file=file)
+    if whole > there + 1:
+        raise _cut_off(file, sound.frames / rate_hz, sound.frames / rate_hz * whole / there)
+    while (block := _next_second(sound)).size:
+        bad = np.flatnonzero(~np.isfinite(block).all(axis=1))
         if bad.size:
-            where = at_s + bad[0] / rate_hz
-            what = f"the sample at {where:.3f} s is no number"
+            what = f"the sample at {(at + bad[0]) / rate_hz:.3f} s is no number"
             raise InputError(what, hint="record again, or export it again", file=file)
-        yield np.asarray(np.clip(block, -1.0, 1.0), np.float32)
+        yield block
+        at += len(block)
+    if at == 0:
+        raise InputError("it holds no sound", hint="record again", file=file)
+    if sound.format == "FLAC" and at < sound.frames < _OPEN_END:
+        raise _cut_off(file, at / rate_hz, sound.frames / rate_hz)
+
+
+def _next_second(sound: SoundFile) -> FloatArray:
+    """Samples of the next second, a row for each time; a decoder of FLAC fails at the end, and has given the rest."""
+    from soundfile import LibsndfileError
+
+    block = np.full((sound.samplerate, sound.channels), np.inf)
+    try:
+        with native_stderr_dropped():
+            return np.asarray(sound.read(out=block))
+    except LibsndfileError:
+        if sound.format != "FLAC":
+            raise
+        return block[: np.count_nonzero(np.isfinite(block[:, 0]))]
+
+
+def _size_of_head(head: bytes) -> int:
+    """Bytes of the whole file as its head says; 0 if it does not."""
+    little, big = struct.unpack_from("<4xI8xQ", head.ljust(24)), struct.unpack_from(">4xII", head.ljust(24))
+    sizes = {b"RIFF": (little[0], 8), b"FORM": (big[0], 8), b".snd": big[::-1], b"riff": (little[1], 0)}
+    size, more = sizes.get(head[:4], (0, 0))
+    return size + more if size < _OPEN_END else 0
+
+
+def _cut_off(file: Path, there_s: float, whole_s: float) -> InputError:
+    what = f"it ends after {there_s:.1f} s, and its head says {whole_s:.1f} s"
+    return InputError(what, hint="copy the whole file, or record again", file=file)
+
+
+_FRAMES_PER_S: Final = 50
+_MOST_CONTRAST_DB: Final = 40.0
+_WORSE_DB: Final = 12.0
+_OPPOSED: Final = -0.3  # correlation with the best channel below which a channel takes away from it
+
+
+def mixing(blocks: Iterable[FloatArray], rate_hz: int) -> FloatArray:
+    """Gain of each channel: the mean of those that do not harm the best one; a peak beyond 1 becomes 1.
+
+    The best channel's level varies most, as speech does and noise does not; much steadier channels, clipped ones beside
+    one that is not, and inverted ones are left out.
+    """
+    count, peaks, clipped, products, levels = zip(*(_measure(block, rate_hz) for block in blocks), strict=True)
+    low, high = np.percentile(np.concatenate(levels), (10, 95), axis=0)
+    power = sum(products).diagonal()
+    contrast = np.minimum(high - low, _MOST_CONTRAST_DB) - _WORSE_DB * (sum(clipped) > _MUCH_CLIPPED * sum(count))
+    best = int(np.lexsort((power, contrast))[-1])
+    alike = sum(products)[best] / np.sqrt(np.maximum(power * power[best], 1e-24))
+    heard = (contrast > contrast[best] - _WORSE_DB) & (alike > _OPPOSED)
+    return np.asarray(heard / heard.sum() / max(1.0, np.max(peaks, axis=0)[heard].max()))
+
+
+def _measure(block: FloatArray, rate_hz: int) -> tuple[int, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Length, and for each channel: peak, clipped samples; of the differences: products with others, levels in dB."""
+    height, change = np.abs(block), np.diff(block, axis=0, prepend=block[:1])
+    frames = np.array_split(change, -(-_FRAMES_PER_S * len(block) // rate_hz))
+    levels = [10.0 * np.log10(np.square(frame).mean(axis=0) + 1e-10) for frame in frames]
+    return len(block), height.max(axis=0), (height >= _CLIP_LEVEL).sum(axis=0), change.T @ change, np.array(levels)
 
 
 def _unreadable(file: Path, head: bytes, reason: str) -> InputError:
@@ -141,10 +232,12 @@ def _unreadable(file: Path, head: bytes, reason: str) -> InputError:
         return InputError("the file is empty", hint="record again", file=file)
     if head[:4] == b"RIFF" and len(head) < _HEAD_BYTES:
         return InputError("the file ends before its sound", hint="copy the whole file, or record again", file=file)
-    return InputError(f"this is no wav file ({reason.rstrip('.')})", hint=_HINT, file=file)
+    return InputError(
+        f"this is no recording that can be read ({reason.rstrip('.')})", hint="save it as wav or FLAC", file=file
+    )
 
 
-def _resampled(blocks: Iterator[Samples], rate_hz: int) -> Generator[Samples, None, None]:
+def _resampled(blocks: Iterator[Samples], rate_hz: int) -> Iterator[Samples]:
     """Blocks of one second at RATE_HZ; each is filtered together with the ends of its neighbours."""
     if rate_hz == RATE_HZ:
         yield from blocks

@@ -11,6 +11,7 @@ import functools
 import operator
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
@@ -100,8 +101,15 @@ class Expression:
         return frozenset(node.id for node in nodes if id(node) not in functions) - set(_CONSTANTS)
 
     def kind(self, kinds: Mapping[str, Kind]) -> Kind:
-        """Type of the value. Raises ExpressionError for an unknown name or types that do not fit."""
+        """Type of the value. Raises ExpressionError for an unknown name, types that do not fit, or a division by 0."""
         kind = _kind(_parsed(self.text).body, kinds)
+        for node in ast.walk(_parsed(self.text)):
+            if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div | ast.FloorDiv | ast.Mod):
+                divisor: Any = None
+                with suppress(ExpressionError):  # it has names
+                    divisor = _value(node.right, {})
+                if divisor == 0:
+                    _worked_out(node, operator.truediv, 1, divisor)
         if not self.names:
             self.value({})
         return kind

@@ -15,7 +15,7 @@ class GoalKind(enum.Enum):
     PLACED = "placed"  # resting in a goal region, let go
     WENT = "went"  # the robot's body in a goal region
     ANSWERED = "answered"  # the answer is what is true of the source regions
-    DOOR_OPEN = "door open"  # the answer is whether the door in the source region is open
+    DOOR_OPEN = "door open"  # the answer is whether the door in the source region is open (`wanted` "closed": closed)
     DOOR_OPENED = "door opened"  # the door in the source region is open
     CLEARED = "cleared"  # nothing rests in the source regions; with goal regions, all that did rests there, let go
     FOLLOWED = "followed"  # the robot is near the person, who stands in a goal region, and never lost them for long

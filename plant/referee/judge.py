@@ -248,7 +248,8 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
 def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges an answer by the state of the door while the robot looked; for a moving door, both answers are right."""
     was = _door_state(condition, truth, truth.now_s if condition.answered_s is None else condition.answered_s)
-    right = condition.answer is not None and was in ("moving", "open" if condition.answer else "closed")
+    is_open = condition.answer != (condition.wanted == "closed")
+    right = condition.answer is not None and was in ("moving", "open" if is_open else "closed")
     said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
     return Finding(right, f"the answer was {said}, and {the(condition.source[0].name)} was {was}.")
 

@@ -109,6 +109,17 @@ def file_beside(naming: Path, name: str, *, home: Path | None = None) -> Path:
 
 
 @contextmanager
+def native_stderr_dropped() -> Iterator[None]:
+    """Drops what a native library writes to the process's stderr about a file whose errors it also returns."""
+    with os.fdopen(os.dup(2), "wb") as stderr, Path(os.devnull).open("wb") as nowhere:
+        try:
+            os.dup2(nowhere.fileno(), 2)
+            yield
+        finally:
+            os.dup2(stderr.fileno(), 2)
+
+
+@contextmanager
 def _opened(file: Path, hint: str, line: int | None = None) -> Iterator[BinaryIO]:
     """Opens a plain file. Raises InputError for a missing file, a folder, a pipe or a device."""
     try:

@@ -1,6 +1,5 @@
 """Guarded reading of picture files: checks the number of pixels in the header before decoding."""
 
-import os
 import re
 import struct
 from collections.abc import Iterator
@@ -14,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.inputs.errors import InputError
-from skills.inputs.outside import read_bytes
+from skills.inputs.outside import native_stderr_dropped, read_bytes
 
 MOST_PIXELS: Final = 64_000_000
 """Limit that keeps a picture from filling the memory; `executive.cli` sets the same limit in OpenCV."""
 MOST_BYTES: Final = 200_000_000
 _PNG: Final = b"\x89PNG\r\n\x1a\n"
+_WIDE_HEADS: Final = (b"II", b"MM", b"PF", b"Pf", b"#?")  # of TIFF, PFM and HDR, whose values may be float
 _LIMIT_NAME: Final = "MAX_IMAGE_PIXELS"
 _JPEG_SIZES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _SPACE: Final = rb"(?:\s|#[^\n\r]*[\n\r])+"
@@ -133,6 +133,8 @@ def _content(file: Path, most_pixels: int) -> bytes:
 def _decoded(content: bytes, file: Path, flags: int) -> NDArray[Any]:
     try:
         with _silent():
+            if content[:2] in _WIDE_HEADS:
+                content = _narrowed(content)
             pixels = cv2.imdecode(np.frombuffer(content, np.uint8), flags) if content else None
     except cv2.error as error:
         large = _LIMIT_NAME in str(error)
@@ -140,6 +142,17 @@ def _decoded(content: bytes, file: Path, flags: int) -> NDArray[Any]:
     if pixels is None:
         raise _unreadable(file, content)
     return np.asarray(pixels)
+
+
+def _narrowed(content: bytes) -> bytes:
+    """Picture of 8 bits a value of one with float, signed or 32-bit values; white is 1, else 255, else the greatest."""
+    pixels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None or pixels.dtype in (np.uint8, np.uint16):
+        return content
+    values = np.nan_to_num(pixels.astype(np.float64), posinf=0.0, neginf=0.0)
+    least, most = min(float(values.min()), 0.0), float(values.max())
+    white = next((full for full in (1.0, 255.0) if least == 0.0 and most <= full), most)
+    return bytes(cv2.imencode(".png", np.rint(255.0 / max(white - least, 1e-300) * (values - least)))[1])
 
 
 def _too_large(file: Path, pixels: str, most_pixels: int) -> InputError:
@@ -151,14 +164,10 @@ def _too_large(file: Path, pixels: str, most_pixels: int) -> InputError:
 def _silent() -> Iterator[None]:
     """Silences OpenCV and the libraries below it, which write to the process's stderr about damaged files."""
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 2)
-        yield
+        with native_stderr_dropped():
+            yield
     finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)
-        os.close(nowhere)
         cv2.utils.logging.setLogLevel(level)
 
 

@@ -316,7 +316,8 @@ class _Onlooker:
 
     def answers(self, goal, t_s):
         if goal.kind is GoalKind.DOOR_OPEN:
-            return {door_is_open(max(0.0, t_s - DOOR_LOOK_S)), door_is_open(t_s)}
+            closed = goal.wanted == "closed"
+            return {door_is_open(max(0.0, t_s - DOOR_LOOK_S)) != closed, door_is_open(t_s) != closed}
         return {self.count(goal, t_s) >= max(1, goal.count)}
 
     def done(self, goal, begun_s, ended_s):

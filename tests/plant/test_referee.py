@@ -527,6 +527,9 @@ def test_an_answer_about_a_door_is_judged_by_how_it_was_while_the_robot_looked(a
     answers = (True, False, None)
     judged = {each: judge([replace(asked, answer=each)], DOOR_TRUTH, collisions=()).success for each in answers}
     assert {answer for answer, success in judged.items() if success} == right
+    shut = replace(asked, wanted="closed")
+    judged = {each: judge([replace(shut, answer=each)], DOOR_TRUTH, collisions=()).success for each in answers}
+    assert {not answer for answer, success in judged.items() if success} == right
 
 
 @pytest.mark.parametrize(("ended_s", "opened"), [(5.0, False), (15.0, True), (30.0, False)])

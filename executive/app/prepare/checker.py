@@ -11,7 +11,7 @@ from typing import Final
 from executive.app.prepare.feasibility import check_prepared, route_planner_of
 from executive.app.prepare.from_request import prepare
 from executive.app.prepare.prepared import Prepared
-from executive.app.prepare.worlds import refuse_unusable
+from executive.app.prepare.worlds import crossing_rooms, refuse_unusable
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, RoutePlanner, minutes_text
@@ -95,6 +95,7 @@ class Checker:
         errors = tuple(error for each in checked.values() for error in each.errors)
         warnings = tuple(warning for each in checked.values() for warning in each.warnings)
         estimates = {name: each.estimate for name, each in checked.items()}
+        warnings += crossing_rooms(prepared.world, prepared.knowledge)
         return Checked(file, _placed(file, errors), trees, _total(prepared, estimates), warnings, prepared.time_limit_s)
 
     def _planner(self, prepared: Prepared) -> RoutePlanner:

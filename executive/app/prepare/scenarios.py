@@ -30,6 +30,7 @@ from skills.quantities import Coordinate, Delay, Height, Quantity
 from skills.robot import FloatArray
 
 DIRECTIONS: Final = 36
+MOST_PEOPLE: Final = 40  # the simulation takes minutes for the bodies of more
 _STEP_M: Final = 0.01
 _BEYOND_M: Final = 0.5
 
@@ -214,6 +215,11 @@ def read_scenario(
     for number, words in enumerate(file.faults):
         with problems:
             _check_fault(words, robots, cameras, partial(source.error, ("faults", number)))
+    walks = [number for number, event in enumerate(file.events) if event.person is not None]
+    if len(walks) > MOST_PEOPLE:
+        raise source.error(
+            ("events", walks[MOST_PEOPLE]), f"at most {MOST_PEOPLE} people have events", "leave some out"
+        )
     reader = _EventReader(source, knowledge, objects, people)
     for number, event in enumerate(file.events):
         with problems:

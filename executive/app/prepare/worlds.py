@@ -31,8 +31,13 @@ def open_world(name: str) -> World:
 
 
 def refuse_unusable(world: World) -> None:
-    """Raises InputError unless the simulation can load a user's world and the imported models."""
+    """Raises InputError unless a user's world, its maps and the imported models can be loaded."""
     is_ours = world.folder.is_relative_to(WORLDS_FOLDER)
+    if not is_ours or world.maps is not None:
+        from skills.estimate.grid_map import load_grid_map
+
+        for path in {*world.scan_map_paths, *([world.scan_map_path] if world.keepout_map_path.is_file() else ())}:
+            load_grid_map(path)
     if is_ours and not world.imports:
         return
     models = tuple(each.folder / f"{name}.sdf" for name, each in world.imports.items())
@@ -63,6 +68,15 @@ def knowledge_of(world: World) -> Knowledge:
     if knowledge.poses:
         refuse_blocked_poses(world, knowledge, read_yaml(world.knowledge_path).error)
     return knowledge
+
+
+def crossing_rooms(world: World, knowledge: Knowledge) -> tuple[InputError, ...]:
+    """Warnings on rooms whose outlines cross themselves, so that it is open what lies inside."""
+    from shapely import Polygon
+
+    places = [("places", name, "polygon") for name, corners in knowledge.rooms.items() if not Polygon(corners).is_valid]
+    source, hint = read_yaml(world.knowledge_path) if places else None, "give the corners in order around the room"
+    return tuple(source.error(at, f"{'.'.join(at)}: the outline crosses itself", hint) for at in places if source)
 
 
 def refuse_blocked_poses(world: World, knowledge: Knowledge, error: Callable[[KeyPath, str, str], InputError]) -> None:

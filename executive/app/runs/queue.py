@@ -146,8 +146,10 @@ class MissionRuns:
         *,
         ask: Answerer | None = None,
         run: Callable[..., FinishedRun] | None = None,
+        out: Path | None = None,
     ) -> None:
-        """`ask` answers open questions of a mission file; `run` replaces `run_request`."""
+        """`ask` answers open questions of a mission file; `run` replaces `run_request`, and `out` the missions' own."""
+        self._out = None if out is None else out.resolve()
         self._missions, self._screen, self._ask, self._run_prepared = missions, screen, ask, run or run_request
         self._control: Control | None = None
         self._cancelled: str | None = None
@@ -230,8 +232,9 @@ class MissionRuns:
         if prepared is None:
             prepared = prepare(mission.request, ask=self._ask)
             self._screen.tell(f"Mission {mission.id}: {name}", title=True)
-        known = begun and holds_run(mission.request.out)
-        kept = kept_run(mission.request.out) if known else new_run(prepared.request, self._missions.now())
+        known = begun and holds_run(out := mission.request.out) and self._out in (None, out.parent)
+        asked = replace(prepared.request, out=self._out or prepared.request.out)
+        kept = kept_run(mission.request.out) if known else new_run(asked, self._missions.now())
         prepared = replace(prepared, request=replace(prepared.request, out=kept.request.out))
         with note_run(self._missions, mission, kept) as ended:
             before = self._before(mission) if mission.queued and resumed is None else None

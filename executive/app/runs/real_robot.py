@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -92,7 +91,6 @@ def real_runner(prepared: Prepared, address: str) -> Iterator[Callable[..., Fini
         what = f"{error.path[0]}: {error.message}" if error.path else error.message
         raise InputError(f"--robot {address[:60]}: {what}", hint=error.hint) from error
     compile_first()
-    logging.getLogger("drake").setLevel(logging.WARNING)
     start, ready = prepared.request.start, Event()
 
     def interrupt(_reason: str) -> None:

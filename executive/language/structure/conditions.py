@@ -112,8 +112,10 @@ def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | No
     match = _P.stands.fullmatch(words) or _P.turns.fullmatch(words)
     if match is None or (match["it"] and state.door is None):
         return None
+    if (how := match["how"].lower()).endswith("locked"):
+        raise RefusalError(f"I cannot see whether a door is {how}; ask whether it is closed", [how])
     door = state.door if match["it"] and state.door is not None else DoorOpen(door=_between(match, reader.knowledge))
-    opens = match["how"].lower() in ("open", "opened", "opens", "to open", "is opening", "has opened")
+    opens = how in ("open", "opened", "opens", "to open", "is opening", "has opened")
     known = replace(state, door=door, goal=None, at=None)
     found = SpokenCondition(door, words, known, known)
     return found if opens != bool(match.groupdict().get("not")) else found.negate(words)

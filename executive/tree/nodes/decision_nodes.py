@@ -331,19 +331,21 @@ def instant_decision(flow: Flow, condition: Condition, builder: PlanBuilder) -> 
 class Check(ExplainedDecorator):
     """Decorator that publishes its child's decision under `ANSWER_TOPIC`, as an answer of the mission.
 
-    Has the status of its only child; `key` holds the answer of the child.
+    Has the status of its only child; `key` holds the answer of the child, and afterwards the opposite if `negated`.
     """
 
     kind = "check"
     question: str
     key: str
     context: RunContext
+    negated: bool = False
 
     def update(self) -> Status:
         """Returns the child's status; publishes the answer when there is one."""
         status = self.pass_on()
         if status == Status.SUCCESS:
-            answer = self.context.board.get(self.key)
+            answer = self.context.board.get(self.key) != self.negated
+            self.context.board.put(self.key, answer)
             note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
             self.context.publish(ANSWER_TOPIC, note)
         return status
@@ -355,10 +357,12 @@ def _plan(assembler: Assembler, block: model.Check, builder: PlanBuilder) -> Ass
         key = assembler.give(name, below.at("look-1").key("answer"), bool, builder)
         look, part = look_plan(below, 1, condition, key)
         return Assembled((look,), (part,))
-    if isinstance(condition, DoorOpen) and not condition.max_age_s:
+    door = condition.part if (closed := isinstance(condition, Not)) else condition
+    if isinstance(door, DoorOpen) and not door.max_age_s:
         key = assembler.give(name, below.key("answer"), bool, builder)
-        look = door_plan(below, condition.between, key)
-        return Assembled((look,), (StepPart(look.path_id, goal=door_goal(builder.knowledge, condition.between)),))
+        look = door_plan(below, door.between, key, closed=closed)
+        goal = door_goal(builder.knowledge, door.between)
+        return Assembled((look,), (StepPart(look.path_id, goal=replace(goal, wanted="closed" if closed else "")),))
     decide, key, parts = decide_plan(assembler.flow, condition, below)
     key = assembler.give(name, key, bool, builder)
     question = str(condition)

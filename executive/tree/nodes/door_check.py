@@ -80,16 +80,18 @@ class BeforeDoor(MemoryComposite):
         return self.door.view_angle_rad(here) < _HERE_RAD
 
 
-def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str, max_age_s: float = 0.0) -> NodeSpec:
-    """Looks at a door and writes the answer to `key`; knowledge at most `max_age_s` old makes a look unnecessary.
+def door_plan(
+    builder: PlanBuilder, between: tuple[str, str], key: str, max_age_s: float = 0.0, *, closed: bool = False
+) -> NodeSpec:
+    """Looks whether a door is open or `closed`; writes the answer to `key`. Knowledge `max_age_s` old spares a look.
 
     Raises InputError when the world has no such door.
     """
     door = _door(builder, between)
     below = builder.at("look") if max_age_s else builder
     look = below.first_of(_FROM_EITHER, *_looks(below, door, key), part="look")
-    name, question = f"is the {_name(door)} open?", f"is the {_name(door)} open"
-    check = below.node("check", name, look, question=question, key=key)
+    question = f"is the {_name(door)} {'closed' if closed else 'open'}"
+    check = below.node("check", f"{question}?", look, question=question, key=key, negated=closed)
     return _known_or(builder, door, check, key, max_age_s) if max_age_s else check
 
 

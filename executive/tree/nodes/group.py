@@ -210,8 +210,7 @@ def whole_mission(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec,
     body = builder.sequence("steps", *steps, part="steps")
     whole = under_policy(body, mission, builder.at("whole"), mission.name, may_skip=False)
     if _may_skip(whole):
-        paths = tuple(node.path_id for node in steps)
-        whole = builder.node("summary", "tell what was skipped", whole, part="summary", steps=paths)
+        whole = builder.node("summary", "tell what was skipped", whole, part="summary")
     return builder.sequence(mission.name, *first, whole)
 
 

@@ -4,7 +4,6 @@ From the inside: the subtree, its timeout, its retries, its guards, and the acti
 So each attempt has its own time, and a violated guard ends all attempts.
 """
 
-from collections.abc import Sequence
 from dataclasses import field
 from typing import ClassVar, Final
 
@@ -26,7 +25,7 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import BatteryAtLeast, KnowsPlace, NotAfter
 from executive.tree.plan import PlanBuilder
 from executive.words.step import Guards, OnFailure, OperatorQuestion, Policy
-from skills.api import Asked, Cause, Failed, Question
+from skills.api import Asked, Cause, Failed, Part, Question
 from skills.robot import Clock, Pose2D
 
 FINAL_CAUSES: Final = frozenset({Cause.ERROR, Cause.CANCELLED})
@@ -126,6 +125,7 @@ class Skip(ExplainedDecorator):
     skips = True
     step: str
     skipped: str | None = field(default=None, init=False)
+    achieved: bool = field(default=False, init=False)
 
     def initialise(self) -> None:
         """Clears the reason for an earlier skip."""
@@ -142,6 +142,11 @@ class Skip(ExplainedDecorator):
         """Returns the skipped step with the reason."""
         is_skipped = self.skipped is not None and self.status is Status.SUCCESS
         return f"{self.step} ({self.skipped})" if is_skipped else None
+
+    def pass_on(self) -> Status:
+        """Returns the child's status; `achieved` stays True once the child has done something, also in later rounds."""
+        self.achieved = self.achieved or (self.decorated.status == Status.SUCCESS and _achieves(self.decorated))
+        return super().pass_on()
 
     def skip(self) -> Status:
         """Returns SUCCESS, and records the child's failure as the reason for the skip."""
@@ -240,20 +245,28 @@ class GoBack(MemoryComposite):
             self._end(cause_of(action), f"{message_of(action)}; the robot {end}")
 
 
+def _achieves(node: Behaviour) -> bool:
+    """Returns whether a skill below a node has succeeded and was not skipped; speech does not count."""
+    if isinstance(node, Skip) and (node.skipped is not None or node.achieved):
+        return node.achieved
+    if (skill := getattr(node, "skill", None)) is not None:
+        return bool(node.status == Status.SUCCESS and skill.uses != {Part.VOICE})
+    return any(map(_achieves, node.children))
+
+
 class Summary(ExplainedDecorator):
-    """Decorator for a mission that may skip steps; `steps` are the path ids of the outermost node of each step.
+    """Decorator for a mission that may skip steps.
 
     | child | status |
     |---|---|
     | RUNNING, FAILURE | as the child |
-    | SUCCESS, all `steps` were skipped | FAILURE with EXECUTION |
+    | SUCCESS, steps were skipped and no skill but speech has succeeded outside them | FAILURE with EXECUTION |
     | SUCCESS | SUCCESS; the message names the skipped steps |
     | halted | INVALID with CANCELLED |
     """
 
     kind = "summary"
     container = True
-    steps: Sequence[str]
 
     def update(self) -> Status:
         """Returns the child's status, with the skipped steps."""
@@ -261,11 +274,10 @@ class Summary(ExplainedDecorator):
         if status != Status.SUCCESS:
             return status
         nodes = [node for node in self.iterate() if isinstance(node, Skip) and node.status == Status.SUCCESS]
-        skipped = {node.path_id: f"{node.step} ({node.skipped})" for node in nodes if node.skipped is not None}
-        if not skipped:
+        steps = "; ".join(f"{node.step} ({node.skipped})" for node in nodes if node.skipped is not None)
+        if not steps:
             return status
-        steps = "; ".join(skipped.values())
-        if skipped.keys() >= set(self.steps):
+        if not _achieves(self.decorated):
             return self.fail(Failed(Cause.EXECUTION, f"all steps were skipped: {steps}"))
         self.message = f"done, but skipped: {steps}"
         return status

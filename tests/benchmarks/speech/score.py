@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from executive.cli.listen_command import listener_for
-from executive.speech.sound import RATE_HZ, concatenate, read_wav
+from executive.speech.sound import RATE_HZ, concatenate, read_sound
 from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
 from tests.benchmarks.harness import command, tell
@@ -63,8 +63,8 @@ def with_noise(clear, folder, ratio_db, seed):
     """The same sentences in noise, so strong that the mean power of the speech lies `ratio_db` above it."""
     draw, cases = np.random.default_rng(seed), []
     for number, (case, kind) in enumerate(zip(clear, cycle(NOISES), strict=False)):
-        speech = concatenate(read_wav(case.wav)).astype(float)
-        talkers = [concatenate(read_wav(clear[n].wav)) for n in draw.integers(len(clear), size=5)]
+        speech = concatenate(read_sound(case.wav)).astype(float)
+        talkers = [concatenate(read_sound(clear[n].wav)) for n in draw.integers(len(clear), size=5)]
         sound = noise(kind, len(speech), draw, talkers)
         mixed = speech + sound * np.std(speech) / max(np.std(sound), 1e-12) / 10 ** (ratio_db / 20)
         mixed /= max(1.0, float(np.max(np.abs(mixed))) / 0.99)

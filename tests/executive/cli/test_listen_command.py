@@ -104,7 +104,7 @@ def test_a_broken_file_is_told_and_the_others_are_heard(says, wav, tmp_path):
     result = errand("listen", broken, wav, "--jsonl")
     bad, good = _lines(result)
     assert result.exit_code == 2
-    assert set(bad) >= KEYS and "no wav file" in bad["reason"] and str(broken) in result.stderr
+    assert set(bad) >= KEYS and "no recording" in bad["reason"] and str(broken) in result.stderr
     assert good["status"] == "ok"
 
 

@@ -180,6 +180,34 @@ def test_a_queued_mission_keeps_its_stack_file(plant, tmp_path):
     assert [run["stack"] for run in plant.runs] == [(tmp_path / "stack.yaml").resolve()]
 
 
+def folders(out):
+    return sorted(
+        file.parent.name.split("-", 4)[-1] for file in Path(out).glob("*/run.json") if not file.parent.is_symlink()
+    )
+
+
+@pytest.mark.parametrize("command", ["queue run --quiet", "queue serve --quiet --until-idle --port 0"])
+def test_the_queue_writes_into_the_folder_that_it_is_given(plant, command):
+    add("first", "second")
+    elsewhere = ("--store", "out/.errand/missions.sqlite", "--out", "elsewhere")
+    assert calls.errand(*shlex.split(command), *elsewhere).exit_code == 0
+    assert [len(folders(out)) for out in ("elsewhere", "out")] == [2, 0]
+
+
+def test_without_a_folder_each_mission_writes_where_it_was_queued_for(plant):
+    calls.errand("queue", "add", "first.yaml", "--store", "out/.errand/missions.sqlite", "--out", "mine")
+    calls.errand("queue", "run", "--quiet", "--store", "out/.errand/missions.sqlite")
+    assert [len(folders(out)) for out in ("mine", "out")] == [1, 0]
+
+
+def test_a_resumed_mission_writes_into_the_folder_that_it_is_given(plant):
+    plant.outcomes = ["killed"]
+    with pytest.raises(GoneError):
+        errand("run alone.yaml --quiet")
+    assert errand("resume --quiet --out elsewhere").exit_code == 0
+    assert [len(folders(out)) for out in ("elsewhere", "out")] == [1, 1]
+
+
 # The mission that runs, the robot that is told to go elsewhere, and what is run when the mission is resumed.
 CORRECTED = [
     ("first", "Alice", "bathroom", "go bathroom 2", [[GO % "bathroom"]]),

@@ -8,7 +8,7 @@ from executive.mission.load import load_mission
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
-from executive.words.condition import DoorOpen, Look, ValueIs
+from executive.words.condition import DoorOpen, Look, Not, ValueIs
 from executive.words.goal import GoalKind, When
 from executive.words.leaf_steps import Awaited, CallSkill, Check, Do, DoorToOpen, OpenDoor, Wait
 from executive.words.mission import Mission
@@ -97,6 +97,17 @@ def test_each_check_of_a_door_is_judged_at_its_time(ran, looks_at_door):
     name = "door between hall and kitchen"
     assert [(one.answer, one.source[0].name) for one in looks] == [(True, name), (False, name)]
     assert looks[0].answered_s < looks[1].answered_s
+
+
+@pytest.mark.parametrize("is_open", [True, False])
+def test_whether_a_door_is_closed_has_one_answer(ran, looks_at_door, is_open):
+    looks_at_door(lambda number: is_open)
+    tree, result = ran(Check(condition=Not(part=DoorOpen(door=("hall", "kitchen")))))
+    (finding,) = result.findings
+    assert (finding.question, finding.answer) == ("is the door between hall and kitchen closed", not is_open)
+    assert "not (" not in result.message
+    (asked,) = conditions_of(tree, result)
+    assert (asked.kind, asked.answer, asked.wanted) == (GoalKind.DOOR_OPEN, not is_open, "closed")
 
 
 def test_a_closed_door_is_asked_for_until_it_opens(ran, looks_at_door, script):

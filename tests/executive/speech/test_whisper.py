@@ -11,7 +11,7 @@ from executive.speech.activity import load_detector
 from executive.speech.hearing import Reader, spoken_phrases
 from executive.speech.listener import Listener
 from executive.speech.recogniser import vocabulary_of_world
-from executive.speech.sound import concatenate, read_wav
+from executive.speech.sound import concatenate, read_sound
 from executive.speech.whisper import load_whisper
 from skills.inputs.errors import InputError
 from tests.tables import table
@@ -50,13 +50,13 @@ def test_speech_to_nobody_is_ignored(listener, say):
 
 
 def test_the_same_sound_gives_the_same_readings(whisper, say, flat):
-    words, sound = vocabulary_of_world(flat, called=True), concatenate(read_wav(say("Hey Alice, find the wrench.")))
+    words, sound = vocabulary_of_world(flat, called=True), concatenate(read_sound(say("Hey Alice, find the wrench.")))
     first, second = (whisper.transcribe(sound, words) for _ in range(2))
     assert first.transcripts == second.transcripts
 
 
 def test_the_words_that_were_said_are_likelier_than_others(whisper, say, flat):
-    sound = concatenate(read_wav(say("Find the wrench.")))
+    sound = concatenate(read_sound(say("Find the wrench.")))
     recognition = whisper.transcribe(sound, vocabulary_of_world(flat, called=False))
     right, wrong = recognition.likelihoods(["Find the wrench.", "Take the beer."])
     assert right > wrong + 5.0

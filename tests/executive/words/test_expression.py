@@ -56,6 +56,12 @@ def test_refusal_says_what_and_how_to_put_it_right(text, message, hint):
     assert found == hint if hint else found
 
 
+@pytest.mark.parametrize("text", ["count / 0 > 1", "count % 0", "count // (2 - 2)", "1 + count / 0.0", "1 / 0"])
+def test_a_division_by_a_plain_zero_is_refused_without_values(text):
+    with pytest.raises(ExpressionError, match="divides by zero"):
+        Expression(text).kind(KINDS)
+
+
 @pytest.mark.parametrize(
     ("text", "values", "message"),
     [

@@ -10,20 +10,23 @@ from typing import Annotated, Final
 
 import typer
 
+from errand_make.new_folder import new_folder
 from errand_make.worlds.wanted import Addition, Wanted
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, StartCommand, start_pose
-from executive.cli.output import console_for, new_folder, show_table
+from executive.cli.output import console_for, show_table
 from plant.worlds.world import WorldError, known_worlds
 from skills.api import ZoneKind
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError, count_text
 from skills.inputs.outside import writing
+from skills.inputs.yaml_source import read_yaml
 from skills.quantities import Angle, Quantity, Share, Speed
 from skills.robot import Pose2D
 
 WallHeight = Annotated[float, Quantity(ge=1.3, le=10.0, unit="m")]
+PixelLength = Annotated[float, Quantity(gt=0.0, le=10.0, unit="m")]
 Out = Annotated[Path, typer.Option("--out", help="New folder for the world.")]
 
 world = typer.Typer(name="world", help="Worlds from any map, and drawings of worlds.", rich_markup_mode=None)
@@ -69,23 +72,45 @@ def _facts_of(name: str) -> tuple[str, ...]:
 
 @world.command(cls=StartCommand)
 def from_map(
-    map_file: Annotated[Path, typer.Argument(metavar="MAP.yaml", help="A map in the format of ROS map_server.")],
+    map_file: Annotated[
+        Path, typer.Argument(metavar="MAP.yaml", help="A map of ROS map_server, or a building of Open-RMF.")
+    ],
     out: Out,
     start: START = None,
     wall_height: Annotated[float, quantity_option(WallHeight, help="Height of the walls, m.")] = 2.5,
     person: Annotated[str, typer.Option(help="Name of a person beside the robot's start; '' for nobody.")] = "Robin",
     dock: Annotated[bool, typer.Option(help="Whether the robot gets a dock, at a wall near its start.")] = True,
+    level: Annotated[str | None, typer.Option(help="Level of a building; by default its first.")] = None,
+    scale: Annotated[
+        float | None, quantity_option(PixelLength, help="Length of a pixel of a building's drawing, m.")
+    ] = None,
 ) -> None:
-    """Builds a world from a map: walls, both grids, rooms and doors without names, a person and a dock."""
+    """Builds a world from a map: walls, both grids, rooms and doors without names, a person and a dock.
+
+    A building.yaml of Open-RMF's traffic editor gives doors, names and preferred lanes, too.
+    """
     from errand_make.worlds.additions import add as add_to_world
-    from errand_make.worlds.own import world_from_grid
+    from errand_make.worlds.building import building_grid, building_plan, building_start, is_building, read_building
+    from errand_make.worlds.own import Plan, found_plan, world_from_grid
     from errand_make.worlds.rooms import grid_of
 
-    read = load_grid_map(map_file)
-    for note in read.notes:
+    def warn(note: str) -> None:
         typer.echo(f"errand: warning: {map_file}: {note}", err=True)
-    grid, pose = grid_of(read), start_pose(start)
-    _made(map_file, out, lambda folder: world_from_grid(folder, grid, start=pose, wall_height_m=wall_height))
+
+    plan: Plan = found_plan
+    pose, source = start_pose(start), read_yaml(map_file)
+    if is_building(source):
+        building = read_building(source, level=level, scale_m=scale)
+        notes, grid, plan = building.notes, building_grid(building), building_plan(building, warn)
+        pose = pose or building_start(building, grid)
+    elif level is not None or scale is not None:
+        raise InputError("--level and --scale are for a building of Open-RMF", hint="leave them out", file=map_file)
+    else:
+        read = load_grid_map(map_file)
+        notes, grid = read.notes, grid_of(read)
+    for each in notes:
+        warn(each)
+    _made(map_file, out, lambda folder: world_from_grid(folder, grid, start=pose, wall_height_m=wall_height, plan=plan))
     for what, name, wanted in ((Addition.DOCK, None, dock), (Addition.PERSON, person, bool(person))):
         try:
             if wanted:

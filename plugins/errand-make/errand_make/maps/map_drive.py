@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -159,7 +158,6 @@ class MapDrive:
 
 def mapper_for(world: World, out: Path) -> Mapper:
     """Returns a new mapper, or the one saved in a folder. Raises InputError."""
-    logging.getLogger("drake").setLevel(logging.WARNING)
     try:
         gtsam_module()
     except MappingExtraMissingError as error:

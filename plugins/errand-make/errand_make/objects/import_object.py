@@ -145,7 +145,8 @@ def import_content(
     _, closing, fitting, writing = STEPS
     reports.step(closing)
     body = _at_rest(_placed(content, options))
-    for note in (*content.notes, *_size_doubts(np.ptp(body.solid.points, axis=0), options.scale)):
+    size_m = np.ptp(body.solid.points, axis=0)
+    for note in (*content.notes, *_size_doubts(size_m, options.scale), *_apart_doubts(body.solid)):
         reports.note(note)
     mass = scale_mass(_mass(body.solid), _mass_kg(body.solid, options))
     _refuse_impossible(mass)
@@ -218,6 +219,16 @@ def _size_doubts(size_m: FloatArray, scale: float) -> tuple[str, ...]:
     if scale != 1.0 or _PLAUSIBLE_M[0] <= largest_m <= _PLAUSIBLE_M[1]:
         return ()
     return (f"it is {largest_m:.3g} m long; if that is wrong, {_scale_hint(largest_m, scale)}",)
+
+
+def _apart_doubts(solid: Solid) -> tuple[str, ...]:
+    """Remark on several bodies with wide gaps between them, which one model moves as one."""
+    many, gap_m = solid.bodies_apart()
+    if many == 1:
+        return ()
+    return (
+        f"it holds {many} bodies, {gap_m:.2g} m apart, which move as one; if they are several objects, part the file",
+    )
 
 
 def _scale_hint(largest_m: float, scale: float) -> str:

@@ -19,7 +19,7 @@ from errand_make.mesh import Colour
 from errand_make.objects.collada import read_collada
 from plant.worlds.geometry_files import check_model
 from skills.inputs.errors import InputError, listing
-from skills.inputs.outside import is_file, plain_file
+from skills.inputs.outside import is_file, native_stderr_dropped, plain_file
 from skills.inputs.picture_files import MOST_PIXELS, read_pixels
 from skills.robot import FloatArray, Picture
 
@@ -180,7 +180,8 @@ def _with_trimesh(path: Path, most: int) -> tuple[Patch, ...]:
     """Reads the triangles of a file with trimesh. Raises ObjectImportError."""
     trimesh = library("trimesh")
     try:
-        scene = trimesh.load_scene(path, process=False)
+        with native_stderr_dropped():
+            scene = trimesh.load_scene(path, process=False)
         parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
         count = sum(len(part.faces) for part in parts)
         if count > most:

@@ -25,6 +25,8 @@ _THICKNESS: Final = 0.01
 _LEAST_M: Final = 0.0003
 """Greatest distance of a side's points from its plane: a share of the body's height above it, or metres."""
 _LEAST_TIPPING_RAD: Final = 0.05
+_SLENDER: Final = 8.0
+"""Height of a body as a multiple of its width, from which on it does not stand."""
 _LEAST_AREA: Final = 0.04
 _MOST_CANDIDATES: Final = 60
 _OTHER_SIDE: Final = 0.97
@@ -52,9 +54,14 @@ class Side:
 
 
 def resting_rotation(points: FloatArray, com: FloatArray) -> FloatArray:
-    """Rotation (3, 3) of a body into its resting pose; the identity if it rests already."""
+    """Rotation (3, 3) of a body into its resting pose; the identity if it rests already.
+
+    A slender body, such as a pencil, lies even if it could stand on its end.
+    """
     as_it_is = side_towards(points, com, np.array(DOWN))
-    if as_it_is is not None and as_it_is.tipping_rad >= _LEAST_TIPPING_RAD:
+    width, depth, height = np.ptp(points, axis=0)
+    slender = height > _SLENDER * max(width, depth)
+    if as_it_is is not None and as_it_is.tipping_rad >= _LEAST_TIPPING_RAD and not slender:
         return np.eye(3)
     sides = resting_sides(points, com)
     if not sides:

@@ -204,6 +204,33 @@ class Solid:
         """Enclosed volume."""
         return _volume(self.triangles)
 
+    def bodies_apart(self) -> tuple[int, float]:
+        """Number of bodies with wide gaps between them, and the narrowest of these gaps (m); (1, 0.0) for one body.
+
+        Gaps are those between the convex hulls of connected pieces, along the directions of `_DIRECTIONS`.
+        """
+        piece = _pieces(self.faces)
+        along = self.triangles @ _DIRECTIONS.T
+        ends = np.zeros((2, piece.max() + 1, len(_DIRECTIONS)))
+        ends[0], ends[1] = np.inf, -np.inf
+        np.minimum.at(ends[0], piece, along.min(axis=1))
+        np.maximum.at(ends[1], piece, along.max(axis=1))
+        gaps = np.zeros((len(ends[0]), len(ends[0])))
+        for low, high in zip(*np.moveaxis(ends, 2, 1), strict=True):
+            gaps = np.maximum(gaps, low[None] - high[:, None])
+        gaps = np.maximum(gaps, gaps.T)
+        first, second = np.nonzero(gaps <= _WIDE_GAP * float(np.ptp(self.points, axis=0).max()))
+        body = _components(first, second, len(gaps))
+        between = gaps[body[:, None] != body]
+        return int(body.max()) + 1, float(between.min()) if between.size else 0.0
+
+
+_WIDE_GAP: Final = 0.1
+"""Gap between two bodies, as a share of the longest side of both, that parts of one object do not have."""
+_DIRECTIONS: Final = np.array(
+    [np.array(d) / np.linalg.norm(d) for d in itertools.product((-1, 0, 1), repeat=3) if d > (0, 0, 0)]
+)
+
 
 def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid, NDArray[np.bool_]]:
     """Solid within triangles (T, 3, 3), and the mask (T,) of the triangles that are flipped to face outward.

@@ -1,6 +1,6 @@
 """Builds the folder of a world from the map of a building, or from upright cylinders."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -46,11 +46,22 @@ directives:
 """
 
 
-def world_from_grid(folder: Path, grid: Grid, *, start: Pose2D | None, wall_height_m: float) -> None:
+Plan = Callable[[Grid, Pose2D], tuple[Sequence[Room], Sequence[Door], Mapping[str, Any]]]
+"""Rooms, doors, and further facts (`places` by pose, `zones`) of a grid, for a start."""
+
+
+def found_plan(grid: Grid, start: Pose2D) -> tuple[Sequence[Room], Sequence[Door], Mapping[str, Any]]:
+    """Rooms and doors that the grid's narrow passages make."""
+    return (*find_rooms(grid, start), {})
+
+
+def world_from_grid(
+    folder: Path, grid: Grid, *, start: Pose2D | None, wall_height_m: float, plan: Plan = found_plan
+) -> None:
     """Writes a world whose walls are the occupied cells. Raises WorldError when the robot fits nowhere."""
     grid = _resampled(grid)
     walls = [_box(grid, cells, wall_height_m) for cells in rectangles(grid.cells == OCCUPIED)]
-    _write(folder, walls, {"scan": grid, "keepout": grid}, start)
+    _write(folder, walls, {"scan": grid, "keepout": grid}, start, plan)
 
 
 def world_from_cylinders(
@@ -82,7 +93,7 @@ def world_from_cylinders(
             if height > bottom:
                 _set_disc(cells, (np.array([x, y]) - low) / step, radius / step)
         grids[name] = Grid(cells, (float(low[0]), float(low[1])), step)
-    _write(folder, shapes, grids, start)
+    _write(folder, shapes, grids, start, found_plan)
 
 
 def _set_disc(cells: np.ndarray[Any, np.dtype[np.uint8]], centre: Any, radius: float) -> None:
@@ -139,11 +150,11 @@ def _box(grid: Grid, cells: tuple[int, int, int, int], height_m: float) -> Box:
     return Box(size=(float(width), float(depth), height_m), p=(float(x), float(y), height_m / 2.0))
 
 
-def _write(folder: Path, walls: Sequence[Shape], grids: dict[str, Grid], start: Pose2D | None) -> None:
+def _write(folder: Path, walls: Sequence[Shape], grids: dict[str, Grid], start: Pose2D | None, plan: Plan) -> None:
     """Writes all files of the world. Raises WorldError when the start is not free, or the robot fits nowhere."""
     keepout = grids["keepout"]
     start = _start(keepout, start)
-    rooms, doors = find_rooms(keepout, start)
+    rooms, doors, more = plan(keepout, start)
     size = np.array(keepout.cells.shape[::-1]) * keepout.resolution_m
     centre = size / 2.0 + keepout.origin_m
     floor = Box(
@@ -156,7 +167,7 @@ def _write(folder: Path, walls: Sequence[Shape], grids: dict[str, Grid], start: 
     write_text(folder / "walls.mtl", mtl_text(mesh, "palette.png"))
     save_png(folder / "palette.png", palette_picture(_MATERIALS), 9)
     write_text(folder / "world.dmd.yaml", _DIRECTIVES)
-    write_text(folder / "knowledge.yaml", _knowledge_text(start, rooms, doors))
+    write_text(folder / "knowledge.yaml", _knowledge_text(start, rooms, doors, more))
     (folder / "map").mkdir(exist_ok=True)
     for name, grid in grids.items():
         (folder / "map" / f"{name}.pgm").write_bytes(pgm_bytes(grid))
@@ -190,12 +201,15 @@ def _mesh(floor: Box, walls: Sequence[Shape]) -> Mesh:
     return mesh
 
 
-def _knowledge_text(start: Pose2D, rooms: Sequence[Room], doors: Sequence[Door]) -> str:
+def _knowledge_text(start: Pose2D, rooms: Sequence[Room], doors: Sequence[Door], more: Mapping[str, Any]) -> str:
+    places = {room.name: {"pose": _pose(room.pose), "polygon": list(map(list, room.polygon))} for room in rooms}
+    places |= {name: {"pose": _pose(pose)} for name, pose in more.get("places", {}).items()}
     facts = {
         "robot": {"name": "Alice"},
         "start": _pose(start),
-        "places": {room.name: {"pose": _pose(room.pose), "polygon": list(map(list, room.polygon))} for room in rooms},
+        "places": places,
         "doors": [{"between": list(d.between), "at": list(d.at), "width": d.width_m} for d in doors],
+        **({"zones": more["zones"]} if more.get("zones") else {}),
     }
     head = "# Made by `errand world`: give the rooms their names, here and under doors. Metres and radians.\n"
     return head + yaml_of(facts)

@@ -98,6 +98,12 @@ def most_open_pose(grid: Grid, clearance: FloatArray, among: Bools | None = None
     wanted = clearance if among is None else np.where(among, clearance, -1.0)
     row, column = np.unravel_index(int(np.argmax(wanted)), wanted.shape)
     x, y = ((index + 0.5) * grid.resolution_m + low for index, low in zip((column, row), grid.origin_m, strict=True))
+    return pose_at(grid, clearance, (float(x), float(y)))
+
+
+def pose_at(grid: Grid, clearance: FloatArray, point: Point) -> Pose2D | None:
+    """Free pose at a point, at the yaw with the widest margin; None when the body does not fit there."""
+    x, y = point
     turned = [Pose2D(float(x), float(y), float(yaw)) for yaw in _YAWS]
     margins = [body_margin_m(grid, clearance, pose) for pose in turned]
     best = int(np.argmax(np.round(margins, 2)))
@@ -125,7 +131,7 @@ def find_rooms(grid: Grid, start: Pose2D) -> tuple[tuple[Room, ...], tuple[Door,
     sizes[0] = 0
     rooms: dict[int, Room] = {}
     for label in np.argsort(-sizes, kind="stable")[: np.count_nonzero(sizes)]:
-        room = _room(f"room {len(rooms) + 1}", labels == label, grid, clearance, reached)
+        room = room_of(f"room {len(rooms) + 1}", labels == label, grid, clearance, reached)
         if room is not None:
             rooms[int(label)] = room
     doors = []
@@ -146,7 +152,7 @@ def reached_cells(clearance: FloatArray, grid: Grid, start: Pose2D) -> Bools:
     return np.asarray((parts == parts[row, column]) & (parts > 0))
 
 
-def _room(name: str, cells: Bools, grid: Grid, clearance: FloatArray, reached: Bools) -> Room | None:
+def room_of(name: str, cells: Bools, grid: Grid, clearance: FloatArray, reached: Bools) -> Room | None:
     """Room of some cells; None when the body does not fit."""
     pose = most_open_pose(grid, clearance, cells & reached)
     outlines, _ = cv2.findContours(cells.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)

@@ -163,3 +163,28 @@ def test_worlds_are_listed_with_rooms_and_robots(own, tmp_path):
     assert lines["flat"].startswith("12 x 9 11 Alice (spot) Robin hall, kitchen, living room")
     assert lines[str(own)].endswith("0 Alice (spot) Robin room 1, room 2")
     assert f"warning: {tmp_path / 'broken' / 'knowledge.yaml'}: there is no such file" in listed.stderr
+
+
+BUILDING = """
+name: two rooms
+levels:
+  L1:
+    vertices: [[0, 0, 0, ""], [200, 0, 0, ""], [200, 80, 0, ""], [0, 80, 0, ""], [30, 40, 0, store], [150, 40, 0, desk]]
+    walls: [[0, 1, {}], [1, 2, {}], [2, 3, {}], [3, 0, {}]]
+    lanes: [[4, 5, {bidirectional: [4, true]}]]
+"""
+
+
+def test_a_building_of_open_rmf_becomes_a_world_to_drive_in(tmp_path):
+    file = tmp_path / "own.building.yaml"
+    file.write_text(BUILDING)
+    built = done("world", "from-map", file, "--out", tmp_path / "own", "--no-dock", "--person", "", "--scale", 0.04)
+    assert ": 1 room, 0 doors, start at 1.20 -1.60" in built.stdout and built.stderr == ""
+    out = ("--out", tmp_path / "out", "--no-record", "--quiet", "--json")
+    ran = done("run", "--say", "go to the desk", "--world", tmp_path / "own", *out)
+    assert json_of(ran)["referee"]["success"] and json_of(ran)["referee"]["collisions"] == 0
+
+
+def test_options_of_a_building_are_refused_for_another_map(map_file, tmp_path):
+    said = refusal("world", "from-map", map_file, "--out", tmp_path / "hall", "--level", "L1")
+    assert "--level and --scale are for a building of Open-RMF" in said

@@ -9,6 +9,8 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from errand_make.objects import ImportOptions, LibraryMissingError, ObjectImportError, import_object
+from errand_make.objects.import_object import ImportReports
+from errand_make.objects.solid import solid_of
 from plant.models.catalogue import read_imported
 
 trimesh = pytest.importorskip("trimesh")
@@ -187,3 +189,34 @@ def test_without_the_extra_the_library_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(LibraryMissingError, match="trimesh"):
         import_object(tmp_path / "m.stl", ImportOptions("gadget", 1.0), tmp_path)
+
+
+def _boxes(*middles):
+    parts = [trimesh.creation.box((0.1, 0.06, 0.06)) for _ in middles]
+    return trimesh.util.concatenate(
+        [part.apply_translation(middle) for part, middle in zip(parts, middles, strict=True)]
+    )
+
+
+#   middles of boxes of 0.1 x 0.06 x 0.06 m                 bodies, gap (m)
+@pytest.mark.parametrize(
+    ("middles", "apart"),
+    [
+        ([(0, 0, 0), (1.0, 0, 0)], (2, 0.9)),
+        ([(0, 0, 0), (0.15, 0, 0)], (2, 0.05)),
+        ([(0, 0, 0), (0.4, 0, 0), (0, 0.4, 0)], (3, 0.3)),
+        ([(0, 0, 0), (0.05, 0, 0)], (1, 0.0)),
+        ([(0, 0, 0), (0.102, 0, 0), (0.204, 0, 0)], (1, 0.0)),
+    ],
+)
+def test_bodies_with_wide_gaps_between_them_are_counted(middles, apart):
+    solid, _ = solid_of(np.array(_boxes(*middles).triangles))
+    assert solid.bodies_apart() == pytest.approx(apart)
+
+
+def test_bodies_far_apart_in_one_file_are_a_warning(tmp_path):
+    _boxes((0, 0, 0), (0.3, 0.3, 0)).export(tmp_path / "pair.stl")
+    (tmp_path / "pair").mkdir()
+    notes = []
+    import_object(tmp_path / "pair.stl", ImportOptions("pair"), tmp_path / "pair", ImportReports(note=notes.append))
+    assert [note.split(",")[0] for note in notes] == ["it holds 2 bodies"]

@@ -1,9 +1,10 @@
 """Tests of the feet on which an imported body rests."""
 
 import numpy as np
+import pytest
 from scipy.spatial import ConvexHull
 
-from errand_make.objects.resting_pose import feet
+from errand_make.objects.resting_pose import feet, resting_rotation
 
 
 def _hammer():
@@ -23,3 +24,33 @@ def test_feet_of_a_hammer_are_within_its_head_and_handle_and_not_between_them():
     assert min(below) < -0.13
     assert max(below) > 0.15  # the end of the handle bears it, too
     assert max(out_m) < 0.002
+
+
+def _prism(radius_m, length_m, tip_m):
+    """Corners of an upright hexagonal prism with a pointed end, and its middle."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 6, endpoint=False)
+    ring = radius_m * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(6)])
+    points = np.concatenate([ring, ring + [0.0, 0.0, length_m - tip_m], [[0.0, 0.0, length_m]]])
+    return points, np.array([0.0, 0.0, (length_m - tip_m) / 2.0])
+
+
+#   radius, length, length of the tip (m)              what it is
+@pytest.mark.parametrize(
+    ("form", "lies"),
+    [
+        ((0.0035, 0.18, 0.02), True),  # a pencil
+        ((0.005, 0.18, 0.02), True),  # a thick one
+        ((0.006, 0.15, 0.0), True),  # a piece of chalk
+        ((0.0125, 1.2, 0.0), True),  # a broomstick
+        ((0.03, 0.2, 0.02), False),  # a bottle
+        ((0.01, 0.09, 0.0), False),  # a lipstick
+    ],
+)
+@pytest.mark.parametrize("down", [False, True])
+def test_slender_bodies_lie_and_others_keep_standing(form, lies, down):
+    points, com = _prism(*form)
+    if down and form[2]:
+        pytest.skip("a tip below never stands")
+    turn = np.diag([1.0, -1.0, -1.0]) if down else np.eye(3)
+    size_m = np.ptp(points @ turn.T @ resting_rotation(points @ turn.T, turn @ com).T, axis=0)
+    assert bool(size_m[2] < 0.5 * size_m.max()) is lies

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from executive.speech.sound import Samples, concatenate, read_wav
+from executive.speech.sound import Samples, concatenate, read_sound
 from skills.inputs.errors import InputError
 
 __all__ = ["Speaker", "draw_speaker", "speak", "speakers"]
@@ -60,7 +60,7 @@ def speak(speaker: Speaker, text: str, draw: random.Random) -> Samples:
         wav = Path(folder) / "spoken.wav"
         command = [speaker.program, *(part.format(wav=wav) for part in speaker.arguments(draw))]
         subprocess.run(command, input=text.encode(), check=True, capture_output=True)
-        return concatenate(read_wav(wav))
+        return concatenate(read_sound(wav))
 
 
 def _espeak(draw: random.Random) -> tuple[str, ...]:

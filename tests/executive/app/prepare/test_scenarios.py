@@ -152,3 +152,14 @@ def test_a_misspelt_robot_or_fault_is_refused_with_the_likely_one(words, hint):
     with pytest.raises(InputError, match="there is no fault") as error:
         understood(scenario=Scenario((words,)))
     assert error.value.hint == hint
+
+
+@pytest.mark.parametrize("count", [40, 41, 2000])
+def test_more_people_than_can_be_simulated_are_refused_in_one_line(read, count):
+    lines = [f"  - {{person: P{n}, from: hall, to: kitchen, at: {n}}}" for n in range(count)]
+    if count == 40:
+        assert len(read("\n".join(["events:", *lines])).people) == 40
+        return
+    with pytest.raises(InputError, match="at most 40 people have events") as refused:
+        read("\n".join(["events:", *lines]))
+    assert (refused.value.line, refused.value.others) == (42, ())

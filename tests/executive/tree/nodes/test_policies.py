@@ -6,7 +6,7 @@ import pytest
 
 from executive.tree.nodes.composites import MemorySequence
 from executive.tree.nodes.policies import AskOperator, GoBack, RememberPose, Retry, Skip, Summary, Timeout
-from skills.api import Cause
+from skills.api import Cause, Part
 from skills.robot import Pose2D
 from tests.executive.tree.scripted import F, Leaf, N, R, S, play, tick
 
@@ -122,18 +122,52 @@ def test_a_drive_back_ends_with_the_first_failure(action, back, expected, cause,
     assert (root.cause, root.message, root.children[1].status) == (cause, message, end)
 
 
+class Drive:
+    """A skill that moves the base."""
+
+    uses = frozenset({Part.BASE})
+
+
+class Speak:
+    """A skill that only speaks."""
+
+    uses = frozenset({Part.VOICE})
+
+
+def work(script, skill=Drive):
+    leaf = Leaf(script)
+    leaf.skill = skill
+    return leaf
+
+
+def row(*children):
+    return MemorySequence(path_id="a/row", name="row", children=[*children])
+
+
+#   the mission                                           status  a part of the message
 @pytest.mark.parametrize(
-    ("first", "steps", "status", "says"),
+    ("mission", "status", "says"),
     [
-        ("F", ("a/skip", "a/other"), S, "done, but skipped: step 1 (leaf F)"),
-        ("F", ("a/skip",), F, "all steps were skipped: step 1 (leaf F)"),
-        ("S", ("a/skip",), S, "leaf S"),
+        (lambda: row(skip(work("F")), work("S")), S, "done, but skipped: step 1 (leaf F)"),
+        (lambda: row(skip(work("F")), skip(work("S"))), S, "done, but skipped: step 1 (leaf F)"),
+        (lambda: skip(work("S")), S, "leaf S"),
+        (lambda: skip(work("F")), F, "all steps were skipped: step 1 (leaf F)"),
+        (lambda: row(row(skip(work("F")), skip(work("F")))), F, "all steps were skipped: step 1 (leaf F); step 1"),
+        (lambda: row(skip(work("F")), work("S", Speak)), F, "all steps were skipped: step 1 (leaf F)"),
+        (lambda: skip(row(work("S"), work("F"))), F, "all steps were skipped"),
+        (lambda: skip(row(skip(work("F")))), F, "all steps were skipped"),
     ],
 )
-def test_the_summary_names_what_was_skipped(first, steps, status, says):
-    root = Summary(path_id="a/summary", name="summary", child=skip(Leaf(first)), steps=steps)
-    assert tick(root) == [status]
+def test_a_mission_that_may_skip_fails_when_nothing_but_speech_is_done(mission, status, says):
+    root = Summary(path_id="a/summary", name="summary", child=mission())
+    assert tick(root, 4)[-1] == status
     assert says in root.message
+
+
+@pytest.mark.parametrize("rounds", ["SF", "FS"])
+def test_what_any_round_did_counts(rounds):
+    step = skip(work(rounds))
+    assert (tick(step, 2), step.achieved) == ([S, S], True)
 
 
 def remember(context, patience_s=1.0):

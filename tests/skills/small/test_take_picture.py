@@ -108,7 +108,7 @@ def pictured_before(wall_m, point_W=(1.4, 0.0, 0.75), **inputs):
     return run, [message for topic, message in bench.published if topic == PICTURES]
 
 
-def test_what_stands_before_the_point_in_the_same_picture_is_no_picture_of_it():
+def test_a_point_hidden_in_the_same_picture_is_not_claimed():
     run, pictures = pictured_before(0.2)
     assert (run.cause, pictures) == (Cause.POSTCONDITION, [])
     assert "before it hides it" in run.message

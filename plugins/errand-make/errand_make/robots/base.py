@@ -46,7 +46,7 @@ def floor_m(tree: KinematicTree, parts: Parts) -> float:
 
 
 def motion_of(parts: Parts) -> tuple[str, str]:
-    """How a base drives, with a note on how that is known."""
+    """Motion of a base, with a note on how it is known."""
     count = len(parts.wheels)
     if parts.drive is Drive.AXLE:
         note = f"{len(parts.mounted)} wheels were found"

@@ -1,4 +1,4 @@
-"""What is what in a kinematic tree, by structure: wheels, casters, legs, arms, fingers, heads and lifts."""
+"""Parts of a kinematic tree by structure: wheels, casters, legs, arms, fingers, heads and lifts."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def is_camera(link: str) -> bool:
 
 
 class Drive(Enum):
-    """How a base moves over the floor."""
+    """Kind of motion of a base over the floor."""
 
     AXLE = "axle"
     STEERED = "steered"

@@ -97,7 +97,7 @@ NOTES = [
 
 
 @pytest.mark.parametrize(("data", "note"), NOTES, ids=[note[:20] for _, note in NOTES])
-def test_what_is_not_taken_is_said(data, note):
+def test_the_report_names_what_is_not_taken(data, note):
     assert any(note in each for each in read(data).notes)
 
 

@@ -165,7 +165,7 @@ def test_a_mission_that_may_skip_fails_when_nothing_but_speech_is_done(mission, 
 
 
 @pytest.mark.parametrize("rounds", ["SF", "FS"])
-def test_what_any_round_did_counts(rounds):
+def test_work_of_any_round_counts(rounds):
     step = skip(work(rounds))
     assert (tick(step, 2), step.achieved) == ([S, S], True)
 

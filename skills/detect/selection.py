@@ -94,9 +94,9 @@ def matching_tracks(
     )
 
 
-def sure_tracks(matching: Sequence[Track], inputs: DetectInputs) -> list[Track]:
+def sure_tracks(matching: Sequence[Track], inputs: DetectInputs, views: int) -> list[Track]:
     """Tracks that need no further view, last seen first; in the given order when any object or a place is wanted."""
-    sure = [track for track in matching if is_sure(track, inputs)]
+    sure = [track for track in matching if is_sure(track, inputs, views)]
     if inputs.expected_W is not None or ANY_OBJECT in inputs.classes:
         return sure
     return sorted(sure, key=lambda track: -track.last_seen_s)
@@ -107,9 +107,8 @@ def is_wanted(track: Track, inputs: DetectInputs) -> bool:
     return ANY_OBJECT in inputs.classes or track.class_name in inputs.classes
 
 
-def is_sure(track: Track, inputs: DetectInputs) -> bool:
-    """Returns whether a track needs no further view; its class does not matter when any object is wanted."""
-    views = 2 if inputs.seen_before is None else 1
+def is_sure(track: Track, inputs: DetectInputs, views: int) -> bool:
+    """Returns whether a track has enough views; its class does not matter when any object is wanted."""
     return track.exists(views) if ANY_OBJECT in inputs.classes else track.is_confirmed(views)
 
 

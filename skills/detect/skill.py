@@ -38,10 +38,12 @@ from skills.perception.model_matching import identified
 from skills.perception.point_cloud import Coverage, in_plain_view
 from skills.perception.surface_segmentation import Cluster, loose_clusters, segment_3d, segment_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
-from skills.robot import FloatArray, Image
+from skills.robot import FloatArray, Image, Mount
 from skills.routine import PlanningAttempt, Routine, SkillFailure
 
 _LEAST_SEEN = 0.02
+_LEAST_IN_VIEW = 0.5
+"""Fraction of a surface in the view of a camera that is fixed to the body."""
 _FITS_NEAR_M = 0.4
 _LOOKED_AT_M = 0.08
 _BELOW_TOP_M = 0.01
@@ -261,7 +263,7 @@ class Detect(LookingSkill[DetectInputs]):
         shifts = len(self.options.confirm_shifts_rad)
         for track in self._matching(inputs):
             tries = shifts + (track.views == 1 and track.missed == 0)
-            if not is_sure(track, inputs) and self._tried.get(track.number, 0) < tries:
+            if not is_sure(track, inputs, self._views(inputs)) and self._tried.get(track.number, 0) < tries:
                 return track
         return None
 
@@ -269,7 +271,11 @@ class Detect(LookingSkill[DetectInputs]):
         return matching_tracks(self._tracker.snapshot(), inputs, self.options, self.X_WB().translation())
 
     def _sure(self, inputs: DetectInputs) -> list[Track]:
-        return sure_tracks(self._matching(inputs), inputs)
+        return sure_tracks(self._matching(inputs), inputs, self._views(inputs))
+
+    def _views(self, inputs: DetectInputs) -> int:
+        """Number of viewpoints that a reliable track needs: one where the camera is fixed to the body."""
+        return 1 if inputs.seen_before is not None or self.object_camera.mount is Mount.BODY else 2
 
     def look(
         self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray], raised_m: float = 0.0
@@ -345,6 +351,10 @@ class Detect(LookingSkill[DetectInputs]):
         seen = "; ".join(f"{name}: {share}" for name, share in shares.items())
         if all(share.seen < _LEAST_SEEN for share in shares.values()):
             why = "it is dark" if is_dark(self._last.image) else "the camera shows none of it"
+            return SkillFailure(Cause.EXECUTION, f"{names} could not be looked at from here: {why}")
+        shown = max(share.seen + share.hidden for share in shares.values())
+        if self.object_camera.mount is Mount.BODY and shown < _LEAST_IN_VIEW:
+            why = f"most of it is out of the camera's view ({seen})"
             return SkillFailure(Cause.EXECUTION, f"{names} could not be looked at from here: {why}")
         if found:
             few = f"{count_sentence(found, inputs.surfaces)}, fewer than {inputs.count} ({seen})"

@@ -44,5 +44,5 @@ def test_a_body_that_cannot_rise_stays_at_its_height(look):
 
 
 def test_a_point_out_of_view_is_refused(look):
-    with pytest.raises(SkillFailure, match="the camera of the body does not turn"):
+    with pytest.raises(SkillFailure, match="outside of the view of the"):
         look(0.5, 2.0, 0.5)

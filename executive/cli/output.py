@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import errno
 import json
+import shutil
 import sys
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import typer
 
 from skills.inputs.errors import InputError
-from skills.inputs.outside import LONGEST_ANSWER, LONGEST_TEXT, plain_text
+from skills.inputs.outside import LONGEST_ANSWER, LONGEST_TEXT, plain_text, writing
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -122,6 +125,21 @@ def refuse(error: InputError | OSError) -> NoReturn:
     for each in (refused, *refused.others):
         typer.echo(f"errand: {each}", err=True)
     raise typer.Exit(BAD_INPUT) from error
+
+
+@contextmanager
+def new_folder(out: Path) -> Iterator[Path]:
+    """Yields a temporary folder, and copies it to a new folder when the block ends without an error.
+
+    Raises InputError if the new folder exists and is not empty, or cannot be written.
+    """
+    with writing(out, "name another --out"):
+        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+            raise InputError("it exists already", hint="name a new folder by --out", file=out)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}-") as folder:
+            yield Path(folder)
+            shutil.copytree(folder, out, dirs_exist_ok=True)
 
 
 def terminal_answerer() -> Answerer | None:

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from errand_make.new_folder import new_folder
 from executive.cli.new_command import show_package
+from executive.cli.output import new_folder
 from skills.inputs.errors import InputError
 
 

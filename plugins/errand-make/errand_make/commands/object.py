@@ -11,10 +11,9 @@ from typing import Annotated, Any
 
 import typer
 
-from errand_make.new_folder import new_folder
 from executive.cli.number_options import OutOfRangeError, quantity_argument, quantity_option
 from executive.cli.options import AS_JSON
-from executive.cli.output import console_for, print_json, progress_bar
+from executive.cli.output import console_for, new_folder, print_json, progress_bar
 from plant.models.catalogue import ImportedObject, read_imported
 from skills.inputs.errors import InputError, count_text
 from skills.inputs.outside import writing

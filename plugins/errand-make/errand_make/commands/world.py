@@ -10,12 +10,11 @@ from typing import Annotated, Final
 
 import typer
 
-from errand_make.new_folder import new_folder
 from errand_make.worlds.wanted import Addition, Wanted
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, StartCommand, start_pose
-from executive.cli.output import console_for, show_table
+from executive.cli.output import console_for, new_folder, show_table
 from plant.worlds.world import WorldError, known_worlds
 from skills.api import ZoneKind
 from skills.estimate.grid_map import load_grid_map

@@ -298,7 +298,7 @@ def test_nobody_answers_and_the_default_counts(control, clock):
     clock.advance(2.0)
     assert (asked.done(), asked.result(), control.state.questions) == (True, "skip", ())
     events = control.poll().events
-    assert [event.what for event in events] == ["question", "question over"]
+    assert [event.what for event in events] == ["question", "question closed"]
 
 
 def test_wrong_answers_and_late_ones_are_refused(control, clock):

@@ -85,10 +85,7 @@ class Recollection:
         return self._checkpoints.get(path_id, {})
 
     def note_work(self, path_id: str, sentence: str = "") -> None:
-        """Records that a skill works instead of repeating a result, and drops the results of later skills.
-
-        Without a `sentence`, only the work of an interrupted skill is worth a line.
-        """
+        """Records that a skill works instead of repeating a result (`sentence`: why); drops results of later skills."""
         later = {path for path in self._ended if self._place[path] > self._place[path_id]}
         for path in {path_id, *later}:
             self._ended.pop(path, None)

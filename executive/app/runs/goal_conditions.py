@@ -14,11 +14,7 @@ from executive.words.goal import GoalCondition, GoalKind, RefereeReport, When
 from skills.inputs.errors import listing
 
 SHOWN_CHARS = 60
-_ENDED = {
-    Outcome.FAILURE: "failed",
-    Outcome.CANCELLED: "was cancelled",
-    Outcome.ERROR: "ended with an internal error",
-}
+_ENDED = {Outcome.FAILURE: "failed", Outcome.CANCELLED: "was cancelled", Outcome.ERROR: "was ended by a defect"}
 _MOVING = frozenset({GoalKind.GRASPED, GoalKind.PLACED, GoalKind.HANDED_OVER, GoalKind.CLEARED})
 
 

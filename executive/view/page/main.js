@@ -190,5 +190,5 @@
   }
   // A recording that loads when all else is drawn follows, too, and shows textures that come still later.
   setInterval(seekScene, 500);
-  window.errand.page = { store, timeline, delays, map, plots };
+  window.errand.page = { store, timeline, delays, map, plots, scene };
 })();

@@ -98,7 +98,7 @@
 
     // The most legible form of a name for which its room has a place, upright in a narrow one; none where no letter fits.
     inRoom(name) {
-      const bounds = boundsOf(name.room), [west, north, east, south] = bounds, { text } = name;
+      const bounds = boundsOf(name.room).map((side, n) => (n < 2 ? Math.max : Math.min)(side, this.inside[n])), [west, north, east, south] = bounds, { text } = name;
       const short = Array.from({ length: text.length - 1 }, (_, n) => [`${text.slice(0, text.length - 1 - n).trimEnd()}…`]);
       const least = NAME_PX[NAME_PX.length - 1], lying = NAME_PX.flatMap((size) => wrapped(text).map((lines) => [lines, size, false]));
       const forms = [...lying, [[text], least, true], ...short.map((lines) => [lines, least, false])];

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -170,7 +171,7 @@ class ConsoleScreen:
         width = max(map(len, names), default=0)
         self.tell(f"Written to {out}:")
         for name in (*known, *sorted(names.difference(known))):
-            self.tell(f"  {name:<{width}}  {WRITTEN.get(name, '')}".rstrip())
+            self.tell(f"  {name:<{width}}  {WRITTEN.get(name) or WRITTEN.get(_OWN.sub('', name), '')}".rstrip())
 
 
 WRITTEN: Final[Mapping[str, str]] = {
@@ -188,6 +189,8 @@ WRITTEN: Final[Mapping[str, str]] = {
     "run.json": "what was asked, when, and the report's values, for scripts and `errand runs`",
 }
 """Files of a run, with their content, in the order in which to look at them."""
+_OWN: Final = re.compile(r"-\d+(?=\.mcap$)|_[^_]+(?=\.(svg|png)$)")
+"""Number of a restart in the name of its log, or name of one of several robots in the name of its picture."""
 REFRESH_S = 0.2
 BAR_CELLS = 20
 FEWEST_ROWS = 5

@@ -108,7 +108,7 @@ def versions(packages: Sequence[str]) -> dict[str, str]:
 
 
 def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[str, Any]:
-    """Encodes the map: a grey PNG (first row: largest y), its origin in the world (m), names of rooms, the dock."""
+    """Encodes the map: a grey PNG (first row: largest y), its origin in the world (m), the places, the dock."""
     grey = grid.grey(**_GREY)
     png = cv2.imencode(".png", np.ascontiguousarray(grey[::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes()
     width_m, height_m = grid.size_m
@@ -123,7 +123,9 @@ def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[s
         "format": "png",
         "data": base64.b64encode(png).decode(),
         "places": [
-            {"name": name, "x": round(float(x), 3), "y": round(float(y), 3)} for name, (x, y) in middles.items()
+            {"name": name, "x": round(float(x), 3), "y": round(float(y), 3)}
+            | ({"outline": knowledge.rooms[name]} if name in knowledge.rooms else {})
+            for name, (x, y) in middles.items()
         ],
         "dock": None if knowledge.dock is None else {"x": knowledge.dock.x, "y": knowledge.dock.y},
     }

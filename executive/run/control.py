@@ -331,7 +331,7 @@ class Control:
         """Answers a question by its default, and records the reason. May be called from any thread."""
         with self._changed:
             if pending.answer is None:
-                self._close_question(pending, pending.open.question.default, "question over", why)
+                self._close_question(pending, pending.open.question.default, "question closed", why)
 
     def _close_question(self, pending: PendingAnswer, answer: str, what: str, message: str) -> None:
         pending.answer = answer
@@ -443,4 +443,4 @@ class PendingAnswer:
 
     def withdraw(self) -> None:
         """Withdraws the question."""
-        self._take_default(self, "taken back")
+        self._take_default(self, "the robot no longer asks it")

@@ -52,6 +52,7 @@ class Recollection:
         self._place = {path_id: number for number, path_id in enumerate(order)}
         self._ended = {path: step for path, step in steps.items() if step.ended and path in self._place}
         self._checkpoints = {path: step.checkpoint for path, step in steps.items() if step.checkpoint}
+        self._interrupted = {path for path, step in steps.items() if step.status is Status.RUNNING}
         self._last: str | None = None
         self._begun_s: float | None = None
         self._world_untouched = True
@@ -83,15 +84,17 @@ class Recollection:
         """Returns the checkpoint of an attempt that the restart interrupted; empty for another node."""
         return self._checkpoints.get(path_id, {})
 
-    def note_work(self, path_id: str, sentence: str) -> None:
-        """Records that a skill works instead of repeating a result, and drops the results of later skills."""
+    def note_work(self, path_id: str, sentence: str = "") -> None:
+        """Records that a skill works instead of repeating a result (`sentence`: why); drops results of later skills."""
         later = {path for path in self._ended if self._place[path] > self._place[path_id]}
         for path in {path_id, *later}:
             self._ended.pop(path, None)
         self.repeated.discard(path_id)
         self.dropped |= later
-        if self._world_untouched:
+        sentence = sentence or ("goes on here" if path_id in self._interrupted else "")
+        if self._world_untouched and sentence:
             self.log.append(f"{path_id}: {sentence}")
+        self._interrupted.discard(path_id)
         self._checkpoints.pop(path_id, None)
 
     def must_check_first(self, changes_world: bool) -> bool:

@@ -246,7 +246,7 @@ class _Resumed(Skill[Any]):
         if not trusted and not self._recollection.is_awake(context.clock.now(), context.localiser.estimate().localised):
             return Running("looks at the state of the world after the restart")
         if result is None:
-            self._work("goes on here")
+            self._work()
             return None
         undone = None if trusted else self._inner.undone(self._inputs)
         if undone is not None:
@@ -258,7 +258,7 @@ class _Resumed(Skill[Any]):
             return Succeeded(message, self._ports)
         return Failed(result.cause or Cause.EXECUTION, message)
 
-    def _work(self, sentence: str) -> None:
+    def _work(self, sentence: str = "") -> None:
         self._working, self._inner.checkpoint = True, self.checkpoint
         self._recollection.note_work(self._path, sentence)
         if self._recollection.must_check_first(self._inner.changes_world):

@@ -265,6 +265,11 @@ def _words(items: Sequence[_Item]) -> str:
     return ", then ".join(map(_command_words, commands)) or items[0].step.words
 
 
+def words_of(steps: Sequence[Step]) -> str:
+    """Text that stands for steps in the name of a node."""
+    return ", then ".join(_words((item,)) for items, _ in _groups(steps) for item in items)
+
+
 def _command_words(command: Command) -> str:
     """Short text of a command: "grasp coke at kitchen table"."""
     item = command.object or command.item

@@ -249,10 +249,9 @@ class PlanBuilder:
         """
         return self.node("afterwards", name, work, tidying, part=part, only_after_failure=only_after_failure)
 
-    def stow_after(self, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:
-        """Stows the arm after work, like `tidied`."""
-        name = "stow the arm if it fails" if only_after_failure else "stow the arm in the end"
-        return self.tidied(name, work, self.skill(STOW), only_after_failure=only_after_failure)
+    def stow_after(self, work: NodeSpec, name: str = "", *, only_after_failure: bool = False) -> NodeSpec:
+        """Stows the arm after work, like `tidied`; the node has by default the name of the work."""
+        return self.tidied(name or work.name, work, self.skill(STOW), only_after_failure=only_after_failure)
 
     def pause(self, part: str, name: str, duration_s: float = MOMENT_S) -> NodeSpec:
         """Builds a leaf that waits on the robot's clock."""

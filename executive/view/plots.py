@@ -19,8 +19,8 @@ _CURVES: Final[Mapping[str, tuple[str, str, float]]] = {
     "speed_m_s": ("Speed", "m/s", 1.0),
     "charge": ("Battery", "%", 100.0),
     "grip_n": ("Force of the gripper", "N", 1.0),
-    "position_sigma_m": ("Uncertainty of the position (robot's own)", "cm", 100.0),
-    "error_m": ("Position error (dashed: own uncertainty)", "cm", 100.0),
+    "position_sigma_m": ("Own estimate of the position (1σ)", "cm", 100.0),
+    "error_m": ("Position error (dashed: own estimate, 1σ)", "cm", 100.0),
     "pace": ("Real-time factor", "", 1.0),
 }
 """Title and unit of the plot of each logged value, and the factor into this unit."""

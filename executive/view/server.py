@@ -17,10 +17,12 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
+from html import unescape
 from http import HTTPStatus
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Any, Final, Protocol
+from urllib.parse import unquote
 
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import FileResponse, JSONResponse, Response
@@ -36,8 +38,8 @@ from skills.inputs.errors import InputError
 from skills.inputs.outside import json_object
 
 HOST: Final = "127.0.0.1"
-_FILES: Final = frozenset({".html", ".mcap"})
-"""Endings of the files of a run that the page links to, and that link to each other."""
+_LINK: Final = re.compile(r'<a href="([^":/.][^":/]*)">')
+"""Link of a report to a file beside it."""
 TOKEN_HEADER: Final = "x-errand-token"
 _GOING_AWAY: Final = 1001
 _NOT_ALLOWED: Final = 4403
@@ -187,10 +189,9 @@ class PageServer(Server):
 
     async def _file(self, request: Request) -> Response:
         """Sends the recording, the report, or a file beside them to which the report links."""
-        name = request.path_params["name"]
-        offered = (each for each in (self._content.recording, self._content.report) if each is not None)
-        beside = (each.with_name(name) for each in offered if Path(name).suffix in _FILES)
-        found = next((each for each in beside if each.is_file()), None)
+        name, report = request.path_params["name"], self._content.report
+        files = (each for each in (self._content.recording, report, *_linked_files(report)) if each is not None)
+        found = next((each for each in files if each.name == name and each.is_file()), None)
         if found is None:
             return JSONResponse({"error": f"there is no file '{name}' here"}, HTTPStatus.NOT_FOUND)
         return FileResponse(found)
@@ -245,6 +246,13 @@ class PageServer(Server):
             "scene": self._content.scene is not None,
             "recording": recording.name if recording is not None and recording.is_file() else None,
         }
+
+
+def _linked_files(report: Path | None) -> Sequence[Path]:
+    """Returns the files beside a report to which it links."""
+    if report is None or not report.is_file():
+        return ()
+    return [report.with_name(unquote(unescape(name))) for name in _LINK.findall(report.read_text(encoding="utf-8"))]
 
 
 def _values(body: bytes | None) -> Mapping[str, Any]:

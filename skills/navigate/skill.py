@@ -360,7 +360,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
 
     def _waiting_sentence(self) -> str:
         obstacle_W = self._planning.obstacle_W
-        return f"waiting for the path to become free at {place_text(obstacle_W) if obstacle_W else 'ahead'}"
+        return f"waiting for the path {f'at {place_text(obstacle_W)}' if obstacle_W else 'ahead'} to become free"
 
     def _goes_on(self, answer: Drive) -> tuple[str, float | None]:
         """Plans again when the path fails; returns the message and the progress, 0 to 1."""

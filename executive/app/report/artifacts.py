@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -38,6 +39,8 @@ _SMALL_PX: Final = (320, 240)
 _ROW: Final = 4
 _EMPTY: Final = 225
 """Grey of the places in a grid of pictures that no picture fills."""
+_LEFT: Final = re.compile(r", [\d.]+ m to go$")
+"""Distance left, which is logged once and soon wrong."""
 _MOMENTS: Final[Mapping[str, str]] = MappingProxyType({"hand-over": "hand_over", "place": "place"})
 _AHEAD_M: Final[Mapping[str, float]] = MappingProxyType({"hand_over": 0.4})
 """Distance of a picture's subject ahead of the retracted hand."""
@@ -78,6 +81,7 @@ class Artifacts(RunVisitor):
         self.trees: list[Mapping[str, Any]] = []
         self.steps: dict[str, list[tuple[float, str]]] = {}
         self._step_of: dict[str, str] = {}
+        self._running: dict[str, dict[str, str]] = {}
 
     def of_robot(self, robot_name: str) -> RobotArtifacts:
         """Returns what was collected for a robot."""
@@ -89,7 +93,7 @@ class Artifacts(RunVisitor):
         if topic == TREE:
             self.trees.append(message)
             self._step_of |= _steps_of(message["root"], message["root"]["name"])
-        if topic == ACTIVITY or (topic == TRANSITIONS and message["to"] == "RUNNING"):
+        if topic in (ACTIVITY, TRANSITIONS):
             self._caption(message)
         if topic == DETECTIONS:
             own.looked.append((own.looks, message))
@@ -114,11 +118,18 @@ class Artifacts(RunVisitor):
         return message
 
     def _caption(self, message: Mapping[str, Any]) -> None:
-        """Adds a step of a robot and what it does in it, once each time."""
-        step, own = self._step_of.get(str(message["node"])), self.steps.setdefault(str(message.get("robot", "")), [])
-        text = " – ".join(filter(None, (step, str(message.get("message", "")))))
-        if step is not None and (not own or own[-1][1] != text):
-            own.append((round(float(message["t"]), 2), text))
+        """Adds what a robot does: the node that began or spoke last of those that run, else the result of the last."""
+        node, robot, t_s = str(message["node"]), str(message.get("robot", "")), round(float(message["t"]), 2)
+        own, running = self.steps.setdefault(robot, []), self._running.setdefault(robot, {})
+        runs = message.get("to", "RUNNING") == "RUNNING"
+        if (step := self._step_of.get(node)) is None or not (running.pop(node, "") or runs):
+            return
+        text = " – ".join(filter(None, (step, _LEFT.sub("", str(message.get("message", ""))))))
+        running |= {node: text} if runs else {}
+        while own and own[-1][0] == t_s:
+            own.pop()
+        text = next(reversed(running.values()), text)
+        own += [(t_s, text)] if not own or own[-1][1] != text else []
 
     def _with_picture(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
         """Adds a picture to an answer: the views with the found objects or the person, or all views if none was found.

@@ -138,6 +138,7 @@ class RunReport(Ending):
     Times are in seconds. `log` is the path of the event log, and `work` has the work counters by name. `answers` and
     `said` are in the order of time, `seen_objects` are the confirmed objects, and `scenario` lists the faults and
     events of the run's scenario. `notes` describe a real robot's sensing. `zones` are the rules of the zones in force.
+    `log_time_s` is the time that the logs span, which for a resumed run includes the part before the restart.
     """
 
     world: str
@@ -155,6 +156,7 @@ class RunReport(Ending):
     notes: tuple[str, ...] = ()
     zones: tuple[str, ...] = ()
     robots: Mapping[str, RobotReport] = field(default_factory=dict)
+    log_time_s: float = 0.0
 
     def every_verdict(self) -> Iterator[Verdict]:
         """Yields the verdicts on the run; those of several robots have the robot's name, and count its contacts."""
@@ -167,7 +169,9 @@ class RunReport(Ending):
     def duration_text(self) -> str:
         """Duration in words; says "simulated" only for a run with a referee."""
         simulated = "" if self.referee is None else f" simulated in {self.wall_time_s:.1f} s"
-        return f"{self.sim_time_s:.1f} s{simulated}"
+        own = f"{self.sim_time_s:.1f} s{simulated}"
+        resumed = self.log_time_s > self.sim_time_s + 0.1
+        return f"{self.log_time_s:.1f} s, of which {own} since the restart" if resumed else own
 
     def to_json(self) -> dict[str, Any]:
         """Returns the report as JSON values, without the events that the referee saw."""

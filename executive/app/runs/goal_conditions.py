@@ -14,6 +14,7 @@ from executive.words.goal import GoalCondition, GoalKind, RefereeReport, When
 from skills.inputs.errors import listing
 
 SHOWN_CHARS = 60
+_ENDED = {Outcome.FAILURE: "failed", Outcome.CANCELLED: "was cancelled", Outcome.ERROR: "was ended by a defect"}
 _MOVING = frozenset({GoalKind.GRASPED, GoalKind.PLACED, GoalKind.HANDED_OVER, GoalKind.CLEARED})
 
 
@@ -59,7 +60,7 @@ def verdict_of(
     conditions = conditions_of(tree, result, before=before)
     verdict = judge([replace(condition, since_s=since_s) for condition in conditions])
     if result.outcome is not Outcome.SUCCESS:
-        why = _joined(f"The mission ended with {result.outcome.value}.", verdict.why)
+        why = _joined(f"The mission {_ENDED[result.outcome]}.", verdict.why)
         return replace(verdict, success=False, why=why, holds=verdict.success)
     said = dict.fromkeys(_speech(tree, result))
     if said:

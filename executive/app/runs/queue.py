@@ -245,7 +245,7 @@ class MissionRuns:
             ended(finished.report)
         report, past, hung_up = finished.report, None if resumed is None else resumed.lines, finished.hung_up
         if past is not None:
-            self._screen.tell("\n  ".join(["What it did before:", *past]))
+            self._screen.tell("\n  ".join(["How it went on after the restart:", *past]))
         self._screen.name_files(prepared.request.out)
         return MissionResult(mission.id, report.outcome, report.achieved, report.message, report, past, hung_up)
 

@@ -133,7 +133,7 @@ def move_aside_plan(
         what,
         twice,
         tuck,
-        below.tidied("set it down again if there is no room", put, back, only_after_failure=True, part="put"),
+        below.tidied("set it down elsewhere", put, back, only_after_failure=True, part="put"),
         below.or_stay(
             "go back to where it stood, or go on from here", there, "go on from here", pause="here", part="there"
         ),

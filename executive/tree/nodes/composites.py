@@ -11,7 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.mission.gripper import held_after_either
-from executive.tree.assembly import Assembler, StepPlans
+from executive.tree.assembly import Assembler, StepPlans, words_of
 from executive.tree.behaviour import MemoryComposite, applies, cause_of, failed_for_good, message_of
 from executive.tree.board import Board
 from executive.tree.estimate import Estimate, Walk
@@ -215,7 +215,8 @@ def _try_plan(assembler: Assembler, block: model.Try, builder: PlanBuilder) -> A
         midway.held, midway.opening = held_after_either(flow.held, after_tried.held), False
     other, after_other = assembler.branch(block.otherwise, builder.at("else"), "else", midway)
     flow.join([after_tried, after_other])
-    return Assembled((builder.node("try", "else the other", *tried.nodes, *other.nodes),), (*tried.parts, *other.parts))
+    name = ", else ".join(filter(None, map(words_of, (block.steps, block.otherwise))))
+    return Assembled((builder.node("try", name, *tried.nodes, *other.nodes),), (*tried.parts, *other.parts))
 
 
 class Together(MemoryComposite):

@@ -6,7 +6,7 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.assembly import PYTHON_TYPES, Assembler, Flow, StepPlans
+from executive.tree.assembly import PYTHON_TYPES, Assembler, Flow, StepPlans, words_of
 from executive.tree.behaviour import ExplainedDecorator, cause_of, message_of
 from executive.tree.context import RunContext
 from executive.tree.estimate import Estimate, Walk
@@ -138,7 +138,8 @@ def frame_plan(
         assembler.flow.join([before.copy(), assembler.flow.copy()])
         last = assembler.row(group.always, builder.at("always"), "in the end")
         parts += last.parts
-        node = builder.node("always", "in the end, whatever happens", node, *last.nodes, part="whatever-happens")
+        name = f"{group.name or node.name}, in the end {words_of(group.always)}"
+        node = builder.node("always", name, node, *last.nodes, part="whatever-happens")
     if group.zones:
         known = assembler.knowledge
         zones = known.with_zones(group.zones).known_zones()[len(known.zones) :]

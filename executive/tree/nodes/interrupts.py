@@ -224,7 +224,7 @@ def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
     return builder.node(
         "interrupt",
         "battery low: charge",
-        below.recover("know where it is", work, (below.skill("relocalise"), lost), attempts=2),
+        below.recover(work.name, work, (below.skill("relocalise"), lost), attempts=2),
         spares=HANDLING,
         uses=MOST_CHARGES,
         condition=BatteryForWork(facts.low, dock),

@@ -127,7 +127,7 @@ def pick_up_plan(
         part="attempts",
         forgets=(near, tried) if seen else (key, near, tried, blocking),
     )
-    return builder.at("tidy").stow_after(attempts, only_after_failure=True)
+    return builder.at("tidy").stow_after(attempts, f"pick up the {item}", only_after_failure=True)
 
 
 def tuck_plan(builder: PlanBuilder) -> NodeSpec:

@@ -125,7 +125,7 @@ def _from_views(
         below, pose = builder.at(f"view-{number}"), compose(view, Pose2D(0.0, 0.0, turn_rad))
         drive = below.navigate(pose, f"the {subject.at or subject.of}", exactly=not title)
         shot = _shot(below, subject, title, point_W=point_W, **kind)
-        nodes.append(below.sequence(f"take a picture of the {what}, view {number}", drive, shot))
+        nodes.append(below.sequence(f"take a picture of the {what}{f', view {number}' * (number > 1)}", drive, shot))
     return builder.first_of(f"a picture of the {what}", *nodes) if len(nodes) > 1 else nodes[0]
 
 

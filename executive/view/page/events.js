@@ -11,7 +11,7 @@
     missions: (data) => ["missions", data.missions.map((each) => `${each.id} ${each.robot || "no robot"}: ${each.outcome}`).join(", ")],
     speech: (data) => [`${data.robot} ${data.silent ? "shows" : "says"}`, `“${data.text}”`],
     errors: (data) => ["defect", (data.traceback || "").trim().split("\n").pop()],
-    control: (data) => [data.what || "control", QUESTION.test(data.what) ? (data.message || "").replace(/^\S+: /, "") : data.message || ""],
+    control: (data) => [`${data.what || "control"}${QUESTION.test(data.what) ? ":" : ""}`, QUESTION.test(data.what) ? (data.message || "").replace(/^\S+: /, "") : data.message || ""],
     question: (data) => ["question", data.text || data.message || ""],
   };
 

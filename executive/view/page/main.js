@@ -142,11 +142,13 @@
 
   // The server says when it ends. Where it says nothing, nobody knows what the robot does, and the page asks again.
   function leave(ended) {
-    const mode = ended ? "ended" : "lost", seen = `what is shown is as of ${store.end.toFixed(1)} s`;
+    const mode = ended ? "ended" : "lost", seen = `what is shown is as of ${store.end.toFixed(1)} s`, control = store.live.control;
+    const over = !control || isOver(control) || (store.robots.length > 0 && store.robots.every((name) => store.now.outcomes.some((each) => each.robot === name)));
+    scene.leave();
     if (store.live.control && !isOver(store.live.control)) store.live.control = { ...store.live.control, mode, reason: "", robots: {}, questions: [], breakpoints: [] };
     byId("connection").hidden = false;
     byId("connection").dataset.look = ended ? "idle" : "failure";
-    byId("connection").textContent = ended ? "Errand has ended; the page shows what happened." : `The connection to Errand is lost: ${seen}. The robot may still move. Trying again …`;
+    byId("connection").textContent = ended ? "Errand has ended; the page shows what happened." : `The connection to Errand is lost: ${seen}. ${over ? "" : "The robot may still move. "}Trying again …`;
     if (!ended) setTimeout(reach, AGAIN_MS);
     schedule();
   }
@@ -188,5 +190,5 @@
   }
   // A recording that loads when all else is drawn follows, too, and shows textures that come still later.
   setInterval(seekScene, 500);
-  window.errand.page = { store, timeline, delays, map, plots };
+  window.errand.page = { store, timeline, delays, map, plots, scene };
 })();

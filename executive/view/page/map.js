@@ -12,32 +12,115 @@
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-  // Names on the map: each near its point, where it covers no other name and no mark.
+  // Names on the map: each near its point, where it covers no other name and no mark. The name of a room, or of a place
+  // in one, stays in the room: it moves, wraps,
+  // shrinks, stands upright, and is shortened last.
+  const NAME_PX = [11, 9], MOST_LINES = 3, BESIDE = [0, -0.6, 0.6, -1.1, 1.1], ROWS = [0, -1, 1, -2, 2, -3, 3, -4, 4, -5, 5], ACROSS = 12;
+
+  const insideOf = (outline, [u, v]) => outline.reduce((is, [u1, v1], n) => {
+    const [u2, v2] = outline[(n || outline.length) - 1];
+    return (v1 > v) !== (v2 > v) && u < ((u2 - u1) * (v - v1)) / (v2 - v1) + u1 ? !is : is;
+  }, false);
+  const overlap = ([l, t, r, b], [l2, t2, r2, b2]) => Math.max(0, Math.min(r, r2) - Math.max(l, l2)) * Math.max(0, Math.min(b, b2) - Math.max(t, t2));
+  const boundsOf = (points) => { const us = points.map((p) => p[0]), vs = points.map((p) => p[1]); return [Math.min(...us), Math.min(...vs), Math.max(...us), Math.max(...vs)]; };
+
+  // A name on one line, and on two and three lines of about the same length.
+  function wrapped(text) {
+    const words = text.split(" "), forms = [[text]];
+    for (let count = 2; count <= Math.min(MOST_LINES, words.length); count += 1) {
+      const lines = [""];
+      for (const word of words) {
+        const last = lines[lines.length - 1], joined = last ? `${last} ${word}` : word;
+        if (last && lines.length < count && joined.length > text.length / count + 1) lines.push(word);
+        else lines[lines.length - 1] = joined;
+      }
+      forms.push(lines);
+    }
+    return forms;
+  }
+
   class Names {
     // `inside` is the rectangle of the map, which names do not leave.
-    constructor(brush, inside) { Object.assign(this, { brush, inside, taken: [], later: [] }); }
+    constructor(brush, inside) { Object.assign(this, { brush, inside, taken: [], later: [], placed: [] }); }
 
     keepClear(u, v, radius) { this.taken.push([u - radius, v - radius, u + radius, v + radius]); }
 
-    add(text, u, v, colour, font) { this.later.push({ text, u, v, colour, font }); }
+    // With `room`, an outline, the name stays in it.
+    add(text, u, v, colour, { bold = false, room = null } = {}) { this.later.push({ text, u, v, colour, bold, room }); }
 
     draw(halo) {
-      const { brush, inside: [west, north, east, south] } = this;
-      brush.textAlign = "left";
-      for (const { text, u, v, colour, font } of this.later) {
-        brush.font = font;
-        const wide = brush.measureText(text).width + 4, high = 16, keep = (x, least, most) => Math.max(least, Math.min(x, most));
-        const shifts = [0, -1, 1, -2, 2, -3, 3].flatMap((dv) => [0, -0.6, 0.6, -1.1, 1.1].map((du) => [du * wide, dv * high]));
-        const boxes = shifts.map(([du, dv]) => { const left = keep(u + du - wide / 2, west, east - wide), top = keep(v + dv - high / 2, north, south - high); return [left, top, left + wide, top + high]; });
-        const cost = ([l, t, r, b]) => Math.hypot((l + r) / 2 - u, (t + b) / 2 - v) + this.taken.reduce((sum, [l2, t2, r2, b2]) => sum + 100 * Math.max(0, Math.min(r, r2) - Math.max(l, l2)) * Math.max(0, Math.min(b, b2) - Math.max(t, t2)), 0);
-        const best = boxes.reduce((one, other) => (cost(other) < cost(one) ? other : one));
-        this.taken.push(best);
+      const { brush } = this;
+      brush.textAlign = "center";
+      for (const name of this.later) {
+        const { box, lines, size, upright } = name.room ? this.inRoom(name) : this.anywhere(name);
+        this.placed.push({ text: name.text, shown: (lines || []).join(" "), box, room: name.room });
+        if (!box) continue;
+        this.taken.push(box);
+        brush.font = this.font(name, size);
         brush.lineWidth = 3;
         brush.strokeStyle = halo;
-        brush.strokeText(text, best[0] + 2, best[3] - 4);
-        brush.fillStyle = colour;
-        brush.fillText(text, best[0] + 2, best[3] - 4);
+        brush.fillStyle = name.colour;
+        brush.save();
+        brush.translate((box[0] + box[2]) / 2, (box[1] + box[3]) / 2);
+        if (upright) brush.rotate(-Math.PI / 2);
+        for (const draw of ["strokeText", "fillText"]) lines.forEach((line, n) => brush[draw](line, 0, (n + 0.8 - lines.length / 2) * (size + 1)));
+        brush.restore();
       }
+      brush.textAlign = "left";
+    }
+
+    font({ bold }, size) { return `${bold ? "600 " : ""}${size}px ${css("--font")}`; }
+
+    sizeOf(name, lines, size) {
+      this.brush.font = this.font(name, size);
+      return [Math.max(...lines.map((line) => this.brush.measureText(line).width)) + 4, lines.length * (size + 1) + 1];
+    }
+
+    // The box of a size about a point, kept in a rectangle.
+    boxAt(u, v, [wide, high], [west, north, east, south]) {
+      const keep = (x, least, most) => Math.max(least, Math.min(x, most)), left = keep(u - wide / 2, west, east - wide), top = keep(v - high / 2, north, south - high);
+      return [left, top, left + wide, top + high];
+    }
+
+    covered(box) { return this.taken.reduce((sum, other) => sum + overlap(box, other), 0); }
+
+    // The box at the least cost: near the point, and above all on nothing else.
+    best(boxes, { u, v }) {
+      const cost = (box) => Math.hypot((box[0] + box[2]) / 2 - u, (box[1] + box[3]) / 2 - v) + 100 * this.covered(box);
+      return boxes.map((box) => [cost(box), box]).reduce((one, other) => (other[0] < one[0] ? other : one))[1];
+    }
+
+    anywhere(name) {
+      const lines = [name.text], size = NAME_PX[0], [wide, high] = this.sizeOf(name, lines, size);
+      const boxes = ROWS.flatMap((dv) => BESIDE.map((du) => this.boxAt(name.u + du * wide, name.v + dv * high, [wide, high], this.inside)));
+      return { box: this.best(boxes, name), lines, size };
+    }
+
+    // The most legible form of a name for which its room has a place, upright in a narrow one; none where no letter fits.
+    inRoom(name) {
+      const bounds = boundsOf(name.room).map((side, n) => (n < 2 ? Math.max : Math.min)(side, this.inside[n])), [west, north, east, south] = bounds, { text } = name;
+      const short = Array.from({ length: text.length - 1 }, (_, n) => [`${text.slice(0, text.length - 1 - n).trimEnd()}…`]);
+      const least = NAME_PX[NAME_PX.length - 1], lying = NAME_PX.flatMap((size) => wrapped(text).map((lines) => [lines, size, false]));
+      const forms = [...lying, [[text], least, true], ...short.map((lines) => [lines, least, false])];
+      for (const [lines, size, upright] of forms) {
+        const measured = this.sizeOf(name, lines, size), [wide, high] = upright ? measured.reverse() : measured, at = (n, from, to) => from + (n / ACROSS) * (to - from);
+        if (wide > east - west + 2 || high > south - north + 2) continue;
+        const grid = Array.from({ length: (ACROSS + 1) ** 2 }, (_, n) => [at(n % (ACROSS + 1), west, east), at(Math.floor(n / (ACROSS + 1)), north, south)]);
+        const boxes = [[name.u, name.v], ...grid].map(([u, v]) => this.boxAt(u, v, [wide, high], bounds)).filter((box) => this.isIn(box, name.room) && this.covered(box) === 0);
+        if (boxes.length) return { box: this.best(boxes, name), lines, size, upright };
+      }
+      return { box: null };
+    }
+
+    isIn([l, t, r, b], outline) {
+      const corners = [[l + 1, t + 1], [r - 1, t + 1], [r - 1, b - 1], [l + 1, b - 1]];
+      return corners.every((corner) => insideOf(outline, corner)) && !outline.some(([u, v]) => u > l + 1 && u < r - 1 && v > t + 1 && v < b - 1);
+    }
+
+    // The full name where one is shortened, or left out of its room.
+    fullAt(point) {
+      const found = this.placed.find(({ text, shown, room }) => shown !== text && room && insideOf(room, point));
+      return found ? found.text : "";
     }
   }
 
@@ -49,6 +132,7 @@
       this.image = null;
       this.robots = [];
       new ResizeObserver(() => this.redraw()).observe(canvas);
+      canvas.addEventListener("pointermove", ({ offsetX, offsetY }) => { canvas.title = this.names ? this.names.fullAt([offsetX, offsetY]) : ""; });
     }
 
     async setMap(map, address) {
@@ -157,9 +241,16 @@
         brush.fillRect(u - 5, v - 5, 10, 10);
         brush.strokeRect(u - 5, v - 5, 10, 10);
         this.names.keepClear(u, v, 8);
-        this.names.add("dock", u, v, css("--text"), `11px ${css("--font")}`);
+        this.names.add("dock", u, v, css("--text"), { room: this.roomAt(at, [u, v]) });
       }
-      for (const { name, x, y } of this.map.places) this.names.add(name, ...at(x, y), css("--dim"), `11px ${css("--font")}`);
+      for (const { name, x, y } of this.map.places) this.names.add(name, ...at(x, y), css("--dim"), { room: this.roomAt(at, at(x, y), name) });
+    }
+
+    // The outline of the room of a name, else of the room at a point; null in logs that have no outlines.
+    roomAt(at, point, name) {
+      const rooms = this.map.places.filter((place) => place.outline), own = rooms.find((place) => place.name === name);
+      const outlines = (own ? [own] : rooms).map((place) => place.outline.map(([x, y]) => at(x, y)));
+      return own ? outlines[0] : outlines.find((outline) => insideOf(outline, point)) || null;
     }
 
     drawScale(brush, { scale }, height) {
@@ -235,7 +326,7 @@
         shape.closePath();
       }
       this.outlines.push([rule, shape]);
-      const us = points.map((p) => p[0]), vs = points.map((p) => p[1]), low = [Math.min(...us), Math.min(...vs)], high = [Math.max(...us), Math.max(...vs)];
+      const [west, north, east, south] = boundsOf(points), low = [west, north], high = [east, south];
       const [u, v] = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2], size = Math.max(high[0] - low[0], high[1] - low[1]);
       const stroke = (...lines) => {
         brush.beginPath();
@@ -259,7 +350,7 @@
         brush.lineWidth = 2.5;
         stroke([[u - x, v - y], [u + x, v + y]], [head[0], [u + x, v + y], head[1]]);
       }
-      if (!this.map || !this.map.places.some((place) => place.name === name)) this.names.add(name, u, v, css("--text"), `11px ${css("--font")}`);
+      if (!this.map || !this.map.places.some((place) => place.name === name)) this.names.add(name, u, v, css("--text"));
     }
 
     line(brush, { at }, points, colour, dashes, thick = 2) {
@@ -326,7 +417,7 @@
         const [u, v] = at(x, y);
         this.mark(brush, u, v);
         this.names.keepClear(u, v, 7);
-        this.names.add(name, u, v, css("--text"), `600 11px ${css("--font")}`);
+        this.names.add(name, u, v, css("--text"), { bold: true });
       }
     }
 
@@ -354,7 +445,7 @@
       brush.fill(); brush.stroke();
       brush.restore();
       this.names.keepClear(u, v, 0.6 * length);
-      this.names.add(held ? `${name}, holding ${held}` : name, u, v, css("--text"), `600 11px ${css("--font")}`);
+      this.names.add(held ? `${name}, holding ${held}` : name, u, v, css("--text"), { bold: true });
       if (held) this.mark(brush, ...at(x + (LENGTH_M / 2) * Math.cos(yaw), y + (LENGTH_M / 2) * Math.sin(yaw)));
       const degrees = Math.round((yaw * 180) / Math.PI), ratio = window.devicePixelRatio || 1;
       const rules = this.outlines.filter(([, shape]) => brush.isPointInPath(shape, u * ratio, v * ratio, "evenodd")).map(([rule]) => `, ${rule}`).join("");

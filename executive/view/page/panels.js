@@ -12,6 +12,7 @@
     "lease lost": ["failure", "lease lost"], stopped: ["failure", "stop button"], ended: ["idle", "ended"], lost: ["failure", "no connection"],
   };
   const MODE_SYMBOLS = { paused: "‖", pausing: "‖", stopped: "■", "lease lost": "!", lost: "!" };
+  const estimate = (sigma_m) => (100 * sigma_m).toFixed(sigma_m < 0.02 ? 1 : 0);
   const STANDS_M_S = 0.05; // odometry of a standing robot is not quite still
 
   const isOver = (control) => control !== null && ["ended", "lost"].includes(control.mode);
@@ -74,7 +75,7 @@
       return [
         ["holds", held || "nothing", false],
         ["battery", `${Math.round(100 * charge)} %`, charge < LOW_CHARGE],
-        ["place", localised ? `known within ${Math.max(1, Math.round(200 * sigma_m))} cm` : "lost", !localised],
+        ["place", localised ? `own estimate ±${estimate(sigma_m)} cm (1σ)` : "lost", !localised],
         ["speed", `${speed.toFixed(1)} m/s`, false],
         ...(state.faults && state.faults.length ? [["reports", state.faults.join(", "), true]] : []),
       ];
@@ -165,7 +166,7 @@
       const image = this.shape("image", { width, height, href: this.addressOf(picture.picture) });
       svg.append(image, ...picture.detections.flatMap((each) => this.boxed(each)));
       const names = picture.detections.map((each) => `${each.class_name} ${Math.round(100 * each.score)} %`);
-      const said = names.length ? names.join(", ") : "nothing found";
+      const said = picture.caption || (names.length ? names.join(", ") : "nothing found");
       svg.setAttribute("aria-label", `Picture of a camera at ${picture.t.toFixed(1)} s: ${said}`);
       this.seen.textContent = `${picture.t.toFixed(1)} s: ${said}`;
       this.box.replaceChildren(svg);
@@ -198,7 +199,8 @@
 
   class ScenePanel {
     constructor(box, follow) {
-      Object.assign(this, { box, follow, address: null, recorded: false, before: null, frame: null, poses: null, due: null, period: drawsSlowly() ? EASY_PERIOD_MS : 0 });
+      Object.assign(this, { box, follow, address: null, recorded: false, before: null, frame: null, poses: null, due: null, ready: false, lost: false, period: drawsSlowly() ? EASY_PERIOD_MS : 0 });
+      addEventListener("message", ({ source }) => { if (this.frame && source === this.frame.contentWindow) this.ready = true; });
     }
 
     show(address, recorded) {
@@ -230,10 +232,21 @@
 
     put(properties) {
       const frame = Object.assign(element("iframe"), properties), loading = element("p", "nothing loading", "Loading the 3D scene …");
-      if (!this.recorded) frame.addEventListener("load", () => { this.post(); loading.remove(); });
+      frame.addEventListener("load", () => {
+        if (this.lost) return this.leave();
+        if (!this.recorded) { this.post(); loading.remove(); }
+      });
       this.box.closest("section").hidden = false;
       this.box.replaceChildren(frame, loading);
-      Object.assign(this, { frame, loading, before: null });
+      Object.assign(this, { frame, loading, before: null, ready: "srcdoc" in properties });
+    }
+
+    // The server is gone: a scene that has not come by then does not come, and the browser would show its own error page.
+    leave() {
+      this.lost = true;
+      if (!this.frame || this.ready) return;
+      this.frame = null;
+      this.box.replaceChildren(element("p", "nothing", "The 3D scene is not there: the connection to Errand ended while it loaded."));
     }
 
     // Show the recording at a time, with the camera beside a robot at a pose.
@@ -244,6 +257,7 @@
         const animator = viewer && viewer.animator;
         if (!animator || !animator.duration) return;
         this.loading.remove();
+        this.ready = true;
         animator.pause();
         animator.seek(Math.min(t, animator.duration));
         this.goAlong(viewer, pose);

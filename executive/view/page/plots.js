@@ -7,7 +7,7 @@
     { key: "speed_m_s", title: "Speed", unit: "m/s", factor: 1, least: 0.5, digits: 2 },
     { key: "charge", title: "Battery", unit: "%", factor: 100, least: 100, digits: 0 },
     { key: "grip_n", title: "Force of the gripper", unit: "N", factor: 1, least: 10, digits: 0 },
-    { key: "position_sigma_m", title: "Uncertainty of the position", unit: "cm", factor: 100, least: 5, digits: 1, error: "Position error (dashed: own σ)" },
+    { key: "position_sigma_m", title: "Own estimate of the position (1σ)", unit: "cm", factor: 100, least: 5, digits: 1, error: "Position error (dashed: own estimate, 1σ)" },
     { key: "pace", title: "Real-time factor", unit: "", factor: 1, least: 2, digits: 1 },
   ];
   const DASHES = [3, 3], GUTTER_PX = 30, FOOT_PX = 14, HEAD_PX = 5;

@@ -22,6 +22,9 @@
     return { t: 0, trees: [], spans: new Map(), states: new Map(), failures: new Map(), robots: new Map(), outcomes: [], late: 0, detections: null, destinations: [], missions: null };
   }
 
+  const LEFT = /, [\d.]+ m to go$/; // logged once, and soon wrong
+  const lasting = (message) => (message || "").replace(LEFT, "");
+
   function robotOf(view, name) {
     if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null, particles: [], seen: [], people: [], doors: [], reserved: null, detections: null });
     return view.robots.get(name);
@@ -35,7 +38,7 @@
       forget(data.root);
     },
     transitions(view, data, t) {
-      const state = { status: data.to, cause: data.cause, message: data.message, t };
+      const state = { status: data.to, cause: data.cause, message: lasting(data.message), t };
       view.states.set(data.node, state);
       if (data.to === "FAILURE") view.failures.set(data.node, state); // it stays when a retry resets the node
       if (data.to === "SUCCESS") view.failures.delete(data.node);
@@ -45,7 +48,7 @@
     },
     activity(view, data) {
       const state = view.states.get(data.node);
-      if (state && state.status === "RUNNING") view.states.set(data.node, { ...state, message: data.message });
+      if (state && state.status === "RUNNING") view.states.set(data.node, { ...state, message: lasting(data.message) });
     },
     pose(view, data) {
       const robot = robotOf(view, data.robot), { position, orientation } = data.pose;
@@ -73,6 +76,8 @@
       view.detections = { ...data, t };
       if (data.robot) robotOf(view, data.robot).detections = view.detections;
     },
+    // A picture that a skill took: it has a caption, and no detections.
+    pictures(view, data, t) { APPLY.detections(view, { ...data, detections: [] }, t); },
     object_destination(view, data) { view.destinations.push({ robot: data.robot, name: data.class_name, x: data.goal_x, y: data.goal_y }); },
     navigation(view, data) {
       const pairs = (xs, ys) => xs.map((x, n) => [x, ys[n]]);

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.text import Text
 
 from executive.cli.output import progress_bar
-from executive.cli.screen import SILENCE, SpeechOutput, live_view, visible_rows, voice_for
+from executive.cli.screen import SILENCE, WRITTEN, ConsoleScreen, SpeechOutput, live_view, visible_rows, voice_for
 from executive.run.control import Control
 from executive.run.visitor import Progress
 from executive.speech import voice as voices
@@ -158,3 +158,20 @@ def test_speech_is_printed_behind_the_skills_that_ended_before_it(tree, show):
             show(visitor, 1.0, {drive: NodeState(Status.SUCCESS, message="there")})
     first, second = told.getvalue().splitlines()
     assert (first.endswith("there"), second) == (True, "Alice: hello")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("log-2.mcap", WRITTEN["log.mcap"]),
+        ("tree_bob.svg", WRITTEN["tree.svg"]),
+        ("hand_over_bob.png", WRITTEN["hand_over.png"]),
+        ("hand_over.png", WRITTEN["hand_over.png"]),
+        ("notes.txt", ""),
+    ],
+)
+def test_each_log_and_picture_of_a_run_is_said_to_be_what_it_is(tmp_path, name, content):
+    (tmp_path / name).touch()
+    told = io.StringIO()
+    ConsoleScreen(Console(file=told, width=200), quiet=True).name_files(tmp_path)
+    assert told.getvalue().splitlines()[-1].strip() == f"{name}  {content}".strip()

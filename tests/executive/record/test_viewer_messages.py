@@ -53,6 +53,8 @@ def test_a_map_comes_back_the_right_way_up(knowledge, write_log):
     event, grid = read_events(path)
     assert (event.data["origin_m"], event.data["size_m"]) == ({"x": -1.0, "y": -2.0}, {"x": 3.0, "y": 2.0})
     assert {place["name"] for place in event.data["places"]} == {"kitchen", "bedroom", "hall", "bathroom"}
+    outlines = {place["name"]: place.get("outline") for place in event.data["places"]}
+    assert outlines["hall"] == [list(corner) for corner in knowledge.rooms["hall"]]
     picture = cv2.imdecode(np.frombuffer(base64.b64decode(event.data["data"]), np.uint8), cv2.IMREAD_GRAYSCALE)
     assert picture.shape == (4, 6)
     assert (picture[3, 0], picture[0, 0]) == (0, 255)

@@ -298,7 +298,7 @@ def test_nobody_answers_and_the_default_counts(control, clock):
     clock.advance(2.0)
     assert (asked.done(), asked.result(), control.state.questions) == (True, "skip", ())
     events = control.poll().events
-    assert [event.what for event in events] == ["question", "question over"]
+    assert [event.what for event in events] == ["question", "question closed"]
 
 
 def test_wrong_answers_and_late_ones_are_refused(control, clock):
@@ -309,6 +309,8 @@ def test_wrong_answers_and_late_ones_are_refused(control, clock):
         control.ask(QUESTION, clock)
     asked.withdraw()
     asked.withdraw()
+    closed = control.poll().events[-1]
+    assert f"{closed.what}: {closed.message}" == f"question closed: {QUESTION.id}: the robot no longer asks it"
     with pytest.raises(ValueError, match="not open"):
         control.answer(QUESTION.id, "retry")
     with pytest.raises(ValueError, match="none of"):

@@ -288,6 +288,12 @@ def test_finished_steps_are_reported_and_not_repeated(resumed, script):
     assert "goes on here" in told
 
 
+def test_only_an_interrupted_skill_is_said_to_go_on(resumed):
+    _, recollection = resumed(TIDY, kill_when=begins("approach"))
+    going_on = [line.split(": ")[0] for line in recollection.log if "goes on here" in line]
+    assert [path_id.rsplit("/", 1)[-1] for path_id in going_on] == ["approach"]
+
+
 def test_the_log_marks_the_transitions_that_repeat_results_from_before(resumed, world):
     resumed(FETCH_AND_ASK, kill_after=12)
     ended = [each for each in world.transitions if each["to"] in ("SUCCESS", "FAILURE")]

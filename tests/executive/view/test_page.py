@@ -10,6 +10,7 @@ import threading
 import time
 from contextlib import ExitStack
 from dataclasses import asdict
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -34,6 +35,7 @@ from executive.view.page_control import SEND_LIMIT_S, ControlWatch, RefusedError
 from executive.view.server import PageContent, PageServer
 from executive.view.text import Styles
 from executive.words.command import parse_command
+from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from skills.api import Cause, Failed, Question
@@ -409,12 +411,12 @@ def state(holding=False, charge=0.9, localised=True, speed_m_s=0.42):
 
 
 def test_the_state_of_the_robot_stands_above_all(page, live, feed):
-    # nothing known yet -> no strip; a coke was found and is held -> its name; 1 sigma of 2 cm -> known within 4 cm
+    # nothing known yet -> no strip; a coke was found and is held -> its name; 1 sigma of 2 cm
     strip = page.locator("#state")
     expect(strip).to_be_hidden()
     feed("object_destination", 0.5, {"class_name": "coke", "goal_x": 1.0, "goal_y": 1.0})
     feed("state", 1.0, state(holding=True))
-    expect(strip).to_have_text("robotAliceholdscokebattery90 %placeknown within 4 cmspeed0.4 m/s")
+    expect(strip).to_have_text("robotAliceholdscokebattery90 %placeown estimate ±2 cm (1σ)speed0.4 m/s")
     feed("state", 1.5, state(charge=0.1, localised=False))
     expect(strip.locator(".bad")).to_have_text(["battery10 %", "placelost"])
     expect(strip).to_contain_text("holdsnothing")
@@ -459,7 +461,8 @@ def test_a_parent_does_not_keep_the_first_sentence_of_its_child(page, live, feed
     expect(page.locator("#tree")).to_contain_text("finding out where I am")
     assert page.locator("#tree .note", has_text="finding out where I am").count() == 1
     feed("activity", 2.0, {"t": 2.0, "robot": "Alice", "node": leaf, "message": "on the way, 2.8 m to go"})
-    expect(row(page, leaf)).to_contain_text("on the way, 2.8 m to go")
+    expect(row(page, leaf)).to_contain_text("on the way")
+    assert "2.8 m" not in page.locator("#tree").inner_text()  # it is logged once, and soon wrong
     assert "finding out" not in page.locator("#tree").inner_text()
 
 
@@ -481,7 +484,7 @@ def test_breakpoints_and_questions_are_named_as_people_name_them(page, live, con
         ("question", "hand-over/Alice: Let go?"),
     ):
         feed("control", 1.0, {"t": 1.0, "what": what, "message": message})
-    expect(page.locator("#events")).to_contain_text("question Let go?")
+    expect(page.locator("#events")).to_contain_text("question: Let go?")
     page.select_option("#nodes", "all")
     shown = page.evaluate("document.body.innerText + [...document.querySelectorAll('[title]')].map((e) => e.title)")
     assert (step.path_id in shown, "alice/" in shown, "hand-over/Alice" in shown) == (False, False, False)
@@ -544,12 +547,64 @@ def test_the_map_keeps_its_place_when_its_legend_grows_and_names_stay_inside(pag
         assert page.locator("#map").bounding_box() == box
         outside = page.evaluate(
             """() => {
-              const { taken, later, inside: [west, north, east, south] } = window.errand.page.map.names;
+              const { placed, inside: [west, north, east, south] } = window.errand.page.map.names;
               const leaves = ([l, t, r, b]) => l < west - 1 || t < north - 1 || r > east + 1 || b > south + 1;
-              return taken.slice(-later.length).filter(leaves);
+              return placed.filter((each) => each.box && leaves(each.box));
             }"""
         )
         assert outside == []
+
+
+EMPTY = {"surfaces": {}, "people": {}, "doors": [], "dock": None, "things": {}, "robots": None}
+UPRIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+NARROW = {
+    "hall": (0.0, 0.0, 10.0, 4.0),
+    "room of the night watch": (0.0, 4.0, 2.0, 8.0),
+    "south corridor": (2.0, 4.0, 2.6, 10.0),
+    "electronics laboratory": (2.6, 4.0, 5.0, 10.0),
+    "bathroom": (5.0, 4.0, 6.0, 6.0),
+}
+"""Rooms, most of them too narrow for their names: west, south, east and north side, in metres."""
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (1400, 900), (390, 844)], ids=str)
+def test_the_name_of_a_room_stays_in_it_and_covers_no_other_name(page, live, feed, knowledge, size):
+    rooms = {
+        name: {"pose": {"x": w + 0.1, "y": s + 0.1, "yaw": 0.0}, "polygon": [(w, s), (e, s), (e, n), (w, n)]}
+        for name, (w, s, e, n) in NARROW.items()
+    }
+    known = Knowledge.model_validate({**knowledge.model_dump(mode="json"), **EMPTY, "places": rooms})
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    feed("map", 0.0, map_message(GridMap(np.eye(100, dtype=bool), 0.1, (0.0, 0.0)), known, world="test"))
+    pose = {"position": {"x": 5.5, "y": 2.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    feed("pose", 0.5, {"robot": "Alice", "pose": pose})
+    page.wait_for_function("() => (window.errand.page.map.names || {placed: []}).placed.length >= 6")
+    placed = {each["text"]: each for each in page.evaluate("() => window.errand.page.map.names.placed")}
+    for name in NARROW:
+        box, us, vs = placed[name]["box"], *zip(*placed[name]["room"], strict=True)
+        west, north, east, south = (box[0] - min(us), box[1] - min(vs), max(us) - box[2], max(vs) - box[3])
+        assert min(west, north, east, south) > -1.5, name
+    boxes = [each["box"] for each in placed.values()]
+    assert not any(a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3] for a, b in combinations(boxes, 2))
+    assert placed["hall"]["shown"] == "hall"
+    assert placed["south corridor"]["shown"] == "south corridor"
+
+
+def test_a_shortened_name_on_the_map_is_told_in_full_under_the_mouse(page, live, feed, knowledge):
+    rooms = {
+        name: {"pose": {"x": w + 0.2, "y": 0.5, "yaw": 0.0}, "polygon": [(w, 0), (e, 0), (e, 1), (w, 1)]}
+        for name, w, e in (("laboratory of robotics", 0.0, 1.0), ("hall", 1.0, 10.0))
+    }
+    known = Knowledge.model_validate({**knowledge.model_dump(mode="json"), **EMPTY, "places": rooms})
+    feed("map", 0.0, map_message(GridMap(np.eye(100, dtype=bool), 0.1, (0.0, 0.0)), known, world="test"))
+    feed("pose", 0.5, {"robot": "Alice", "pose": {"position": {"x": 5.0, "y": 5.0, "z": 0.0}, "orientation": UPRIGHT}})
+    page.wait_for_function("() => (window.errand.page.map.names || {placed: []}).placed.length >= 3")
+    placed = {each["text"]: each for each in page.evaluate("() => window.errand.page.map.names.placed")}
+    assert placed["laboratory of robotics"]["shown"].endswith("…")
+    for name, title in (("laboratory of robotics", "laboratory of robotics"), ("hall", "")):
+        us, vs = zip(*placed[name]["room"], strict=True)
+        page.locator("#map").hover(position={"x": sum(us) / 4, "y": sum(vs) / 4})
+        expect(page.locator("#map")).to_have_attribute("title", title)
 
 
 def test_the_verdicts_and_the_way_to_the_report_appear_at_the_end(page, serve, controlled, tree, feed, tmp_path):
@@ -607,6 +662,40 @@ def test_a_lost_connection_is_a_banner_and_not_an_end(page, process):
     expect(page.locator("#mode-text")).to_have_text("no connection")
     assert "ended" not in page.locator("body").inner_text()
     assert all(page.locator(f"#{each}").is_disabled() for each in ("pause", "step", "cancel", "stop"))
+
+
+def test_a_finished_run_has_no_robot_that_may_still_move(page, process):
+    page.goto(process.stdout.readline().strip())
+    expect(page.locator("#mode-text")).to_have_text("running")
+    ended = {"robot": "Alice", "outcome": "success", "cause": None, "message": "done"}
+    page.evaluate("(data) => window.errand.page.store.add({topic: 'outcome', t: 4, data})", ended)
+    page.evaluate("() => window.errand.page.store.meet(['Alice'])")
+    process.kill()
+    expect(page.locator("#connection")).to_contain_text("The connection to Errand is lost")
+    expect(page.locator("#connection")).not_to_contain_text("may still move")
+
+
+def test_a_scene_that_the_server_cannot_send_any_more_is_said_and_not_a_broken_page(page, process):
+    page.goto(process.stdout.readline().strip())
+    expect(page.locator("#mode-text")).to_have_text("running")
+    process.kill()
+    expect(page.locator("#connection")).to_be_visible()
+    page.evaluate("() => window.errand.page.scene.show('scene', false)")
+    expect(page.locator("#scene")).to_contain_text("The 3D scene is not there")
+    expect(page.locator("#scene iframe")).to_have_count(0)
+
+
+def test_a_picture_that_a_skill_took_is_in_the_camera_panel(page, live, feed):
+    expect(page.locator("#camera")).to_have_text("No picture yet.")
+    taken = {"robot": "Alice", "caption": "the stove, by the hand camera", "width": 8, "height": 6, "format": "png"}
+    feed("pictures", 22.8, {**taken, "data": "AAAA"})
+    expect(page.locator("#seen")).to_have_text("22.8 s: the stove, by the hand camera")
+    expect(page.locator("#camera svg image")).to_have_count(1)
+
+
+def test_an_event_of_the_control_stands_apart_from_its_words(page, live, feed):
+    feed("control", 1.0, {"t": 1.0, "what": "question closed", "message": "q/Alice: the robot no longer asks it"})
+    expect(page.locator("#events")).to_contain_text("question closed: the robot no longer asks it")
 
 
 def test_an_end_that_the_server_announces_is_no_lost_connection(page, process):
@@ -1031,7 +1120,7 @@ def test_the_plots_show_the_values_now_with_their_units(page, live, feed):
         "Speed, m/s: Alice 0.50",
         "Battery, %: Alice 80",
         "Force of the gripper, N: Alice 12",
-        "Uncertainty of the position, cm: Alice 2.0",
+        "Own estimate of the position (1σ), cm: Alice 2.0",
         "Real-time factor: 4.0",
     ):
         expect(plot(page, label.split(":")[0])).to_have_attribute("aria-label", label)
@@ -1041,7 +1130,9 @@ def test_the_plot_of_the_position_shows_the_error_where_the_truth_is_known(page,
     for number in range(2):
         drive(feed, float(number), error_m=0.03 * number)
     plots_of(page)
-    expect(plot(page, "Position error")).to_have_attribute("aria-label", re.compile(r"own σ\), cm: Alice 3\.0$"))
+    expect(plot(page, "Position error")).to_have_attribute(
+        "aria-label", re.compile(r"own estimate, 1σ\), cm: Alice 3\.0$")
+    )
 
 
 def test_each_robot_has_a_line_of_its_colour_and_a_value_in_the_plots(page, two):

@@ -41,7 +41,7 @@ def position_events(errors_m):
 
 def test_the_error_of_the_position_is_plotted_above_the_dashed_uncertainty_where_the_truth_is_known():
     (curve,) = curves_of(position_events([0.01, 0.04, 0.5]))
-    assert (curve.title, curve.unit) == ("Position error (dashed: own uncertainty)", "cm")
+    assert (curve.title, curve.unit) == ("Position error (dashed: own estimate, 1σ)", "cm")
     np.testing.assert_allclose(curve.lines["Alice"], [(0, 1), (1, 4), (2, 50)])
     np.testing.assert_allclose(curve.dashed["Alice"], [(0, 2), (1, 2), (2, 2)])
     assert re.findall(r'stroke-dasharray="([^"]*)"', to_plot(curve)) == ["3 3", "none"]
@@ -49,7 +49,7 @@ def test_the_error_of_the_position_is_plotted_above_the_dashed_uncertainty_where
 
 def test_the_log_of_a_real_robot_shows_only_the_uncertainty():
     (curve,) = curves_of(position_events([]))
-    assert curve.title == "Uncertainty of the position (robot's own)"
+    assert curve.title == "Own estimate of the position (1σ)"
     assert re.findall(r'stroke-dasharray="([^"]*)"', to_plot(curve)) == ["none"]
 
 

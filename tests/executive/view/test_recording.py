@@ -67,6 +67,17 @@ def test_the_camera_follows_the_robot_and_a_caption_tells_the_step(page):
     page.wait_for_function(far, arg=before)
 
 
+def test_a_recording_stays_at_its_end_and_plays_again_from_there(page):
+    page.evaluate("() => { viewer.animator.pause(); viewer.animator.seek(3.7); viewer.animator.play(); }")
+    page.wait_for_function("() => !viewer.animator.playing")
+    page.wait_for_timeout(300)
+    expect(page.locator("#recording output")).to_have_text("4.0 s")
+    expect(page.locator("#recording p")).to_have_text("Alice: go to the hall – stopping at </script> the goal")
+    expect(page.locator("#recording button")).to_have_text("▶")
+    page.locator("#recording button").click()
+    page.wait_for_function("() => viewer.animator.playing && viewer.animator.actions[0].time < 3")
+
+
 def test_the_whole_world_fits_into_the_window_above_the_caption(page, recording):
     page.select_option("#recording select", "")
     page.wait_for_function("() => Math.hypot(viewer.controls.target.x - 1, viewer.controls.target.z) < 0.01")

@@ -71,7 +71,7 @@ def server(feed, control, scene, tmp_path):
     recording = tmp_path / "recording.html"
     recording.write_text("<p>recorded</p>")
     actions = {**control_actions(control), "say": lambda values: f"first: {text_of(values, 'text')}"}
-    with PageServer(PageContent(feed, actions, scene, recording)) as running:
+    with PageServer(PageContent(feed, actions, scene, recording, tmp_path / "report.html")) as running:
         yield running
 
 
@@ -110,15 +110,19 @@ def test_nothing_of_the_run_is_shown_without_the_token(server, feed, path):
     assert ask(server, "GET", f"{path}?token={token_of(server)}")[0] == 200
 
 
-def test_the_files_of_the_run_link_to_each_other_and_nothing_else_is_sent(server, tmp_path):
-    # the report lies beside the recording; a store and what lies above the folder are no files of the page
-    (tmp_path / "report.html").write_text("<p>reported</p>")
-    (tmp_path / "missions.sqlite").write_text("secret")
+def test_the_files_to_which_the_report_links_are_sent_and_no_others(server, tmp_path):
+    # nothing links to a store or a page beside the report, and what lies above the folder is no file of the run
+    links = '<a href="tree.svg">tree</a><a href="log%202%26.mcap">log</a><a href="..">up</a>'
+    (tmp_path / "report.html").write_text(links)
+    for name in ("tree.svg", "log 2&.mcap", "missions.sqlite", "other.html", "other.mcap"):
+        (tmp_path / name).write_text(name)
     token = token_of(server)
     assert ask(server, "GET", f"/file/{token}/recording.html") == (200, b"<p>recorded</p>")
-    assert ask(server, "GET", f"/file/{token}/report.html") == (200, b"<p>reported</p>")
+    assert ask(server, "GET", f"/file/{token}/report.html") == (200, links.encode())
+    assert ask(server, "GET", f"/file/{token}/tree.svg") == (200, b"tree.svg")
+    assert ask(server, "GET", f"/file/{token}/log%202%26.mcap") == (200, b"log 2&.mcap")
     assert ask(server, "GET", "/file/wrong/report.html")[0] == 403
-    for name in ("missions.sqlite", "none.html", "..%2Freport.html", "%2E%2E"):
+    for name in ("missions.sqlite", "other.html", "other.mcap", "none.html", "..%2Freport.html", "%2E%2E"):
         assert ask(server, "GET", f"/file/{token}/{name}")[0] == 404
 
 

@@ -1,4 +1,5 @@
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -270,3 +271,9 @@ def test_robot_plans_around_a_new_obstacle_without_standing():
     arrives(bench, Pose2D(7.6, 5.4, 0.0), each=pillar_appears, options=NavigateOptions(review_m=5.0))
     assert min(speeds) > 0.1
     assert bench.worker.names.count("plan a path") >= 2
+
+
+@pytest.mark.parametrize(("obstacle_W", "where"), [(None, "ahead"), ((1.0, 2.0), "at (1.00, 2.00)")])
+def test_a_robot_says_for_which_path_it_waits(obstacle_W, where):
+    waits = SimpleNamespace(_planning=SimpleNamespace(obstacle_W=obstacle_W))
+    assert Navigate._waiting_sentence(waits) == f"waiting for the path {where} to become free"

@@ -170,3 +170,42 @@ def test_pictures_that_a_skill_shows_go_into_the_report_with_their_captions():
     pictures = list(_pictures(artifacts, "Alice", ["Alice"]))
     assert [caption for caption, _ in pictures] == [f"gauge {number}" for number in range(MOST_SHOWN)]
     assert all(data.startswith(b"\xff\xd8") for _, data in pictures)
+
+
+def captions(*messages):
+    """The steps of a robot whose mission has a drive and, beside it or before it, a charge."""
+    leaves = [{"id": f"a/{name}", "name": name, "step": True, "children": []} for name in ("drive", "charge")]
+    artifacts = Artifacts()
+    artifacts.message("tree", {"robot": "Alice", "root": {"id": "a", "name": "round", "children": leaves}})
+    for t, node, to, text in messages:
+        own = {"robot": "Alice", "node": f"a/{node}", "t": t, "message": text}
+        artifacts.message("transitions" if to else "activity", own | ({"to": to} if to else {}))
+    return artifacts.steps["Alice"]
+
+
+def test_the_caption_is_of_the_node_that_still_runs_when_another_has_ended():
+    told = captions(
+        (0.1, "drive", "RUNNING", "on the way"),
+        (2.0, "charge", "RUNNING", "charging"),
+        (5.0, "charge", "SUCCESS", "charged"),
+    )
+    assert told == [(0.1, "drive – on the way"), (2.0, "charge – charging"), (5.0, "drive – on the way")]
+
+
+def test_the_last_caption_is_the_result():
+    told = captions((0.1, "drive", "RUNNING", "on the way"), (2.0, "drive", "SUCCESS", "standing there"))
+    assert told[-1] == (2.0, "drive – standing there")
+
+
+def test_a_node_that_begins_when_another_ends_has_the_caption():
+    told = captions(
+        (0.1, "drive", "RUNNING", "on the way"),
+        (2.0, "drive", "SUCCESS", "standing there"),
+        (2.0, "charge", "RUNNING", "charging"),
+    )
+    assert told == [(0.1, "drive – on the way"), (2.0, "charge – charging")]
+
+
+def test_a_caption_has_no_distance_that_is_soon_wrong():
+    told = captions((0.1, "drive", "RUNNING", "planning"), (0.4, "drive", "", "on the way, 4.6 m to go"))
+    assert told[-1] == (0.4, "drive – on the way")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.app.report.run_report import Verdict, counts_text, title_of
+from executive.app.report.run_report import RunReport, Verdict, counts_text, title_of
 from executive.words.goal import RefereeReport
 
 
@@ -58,3 +58,16 @@ def test_a_reason_is_not_split_inside_quotation_marks(text, sentences):
 )
 def test_a_title_names_the_missions(names, title):
     assert title_of(names) == title
+
+
+@pytest.mark.parametrize(
+    ("log_time_s", "text"),
+    [
+        (72.8, "72.8 s simulated in 30.0 s"),
+        (79.0, "79.0 s, of which 72.8 s simulated in 30.0 s since the restart"),
+    ],
+)
+def test_the_duration_of_a_resumed_run_is_that_of_its_plots(log_time_s, text):
+    referee = RefereeReport(True, "it is so", 0, 0)
+    report = RunReport("success", None, "", referee, (), "flat", 1, 72.8, 30.0, 2.4, 10, "", log_time_s=log_time_s)
+    assert report.duration_text == text

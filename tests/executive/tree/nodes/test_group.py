@@ -4,7 +4,7 @@ from executive.tree.compiler import compile_mission
 from executive.words.command import Command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.steps import Group
+from executive.words.steps import Group, Try
 from executive.words.zone import ZoneFacts
 from skills.api import Succeeded
 
@@ -57,3 +57,19 @@ def test_the_tree_names_the_zones_of_a_group(knowledge, registry):
     group = Group(steps=(KITCHEN,), zones={"corner": CLOSED, "hall": QUIET})
     tree = compile_mission(Mission(name="round", steps=(HALL, group)), knowledge=knowledge, registry=registry)
     assert "keep out of: corner; silent in: hall" in [node.name for node in tree.root.walk()]
+
+
+def names(knowledge, registry, mission, kind):
+    tree = compile_mission(mission, knowledge=knowledge, registry=registry)
+    return [node.name for node in tree.root.walk() if node.kind == kind]
+
+
+def test_a_try_is_named_after_what_it_tries_and_what_it_does_else(knowledge, registry):
+    block = Try.model_validate({"try": [HALL], "else": [KITCHEN, HALL]})
+    mission = Mission(name="round", robot="Alice", steps=(block,))
+    assert names(knowledge, registry, mission, "try") == ["go to hall, else go to kitchen, then go to hall"]
+
+
+def test_a_mission_with_steps_in_the_end_is_named_after_both(knowledge, registry):
+    mission = Mission(name="round", robot="Alice", steps=(HALL,), always=(KITCHEN,))
+    assert names(knowledge, registry, mission, "always") == ["round, in the end go to kitchen"]

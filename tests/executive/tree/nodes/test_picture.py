@@ -138,3 +138,10 @@ def test_a_file_names_what_the_picture_shows(tmp_path):
     file.write_text("name: m\nsteps: [{picture: {of: stove, at: kitchen}}]\n", encoding="utf-8")
     (step,) = load_mission(file).steps
     assert (step.subject, step.words) == (Subject(of="stove", at="kitchen"), "take a picture of the stove")
+
+
+def test_the_step_of_a_picture_or_a_search_is_named_after_it(pictured, compiled):
+    picture = next(node for node in pictured(of="gauge").root.walk() if node.kind == "afterwards")
+    asked = compiled("Take [Nothing] to [kitchen] and do [find] to [coke]")
+    search = next(node for node in asked.root.walk() if node.kind == "afterwards")
+    assert (picture.name, search.name) == ("take a picture of the gauge", "is there a coke in the kitchen?")

@@ -52,7 +52,7 @@ SLOTS: Final[Mapping[str, str]] = {
 """Slots of a stack file, each with its entry-point group."""
 SKILLS: Final = "skills"
 SKILL_GROUP: Final = "errand.skills"
-USE: Final = "use"
+USE, ALSO_USE = "use", "name"
 DOORS: Final = "errand.doors"
 """Entry-point group of the plug-ins that open doors (`skills.doorway.DoorOpener`)."""
 BACKENDS: Final = "errand.backends"
@@ -218,8 +218,11 @@ def default_component(slot: str) -> Any:
     return _component(slot, _default_data()[slot])[1]
 
 
-def stack_of(data: Any) -> RobotStack:
-    """Builds a stack from a file's data, with defaults for missing slots. Raises StackError for invalid data."""
+def stack_of(data: Any, folder: Path = Path()) -> RobotStack:
+    """Builds a stack from a file's data, with defaults for missing slots. Raises StackError for invalid data.
+
+    Relative paths among the options count from `folder`.
+    """
     _known((), data, (*SLOTS, SKILLS))
     chosen = {slot: data.get(slot, {}) for slot in SLOTS}
     parts = {slot: _component(slot, given) for slot, given in chosen.items()}
@@ -228,16 +231,28 @@ def stack_of(data: Any) -> RobotStack:
         _known((SKILLS,), skills, sorted(skill_options()))
     options = {name: _options(name, given) for name, given in skills.items()}
     return RobotStack(
-        **{slot: part for slot, (_, part) in parts.items()},
+        **{slot: _located(part, folder) for slot, (_, part) in parts.items()},
         names={slot: name for slot, (name, _) in parts.items()},
         skills=options,
     )
+
+
+def _located(part: Any, folder: Path) -> Any:
+    """Returns a component whose options that are relative paths count from a folder."""
+    options = {field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.init}
+    paths: dict[str, Any] = {name: folder / value for name, value in options.items() if isinstance(value, Path)}
+    for name, value in options.items():
+        if isinstance(value, tuple) and any(isinstance(each, Path) for each in value):
+            paths[name] = tuple(folder / each for each in value)
+    return dataclasses.replace(part, **paths)
 
 
 def _component(slot: str, given: Any) -> tuple[str, Any]:
     """Returns the name and the component of one slot. Raises StackError when name or options are invalid."""
     if not isinstance(given, Mapping):
         raise StackError((slot,), "should be a mapping", f"write '{slot}: {{{USE}: NAME}}', then the options")
+    if USE not in given and ALSO_USE in given:
+        given = {USE if key == ALSO_USE else key: value for key, value in given.items()}
     known = _names(slot)
     name = given.get(USE, known[0])
     if name not in known:

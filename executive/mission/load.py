@@ -136,6 +136,6 @@ def load_stack(path: Path | None) -> RobotStack:
         return default_stack()
     source = read_yaml(path)
     try:
-        return stack_of(source.data or {})
+        return stack_of(source.data or {}, path.parent)
     except StackError as error:
         raise source.error(error.path, error.message, error.hint) from error

@@ -40,7 +40,7 @@ _OTHER_KIND: Final = "choose another kind of robot"
 class Abilities:
     """Abilities of the robot and properties of the objects that are known before a run.
 
-    `masses_kg` has the mass of each class with a model, `lift_kg` is the arm's payload. The detector recognises
+    `masses_kg` has the least mass of each class, `lift_kg` is the arm's payload. The detector recognises
     `classes` and `attributes`; a search for several objects fails for any others. `reaches_m` are the heights of the
     lowest and the highest reachable surface. `widths_m` has the least width of each class, `opens_m` is the gripper's
     maximum opening; `gripper` is False without a gripper, `arm` without an arm, `looks` without a camera for objects.

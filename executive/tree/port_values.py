@@ -38,7 +38,7 @@ def conforms(value: Any, hint: Any) -> bool:
         return fits and all(map(conforms, value, kinds))
     if hint is float:
         return isinstance(value, int | float) and not isinstance(value, bool)
-    return isinstance(value, origin or hint)
+    return value in arguments if origin is typing.Literal else isinstance(value, origin or hint)
 
 
 def assignable(source: Any, target: Any) -> bool:

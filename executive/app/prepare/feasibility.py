@@ -15,7 +15,6 @@ from executive.app.prepare.prepared import Prepared
 from executive.app.prepare.worlds import refuse_unusable
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
 from executive.tree.estimate import Route, RoutePlanner, load_estimates
-from plant.models.catalogue import load_catalogue
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
 from skills.api import Zone
@@ -137,8 +136,7 @@ def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
 @cache
 def abilities_of(kind: str) -> Abilities:
     """Returns payload, reach and gripper of a kind of robot, and the least mass and width of each object class."""
-    known = {name: form.mass_kg for name, form in class_forms().items() if name in load_catalogue()}
-    masses = {name: 0.0 if mass_kg is None else mass_kg[0] for name, mass_kg in known.items()}
+    masses = {name: 0.0 if form.mass_kg is None else form.mass_kg[0] for name, form in class_forms().items()}
     capabilities = robot_kind(kind).capabilities()
     return Abilities(
         masses,

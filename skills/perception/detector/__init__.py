@@ -1,4 +1,4 @@
-"""Detector of objects in pictures: a cascade of three small networks in ONNX Runtime."""
+"""Detectors of objects in pictures: a cascade of three small networks, or an exported network, in ONNX Runtime."""
 
 from __future__ import annotations
 
@@ -16,16 +16,22 @@ class Cascade:
     `objects`: folders written by `errand object import`, whose objects are recognised by their models.
     """
 
-    file: str | None = None
+    file: Path | None = None
     views: bool = True
-    objects: tuple[str, ...] = ()
+    objects: tuple[Path, ...] = ()
 
     def build(self) -> Detector:
         """Loads the detector. Raises InputError when a file cannot be used."""
         from skills.perception.detector.augmentation import AugmentedDetector
-        from skills.perception.detector.model_files import MODEL_FILE
+        from skills.perception.detector.exported import ExportedNetwork, load_exported
+        from skills.perception.detector.layouts import LAYOUTS
+        from skills.perception.detector.model_files import MODEL_FILE, ModelFileError, is_cascade
         from skills.perception.detector.onnx_detector import load_detector
         from skills.perception.model_matching import with_models
 
-        single = load_detector(MODEL_FILE if self.file is None else Path(self.file))
+        if self.file is not None and not is_cascade(self.file):
+            about = LAYOUTS[load_exported(ExportedNetwork(self.file), every=True).layout].about
+            hint = "write 'detector: {use: onnx, file: ...}'; other detectors come as a class of errand.detectors"
+            raise ModelFileError(f"it is no cascade of Errand, but {about}", hint=hint, file=self.file)
+        single = load_detector(self.file or MODEL_FILE)
         return with_models(AugmentedDetector(single) if self.views else single, self.objects)

@@ -95,12 +95,8 @@ class AugmentedDetector(DetectorWrapper):
         else:
             found += self._networks.detect([view.apply(picture) for view in views[1:]], _LEAST_SCORE)
         fused = _fused(views, found, picture.shape, self.class_names)
-        return detections_from(
-            fused.from_score(min(threshold, options.alternative_threshold)),
-            self.class_names,
-            threshold,
-            options.suppression,
-        )
+        likely = fused.from_score(min(threshold, options.alternative_threshold))
+        return detections_from(likely, self.class_names, threshold, options.suppression)
 
     def _in_doubt(self, found: Sequence[Detection]) -> bool:
         """Returns whether the first view has a score between `low` and `high`."""

@@ -210,18 +210,11 @@ def detections_from(
     """Detections in a picture: candidates from the threshold on after suppression, with their alternatives."""
     candidates = candidates.at(np.flatnonzero((candidates.boxes[:, 2:] > candidates.boxes[:, :2]).all(axis=1)))
     selected = suppress(candidates.from_score(threshold), options)
-    rows = zip(
-        selected.classes.tolist(),
-        selected.scores.tolist(),
-        selected.boxes.astype(np.float64).tolist(),
-        alternative_scores(selected, candidates, options),
-        strict=True,
-    )
+    others = alternative_scores(selected, candidates, options)
+    rows = zip(selected.classes.tolist(), selected.scores.tolist(), selected.boxes.tolist(), others, strict=True)
     return tuple(
-        Detection(
-            class_names[which], score, (u0, v0, u1, v1), tuple((class_names[k], s) for k, s in alternatives.items())
-        )
-        for which, score, (u0, v0, u1, v1), alternatives in rows
+        Detection(class_names[which], score, (u0, v0, u1, v1), tuple((class_names[k], s) for k, s in other.items()))
+        for which, score, (u0, v0, u1, v1), other in rows
     )
 
 

@@ -43,12 +43,10 @@ def rotate_180(picture: Picture) -> Picture:
 
 def rotate_boxes_180(found: Sequence[Detection], width_px: int, height_px: int) -> Detections:
     """Rotates the boxes of detections by half a turn in a picture of width_px x height_px."""
-
-    def rotated(one: Detection) -> Detection:
-        u0, v0, u1, v1 = one.box
-        return replace(one, box=(width_px - u1, height_px - v1, width_px - u0, height_px - v0))
-
-    return tuple(rotated(one) for one in found)
+    boxes = [
+        (width_px - u1, height_px - v1, width_px - u0, height_px - v0) for u0, v0, u1, v1 in (x.box for x in found)
+    ]
+    return tuple(replace(one, box=box) for one, box in zip(found, boxes, strict=True))
 
 
 def turn_upright(image: Image, found: Sequence[Detection]) -> tuple[Picture, Detections]:
@@ -57,14 +55,9 @@ def turn_upright(image: Image, found: Sequence[Detection]) -> tuple[Picture, Det
     up_C = image.frames.pose(image.camera_frame).rotation().matrix()[2]
     for _ in range(round(float(np.arctan2(up_C[0], -up_C[1])) / (np.pi / 2.0)) % 4):
         width, picture = picture.shape[1], np.rot90(picture)
-        found = [replace(one, box=_turned(one.box, width)) for one in found]
+        boxes = [(v0, width - u1, v1, width - u0) for u0, v0, u1, v1 in (one.box for one in found)]
+        found = [replace(one, box=box) for one, box in zip(found, boxes, strict=True)]
     return np.ascontiguousarray(picture), tuple(found)
-
-
-def _turned(box: tuple[float, float, float, float], width_px: int) -> tuple[float, float, float, float]:
-    """Rotates a box with its picture by a quarter turn to the left."""
-    u0, v0, u1, v1 = box
-    return v0, width_px - u1, v1, width_px - u0
 
 
 def brighten(picture: Picture) -> Picture:

@@ -20,7 +20,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -98,6 +98,9 @@ CLASSIFIER: Final = NetworkKind(
     _box_outputs,
 )
 """Classifies the refined regions."""
+_EXPORTED: Final = replace(
+    PROPOSAL, hint="name an ONNX file; yolo export model=FILE format=onnx makes one of a .pt file"
+)
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,18 @@ def load_network(file: Path, kind: NetworkKind) -> Network:
     return Network(session, names, metadata, hashlib.sha256(content).hexdigest())
 
 
+def open_session(file: Path) -> onnxruntime.InferenceSession:
+    """Opens a network that another tool exported, with weights in files beside it. Raises ModelFileError."""
+    reader = _Reader(file, _EXPORTED)
+    reader.content()
+    return reader.session(str(file))
+
+
+def is_cascade(file: Path) -> bool:
+    """Returns whether a file names a format of Errand. Raises ModelFileError when it is no ONNX file."""
+    return "format" in open_session(file).get_modelmeta().custom_metadata_map
+
+
 def seal(content: bytes) -> bytes:
     """Appends the digest of a model file to its metadata, so that damage is detected."""
     return content + _seal_of(content)
@@ -204,8 +219,8 @@ class _Reader:
             raise self.error("the model of the detector is damaged (its digest is another than the file says)")
         return content
 
-    def session(self, content: bytes) -> onnxruntime.InferenceSession:
-        """Creates the inference session."""
+    def session(self, content: bytes | str) -> onnxruntime.InferenceSession:
+        """Creates the inference session of a file's content or name."""
         import onnxruntime
 
         try:

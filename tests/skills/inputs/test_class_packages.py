@@ -9,10 +9,12 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from plant.models.catalogue import MODELS_FOLDER
 from plant.worlds.world import WORLDS_FOLDER
+from tests.skills.exported_networks import export
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "how-to" / "own-class.md").read_text(encoding="utf-8")
@@ -73,6 +75,18 @@ def test_a_mission_for_it_needs_a_detector_that_knows_it(site):
     ended = errand(site, "check", "fetch.yaml", "--world", "pantry")
     assert ended.returncode != 0
     assert "the robot does not know what mug looks like" in ended.stdout + ended.stderr
+
+
+def test_a_network_that_knows_it_needs_its_form_alone(site):
+    for name in ("catalogue.yaml", "synonyms.yaml"):
+        (site / "mugs" / name).unlink()
+    shutil.copy(WORLDS_FOLDER / "flat" / "objects.yaml", site / "pantry")
+    output = {"output0": np.zeros((1, 5, 84), np.float32)}
+    export(site / "own.onnx", output, metadata={"names": "{0: 'cup'}"})
+    (site / "own.yaml").write_text("detector: {use: onnx, file: own.onnx, classes: {cup: mug}}\n")
+    (site / "fetch.yaml").write_text("name: fetch\nsteps:\n  - say: bring me the mug\n")
+    ended = errand(site, "check", "fetch.yaml", "--world", "pantry", "--stack", "own.yaml")
+    assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,208 @@
+"""Detector of an exported network: preparation of the picture, class names, words, suppression, and refusals."""
+
+import numpy as np
+import pytest
+
+from executive.testing.skill_test import carry_out, load_skill_tests, scripted_maker
+from executive.tree.registry import built_in_skills
+from plant.robots.spot.kind import spot_capabilities
+from skills.inputs.errors import InputError
+from skills.perception.detector import Cascade
+from skills.perception.detector.exported import ExportedNetwork, load_exported, place
+from skills.perception.detector.layouts import SMOOTH
+from skills.perception.detector.model_files import ModelFileError
+from skills.stack import stack_of
+from skills.testing.blocks import TABLE_CAN
+from tests.skills.exported_networks import coloured_patch, export, mean_colour
+
+THREE = {"names": "{0: 'bottle', 1: 'coke', 2: 'hammer'}"}
+RED = np.full((64, 64, 3), (200, 100, 0), np.uint8)
+
+
+def yolo(*boxes):
+    """Output of a YOLO: rows of centre, sides and the scores, and empty ones."""
+    found = np.zeros((1, len(boxes[0]), 84), np.float32)
+    found[0, :, : len(boxes)] = np.array(boxes).T
+    return {"output0": found}
+
+
+def network(tmp_path, outputs=None, *, metadata=THREE, **options):
+    outputs = yolo([32, 32, 20, 20, 0.1, 0.9, 0.2]) if outputs is None else outputs
+    file = export(tmp_path / "own.onnx", outputs, metadata=metadata)
+    return ExportedNetwork(file, **options)
+
+
+def scores(detector, picture=RED):
+    return {one.class_name: round(one.score, 3) for one in detector.detect_in_views(picture, 0.01)}
+
+
+@pytest.fixture
+def colours(tmp_path):
+    """Returns the score of the colour that an own network sees most of in a picture, by options."""
+    file = mean_colour(tmp_path / "own.onnx")
+    return lambda picture=RED, **options: scores(load_exported(ExportedNetwork(file, **options), every=True), picture)
+
+
+def test_bytes_are_scaled_and_channels_stand_as_red_green_blue(colours):
+    assert colours() == {"red": round(200 / 255, 3)}
+
+
+def test_colour_order_scale_mean_and_deviation_come_from_the_options(colours):
+    assert colours(colours="bgr") == {"blue": round(200 / 255, 3)}
+    assert colours(scale=0.001, mean=(0.1, 0.0, 0.0), std=(0.5, 1.0, 1.0)) == {"red": 0.2}
+
+
+def test_a_wide_picture_is_padded_with_grey_above_and_below(colours):
+    wide = np.full((32, 64, 3), 255, np.uint8)
+    assert set(colours(wide).values()) == {round((1 + 114 / 255) / 2, 3)}
+    assert set(colours(wide, fit="stretch").values()) == {1.0}
+
+
+@pytest.mark.parametrize(
+    ("fit", "box"),
+    [("letterbox", (44, 12, 84, 52)), ("corner", (44, 44, 84, 64)), ("stretch", (44, 22, 84, 42))],
+)
+def test_boxes_are_converted_back_to_the_picture(tmp_path, fit, box):
+    detector = network(tmp_path, fit=fit).build()
+    assert detector.detect([np.zeros((64, 128, 3), np.uint8)])[0][0].box == pytest.approx(box)
+
+
+def test_a_grey_picture_is_taken_as_colour(tmp_path):
+    assert len(network(tmp_path).build().detect([np.zeros((64, 64), np.uint8)])[0]) == 1
+
+
+def test_boxes_of_a_class_that_overlap_are_one_object(tmp_path):
+    boxes = [[32, 32, 20, 20, 0, 0.8, 0], [33, 32, 20, 20, 0, 0.9, 0], [32, 32, 20, 20, 0, 0, 0.7]]
+    found = network(tmp_path, yolo(*boxes)).build().detect([RED])[0]
+    assert [(one.class_name, round(one.score, 2)) for one in found] == [("coke", 0.9), ("hammer", 0.7)]
+
+
+def test_a_box_is_of_its_best_class_alone(tmp_path):
+    found = network(tmp_path, yolo([32, 32, 20, 20, 0.0, 0.7, 0.9])).build().detect([RED])[0]
+    assert [one.class_name for one in found] == ["hammer"]
+
+
+def test_a_better_class_without_a_word_keeps_the_box(tmp_path):
+    assert network(tmp_path, yolo([32, 32, 20, 20, 0.9, 0.7, 0.0])).build().detect([RED]) == [()]
+
+
+def test_names_come_from_options_a_file_or_a_table_of_labels(tmp_path):
+    (tmp_path / "names.txt").write_text("bottle\n\nhammer\n")
+    for names in (("bottle", "coke", "hammer"), {1: "coke", 2: "hammer"}):
+        assert network(tmp_path, metadata={}, names=names).build().class_names == ("coke", "hammer")
+    assert network(tmp_path, metadata={}, names=tmp_path / "names.txt").build().class_names == ("hammer",)
+
+
+def test_several_classes_may_stand_for_one_word(tmp_path):
+    both = network(tmp_path, classes={"bottle": "beer", "hammer": "beer"}).build()
+    assert both.class_names == ("beer", "coke")
+
+
+def test_a_stack_names_the_network_relative_to_its_folder(tmp_path):
+    network(tmp_path)
+    for key in ("use", "name"):
+        stack = stack_of({"detector": {key: "onnx", "file": "own.onnx", "classes": {"bottle": "beer"}}}, tmp_path)
+        assert stack.detector.build().class_names == ("beer", "coke", "hammer")
+
+
+def refusal(component):
+    with pytest.raises(InputError) as error:
+        component.build()
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("outputs", "metadata", "expected"),
+    [
+        ({"probabilities": np.ones((1, 1000), np.float32)}, THREE, "it classifies whole pictures"),
+        ({"output0": np.ones((1, 3), np.float32)}, {**THREE, "task": "classify"}, "it classifies whole pictures"),
+        (
+            {"masks": np.ones((1, 3, 64, 64), np.float32)},
+            THREE,
+            "it gives a map of pixels (segmentation), and no boxes",
+        ),
+        (yolo([0] * 8), {**THREE, "task": "obb"}, "of no layout that Errand reads (task 'obb')"),
+        ({"out": np.ones((1, 17, 5), np.float32)}, THREE, "images float (1, 3, 64, 64) -> out (1, 17, 5)"),
+        (yolo([0] * 8), {}, "its layout is yolo with 4 classes, and none are named"),
+        (yolo([0] * 8), THREE, "its layout is yolo with 4 classes, and 3 are named"),
+        (yolo([0] * 5), {"names": "{0: 'chair'}"}, "none of its classes is a word of Errand (chair)"),
+        (yolo([0] * 5), {"names": "{'a': 'coke'}"}, "and none are named"),
+    ],
+)
+def test_a_network_that_is_no_detector_with_names_is_refused(tmp_path, outputs, metadata, expected):
+    message = refusal(network(tmp_path, outputs, metadata=metadata))
+    assert expected in message
+    assert str(tmp_path / "own.onnx") in message
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"classes": {"botle": "beer"}}, "'classes' names 'botle', which is no class of the network"),
+        ({"classes": {"bottle": "bear"}}, "'classes' names 'bear', which has no class_forms"),
+        ({"layout": "yolov8"}, "there is no layout 'yolov8'"),
+        ({"layout": "darknet"}, "its outputs are not of layout darknet"),
+    ],
+)
+def test_options_that_do_not_fit_the_network_are_refused_with_the_likely_ones(tmp_path, options, expected):
+    message = refusal(network(tmp_path, **options))
+    assert expected in message
+    assert "did you mean" in message or "leave out 'layout'" in message
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 64, 64), (1, 64, 64, 3), (1, 3)])
+def test_an_input_that_is_no_picture_in_colour_is_refused(tmp_path, shape):
+    file = export(tmp_path / "own.onnx", yolo([0] * 7), shape=shape, metadata=THREE)
+    assert "it takes no picture in colour: images float" in refusal(ExportedNetwork(file))
+
+
+def test_a_file_that_is_no_onnx_is_refused(tmp_path):
+    (tmp_path / "own.pt").write_bytes(b"PK\x03\x04 weights")
+    message = refusal(ExportedNetwork(tmp_path / "own.pt"))
+    assert "no ONNX file" in message
+    assert "yolo export" in message
+
+
+def test_a_file_that_is_missing_is_refused(tmp_path):
+    with pytest.raises(ModelFileError, match="there is no such model"):
+        ExportedNetwork(tmp_path / "own.onnx").build()
+
+
+def test_a_cascade_names_the_layout_of_an_exported_file(tmp_path):
+    message = refusal(Cascade(network(tmp_path).file))
+    assert "it is no cascade of Errand, but Ultralytics YOLO" in message
+    assert "detector: {use: onnx" in message
+    assert "errand.detectors" in message
+
+
+SKILL_TESTS = """\
+skill: detect
+robot: {pose: {x: 0.45}, stack: own.yaml}
+with: {classes: [coke], surfaces: table}
+tests:
+  - name: the network sees the can
+    expect: {outcome: success, message: saw a coke on the table}
+  - name: it sees none where there is none
+    world: {can: false}
+    expect: {outcome: failure, cause: POSTCONDITION}
+"""
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_a_skill_finds_an_object_with_an_own_network(tmp_path, index):
+    coloured_patch(tmp_path / "own.onnx", TABLE_CAN.colour)
+    (tmp_path / "own.yaml").write_text("detector: {use: onnx, file: own.onnx, classes: {can: coke}}\n")
+    path = tmp_path / "own.skilltest.yaml"
+    path.write_text(SKILL_TESTS)
+    skills = built_in_skills()
+    file = load_skill_tests(path, skills)
+    trial = carry_out(file, index, skills["detect"], {"scripted": scripted_maker(spot_capabilities())})
+    assert not trial.differences, trial.report()
+
+
+@pytest.mark.parametrize(("shape", "size_px"), [((90, 160, 3), (64, 64)), ((33, 50, 3), (64, 48))])
+def test_smooth_scaling_gives_the_bytes_of_pillow(shape, size_px):
+    image = pytest.importorskip("PIL.Image")
+    picture = np.random.default_rng(1).integers(0, 256, shape, dtype=np.uint8)
+    wanted = np.asarray(image.fromarray(picture).resize(size_px, image.Resampling.BILINEAR))
+    assert np.array_equal(place(picture, size_px, SMOOTH)[0], wanted)

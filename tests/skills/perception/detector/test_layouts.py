@@ -1,0 +1,96 @@
+"""Each layout of exported networks, on a small ONNX file with constant outputs: one coke at (16, 8) to (48, 56)."""
+
+import numpy as np
+import pytest
+
+from skills.perception.detector.exported import ExportedNetwork, load_exported
+from skills.perception.detector.layouts import LAYOUTS
+from tests.skills.exported_networks import export
+
+NAMES = {"names": "{0: 'bottle', 1: 'coke', 2: 'hammer'}", "task": "detect"}
+RTDETR = {**NAMES, "description": "Ultralytics rtdetr-l model"}
+PICTURE = np.zeros((64, 64, 3), np.uint8)
+CORNERS, CENTRE = [16, 8, 48, 56], [32, 32, 32, 48]
+SHARES, CENTRE_SHARES = [each / 64 for each in CORNERS], [each / 64 for each in CENTRE]
+SCORES = [0.125, 0.75, 0.25]
+LOGITS = np.log(np.array(SCORES) / (1 - np.array(SCORES))).tolist()
+
+
+def f32(*values):
+    return np.array(values, np.float32)
+
+
+def rows(*row, others=8, empty=0.0):
+    """One row with an object and others that are empty."""
+    return np.concatenate([f32([row]), np.full((1, others, len(row)), empty, np.float32)], axis=1)
+
+
+CASES = {
+    "yolo": ({"output0": rows(*CENTRE, *SCORES).transpose(0, 2, 1)}, NAMES),
+    "yolov5": ({"output0": rows(*CENTRE, 0.8, 0.1, 0.75 / 0.8, 0.2)}, NAMES),
+    "end_to_end": ({"output0": rows(*CORNERS, 0.75, 1)}, NAMES),
+    "rtdetr": ({"output0": rows(*CENTRE_SHARES, *SCORES)}, RTDETR),
+    "rtdetr_labels": ({"output0": rows(*CENTRE_SHARES, 0.75, 1)}, RTDETR),
+    "rfdetr": ({"dets": rows(*CENTRE_SHARES), "labels": rows(*LOGITS, 9, empty=-9)}, NAMES),
+    "detr": ({"logits": rows(*LOGITS, empty=-9), "pred_boxes": rows(*CENTRE_SHARES)}, NAMES),
+    "dfine": ({"labels": np.array([[1, 2]]), "boxes": f32([CORNERS, CORNERS]), "scores": f32([0.75, 0])}, NAMES),
+    "torchvision": ({"a": f32(CORNERS), "b": np.array([1]), "c": f32(0.75)}, NAMES),
+    "darknet": ({"boxes": rows(*SHARES)[:, :, None], "confs": rows(*SCORES)}, NAMES),
+}
+
+
+def loaded(file, **options):
+    return load_exported(ExportedNetwork(file, **options), every=True)
+
+
+def best(detector, picture=PICTURE):
+    one = detector.detect([picture])[0][0]
+    return one.class_name, pytest.approx(one.score, abs=1e-3), pytest.approx(one.box, abs=1e-2)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_a_network_of_the_layout_is_recognised_and_decoded(layout, tmp_path):
+    outputs, metadata = CASES[layout]
+    detector = loaded(export(tmp_path / "own.onnx", outputs, metadata=metadata))
+    assert detector.layout == layout
+    assert ("coke", 0.75, tuple(CORNERS)) == best(detector)
+
+
+def test_the_tables_column_of_background_gives_no_detection(tmp_path):
+    outputs, metadata = CASES["rfdetr"]
+    found = loaded(export(tmp_path / "own.onnx", outputs, metadata=metadata)).detect([PICTURE])[0]
+    assert [one.class_name for one in found] == ["coke"]
+
+
+def test_masks_beside_the_boxes_are_left_out(tmp_path):
+    outputs = {
+        "output0": rows(*CENTRE, *SCORES, 7, 8).transpose(0, 2, 1),
+        "output1": np.ones((1, 2, 16, 16), np.float32),
+    }
+    detector = loaded(export(tmp_path / "own.onnx", outputs, metadata={**NAMES, "task": "segment"}))
+    assert ("coke", 0.75, tuple(CORNERS)) == best(detector)
+
+
+def test_boxes_of_dfine_are_in_pixels_of_the_size_that_it_is_given(tmp_path):
+    outputs = {"labels": np.array([[1]]), "boxes": f32([SHARES]), "scores": f32([0.75])}
+    file = export(tmp_path / "own.onnx", outputs, metadata=NAMES, sizes="orig_target_sizes")
+    assert best(loaded(file), np.zeros((64, 128, 3), np.uint8)) == ("coke", 0.75, (32, 8, 96, 56))
+
+
+@pytest.mark.parametrize("shape", [("N", 3, "H", "W"), (2, 3, 64, 64), (1, 3, "H", "W")])
+def test_inputs_with_a_batch_or_of_any_size_are_filled(shape, tmp_path):
+    outputs, metadata = CASES["yolo"]
+    file = export(tmp_path / "own.onnx", outputs, shape=shape, metadata={**metadata, "imgsz": "[64, 64]"})
+    assert ("coke", 0.75, tuple(CORNERS)) == best(loaded(file))
+
+
+def test_half_precision_is_read(tmp_path):
+    outputs = {"output0": rows(*CENTRE, *SCORES).transpose(0, 2, 1).astype(np.float16)}
+    assert ("coke", 0.75, tuple(CORNERS)) == best(
+        loaded(export(tmp_path / "own.onnx", outputs, dtype="float16", metadata=NAMES))
+    )
+
+
+def test_a_named_layout_decides(tmp_path):
+    file = export(tmp_path / "own.onnx", CASES["rtdetr"][0], metadata=NAMES)
+    assert ("coke", 0.75, tuple(CORNERS)) == best(loaded(file, layout="rtdetr"))

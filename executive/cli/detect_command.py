@@ -16,7 +16,6 @@ from executive.cli.number_options import quantity_option
 from executive.cli.output import BAD_INPUT, console_for, finish, progress_bar, show_table
 from skills.detection import Detection, Detector
 from skills.inputs.errors import InputError
-from skills.perception.detector.onnx_detector import DetectorOptions
 from skills.quantities import Share
 from skills.robot import Picture
 
@@ -48,15 +47,15 @@ class PictureResult:
 def detect(
     images: Annotated[list[Path], typer.Argument(metavar="IMAGE...", help="Pictures: PNG, JPEG, WebP, TIFF, BMP.")],
     threshold: Annotated[float, quantity_option(Share, help="Least score of a reported detection.")] = 0.5,
-    model: Annotated[Path | None, typer.Option(help="File of another detector.")] = None,
+    model: Annotated[Path | None, typer.Option(help="ONNX file of another detector, or a stack file.")] = None,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for the pictures with boxes.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
     """Finds beer, coke, extinguishers, hammers, screwdrivers, wrenches, people, cylinders and cubes in pictures.
 
-    If a picture cannot be read, the others are processed nevertheless, and the exit status is 2.
+    Another tool's ONNX file finds what it knows. If a picture cannot be read, the others are, and the exit status is 2.
     """
-    detector = open_detector(model, DetectorOptions(threshold=threshold))
+    detector = open_detector(model, threshold)
     names: Sequence[Path | None] = [None] * len(images) if out is None else _drawing_names(images, out)
     results = list[PictureResult]()
     with progress_bar(console_for(as_json), "pictures", len(images)) as advance:

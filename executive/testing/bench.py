@@ -165,6 +165,10 @@ class SkillBench:
         """Returns the context with which a skill is created."""
         return self._context.for_skill(f"{_PREFIX}/skill")
 
+    def use_detector(self, detector: Detector) -> None:
+        """Replaces the detector for the skills that run from now on."""
+        self._context = replace(self._context, detector=with_defaults(detector))
+
     def inject(self, *words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS) -> None:
         """Injects faults that words describe. Raises ValueError for words that describe no fault of this robot."""
         cameras = [camera.source for camera in self._capabilities.cameras]

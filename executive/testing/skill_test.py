@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
+from executive.mission.load import load_stack
 from executive.testing.bench import SkillBench, SkillRun, room_knowledge, scripted_bench
 from executive.tree.port_values import (
     PortValueError,
@@ -73,6 +74,7 @@ class RobotSetup(Strict):
     docked: bool = Field(default=False, description="whether it stands on a dock and charges (scripted only)")
     charge: Share = Field(default=0.9, description="battery, 0 to 1 (scripted only)")
     lost: bool = Field(default=False, description="whether it is not localised (scripted only)")
+    stack: Path | None = Field(default=None, description="stack file beside this one, whose detector it uses")
 
 
 class BlockSetup(Strict):
@@ -286,6 +288,8 @@ def carry_out(
     test = file.tests[index]
     setup = test.robot or file.robot
     bench = makers[setup.kind](setup, test.world or file.world)
+    if setup.stack is not None:
+        bench.use_detector(load_stack(file._source.path.parent / setup.stack).detector.build())
     bench.inject(*test.faults, kinds=kinds)
     inputs = file.inputs(index, skill)
     run = bench.run(skill, inputs, cancel_at_s=math.inf if test.cancel_at_s is None else test.cancel_at_s)

@@ -17,23 +17,24 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from errand_train.commands.score_report import scores_json, show_scores
 from errand_train.commands.worst_sheet import Shown, contact_sheet
 from errand_train.detector.scoring import BODY, BODY_CLASSES, by_camera, judge_picture, picture_errors, score
-from errand_train.detector.scoring_labels import LabelledPicture, pictures_of_coco
+from errand_train.detector.scoring_labels import LabelledPicture, LabelledPictures, pictures_of_coco
 from errand_train.libraries import check_libraries
 from executive.app.report.pictures import open_detector, read_picture, write_picture
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json
-from skills.api import Detection
+from skills.api import Detection, Detector
 from skills.inputs.errors import InputError
 from skills.inputs.outside import read_text
 from skills.perception.detector.augmentation import AugmentedDetector
 from skills.perception.detector.camera_images import rotate_180, rotate_boxes_180
-from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector
+from skills.perception.detector.onnx_detector import OnnxDetector
 from skills.quantities import Count
 from skills.robot import Picture
 
 __all__ = ["score_command"]
 
 LEAST_SCORE: Final = 0.01
+USUAL_SCORE: Final = 0.5
 TIMED_PICTURES: Final = 200
 TOGETHER: Final = 8
 WORST: Final = 20
@@ -44,11 +45,13 @@ Found = tuple[Detection, ...]
 
 @dataclass(frozen=True)
 class _Work:
-    """Labelled pictures, their folder, and the detector under evaluation."""
+    """Labelled pictures, their files, and the detector under evaluation, also with its usual threshold."""
 
+    data: LabelledPictures
     pictures: tuple[LabelledPicture, ...]
     files: tuple[Path, ...]
-    detector: OnnxDetector
+    detector: Detector
+    usual: Detector
     views: bool
 
 
@@ -68,8 +71,8 @@ def score_command(
     console = console_for(as_json)
     check_libraries(("pycocotools",), "scoring")
     drawing = _png(sheet)
-    detector = open_detector(model, DetectorOptions(threshold=LEAST_SCORE))
-    work = _work(data, pictures or data.parent, limit, detector, views)
+    detectors = open_detector(model, LEAST_SCORE), open_detector(model, USUAL_SCORE)
+    work = _work(data, pictures or data.parent, limit, detectors, views)
     found = _all_found(work, console)
     names = work.detector.class_names
     scores = {"all": score(work.pictures, found, names)}
@@ -81,17 +84,32 @@ def score_command(
         write_picture(drawing, contact_sheet([_shown(work, found, k) for k in order]))
     named = [{"file": work.pictures[k].file, "error": round(_error(work, found, k), 3)} for k in order]
     if as_json:
-        print_json({"data": str(data), **scores_json(scores, speed), **({"worst": named} if named else {})})
+        read = {"aliases": dict(work.data.aliases), "left_out": dict(work.data.left_out)}
+        print_json({"data": str(data), **scores_json(scores, speed), **read, **({"worst": named} if named else {})})
     else:
+        _show_categories(console, work.data)
         show_scores(console, scores, speed)
         for one in named:
             console.print(f"{one['error']:7.3f}  {one['file']}", markup=False)
 
 
-def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, views: bool) -> _Work:
+def _show_categories(console: Console, data: LabelledPictures) -> None:
+    """Prints which categories are read as another class, and which are left out."""
+    for name, ours in data.aliases.items():
+        console.print(f"category '{name}' is read as {ours}", markup=False)
+    for name, count in data.left_out.items():
+        labels = "1 label" if count == 1 else f"{count} labels"
+        console.print(f"category '{name}' is left out, with {labels}: the detector has no such class", markup=False)
+
+
+def _work(data: Path, folder: Path, limit: int | None, detectors: tuple[Detector, Detector], views: bool) -> _Work:
     """Reads the labels and checks that all pictures exist. Raises InputError."""
+    detector, usual = detectors
+    if views and not isinstance(detector, OnnxDetector):
+        raise InputError("--views needs a cascade", hint="leave out --views, or name a cascade with --model")
     try:
-        labelled = pictures_of_coco(_document(data), detector.class_names)[:limit]
+        document = pictures_of_coco(_document(data), detector.class_names)
+        labelled = document.pictures[:limit]
     except ValueError as error:
         raise InputError(str(error), hint="name a COCO file with --data", file=data) from error
     files = tuple(folder / picture.file for picture in labelled)
@@ -101,7 +119,7 @@ def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, v
         raise InputError(what, hint="name the folder from which their names count with --pictures", file=missing[0])
     if not files:
         raise InputError("it names no pictures", hint="name a COCO file with pictures with --data", file=data)
-    return _Work(labelled, files, detector, views)
+    return _Work(document, labelled, files, detector, usual, views)
 
 
 def _document(data: Path) -> Any:
@@ -133,9 +151,9 @@ def _found(work: _Work, group: range) -> list[Found]:
     return [rotate_boxes_180(found, *picture.shape[1::-1]) if turned else found for found, picture, turned in seen]
 
 
-def _looked(detector: OnnxDetector, pictures: Sequence[Picture], views: bool) -> list[Found]:
+def _looked(detector: Detector, pictures: Sequence[Picture], views: bool) -> list[Found]:
     """Detects the objects in some pictures."""
-    if not views:
+    if not (views and isinstance(detector, OnnxDetector)):
         return detector.detect(pictures)
     return [AugmentedDetector(detector).detect_in_views(picture) for picture in pictures]
 
@@ -157,12 +175,11 @@ def _read(work: _Work, k: int) -> Picture:
 
 def _pictures_per_second(work: _Work) -> float:
     """Speed from pictures in memory to final boxes at the usual threshold: one over the median time."""
-    detector = OnnxDetector(work.detector.model)
     times_s = list[float]()
     for group in _groups(min(len(work.files), TIMED_PICTURES)):
         pictures = [_read(work, k) for k in group]
         begun = time.perf_counter()
-        _looked(detector, pictures, work.views)
+        _looked(work.usual, pictures, work.views)
         times_s.append((time.perf_counter() - begun) / len(pictures))
     return 1.0 / statistics.median(times_s)
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 
 class _Entry(BaseModel):
@@ -12,10 +12,10 @@ class _Entry(BaseModel):
 
 
 class CocoImage(_Entry):
-    """A picture; `crowded` ones are of scenes with more objects than usual."""
+    """A picture; `crowded` ones are of scenes with more objects than usual. Backslashes in its name become slashes."""
 
     id: int | str
-    file_name: str
+    file_name: Annotated[str, AfterValidator(lambda name: name.replace("\\", "/"))]
     width: int | None = None
     height: int | None = None
     roll_deg: float = 0.0
@@ -75,6 +75,18 @@ class CocoFile(_Entry):
                 raise ValueError(f"annotations[{k}].image_id: there is no image {label.image_id!r}")
             labels[label.image_id].append(label)
         return [(image, labels[image.id]) for image in self.images]
+
+    def refuse_other_boxes(self) -> None:
+        """Raises ValueError when the boxes are shares of the pictures' sides, or corners, instead of COCO's pixels."""
+        wanted = "COCO's are x, y, width and height in pixels"
+        if self.annotations and all(max(label.bbox) <= 1.0 for label in self.annotations):
+            raise ValueError(f"annotations[0].bbox: the boxes are shares of the pictures' sides, and {wanted}")
+        sizes = {image.id: image.size_px for image in self.images}
+        boxes = [(label.bbox, size) for label in self.annotations if (size := sizes.get(label.image_id)) is not None]
+        beyond = [k for k, ((x, y, w, h), size) in enumerate(boxes) if x + w > size[0] + 1 or y + h > size[1] + 1]
+        if 2 * len(beyond) > len(boxes) and all(x < w <= size[0] and y < h <= size[1] for (x, y, w, h), size in boxes):
+            box = ", ".join(f"{value:g}" for value in boxes[beyond[0]][0])
+            raise ValueError(f"annotations: the boxes are corners, such as [{box}], and {wanted}")
 
 
 def coco_file(document: object) -> CocoFile:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from errand_train.detector.coco import CocoLabel, coco_file
+from executive.language.spelling import synonyms_of
 from skills.perception.detector.camera_images import LEAST_ROLL_DEG
 
 LEAST_LONG_PX: Final = 24.0
@@ -84,23 +86,35 @@ def large_enough(box: Box) -> bool:
     return long_side_px(box) >= LEAST_LONG_PX and min(box[2] - box[0], box[3] - box[1]) >= LEAST_SHORT_PX
 
 
-def pictures_of_coco(document: object, class_names: Sequence[str]) -> tuple[LabelledPicture, ...]:
+@dataclass(frozen=True)
+class LabelledPictures:
+    """Pictures of a COCO file, the categories that are read as another class, and the labels left out by category."""
+
+    pictures: tuple[LabelledPicture, ...]
+    aliases: Mapping[str, str]
+    left_out: Mapping[str, int]
+
+
+def pictures_of_coco(document: object, class_names: Sequence[str]) -> LabelledPictures:
     """Reads the pictures of a COCO file in the order of their ids, with the labels of the named classes.
 
-    Categories match by name, in upper or lower case; their ids may be any. Leaves out labels of other categories.
-    Raises ValueError, naming the entry.
+    Categories match by name or by a synonym of one class, in upper or lower case; their ids may be any. Leaves out
+    labels of other categories. Raises ValueError, naming the entry.
     """
     coco = coco_file(document)
+    coco.refuse_other_boxes()
     ours = {name.casefold(): name for name in class_names}
-    names = {one.id: ours.get(one.name.strip().casefold()) for one in coco.categories}
+    names = {one.id: _class_of(one.name.strip().casefold(), ours) for one in coco.categories}
     if not any(names.values()):
         told = ", ".join(one.name for one in coco.categories)
         raise ValueError(f"categories: none of '{told}' is a class that is known ({', '.join(class_names)})")
     for k, label in enumerate(coco.annotations):
         if label.category_id not in names:
             raise ValueError(f"annotations[{k}].category_id: there is no category {label.category_id!r}")
+    counts = Counter(label.category_id for label in coco.annotations)
+    others = {one.id: (one.name, names[one.id]) for one in coco.categories}
     pictures = sorted(coco.by_picture(), key=lambda pair: (isinstance(pair[0].id, str), pair[0].id))
-    return tuple(
+    found = tuple(
         LabelledPicture(
             file=image.file_name,
             labels=tuple(_label(one, name) for one in labels if (name := names[one.category_id]) is not None),
@@ -111,6 +125,23 @@ def pictures_of_coco(document: object, class_names: Sequence[str]) -> tuple[Labe
         )
         for image, labels in pictures
     )
+    return LabelledPictures(
+        found,
+        {
+            name: ours
+            for name, ours in others.values()
+            if ours is not None and ours.casefold() != name.strip().casefold()
+        },
+        {name: counts[number] for number, (name, ours) in others.items() if ours is None},
+    )
+
+
+def _class_of(name: str, ours: Mapping[str, str]) -> str | None:
+    """Class of a category's name: the same word, or the only class of which it is a synonym."""
+    if name in ours:
+        return ours[name]
+    meant = synonyms_of(name.replace("_", " "), ours)
+    return meant[0] if len(meant) == 1 else None
 
 
 def _label(one: CocoLabel, name: str) -> Label:

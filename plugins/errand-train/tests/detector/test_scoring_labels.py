@@ -22,7 +22,7 @@ def coco(**changes):
 
 
 def test_categories_go_by_name_and_pictures_by_their_ids():
-    first, second = pictures_of_coco(coco(), CLASSES)
+    first, second = pictures_of_coco(coco(), CLASSES).pictures
     assert (first.file, first.labels, first.only_distractors) == ("a.jpg", (), True)
     assert (first.size_px, second.size_px) == (None, (64, 48))
     assert second.labels == (
@@ -61,7 +61,7 @@ def test_labels_that_count(width, height, visibility, crowd, ignore, counts):
 )
 def test_parts_beyond_the_edge_are_hidden(told, share):
     entry = {"id": 1, "image_id": 3, "category_id": 90, "bbox": [10, 20, 30, 40], **told}
-    first, _ = pictures_of_coco(coco(annotations=[entry]), CLASSES)
+    first, _ = pictures_of_coco(coco(annotations=[entry]), CLASSES).pictures
     assert first.labels[0].visibility == (None if share is None else pytest.approx(share))
 
 
@@ -93,3 +93,24 @@ def test_anything_but_a_coco_file_is_refused_with_the_wrong_entry(changes, place
 def test_anything_but_a_json_object_is_refused(document):
     with pytest.raises(ValueError, match="the file"):
         pictures_of_coco(document, CLASSES)
+
+
+def test_a_category_may_have_a_synonym_of_one_class():
+    categories = [{"id": 90, "name": "coke can"}, {"id": 1, "name": "cat"}, {"id": 4, "name": "person"}]
+    found = pictures_of_coco(coco(categories=categories), ("coke", "person"))
+    assert (found.aliases, found.left_out) == ({"coke can": "coke"}, {"cat": 1})
+    assert [label.class_name for label in found.pictures[1].labels] == ["coke", "person"]
+
+
+def test_backslashes_in_names_of_files_are_slashes():
+    images = [{"id": 7, "file_name": "a\\b.jpg"}, {"id": 3, "file_name": "c.jpg"}]
+    assert pictures_of_coco(coco(images=images), CLASSES).pictures[1].file == "a/b.jpg"
+
+
+@pytest.mark.parametrize(
+    ("box", "what"),
+    [([0.1, 0.2, 0.3, 0.4], "shares of the pictures' sides"), ([40, 30, 60, 45], "the boxes are corners")],
+)
+def test_boxes_in_another_form_are_refused_as_such(box, what):
+    with pytest.raises(ValueError, match=what):
+        pictures_of_coco(coco(annotations=[{"image_id": 7, "category_id": 90, "bbox": box}]), CLASSES)

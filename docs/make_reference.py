@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -273,7 +274,9 @@ def _ports(skill: type[Skill[Any]]) -> Iterator[str]:
 
 
 def _type(hint: Any) -> str:
-    return describe_type(hint).replace("skills.api.", "").replace("skills.robot.", "").replace("|", "&#124;")
+    text = re.sub(r"Literal\[(.*?)\]", lambda found: found[1].replace(", ", " or "), describe_type(hint))
+    text = re.sub(r"\bPath\b", "path", text.replace("collections.abc.Mapping[", "table["))
+    return text.replace("skills.api.", "").replace("skills.robot.", "").replace("|", "&#124;")
 
 
 def stack_page() -> str:
@@ -299,10 +302,13 @@ def _slot(slot: str, group: str) -> str:
 def _options(heading: str, kind: type[Any]) -> str:
     """One component or skill: its docstring, then its options; options within options follow."""
     rows, inner = [], []
-    default, hints = kind(), field_types(kind)
+    hints = field_types(kind)
     for field in dataclasses.fields(kind):
-        value = getattr(default, field.name)
-        if dataclasses.is_dataclass(value):
+        computed = field.default_factory
+        value = field.default if computed is dataclasses.MISSING else computed()
+        if value is dataclasses.MISSING:
+            rows.append(f"| `{field.name}` | {_type(hints[field.name])} | required |")
+        elif dataclasses.is_dataclass(value):
             inner.append(_options(f"{heading}.{field.name}", type(value)))
         else:
             rows.append(f"| `{field.name}` | {_type(hints[field.name])} | `{value}` |")

@@ -36,15 +36,17 @@ DECIDING = (
     ),
     Construct(
         "repeat",
-        "Repeats `steps`: `times`, `until` a condition holds after a round, `while` one holds before a round. With "
+        "Repeats `steps`: `times`, `until` a condition holds after a round, `while` one holds before a round, "
+        "or rounds begin until a time of day (`until_clock`, which is over for twelve hours after it). With "
         '`every` (seconds, or "30 min") successive rounds begin at least that far apart. `times` '
         "beside a condition is the largest number of rounds.",
         """- repeat: {until: {object: hammer, at: workbench}, times: 3, every: 60}
   steps:
     - to: workbench
 """,
-        "FAILURE with the cause of a step as soon as one fails. SUCCESS when `until` holds, `while` does not hold, or "
-        "after `times` rounds without a condition. FAILURE with POSTCONDITION when a condition still "
+        "FAILURE with the cause of a step as soon as one fails. SUCCESS when `until` holds, `while` does not hold, at "
+        "`until_clock`, or after `times` rounds without a condition. FAILURE with PRECONDITION when `until_clock` is "
+        "over before the first round. FAILURE with POSTCONDITION when a condition still "
         "keeps the rounds going after `times` of them. Endless rounds are refused before the mission starts.",
         "repeat",
     ),

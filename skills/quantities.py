@@ -253,6 +253,12 @@ def clock_text(value: Any) -> str:
     raise QuantityError("should be a time of day from 00:00 to 23:59", f"it reads {display_text(value)} now; {hint}")
 
 
+def clock_s(clock: str) -> float:
+    """Returns the time of day of a text such as "08:30", in seconds after midnight."""
+    hours, minutes = map(int, clock.split(":"))
+    return 3600.0 * hours + 60.0 * minutes
+
+
 def display_text(value: Any) -> str:
     """Returns a value for an error message: text in quotes, `true`, `nothing`, `a list`; shortened to fit a line."""
     if value is None:

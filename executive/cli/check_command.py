@@ -79,6 +79,7 @@ def _estimate_json(one: Checked) -> dict[str, Any]:
         "least_s": round(taken.duration_s, 1),
         "most_s": None if math.isinf(taken.most_s) else round(taken.most_s, 1),
         "reasons": list(taken.reasons),
+        "time_limit_s": one.time_limit_s,
         "distance_m": round(taken.distance_m, 2),
         "charge": round(taken.charge, 4),
     }
@@ -92,7 +93,7 @@ def _error_json(error: InputError) -> dict[str, Any]:
 def _show(one: Checked, name: str, console: Console, *, verbose: bool) -> None:
     """Prints a line on the file or sentence, and its errors; with `verbose` also the commands and the tree."""
     mark = "[green]✓[/green]" if one.ok else "[red]✗[/red]"
-    found = str(one.estimate) if one.ok else count_text(len(one.errors), "error")
+    found = "; ".join(one.summary) if one.ok else count_text(len(one.errors), "error")
     console.print(f"{mark} [bold]{escape(one_line(name))}[/bold]: {found}")
     for error in one.errors:
         typer.echo(f"errand: {error}", err=True)

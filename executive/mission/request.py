@@ -90,6 +90,8 @@ class RequestFields(TypedDict, total=False):
     friction: float
 
 
+TIME_LIMIT_S: Final = 1200.0
+"""Default time limit of a run, beyond the waits of which its mission tells."""
 _READERS: Final[Mapping[str, Callable[[Any], Any]]] = {
     "robots": lambda value: _robots(value) if isinstance(value, str) else value,
     "start": lambda value: parse_start(value) if isinstance(value, str) else value,
@@ -227,7 +229,9 @@ class Request:
     time_limit_s: Annotated[
         LongDuration | None,
         Option(
-            'Ends the run after so long: seconds, or "2 h"; by default 20 min.', "--time-limit", group=Heading.REQUEST
+            'Ends the run after so long: seconds, or "2 h"; by default 20 min beyond the mission\'s own waits.',
+            "--time-limit",
+            group=Heading.REQUEST,
         ),
     ] = None
     robots: Annotated[

@@ -167,6 +167,11 @@ class ExplainedNode(_TakesKeywords, Explained):
         """Estimates a node from its spec on a `walk` (`executive.tree.estimate`); with `first`, raises its error."""
         return walk.all_of(node, first)
 
+    @classmethod
+    def waiting_s(cls, node: Any, now_s: float) -> float:
+        """Returns the time (s) that a node waits as its mission says, begun at a time of day (s after midnight)."""
+        return float(sum(child.behaviour.waiting_s(child, now_s) for child in cls.usual_children(node)))
+
     def restore(self, status: Status, cause: Cause | None, message: str) -> None:
         """Restores the status, cause and message that the node had before a restart."""
         self.status, self.cause, self.message = status, cause, message

@@ -5,19 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from executive.mission.gripper import InGripper, grasp_objection, objection
+from executive.tree.board import Constant
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, estimate_tree
+from executive.tree.node import NodeSpec
 from executive.tree.plan import StepPart
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import area_m2
 from skills.api import FreeSpace, PlanningError, Zone, ZoneKind
-from skills.inputs.errors import InputError, listing, suggestion
+from skills.inputs.errors import InputError, SourceLine, listing, suggestion
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import Path, path_length
 from skills.robot import Pose2D
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from skills.navigate.zone_map import ZoneMap
 
 
+_TAKE_PICTURE: Final = "take_picture"
 Fault = tuple[str, str]
 """Error in a part of a mission, and a hint."""
 
@@ -37,10 +40,11 @@ class Abilities:
     """Abilities of the robot and properties of the objects that are known before a run.
 
     `masses_kg` has the least mass of each class, `lift_kg` is the arm's payload. The detector recognises
-    `classes` and `attributes`; a search for several objects fails for any others. `reaches_m` are the heights of the
-    lowest and the highest reachable surface. `widths_m` has the least width of each class, `opens_m` is the gripper's
-    maximum opening; `gripper` is False without a gripper. `takers` are the people who take objects from the robot
-    (None: unknown). `taken_m2` is the covered area of each surface, `apart_m` the clearance around an object.
+    `classes` and `attributes`; a search for several objects fails for any others. `reaches_m` are the heights of
+    the lowest and the highest reachable surface. `widths_m` has the least width of each class, `opens_m` is the
+    gripper's maximum opening; `gripper` is False without a gripper. `cameras` are the robot's cameras with their
+    heights in m (infinite for one that moves). `takers` are the people who take objects from the robot (None:
+    unknown). `taken_m2` is the covered area of each surface, `apart_m` the clearance around an object.
     """
 
     masses_kg: Mapping[str, float]
@@ -54,6 +58,7 @@ class Abilities:
     takers: frozenset[str] | None = None
     taken_m2: Mapping[str, float] = field(default_factory=dict)
     apart_m: float = 0.0
+    cameras: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -176,10 +181,11 @@ def check_tree(
     needs = ((part, _objection(part, before, knowledge, abilities)) for part, before in starts)
     grasps = errors((part, each) for part, each in needs if each is not None)
     full = errors(_full_surfaces(tree, knowledge, abilities))
+    unseen = _unseen(tree.root, abilities)
     estimate, unreachable, warnings = estimate_tree(
         tree.root, start=start, planner=planner, estimates=estimates, zones=tree.zones
     )
-    return Checked((*impossible, *grasps, *unreachable), estimate, (*full, *warnings))
+    return Checked((*impossible, *grasps, *unseen, *unreachable), estimate, (*full, *warnings))
 
 
 def _objection(part: StepPart, held: InGripper | None, knowledge: Knowledge, abilities: Abilities) -> Fault | None:
@@ -231,6 +237,24 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
         known = [one for one in knowledge.things if one in abilities.classes]
         message = f"the robot does not know what {listing(unseen)} looks like"
         yield message, f"it knows {listing(known)} by sight"
+
+
+def _unseen(root: NodeSpec, abilities: Abilities) -> tuple[InputError, ...]:
+    """Returns the errors of pictures by a camera that the robot lacks, or that is lower than the top to be seen."""
+    found = dict[tuple[str, SourceLine | None], InputError]()
+    for node in (each for each in root.walk() if each.skill is not None and each.skill.name == _TAKE_PICTURE):
+        inputs = {name: each.value for name, each in node.options["inputs"].items() if isinstance(each, Constant)}
+        camera, cameras = str(inputs.get("camera", "")).lower().replace(" ", ""), abilities.cameras
+        if camera and camera not in cameras:
+            hint = suggestion(camera, cameras) if cameras else "choose another kind of robot"
+            what = f"the robot has no camera '{inputs['camera']}'"
+        elif camera and inputs.get("top") and cameras[camera] <= inputs["point_W"][2]:
+            top_m, hint = inputs["point_W"][2], "leave the camera out, or name a higher one"
+            what = f"the {camera} camera, {cameras[camera]:.2f} m high, does not see a top {top_m:g} m high"
+        else:
+            continue
+        found[what, node.source] = InputError.at(node.source, what, hint=hint)
+    return tuple(found.values())
 
 
 def _nobody_takes(command: Command, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:

@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
 
@@ -12,6 +12,14 @@ from executive.tree.behaviour import Hook
 from executive.tree.board import Board
 from skills.api import ExcludesRobots, Part, Skill, SkillContext
 from skills.robot import Pose2D
+
+DAY_S: Final = 86_400.0
+
+
+def time_ahead_s(clock_s: float, now_s: float) -> float:
+    """Time from now until a time of day, in s; both are s after midnight; 0 if it passed at most 12 hours ago."""
+    ahead_s = (clock_s - now_s) % DAY_S
+    return ahead_s if ahead_s <= DAY_S / 2 else 0.0
 
 
 def leaf_seed(run_seed: int, path_id: str) -> int:
@@ -87,6 +95,10 @@ class RunContext(SkillContext):
     def robot_excluders(self) -> tuple[ExcludesRobots, ...]:
         """Estimators that can exclude readings of other robots, whose poses are known."""
         return tuple(each for each in (self.localiser, self.costmap) if isinstance(each, ExcludesRobots))
+
+    def ahead_s(self, clock_s: float) -> float:
+        """Time from now until a time of day (s after midnight), in s."""
+        return time_ahead_s(clock_s, self.day_began_s + self.clock.now())
 
     def known_pose(self) -> Pose2D | None:
         """Returns the robot's estimated pose, the planar part of X_WB; None while it is not localised."""

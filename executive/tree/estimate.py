@@ -84,11 +84,11 @@ class Estimate:
 
     def __str__(self) -> str:
         """Formats the estimate; its time is "about 2 min 05 s" or "2 min 05 s to 5 min 10 s (1 to 3 rounds)"."""
-        least = _minutes(self.duration_s)
+        least = minutes_text(self.duration_s)
         if round(self.spare_s if math.isfinite(self.spare_s) else 1.0) == 0:
             time = f"about {least}"
         else:
-            most = "or more" if math.isinf(self.spare_s) else f"to {_minutes(self.most_s)}"
+            most = "or more" if math.isinf(self.spare_s) else f"to {minutes_text(self.most_s)}"
             time = f"{least} {most} ({'; '.join(self.reasons)})"
         charge = f"{self.charge:.1%} of the battery" if self.charge <= 1.0 else "more than one charge"
         return f"{time}, {self.distance_m:.0f} m of driving and {charge} when all goes well"
@@ -113,7 +113,8 @@ class Estimate:
         return replace(self, spare_s=max(0.0, most_s - self.duration_s), reasons=all_reasons)
 
 
-def _minutes(duration_s: float) -> str:
+def minutes_text(duration_s: float) -> str:
+    """Formats a duration (s) as "45 s", "2 min 05 s" or "1 h 05 min"."""
     minutes, seconds = divmod(round(duration_s), 60)
     hours, minutes = divmod(minutes, 60)
     if hours:

@@ -180,12 +180,6 @@ class Awaited(Strict):
             raise ValueError("give one of 'for', 'seconds' and 'until_clock'")
         return self
 
-    @property
-    def until_clock_s(self) -> float:
-        """Time of day in seconds after midnight; 0 if the wait has no time of day."""
-        hours, minutes = map(int, (self.until_clock or "00:00").split(":"))
-        return 3600.0 * hours + 60.0 * minutes
-
 
 class Wait(Step):
     """`wait`: waits for a condition, for a duration, or until a time of day."""

@@ -247,13 +247,19 @@ class Mission(_Whole):
 
     @classmethod
     def from_steps(cls, steps: Sequence[Step], *, world: str, robot: str) -> Self:
-        """Builds a mission without a file; names it after its first command, or else after its first block."""
-        first = next((command for step in steps for each in step.walk() for command in each.commands), None)
+        """Builds a mission without a file; names it after its first command, or else after its first block.
+
+        Three or more commands like the first are counted: "visit hall and 6 more".
+        """
+        commands = [command for step in steps for each in step.walk() for command in each.commands]
+        first = commands[0] if commands else None
         if first is None:
             name = type(steps[0]).__name__.lower() if steps else "do"
         else:
             verb = "find" if first.verb in _STATES else first.verb or "do"
-            name = " ".join(filter(None, (verb, str(first.object or first.item or first.goal or ""))))
+            more = sum(each.verb == first.verb for each in commands) - 1
+            counted = f"and {more} more" if more > 1 else ""
+            name = " ".join(filter(None, (verb, str(first.object or first.item or first.goal or ""), counted)))
         return cls(name=name, world=world, robot=robot or None, steps=tuple(steps))
 
     @property

@@ -29,6 +29,7 @@ from executive.words.leaf_steps import (
     Answering,
     CallSkill,
     Check,
+    Clock,
     Do,
     Dock,
     OpenDoor,
@@ -89,6 +90,7 @@ class Loop(Strict):
     while_: Annotated[
         Condition | None, Field(alias="while", description="Rounds are made as long as this holds before one.")
     ] = None
+    until_clock: Clock | None = Field(default=None, description='Rounds begin until this time of day, as in "18:00".')
     every_s: Annotated[
         Duration | None,
         Field(alias="every", description='A round begins so long after the one before began: seconds, or "30 min".'),
@@ -101,21 +103,24 @@ class Loop(Strict):
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
-        if self.until is not None and self.while_ is not None:
-            raise ValueError("rounds go on 'until' or 'while', not both")
+        if sum(each is not None for each in (self.until, self.while_, self.until_clock)) > 1:
+            raise ValueError("rounds go on 'until' or 'while' or 'until_clock', not two of them")
         if (self.for_each is None) != (self.name is None):
             raise ValueError("'for_each' and 'as' go together")
-        others = [key for key in ("times", "until", "while_", "every_s") if getattr(self, key) is not None]
+        others = [
+            key for key in ("times", "until", "while_", "until_clock", "every_s") if getattr(self, key) is not None
+        ]
         if self.for_each is not None and others:
             raise ValueError("'for_each' stands alone")
         if self.for_each is None and not others:
-            raise ValueError("it does not say how often: give 'times', 'until', 'while', 'every' or 'for_each'")
+            known = "'times', 'until', 'while', 'until_clock', 'every' or 'for_each'"
+            raise ValueError(f"it does not say how often: give {known}")
         return self
 
     @property
     def is_endless(self) -> bool:
         """Returns whether the rounds have no end condition and no number."""
-        return self.times is None and self.until is None and self.while_ is None
+        return self.times is None and self.until is None and self.while_ is None and self.until_clock is None
 
 
 _ROUNDS: Final = "How often, and until when, `steps` are repeated."

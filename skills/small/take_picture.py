@@ -11,15 +11,19 @@ from skills.api import PICTURES, Cause, ObjectObservation, Running, Succeeded
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import overview_viewpoints
 from skills.perception.detector.camera_images import is_dark
-from skills.perception.point_cloud import project
+from skills.perception.point_cloud import nearest_pixels, project
 from skills.quantities import Coordinate, Height
-from skills.robot import CameraCapabilities, FloatArray, Image
+from skills.robot import CameraCapabilities, FloatArray, Image, Mount
 from skills.routine import Patience, PlanningAttempt, Routine, SkillFailure
 
 _ASIDE_RAD: Final = (0.0, 0.35, -0.35)
 """Turns about the shoulder of the hand camera's viewpoints, the best first."""
 _GOOD_HEALTH: Final = 0.5
 """Least health of an estimate that confirms where the robot stood."""
+_HIDES_M: Final = 0.25
+"""Distance before the point, along the optical axis, from which on something hides it."""
+_AROUND_PX: Final = 4
+"""Half the side of the window of depth around the point."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +31,16 @@ class TakePictureInputs:
     """Subject of a picture: `of` in words, and its point in the world, or an observed object.
 
     `camera` is one of the robot's cameras. Without it, the camera that searches for objects takes the picture, or else
-    one on the body that sees the point.
+    one on the body that sees the point. `top`: the point is on top of a surface, which is seen from above. `ahead`: the
+    point only gives the direction, and whatever stands there is the subject.
     """
 
     of: str
     point_W: tuple[Coordinate, Coordinate, Height] | None = None
     object: ObjectObservation | None = None
     camera: str = ""
+    top: bool = False
+    ahead: bool = False
 
 
 class TakePicture(LookingSkill[TakePictureInputs]):
@@ -45,7 +52,8 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         Cause.PRECONDITION: "the robot has no such camera, or nothing is named to point it at",
         Cause.PLANNING: "the arm reaches no viewpoint, and no other camera sees it from here",
         Cause.EXECUTION: "the arm did not reach its viewpoint, or the camera shows nothing",
-        Cause.POSTCONDITION: "no scan after the picture confirms the robot's place, or the point is not in the picture",
+        Cause.POSTCONDITION: "no scan after the picture confirms the robot's place, or the point is not in the picture "
+        "or hidden",
     }
     default_timeout_s = 60.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 1.0, "joints": 0.5, "gripper": 0.5}
@@ -65,6 +73,8 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         for camera in self._cameras(inputs.camera):
             self._camera, p_BT = camera, self.X_WB().inverse() @ np.array(p_WT)
             with PlanningAttempt() as attempt:
+                if inputs.top:
+                    _refuse_from_below(camera, self.X_WB(), p_WT[2])
                 yield from self.look_at(p_BT, self._viewpoints(p_BT), message)
             if attempt.failure is None:
                 image = yield from self.picture(message)
@@ -74,9 +84,13 @@ class TakePicture(LookingSkill[TakePictureInputs]):
                 if p_CT[2] <= 0.0 or not (0.0 <= u < lens.width and 0.0 <= v < lens.height):
                     what = f"{inputs.of} is not in the picture: the robot was not where it believed to be"
                     raise SkillFailure(Cause.POSTCONDITION, what)
-                return self._taken(inputs.of, image, X_WC)
+                hidden = None if inputs.ahead else _hidden(image, p_CT)
+                if hidden is None:
+                    return self._taken(inputs.of, image, X_WC)
+                attempt.failure = SkillFailure(Cause.POSTCONDITION, f"the {camera.source} camera: {hidden}")
             blocked.append(attempt.failure)
-        raise SkillFailure(Cause.PLANNING, f"no view of {inputs.of} from here: {blocked[0].message}")
+        first = next((each for each in blocked if each.cause is Cause.POSTCONDITION), blocked[0])
+        raise SkillFailure(first.cause, f"no view of {inputs.of} from here: {first.message}")
 
     def _cameras(self, named: str) -> Sequence[CameraCapabilities]:
         """Returns the named camera, or all, the usual one first. Raises SkillFailure with cause PRECONDITION."""
@@ -114,3 +128,23 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         picture = image.grey if image.colour is None else image.colour
         self.context.publish(PICTURES, {"caption": text, "image": picture, "pose": pose, **facts})
         return Succeeded(f"took a picture of {text}")
+
+
+def _refuse_from_below(camera: CameraCapabilities, X_WB: RigidTransform, top_m: float) -> None:
+    """Raises SkillFailure with cause PLANNING for a camera of the body that is lower than the top of a surface."""
+    high_m = (X_WB @ camera.X_FC).translation()[2]
+    if camera.mount is Mount.BODY and high_m <= top_m:
+        what = f"the {camera.source} camera, {high_m:.2f} m high, does not see a top {top_m:.2f} m high"
+        raise SkillFailure(Cause.PLANNING, what)
+
+
+def _hidden(image: Image, p_CT: FloatArray) -> str | None:
+    """Returns why the depth of a picture does not show the point p_CT (3,) in the camera frame; None if it does."""
+    column, row = nearest_pixels(*project(p_CT, image.depth_intrinsics), image.depth_intrinsics)
+    low = np.maximum((row - _AROUND_PX, column - _AROUND_PX), 0)
+    window = image.depth_m[low[0] : row + _AROUND_PX + 1, low[1] : column + _AROUND_PX + 1]
+    measured_m, away_m = window[window > 0.0], float(p_CT[2])
+    if not measured_m.size:
+        return f"no depth shows whether something hides it, {away_m:.1f} m away"
+    before_m = away_m - float(np.median(measured_m))
+    return f"something {before_m:.1f} m before it hides it" if before_m > _HIDES_M else None

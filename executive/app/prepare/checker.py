@@ -1,5 +1,6 @@
 """Checks missions without running them: errors, warnings, and estimates of time, path and charge."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import TopologicalSorter
@@ -13,7 +14,7 @@ from executive.app.prepare.prepared import Prepared
 from executive.app.prepare.worlds import refuse_unusable
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree
-from executive.tree.estimate import Estimate, RoutePlanner
+from executive.tree.estimate import Estimate, RoutePlanner, minutes_text
 from executive.tree.node_view import node_view
 from executive.view.text import DRAWN_NODES, readable
 from skills.inputs.errors import InputError
@@ -35,6 +36,7 @@ class Checked:
     trees: tuple[CompiledTree, ...] = ()
     estimate: Estimate = field(default_factory=Estimate)
     warnings: tuple[InputError, ...] = ()
+    time_limit_s: float = math.inf
 
     @property
     def ok(self) -> bool:
@@ -51,7 +53,13 @@ class Checked:
             most = _SHOWN if len(found) > _SHOWN + 1 else len(found)
             lines += [what + each for each in found[:most]]
             lines += [f"{what}and {len(found) - most} more"] if found[most:] else []
-        return [*lines, str(self.estimate)] if self.ok else lines
+        return [*lines, *self.summary] if self.ok else lines
+
+    @property
+    def summary(self) -> tuple[str, ...]:
+        """The estimate, and where a run may be cut short, its time limit."""
+        limit = f"a run ends after {minutes_text(self.time_limit_s)} at the latest, unless --time-limit says otherwise"
+        return (str(self.estimate), *([limit] if self.estimate.most_s > self.time_limit_s else ()))
 
     def __str__(self) -> str:
         return "\n".join(self._lines)
@@ -87,7 +95,7 @@ class Checker:
         errors = tuple(error for each in checked.values() for error in each.errors)
         warnings = tuple(warning for each in checked.values() for warning in each.warnings)
         estimates = {name: each.estimate for name, each in checked.items()}
-        return Checked(file, _placed(file, errors), trees, _total(prepared, estimates), warnings)
+        return Checked(file, _placed(file, errors), trees, _total(prepared, estimates), warnings, prepared.time_limit_s)
 
     def _planner(self, prepared: Prepared) -> RoutePlanner:
         world, robot = prepared.world, prepared.robot

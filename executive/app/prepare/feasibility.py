@@ -21,7 +21,7 @@ from skills.api import Zone
 from skills.inputs.errors import Problems
 from skills.manipulation.arm.kinematics import arm_model
 from skills.perception.class_forms import class_forms, known_attributes, shipped_forms
-from skills.robot import Capabilities, Pose2D
+from skills.robot import CameraCapabilities, Capabilities, Mount, Pose2D
 from skills.stack import DEFAULT_FILE, ControllerComponent, default_component
 
 
@@ -147,7 +147,14 @@ def abilities_of(kind: str) -> Abilities:
         {name: form.width_m[0] for name, form in class_forms().items()},
         math.inf if capabilities.gripper is None else capabilities.gripper.max_grasp_m,
         capabilities.gripper is not None and capabilities.arm is not None,
+        cameras={each.source: _height_m(each, capabilities) for each in capabilities.cameras},
     )
+
+
+def _height_m(camera: CameraCapabilities, capabilities: Capabilities) -> float:
+    """Height of a camera above the floor (m) while the robot stands; infinite for one on the hand or the head."""
+    fixed = camera.mount is Mount.BODY
+    return capabilities.standing_height_m + float(camera.X_FC.translation()[2]) if fixed else math.inf
 
 
 def reached_heights_m(capabilities: Capabilities) -> tuple[float, float]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from executive.mission.request import Request
+from executive.mission.request import TIME_LIMIT_S, Request
 from executive.tree.board import LastKnown
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills
@@ -16,6 +17,7 @@ from executive.words.mission import Mission
 from executive.words.steps import lines_of_steps
 from plant.robots.robot_kind import PlacedRobot
 from plant.worlds.world import World
+from skills.quantities import clock_s
 from skills.robot import Pose2D
 
 if TYPE_CHECKING:
@@ -69,6 +71,15 @@ class Prepared:
             self.request, name=tree.mission_name, commands=lines_of_steps(tree.steps), fingerprint=fingerprint
         )
         return replace(self, request=named, tree=tree)
+
+    @property
+    def time_limit_s(self) -> float:
+        """Time limit of the run (s): the given one, else `TIME_LIMIT_S` beyond the waits of which its missions tell."""
+        if self.request.time_limit_s is not None:
+            return self.request.time_limit_s
+        begin_s = clock_s(self.request.time_of_day or time.strftime("%H:%M"))
+        roots = (each.tree.root for each in self.all)
+        return TIME_LIMIT_S + max(root.behaviour.waiting_s(root, begin_s) for root in roots)
 
     @property
     def several(self) -> bool:

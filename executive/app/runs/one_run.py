@@ -20,7 +20,6 @@ from executive.app.runs.backend import Backend, Durable
 from executive.app.runs.goal_conditions import Share
 from executive.app.runs.signals import ended_by_signals
 from executive.app.runs.simulated import SimulatedBackend, compile_first
-from executive.mission.request import Request
 from executive.record.announce import announce, map_message
 from executive.record.event_log import EventLog
 from executive.record.history import Event, read_events
@@ -45,6 +44,7 @@ from skills.faults.faulty_robot import FaultyRobot, inject_faults, parse_fault
 from skills.inputs.errors import InputError, SpareFiles, shortage_of_files
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path
+from skills.quantities import clock_s
 from skills.robot import Pose2D, Robot
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def run_request(
 
     Raises InputError if the world or the stored state cannot be used.
     """
-    request, scenario, settings = prepared.request, prepared.request.scenario, _settings(prepared.request)
+    request, scenario, settings = prepared.request, prepared.request.scenario, _settings(prepared)
     out, world, kinds = request.out, prepared.world, {name: robot.kind for name, robot in prepared.robots.items()}
     backend, artifacts = backend or simulated_backend(prepared), Artifacts()
     entries = [entry_for(each, backend, durable) for each in prepared.all]
@@ -186,13 +186,11 @@ def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> 
     )
 
 
-def _settings(request: Request) -> RunSettings:
+def _settings(prepared: Prepared) -> RunSettings:
     """Returns the settings of a run: seed, time of day and time limit."""
-    usual = RunSettings(seed=request.seed)
-    limit_s = usual.time_limit_s if request.time_limit_s is None else request.time_limit_s
-    hours, minutes = map(int, (request.time_of_day or "0:0").split(":"))
-    time_s = None if request.time_of_day is None else 3600.0 * hours + 60.0 * minutes
-    return replace(usual, time_limit_s=limit_s, time_of_day_s=time_s)
+    request = prepared.request
+    time_s = None if request.time_of_day is None else clock_s(request.time_of_day)
+    return RunSettings(seed=request.seed, time_limit_s=prepared.time_limit_s, time_of_day_s=time_s)
 
 
 def log_name(start: int) -> str:

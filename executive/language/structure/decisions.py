@@ -35,7 +35,6 @@ from executive.language.structure.plain import (
 )
 from executive.language.structure.requests import Done, escape_braces, parse_speech, wait_steps
 from executive.words.command import Task
-from executive.words.condition import ValueIs
 from executive.words.leaf_steps import Awaited, Do, Speak, Wait, steps_of_commands
 from executive.words.step import OnFailure, Step
 from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, Try
@@ -340,7 +339,7 @@ class DecisionBuilder:
             return None
         if (time := parse_time(match["what"])) is not None:
             self.notes += time.notes(match["what"])
-            return Rounds(Loop(until=ValueIs(text=f'clock >= "{time.text}"'), every_s=every_s), state)
+            return Rounds(Loop(until_clock=time.text, every_s=every_s), state)
         try:
             supposed = parse_condition(match["what"], state, self.reader)
         except RefusalError:
@@ -396,7 +395,7 @@ class DecisionBuilder:
             raise RefusalError(f"{found.cue.lower()} what?", [found.cue])
         if found.kind is Cue.UNTIL and (time := parse_time(found.text)) is not None:
             self.notes += time.notes(found.text)
-            return Rounds(Loop(until=ValueIs(text=f'clock >= "{time.text}"')), row.state)
+            return Rounds(Loop(until_clock=time.text), row.state)
         _, state = type(self)(self.reader).sequence(scope, row.state)
         return replace(rounds_by(found.kind, parse_condition(found.text, state, self.reader)), state=row.state)
 

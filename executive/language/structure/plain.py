@@ -438,7 +438,9 @@ def merge_repeats(block: Repeat) -> Repeat:
         return block
     if outer.every_s is not None or outer.times is not None:
         raise RefusalError("an endless repetition cannot be repeated again; say how often", [])
-    loop = inner.loop.model_copy(update={"until": outer.until, "while_": outer.while_})
+    loop = inner.loop.model_copy(
+        update={"until": outer.until, "while_": outer.while_, "until_clock": outer.until_clock}
+    )
     return inner.model_copy(update={"loop": loop})
 
 

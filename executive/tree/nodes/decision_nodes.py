@@ -14,7 +14,7 @@ from py_trees.common import Status
 from executive.mission.certainty import refuse_certain
 from executive.tree.assembly import Assembler, Flow, StepPlans
 from executive.tree.behaviour import ExplainedDecorator, MemoryComposite, cause_of, message_of
-from executive.tree.context import RunContext
+from executive.tree.context import DAY_S, RunContext
 from executive.tree.goals import command_goal, door_goal
 from executive.tree.node import NodeSpec
 from executive.tree.nodes import guard
@@ -39,7 +39,6 @@ from executive.words.expression import ExpressionError, Kind, Value
 from skills.api import Cause, Failed
 from skills.inputs.errors import InputError
 
-DAY_S: Final = 86_400.0
 Keys = Mapping[str, str]
 """Blackboard keys by the names in expressions."""
 

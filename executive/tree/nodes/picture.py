@@ -76,13 +76,14 @@ def _picture_plan(_: Assembler, step: Picture, builder: PlanBuilder) -> Assemble
         facts = knowledge.surfaces[place]
         point, at = (*np.mean(facts.polygon, axis=0).tolist(), facts.height), subject.at
         views = facts.viewpoints if at is None else (knowledge.place_pose(at),)
-        node = _from_views(builder, subject, point, [each.pose_2d() for each in views])
+        node = _from_views(builder, subject, point, [each.pose_2d() for each in views], top=True)
         goal = _shows(place, point)
     else:
         pose, shows = knowledge.place_pose(subject.at or place), knowledge.places[place].shows
         point = shows or _ahead(pose.pose_2d())
         near = () if shows else (square_region(place, pose, POSE_NEAR_M + _ARM_M),)
-        node, goal = _from_views(builder, subject, point, (pose.pose_2d(),)), replace(_shows(place, point), source=near)
+        node = _from_views(builder, subject, point, (pose.pose_2d(),), ahead=shows is None)
+        goal = replace(_shows(place, point), source=near)
     node = builder.at("tidy").stow_after(node)
     return Assembled((node,), (StepPart(builder.path_id, goal=goal, node=node.path_id),))
 
@@ -104,23 +105,26 @@ def _of_room(builder: PlanBuilder, subject: Subject, room: str) -> tuple[NodeSpe
     for number, turn_rad in enumerate(_TURNS_RAD, start=1):
         view = compose(builder.knowledge.place_pose(at).pose_2d(), Pose2D(0.0, 0.0, turn_rad))
         title, below = f"{room} ({number} of {len(_TURNS_RAD)})", builder.at(f"view-{number}")
-        views.append(_from_views(below, subject.model_copy(update={"at": at}), _ahead(view), (view,), title))
+        views.append(
+            _from_views(below, subject.model_copy(update={"at": at}), _ahead(view), (view,), title, ahead=True)
+        )
     outline = Region(room, builder.knowledge.rooms[builder.knowledge.room(at)])
     return builder.sequence(f"look around in the {room}", *views), replace(_PICTURED, source=(outline,), count=4)
 
 
 def _from_views(
-    builder: PlanBuilder, subject: Subject, point_W: Point, views: Sequence[Pose2D], title: str = ""
+    builder: PlanBuilder, subject: Subject, point_W: Point, views: Sequence[Pose2D], title: str = "", **kind: bool
 ) -> NodeSpec:
     """Takes a picture of a point from the first of some poses that can be reached and sees it.
 
-    At each pose the body turns until a named camera sees the point. A picture with a title needs no exact pose.
+    At each pose the body turns until a named camera sees the point. A picture with a title needs no exact pose. `kind`
+    is what the point is, as inputs of the skill.
     """
     what, nodes = title or subject.of, list[NodeSpec]()
     for number, (view, turn_rad) in enumerate(product(views, _TURNS_RAD if subject.camera else (0.0,)), start=1):
         below, pose = builder.at(f"view-{number}"), compose(view, Pose2D(0.0, 0.0, turn_rad))
         drive = below.navigate(pose, f"the {subject.at or subject.of}", exactly=not title)
-        shot = _shot(below, subject, title, point_W=point_W)
+        shot = _shot(below, subject, title, point_W=point_W, **kind)
         nodes.append(below.sequence(f"take a picture of the {what}, view {number}", drive, shot))
     return builder.first_of(f"a picture of the {what}", *nodes) if len(nodes) > 1 else nodes[0]
 

@@ -12,6 +12,7 @@ from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.board import Board
+from executive.tree.context import DAY_S, RunContext, time_ahead_s
 from executive.tree.estimate import Estimate, Walk
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import Decide, decide_plan
@@ -22,7 +23,7 @@ from executive.words.leaf_steps import CallSkill, Check, Do, Say, Set
 from executive.words.step import Step
 from skills.api import Cause
 from skills.inputs.errors import InputError, count_text
-from skills.robot import Clock
+from skills.quantities import clock_s
 
 
 class Repeat(MemoryComposite):
@@ -41,6 +42,7 @@ class Repeat(MemoryComposite):
     | `until`: false after `times` rounds | SUCCESS | FAILURE with POSTCONDITION |
     | `while`: true after `times` rounds | idle | FAILURE with POSTCONDITION |
     | none (mode `times`) | SUCCESS | RUNNING until the next round; SUCCESS after `times` rounds |
+    | none, before a round at `until_clock_s` or later | idle | SUCCESS; FAILURE with PRECONDITION before the first |
     | halted | halted | INVALID with CANCELLED |
 
     A round begins in the tick after the previous round ended, at the earliest `every_s` after the previous round began.
@@ -56,10 +58,12 @@ class Repeat(MemoryComposite):
     key: str = ""
     times: int | None = None
     every_s: float = 0.0
+    until_clock_s: float | None = None
     board: Board
-    clock: Clock
+    context: RunContext
     _phase: Literal["start", "before", "body", "after"] = field(default="start", init=False)
     _due_s: float = field(default=0.0, init=False)
+    _end_s: float = field(default=math.inf, init=False)
 
     @classmethod
     def _repeated(cls, node: NodeSpec, walk: Walk, first: bool, begun: Estimate, times: int) -> Estimate:
@@ -80,6 +84,8 @@ class Repeat(MemoryComposite):
         if fixed and times:
             return cls._repeated(node, walk, first, begun, times)
         if not times:
+            if node.options["until_clock_s"] is not None:
+                return begun.up_to(DAY_S, f"until {node.options['words']}")
             endless = "for ever" if fixed else f"{node.options['mode']} {node.options['words']}"
             return begun.up_to(math.inf, endless)
         if times == 1:
@@ -89,13 +95,28 @@ class Repeat(MemoryComposite):
         walk.go_to(here)
         return begun.up_to(most_s, f"1 to {times} rounds")
 
+    @classmethod
+    def waiting_s(cls, node: NodeSpec, now_s: float) -> float:
+        """Returns the time of all rounds, or until the time of day at which they end."""
+        round_s, options = super().waiting_s(node, now_s), node.options
+        if options["until_clock_s"] is not None:
+            return max(round_s, time_ahead_s(options["until_clock_s"], now_s))
+        return round_s + ((options["times"] or 1) - 1) * max(round_s, float(options["every_s"]))
+
     def _tick(self) -> Iterator[Behaviour]:
         """Begins a round, decides, or ticks the body."""
         if self.status != Status.RUNNING:
             self._restart()
         if self._phase == "start":
-            if self.clock.now() < self._due_s - 1e-9:
-                self._go_on(f"{self._report()}; the next in {self._due_s - self.clock.now():.0f} s")
+            now_s = self.context.clock.now() + 1e-9
+            if now_s >= self._end_s:
+                past = None if self.rounds else Cause.PRECONDITION
+                self._end(past, self._report() if self.rounds else f"no round is made: it is past {self.words}")
+            elif now_s < self._due_s:
+                last = self._due_s >= self._end_s
+                then = f"waits until {self.words}" if last else f"the next in {self._due_s - now_s:.0f} s"
+                self._go_on(f"{self._report()}; {then}")
+            if now_s >= self._end_s or now_s < self._due_s:
                 yield self
                 return
             self._reset_children()
@@ -111,11 +132,13 @@ class Repeat(MemoryComposite):
     def _restart(self) -> None:
         goes_on = self.resumed and self.count in self.board
         super()._restart()
+        if self.until_clock_s is not None:
+            self._end_s = self.context.clock.now() + self.context.ahead_s(self.until_clock_s)
         if goes_on:
             self._enter_round()
             return
         self.board.put(self.count, 0)
-        self._phase, self._due_s = "start", self.clock.now()
+        self._phase, self._due_s = "start", self.context.clock.now()
         if len(self.children) == 2 and isinstance(self.children[0], Decide):
             self.children[0].view.forget_presses()
 
@@ -126,7 +149,7 @@ class Repeat(MemoryComposite):
 
     def _enter_round(self) -> None:
         self._phase = "before" if self.mode == "while" else "body"
-        self._due_s = self.clock.now() + self.every_s
+        self._due_s = self.context.clock.now() + self.every_s
 
     def _judged(self, child: Behaviour) -> bool:
         """Handles the child's status; returns False when another child is ticked in the same tick."""
@@ -192,8 +215,9 @@ def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> As
         assembler.flow.join([before, assembler.flow.copy()])
     elif assembler.flow.held != before.held:
         assembler.flow.held = held_after_either(before.held, assembler.flow.held)
-    words = "" if condition is None else str(condition)
-    often = f"{mode} {words}" if condition is not None else f"{rounds.times} times" if rounds.times else "for ever"
+    words = rounds.until_clock or ("" if condition is None else str(condition))
+    often = f"{rounds.times} times" if rounds.times else "for ever"
+    often = f"{'until' if rounds.until_clock else mode} {words}" if words else often
     every = f", every {rounds.every_s:g} s" if rounds.every_s else ""
     node = builder.node(
         "repeat",
@@ -206,6 +230,7 @@ def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> As
         key=key,
         times=rounds.times,
         every_s=rounds.every_s or 0.0,
+        until_clock_s=rounds.until_clock and clock_s(rounds.until_clock),
     )
     return Assembled((node,), (*parts, *body.parts))
 

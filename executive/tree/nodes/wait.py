@@ -8,12 +8,13 @@ from py_trees.common import Status
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import ExplainedDecorator, ExplainedLeaf
 from executive.tree.board import Board
-from executive.tree.context import RunContext
+from executive.tree.context import DAY_S, RunContext, time_ahead_s
 from executive.tree.estimate import Estimate, Walk
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.decision_nodes import DAY_S, Decide, decide_plan
+from executive.tree.nodes.decision_nodes import Decide, decide_plan
 from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import leaf_steps as model
+from skills.quantities import clock_s
 from skills.robot import Clock
 
 
@@ -28,6 +29,11 @@ class Pause(ExplainedLeaf):
     def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
         """Estimates the pause."""
         return Estimate(node.options["duration_s"])
+
+    @classmethod
+    def waiting_s(cls, node: NodeSpec, now_s: float) -> float:
+        """Returns the duration of the pause."""
+        return float(node.options["duration_s"])
 
     def initialise(self) -> None:
         """Starts to count the duration."""
@@ -104,11 +110,14 @@ class WaitUntilClock(ExplainedLeaf):
         """Estimates a wait of at most a day."""
         return Estimate().up_to(DAY_S, f"until {node.options['words']}")
 
+    @classmethod
+    def waiting_s(cls, node: NodeSpec, now_s: float) -> float:
+        """Returns the time until the time of day."""
+        return time_ahead_s(node.options["time_s"], now_s)
+
     def initialise(self) -> None:
         """Computes when the wait ends."""
-        now_s = self.context.clock.now()
-        ahead_s = (self.time_s - self.context.day_began_s - now_s) % DAY_S
-        self._end_s = now_s + ahead_s if ahead_s <= DAY_S / 2 else now_s
+        self._end_s = self.context.clock.now() + self.context.ahead_s(self.time_s)
 
     def update(self) -> Status:
         """Returns SUCCESS once the time has come."""
@@ -121,7 +130,7 @@ def _plan(assembler: Assembler, block: model.Wait, builder: PlanBuilder) -> Asse
     if awaited.seconds is not None:
         return Assembled((builder.pause("wait", f"wait {awaited.seconds:g} s", awaited.seconds),))
     if awaited.until_clock is not None:
-        time_s, words = awaited.until_clock_s, awaited.until_clock
+        time_s, words = clock_s(awaited.until_clock), awaited.until_clock
         return Assembled((builder.node("wait until", f"wait until {words}", time_s=time_s, words=words),))
     assert awaited.condition is not None
     decide, key, parts = decide_plan(assembler.flow, awaited.condition, builder.at("for"))

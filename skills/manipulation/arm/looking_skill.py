@@ -176,8 +176,8 @@ def head_angles(head: HeadCapabilities, camera: CameraCapabilities, p_BT: FloatA
         pan_rad, tilt_rad = pan_rad - math.atan2(x, max(z, _NEAREST_M)), tilt_rad + math.atan2(y, max(z, _NEAREST_M))
     most_rad = _OFF_AXIS_RAD if camera.mount is Mount.HEAD else _IN_VIEW_RAD
     if off_rad > most_rad or math.hypot(x, y, z) < _NEAREST_M:
-        who = f"the {camera.mount.value}" if camera.mount is Mount.HEAD else "the camera of the body"
-        raise PlanningError(f"{who} does not turn to the point {np.round(p_BT, 2).tolist()} of the body")
+        blind = "the head does not turn far enough to see it" if camera.mount is Mount.HEAD else ""
+        raise PlanningError(blind or f"it is outside of the view of the {camera.source} camera")
     return _within(pan_rad, head.pan_range_rad), _within(tilt_rad, head.tilt_range_rad)
 
 

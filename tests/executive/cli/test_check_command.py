@@ -158,6 +158,14 @@ def test_a_range_of_time_is_printed_with_its_reason_and_stands_in_the_json(write
     assert "0 s to 24 h 00 min (until 18:00)" in " ".join(check(file).stdout.split())
 
 
+def test_check_says_when_the_time_limit_ends_a_run(write):
+    endless = write('name: endless\nworld: flat\nsteps:\n  - repeat: {every: "10 min"}\n    steps: [dock]\n')
+    told = " ".join(check(endless).stdout.split())
+    assert "a run ends after 20 min 00 s at the latest, unless --time-limit says otherwise" in told
+    assert json_of(check(endless, "--json"))["estimates"][0]["time_limit_s"] == 1200.0
+    assert "at the latest" not in check(GOOD).stdout
+
+
 # The steps of `else` -> the least and the most that it may take (s)
 @pytest.mark.parametrize(("otherwise", "least_s", "most_s"), [("", 0, 60), ("else: [{wait: {seconds: 15}}]", 15, 60)])
 def test_an_if_takes_as_long_as_one_of_its_branches(write, otherwise, least_s, most_s):

@@ -6,6 +6,7 @@ import re
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
 from executive.words.leaf_steps import Check, Do, Dock, OpenDoor, Picture, Speak, Wait
 from executive.words.steps import Ask, Choose, Group, Repeat, Together, Try
+from skills.quantities import clock_s
 
 
 def noted(steps):
@@ -76,14 +77,15 @@ def _rounds(step):
     every = "" if loop.every_s is None else f" every {_number(loop.every_s)} s"
     while_ = "" if loop.while_ is None else f" while ({_condition(loop.while_)})"
     until = "" if loop.until is None else f" until ({_condition(loop.until)})"
-    return f"{times}{every}{while_}{until}"
+    clock = "" if loop.until_clock is None else f" until {loop.until_clock}"
+    return f"{times}{every}{while_}{until}{clock}"
 
 
 def _awaited(step):
     awaited = step.awaited
     condition = "" if awaited.condition is None else f" for ({_condition(awaited.condition)})"
     seconds = "" if awaited.seconds is None else f" {_number(awaited.seconds)} s"
-    clock = "" if awaited.until_clock is None else f" until {_number(awaited.until_clock_s)} s"
+    clock = "" if awaited.until_clock is None else f" until {_number(clock_s(awaited.until_clock))} s"
     return f"{condition}{seconds}{clock}"
 
 

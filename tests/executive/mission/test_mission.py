@@ -126,6 +126,12 @@ def test_commands_become_a_mission_named_for_the_first():
     assert Mission.from_steps(steps_of_commands([command]), world="flat", robot="Alice").name == "do hall"
 
 
+def test_a_mission_of_several_commands_alike_is_named_after_the_first_with_their_number():
+    rooms = [Command(goal=goal, verb="visit") for goal in ("hall", "kitchen", "office")]
+    assert Mission.from_steps(steps_of_commands(rooms), world="flat", robot="Alice").name == "visit hall and 2 more"
+    assert Mission.from_steps(steps_of_commands(rooms[:2]), world="flat", robot="Alice").name == "visit hall"
+
+
 @pytest.mark.parametrize("sentence", [STRUCTURED, "fetch me a drink"])
 def test_steps_of_a_sentence_survive_their_text_form(spoken, sentence):
     lines = lines_of_steps(spoken(sentence).steps)

@@ -11,7 +11,7 @@ from executive.tree.compiler import compile_mission
 from executive.tree.estimate import Route, load_estimates
 from executive.words.command import parse_command
 from executive.words.condition import Look
-from executive.words.leaf_steps import Awaited, CallSkill, Do, Wait
+from executive.words.leaf_steps import Awaited, CallSkill, Do, Picture, Subject, Wait
 from executive.words.mission import Mission
 from executive.words.step import Place, Policy
 from executive.words.steps import Group, Loop, Repeat, Together
@@ -58,7 +58,7 @@ def check(knowledge, registry, tmp_path):
         for line, one in enumerate(steps, start=1):
             place = Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=line), ())
             step = Do.from_command(parse_command(one)) if isinstance(one, str) else one
-            made.append(step.with_place(place) if isinstance(step, Do | CallSkill) else step)
+            made.append(step.with_place(place) if isinstance(step, Do | CallSkill | Picture) else step)
         mission = Mission(name="m", robot="Alice", steps=tuple(made))
         tree = compile_mission(mission, knowledge=knowledge, registry=registry)
         return check_tree(
@@ -246,9 +246,16 @@ def test_the_held_object_is_followed_step_by_step(check, steps, lines):
 DRIVE = CallSkill(skill="navigate", values={"x": 3.0, "y": 0.0})
 FROM_SHELF = "Take [Nothing] to [shelf] and do [grasp] to [coke]"
 TO_SHELF, TO_ROBIN, TO_START, TO_BEDROOM = (BRING.format("coke", to) for to in ("shelf", "Robin", "start", "bedroom"))
+POINTED = CallSkill(skill="take_picture", values={"of": "it", "camera": "tail"})
+CAMERAS = {"cameras": {"hand": math.inf, "left": 0.56, "high": 1.2}}
 NARROW = {"widths_m": {"coke": 0.05, "beer": 0.1}, "opens_m": 0.09}
 NO_ROBIN = "Robin is not in this world, or takes nothing"
 NO_HANDS, HIGH = "this kind of robot has no gripper", "the shelf is 1 m high, and the arm reaches"
+
+
+def shot(camera):
+    """A picture of the shelf, 1 m high, by a camera."""
+    return Picture(subject=Subject(of="shelf", camera=camera))
 
 
 # steps, abilities; line, message and hint of the error
@@ -268,6 +275,10 @@ NO_HANDS, HIGH = "this kind of robot has no gripper", "the shelf is 1 m high, an
         ((TAKE_COKE, TO_ROBIN), {"takers": {"Anna"}}, 2, f"{NO_ROBIN}, so nobody takes the coke", "name Anna"),
         ((GO.format("kitchen"), TAKE_COKE), {"gripper": False}, 2, f"{NO_HANDS} to take the coke with", ""),
         ((DRIVE, DROPPED), {"gripper": False}, 2, f"{NO_HANDS}, which place needs", ""),
+        ((DRIVE, shot("tail")), CAMERAS, 2, "the robot has no camera 'tail'", "hand, left"),
+        ((shot("Left"),), CAMERAS, 1, "the left camera, 0.56 m high, does not see a top 1 m high", "higher"),
+        ((POINTED,), CAMERAS, 1, "the robot has no camera 'tail'", "hand, left"),
+        ((shot("hand"),), {}, 1, "the robot has no camera 'hand'", "another kind of robot"),
     ],
 )
 def test_a_step_that_the_robot_or_the_world_does_not_allow_is_refused(check, steps, abilities, line, message, hint):
@@ -286,6 +297,8 @@ def test_a_step_that_the_robot_or_the_world_does_not_allow_is_refused(check, ste
         ((TAKE_COKE, TO_SHELF), {"reaches_m": (0.0, 1.6)}),
         ((TAKE_COKE, TO_BEDROOM), {"takers": set()}),
         ((TAKE_COKE, TO_ROBIN), {"takers": {"Robin"}}),
+        ((shot("hand"),), CAMERAS),
+        ((shot("high"),), CAMERAS),
     ],
 )
 def test_a_step_that_needs_no_more_than_there_is_is_taken(check, steps, abilities):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from executive.testing.bench import SkillBench
@@ -94,3 +95,40 @@ def test_a_picture_that_by_the_confirmed_pose_does_not_show_the_point_is_not_cla
     run, pictures = pictured_by(SlippedPlace(None, run.time_s - 0.05))
     assert (run.cause, pictures) == (Cause.POSTCONDITION, [])
     assert "the thing is not in the picture" in run.message
+
+
+def pictured_before(wall_m, point_W=(1.4, 0.0, 0.75), **inputs):
+    """Result of the skill with a wall `wall_m` before the camera everywhere in the depth (0: unknown)."""
+    bench, _ = bench_of_setup(SPOT_CAPABILITIES, RobotSetup(pose=PoseSetup(x=0.45)), WorldSetup())
+    image = bench.robot.image
+    bench.robot.image = lambda *which, **how: (lambda one: replace(one, depth_m=np.full_like(one.depth_m, wall_m)))(
+        image(*which, **how)
+    )
+    run = bench.run(TakePicture, TakePictureInputs("the thing", point_W, **inputs))
+    return run, [message for topic, message in bench.published if topic == PICTURES]
+
+
+def test_what_stands_before_the_point_in_the_same_picture_is_no_picture_of_it():
+    run, pictures = pictured_before(0.2)
+    assert (run.cause, pictures) == (Cause.POSTCONDITION, [])
+    assert "before it hides it" in run.message
+
+
+def test_a_point_without_depth_around_it_is_not_claimed():
+    run, pictures = pictured_before(0.0)
+    assert (run.cause, pictures) == (Cause.POSTCONDITION, [])
+    assert "no depth shows whether something hides it" in run.message
+
+
+def test_a_picture_of_what_is_ahead_shows_what_stands_there():
+    run, pictures = pictured_before(0.2, ahead=True)
+    assert (run.outcome, len(pictures)) == ("success", 1)
+
+
+def test_a_camera_below_the_top_of_a_surface_takes_no_picture_of_it():
+    run, pictures = picture_of((0.45, 1.2, 0.75), "left", BLIND)
+    assert len(pictures) == 1  # of a thing at this point
+    bench, _ = bench_of_setup(BLIND, RobotSetup(pose=PoseSetup(x=0.45)), WorldSetup())
+    run = bench.run(TakePicture, TakePictureInputs("the table", (0.45, 1.2, 0.75), camera="left", top=True))
+    assert (run.cause, run.message.split(": ")[1].startswith("the left camera, 0.")) == (Cause.PLANNING, True)
+    assert "does not see a top 0.75 m high" in run.message

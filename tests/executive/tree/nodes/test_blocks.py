@@ -12,7 +12,7 @@ from executive.tree.nodes.guard import Guard
 from executive.tree.nodes.policies import Retry, Skip, Timeout
 from executive.tree.nodes.repeat import Repeat
 from skills.api import Cause, Failed
-from tests.executive.tree.scripted import Leaf, N, R, S, Switch, play, tick
+from tests.executive.tree.scripted import F, Leaf, N, R, S, Switch, play, tick
 
 KEY, COUNT = "alice/decided", "alice/rounds"
 CANCELLED, ERROR, EXECUTION, POSTCONDITION = Cause.CANCELLED, Cause.ERROR, Cause.EXECUTION, Cause.POSTCONDITION
@@ -81,19 +81,20 @@ def test_choose_keeps_its_branch_over_a_suspension_whatever_would_be_decided_now
     assert log == ["+decide", "+then", "~then"]
 
 
-def repeat(context, mode, body, decide=None, times=None, every_s=0.0):
+def repeat(context, mode, body, decide=None, times=None, every_s=0.0, until_clock_s=None):
     return Repeat(
         path_id="alice/repeat",
         name="repeat",
         children=[body] if decide is None else [decide, body],
         mode=mode,
-        words="it is so",
+        words="it is so" if until_clock_s is None else "the hour",
         count=COUNT,
         key="" if decide is None else KEY,
         times=times,
         every_s=every_s,
+        until_clock_s=until_clock_s,
         board=context.board,
-        clock=context.clock,
+        context=context,
     )
 
 
@@ -144,6 +145,31 @@ def test_a_round_begins_so_long_after_the_one_before_began(context, clock, leaf,
         begun += [(clock.now(), log.pop())] if log else []
         clock.advance(1.0)
     assert begun == [(begin_s, "+body") for begin_s in begins_s]
+
+
+# now (h)  until (h)  rounds begin at (s)             end (s)  status
+UNTIL_CLOCK = [
+    (17.5, 18.0, [0.0, 600.0, 1200.0], 1800.0, S),  # none begins at 18:00
+    (17.9, 18.0, [0.0], 360.0, S),  # the pause ends at 18:00
+    (18.0, 18.0, [], 0.0, F),
+    (19.0, 18.0, [], 0.0, F),
+    (23.9, 0.1, [0.0, 600.0], 720.0, S),  # over midnight
+]
+
+
+@pytest.mark.parametrize(("now_h", "until_h", "begins_s", "end_s", "status"), UNTIL_CLOCK)
+def test_rounds_begin_until_a_time_of_day(context, clock, leaf, log, now_h, until_h, begins_s, end_s, status):
+    context = replace(context, day_began_s=now_h * 3600.0 - clock.now())
+    root = repeat(context, "times", leaf("RS" * 9, "body"), every_s=600.0, until_clock_s=until_h * 3600.0)
+    begun, start_s = [], clock.now()
+    root.tick_once()
+    while root.status == R:
+        begun += [clock.now() - start_s] if log else []
+        log.clear()
+        clock.advance(60.0)
+        root.tick_once()
+    assert (begun, clock.now() - start_s, root.status) == (begins_s, end_s, status)
+    assert "it is past the hour" in root.message if status == F else f"{len(begun)} round" in root.message
 
 
 def test_repeat_cancelled_between_two_rounds(context, leaf, log):

@@ -10,6 +10,7 @@ import pytest
 from tiny_detector import picture_of, write_model
 
 from tests.executive.cli.calls import errand, json_of
+from tests.skills.exported_networks import mean_colour
 
 HAMMER = ("hammer", 0.9, (100, 50, 200, 80))
 BEER = ("beer", 0.6, (0, 0, 50, 50))
@@ -111,3 +112,14 @@ def test_all_other_commands_are_there_too(tmp_path):
     run = subprocess.run([sys.executable, "-m", "executive.cli", "--help"], capture_output=True, text=True, check=True)
     for name in ("detect", "parse", "run"):
         assert f" {name} " in run.stdout
+
+
+def test_an_exported_network_and_a_stack_file_that_names_it_are_taken(tmp_path):
+    mean_colour(tmp_path / "own.onnx")
+    (tmp_path / "stack.yaml").write_text("detector: {use: onnx, file: own.onnx, classes: {red: beer}}\n")
+    red = tmp_path / "red.png"
+    cv2.imwrite(str(red), np.full((64, 64, 3), (0, 0, 255), np.uint8))
+    for model, name in (("own.onnx", "red"), ("stack.yaml", "beer")):
+        result = errand("detect", "--model", tmp_path / model, red, "--json")
+        (found,) = json_of(result)
+        assert [one["class"] for one in found["detections"]] == [name]

@@ -45,7 +45,7 @@ def check(
     with progress_bar(console, "files", len(missions)) as advance:
         checked = [_check(checker, each, context, advance) for each in missions]
     for one in () if as_json else checked:
-        _show(one, request.sentence or str(one.file), console_for(as_json=False), verbose=verbose)
+        _show(one, str(one.file or request.sentence or "--say ''"), console_for(as_json=False), verbose=verbose)
     finish(to_json(checked), as_json, good=all(one.ok for one in checked), otherwise=BAD_INPUT)
 
 

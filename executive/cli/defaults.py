@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from skills.inputs.errors import InputError, suggestion
-from skills.inputs.outside import read_text
+from skills.inputs.outside import is_there, read_text
 
 if TYPE_CHECKING:
     from executive.mission.request import Request
@@ -54,11 +54,13 @@ def runs_folder() -> Path:
     return Path(default_map(Path()).get("run", {}).get("out", "out"))
 
 
-def last_run() -> Path:
-    """Returns the link to the last run, which may be missing. Raises InputError."""
+def chosen_run(run: Path | None) -> Path:
+    """Returns the folder or file of a run, by default the link to the last run. Raises InputError if it is missing."""
     from executive.app.runs.folders import LAST
 
-    return runs_folder() / LAST
+    if not is_there(path := run or runs_folder() / LAST):
+        raise InputError("there is no run, or it is removed", hint="name one that `errand runs` lists", file=path)
+    return path
 
 
 def _nearest(folder: Path) -> tuple[Path, Mapping[str, Any]]:

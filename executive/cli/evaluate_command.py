@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from executive.cli.defaults import last_run, typed_options, yielding
+from executive.cli.defaults import chosen_run, typed_options, yielding
 from executive.cli.number_options import quantity_option
 from executive.cli.options import ANYWAY, AS_JSON, REQUEST_OPTIONS, takes_request
 from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer
@@ -163,16 +163,10 @@ def _seed_row(case: Case) -> tuple[str, ...]:
     from executive.app.report.run_report import VERDICTS
 
     report, seen = case.report, case.report.seen
-    return (
-        str(report.seed),
-        report.outcome,
-        VERDICTS[seen.success],
-        str(seen.collisions),
-        str(seen.drops),
-        f"{report.sim_time_s:.1f}",
-        f"{report.real_time_factor:.1f}",
-        report.message if seen.success else f"{report.message} / {seen.why}",
-    )
+    counts = (str(seen.collisions), str(seen.drops))
+    times = (f"{report.sim_time_s:.1f}", f"{report.real_time_factor:.1f}")
+    message = report.message if seen.success else f"{report.message} / {seen.why}"
+    return str(report.seed), report.outcome, VERDICTS[seen.success], *counts, *times, message
 
 
 def _show(evaluation: Evaluation, found: Results, console: Console) -> dict[str, Any]:
@@ -209,15 +203,8 @@ def _show_cases(console: Console, found: Results) -> None:
     rows = standing_rows(found.cases)
     show_table(console, ("claim against verdict", "runs", "share", "95 %", "causes"), map(_standing_row, rows))
     inspected = [
-        (
-            each.label,
-            each.report.world,
-            str(each.run.request.seed),
-            each.asked,
-            each.why,
-            str(found.log_folder(each) or ""),
-        )
-        for each in cases_to_inspect(found.cases)
+        (one.label, one.report.world, str(one.run.request.seed), one.asked, one.why, str(found.log_folder(one) or ""))
+        for one in cases_to_inspect(found.cases)
     ]
     if inspected:
         console.print()
@@ -252,10 +239,15 @@ def report(
 
     Of an evaluation: success rates, causes, run time by skill, and each failure.
     """
-    if run is None or is_folder(run):
+    if run is None or run.suffix != ".sqlite":
+        run = chosen_run(run)
+    if run.suffix == ".html":
+        raise InputError("it is a page", hint="open it in a browser, or name the folder of its run", file=run)
+    run = run.parent if run.suffix == ".mcap" else run
+    if is_folder(run):
         if out is not None or against is not None:
             raise InputError("--out and --against are for an evaluation", hint="name its results.sqlite")
-        _open_report(run or last_run(), as_json=as_json)
+        _open_report(run, as_json=as_json)
         return
     from executive.app.evaluate.results import ResultsFile
     from executive.app.evaluate.summary import summary_json, to_page

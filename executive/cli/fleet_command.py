@@ -15,9 +15,8 @@ from executive.cli.options import AS_JSON, FOXGLOVE, HOST, PORT, QUIET, VIEW, St
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, progress_bar, show_table
 from executive.mission.request import Request
 from executive.store.missions import STORE, GivenMissions, MissionState, MissionStore, StoredMission, store_in
-from executive.words.robot_config import named_robot
 from skills.inputs.errors import InputError
-from skills.inputs.outside import is_folder
+from skills.inputs.outside import is_folder, is_there
 
 fleet = typer.Typer(
     name="fleet", help="Run the queued missions with several robots.", no_args_is_help=True, rich_markup_mode=None
@@ -44,13 +43,14 @@ def run(
     A fault is for the robot that it names ("bob: robot dies at 20 s"), else for all robots.
     """
     console = console_for(as_json)
+    from executive.view.foxglove import serve_live
+
     store, tell = _store(queue), plain_lines(console)
-    with MissionStore(store, create=False) as missions, missions.claim():
+    with MissionStore(store, create=False) as missions, missions.claim(), serve_live(foxglove, tell) as live:
         from executive.app.fleet.dispatch import silence
         from executive.app.fleet.fleet_run import run_fleet, simulated_fleet
         from executive.app.runs.folders import new_run
         from executive.app.runs.page_view import PageView, queue_function
-        from executive.view.foxglove import serve_live
 
         if not request.robots:
             raise InputError("a fleet needs its robots", hint="name them, as in --robots alice=spot,bob=spot")
@@ -67,17 +67,18 @@ def run(
             record=request.record,
         )
         beside = store.parents[store.parent.name == STORE.parent.name]  # not in the hidden folder
-        asked = replace(request, name="fleet", out=out or beside)
-        kept = new_run(asked, missions.now())
+        kept = new_run(replace(request, name="fleet", out=out or beside), missions.now())
         first = next(iter(next(iter(dispatch.missions.values())).options.values()))
         later = queue_function(replace(first.request, robots=request.robots), dispatch.add)
         page = PageView(None, tell, address=(view_host, view_port), later=later) if view is not None else None
         run_in = partial(run_fleet, dispatch, out=kept.request.out, seed=request.seed, first=first, page=page)
-        with serve_live(foxglove, tell) as live, progress_bar(console, "missions", len(dispatch.missions)) as ended:
+        with progress_bar(console, "missions", len(dispatch.missions)) as ended:
             verdict = run_in(live=live, ended=ended, time_limit_s=request.time_limit_s)
         results = dispatch.rows
         left = resumable_lines(missions, queue)
-    kept.end({"outcome": "success" if verdict.good else "failure", "message": verdict.word, "missions": results})
+    seen = {each["referee"]["success"] for each in results if each["referee"] is not None}
+    ending = {"outcome": "success" if verdict.good else "failure", "message": verdict.word, "missions": results}
+    kept.end({**ending, "referee": {"success": False not in seen and (True in seen or None)}})
     for line in (verdict.word, *left, f"Written to {kept.request.out}"):
         console.print(line, markup=False)
     if as_json:
@@ -102,7 +103,10 @@ def status(queue: Queue, as_json: AS_JSON = False) -> None:
 
 
 def _store(queue: Path) -> Path:
-    return store_in(queue) if is_folder(queue) else queue
+    store = store_in(queue) if is_folder(queue) else queue
+    if not is_there(store):
+        raise InputError("there is no queue", hint="name the folder that `errand queue add` writes to", file=queue)
+    return store
 
 
 def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
@@ -151,15 +155,11 @@ def resumable_lines(missions: MissionStore, queue: Path | None = None) -> Sequen
 
 def _faults(words: Sequence[str], robots: Sequence[str]) -> Mapping[str, Sequence[str]]:
     """Returns the faults for each robot. Raises InputError for words that describe no fault."""
-    from skills.faults.faulty_robot import parse_fault
+    from executive.app.prepare.scenarios import check_fault
 
     faults: dict[str, list[str]] = {name: [] for name in robots}
     for each in words:
-        named, said = named_robot(each, robots)
-        try:
-            parse_fault(said)
-        except ValueError as error:
-            raise InputError(f"--fault {each[:60]}: {error}") from error
+        named, said = check_fault(each, robots)
         for name in robots if named is None else (named,):
             faults[name].append(said)
     return faults

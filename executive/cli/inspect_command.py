@@ -14,7 +14,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from executive.cli.defaults import last_run
+from executive.cli.defaults import chosen_run
 from executive.cli.number_options import quantity_option
 from executive.cli.options import HOST, PORT, takes_request
 from executive.cli.output import console_for, show_table, terminal_answerer
@@ -44,8 +44,10 @@ def log(
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes, and ticks that took too long.")] = False,
 ) -> None:
     """Prints the timeline of a run: nodes with causes, detections, outcome, tracebacks of defects."""
-    history = _history(run)
+    history = _history(run, at if out is not None else None)
     history = history if robot is None else history.of_robot(robot)
+    if out is None and at < math.inf:
+        raise InputError("--at is for --format map", hint="name a picture: --format map --out map.png")
     if (form == "text") != (out is None):
         what = "--out is for --format map" if out is not None else "--format map writes a file"
         raise InputError(what, hint="name both: --format map --out map.png")
@@ -94,12 +96,13 @@ def _row(entry: Entry, prefix: str) -> tuple[str | Text, ...]:
     return f"{entry.t:.2f}", symbol, Text(printable(about)), Text(printable(entry.text), style=style.rich)
 
 
-def _history(run: Path | None) -> History:
-    """Returns the history of a run, by default of the last one. Raises InputError."""
-    last = last_run()
-    if run is None and not last.exists():
-        raise InputError("no run has written there yet", hint="name a run's folder, or its log.mcap", file=last)
-    return read_history(run or last)
+def _history(run: Path | None, at_s: float | None = None) -> History:
+    """Returns the history of a run, by default of the last one. Raises InputError, also for a time after its end."""
+    history = read_history(chosen_run(run))
+    end_s = max((event.stamp_s for event in history.events), default=0.0)
+    if at_s is not None and end_s < at_s < math.inf:
+        raise InputError(f"--at {at_s:g} is after the end", hint=f"give at most {end_s:.2f}", file=history.file)
+    return history
 
 
 def replay(
@@ -118,6 +121,8 @@ def replay(
     beside = history.file.parent / RECORDING
     recording = beside if scene and beside.is_file() else None
     if out is not None:
+        if (view_host, view_port, view_for) != ("127.0.0.1", 0, None):
+            raise InputError("with --out no page is served", hint="leave --view-port, --view-host and --view-for out")
         from executive.view.html import log_page
 
         with writing(out):
@@ -183,7 +188,7 @@ def _view(text: str | None, request: Request, at_s: float | None, robot: str | N
     """Returns the tree of a run, a mission file (.yaml, a file, or a shipped one), or a sentence."""
     nothing = text is None and request.sentence is None
     if nothing or (text is not None and (text.endswith(LOG_SUFFIX) or is_folder(Path(text)))):
-        history = _history(None if text is None else Path(text))
+        history = _history(None if text is None else Path(text), at_s)
         if robot is None and len(history.robots) > 1:
             known = ", ".join(history.robots)
             raise InputError("the log has several robots", hint=f"add --robot with one of: {known}", file=history.file)
@@ -209,5 +214,7 @@ def _request(text: str | None, request: Request) -> Request:
         return request
     if request.sentence is not None:
         raise InputError("both a sentence and --say are given", hint="leave one of them out")
+    if "/" in text and " " not in text and not text.endswith((".yaml", ".yml")):
+        chosen_run(Path(text))
     is_mission = text.endswith((".yaml", ".yml")) or text in shipped_missions() or is_file(Path(text))
     return replace(request, file=Path(text)) if is_mission else replace(request, sentence=text)

@@ -14,11 +14,12 @@ from typing import Annotated, Any, Final, get_args
 import typer
 from typer.core import TyperCommand
 
-from executive.cli.defaults import yielding
+from executive.cli.defaults import typed_options, yielding
 from executive.cli.number_options import NumberReader, quantity_option
 from executive.mission.request import Request, parse_start
 from executive.mission.request_fields import RequestField, request_fields
 from executive.words.forms import OptionGroup as Group
+from skills.inputs.errors import InputError
 from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
 
@@ -29,7 +30,7 @@ _FOXGLOVE_ADDRESS: Final = "127.0.0.1:8765"
 _UNTIL_CTRL_C_S: Final = 1e9
 """Value of `--view` alone: the longest wait."""
 _WITH_PORT: Final = re.compile(r"[^\s/=]*:[^\s/=]*")
-_NUMERIC: Final = re.compile(r"[-+]?\.?\d[\d.,]*(?:e[-+]?\d+)?", re.IGNORECASE)
+_NUMERIC: Final = re.compile(r"[-+]?(?:\.?\d[\d.,]*(?:e[-+]?\d+)?|nan|inf(?:inity)?)", re.IGNORECASE)
 
 
 def grouped(group: Group, *names: str, **settings: Any) -> Any:
@@ -93,6 +94,18 @@ class StartCommand(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Joins the values of options that take any number of words, and parses as click does."""
         return super().parse_args(ctx, join_values(args))
+
+    def invoke(self, ctx: Any) -> Any:
+        """Invokes the command. Raises InputError before it begins if its page cannot be served, or has no `--view`."""
+        address = {name: ctx.params.get(name) for name in ("view_host", "view_port")}
+        if ctx.params.get("view") is not None:
+            from executive.view.feed import Feed
+            from executive.view.server import PageContent, serve
+
+            serve(PageContent(Feed()), (*address.values(),)).close()
+        elif "view" in ctx.params and typed_options(ctx) & address.keys():
+            raise InputError("--view-host and --view-port have no effect without --view", hint="add --view")
+        return super().invoke(ctx)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Writes the arguments, then the options of each group, then the others."""

@@ -65,12 +65,12 @@ def progress_bar(console: Console, what: str, total: int, *, lines: bool = False
     """Shows a bar over `total` steps with the time left; nothing without a terminal, or for a single step.
 
     Call the yielded function at the end of each step, perhaps with the name of the next step. Without a terminal,
-    `lines` shows what it is called with.
+    `lines` shows what it is called with. A `total` that it is called with is the new one, after steps were added.
     """
     if not console.is_terminal or total < 2:
         numbers = iter(range(1, total + 1))
 
-        def tell(line: str | None = None) -> None:
+        def tell(line: str | None = None, **_: int) -> None:
             if lines and line is not None:
                 console.print(f"{next(numbers)} of {total} {what}: {line}", markup=False)
 
@@ -89,7 +89,7 @@ def progress_bar(console: Console, what: str, total: int, *, lines: bool = False
     columns = (*done, TimeRemainingColumn(), TextColumn("left"))
     with Progress(*columns, console=console, transient=True, refresh_per_second=BAR_REFRESH_HZ) as bar:
         task = bar.add_task(what, total=total)
-        yield lambda following=None: bar.update(task, advance=1, description=following)
+        yield lambda following=None, **new: bar.update(task, advance=1, description=following, **new)
 
 
 def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from datetime import datetime, timedelta
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -177,12 +177,16 @@ def _in_turn(
     """
     from executive.app.runs.queue import queued_missions, run_in_turn
 
-    coming, total = iter(() if first is None else (first,)), int(first is not None)
-    if first is None or first.queued:
-        coming = chain(coming, queued_missions(missions))
-        total += sum(each.queued for each in missions.missions(MissionState.QUEUED))
-    with progress_bar(console, "missions", total) as advance:
-        return run_in_turn(coming, runs, advance)
+    coming, done, waiting = iter(() if first is None else (first,)), count(1), 0
+    if several := first is None or first.queued:
+        coming, waiting = chain(coming, queued_missions(missions)), _waiting(missions)
+    with progress_bar(console, "missions", waiting + (first is not None)) as advance:
+        return run_in_turn(coming, runs, lambda: advance(total=next(done) + (_waiting(missions) if several else 0)))
+
+
+def _waiting(missions: MissionStore) -> int:
+    """Counts the queued missions."""
+    return sum(each.queued for each in missions.missions(MissionState.QUEUED))
 
 
 def _row(mission: StoredMission, standing: Mapping[int, StandingMission]) -> tuple[str, ...]:

@@ -106,8 +106,10 @@ class Every:
 
     @staticmethod
     def from_text(text: str) -> Every:
-        """Parses "30m", "1 h 30 min", "PT5M" or "1 day". Raises InputError."""
+        """Parses "30m", "1 h 30 min", "PT5M" or "1 day". Raises InputError, also for a number without a unit."""
         seconds = seconds_in(text) or 0.0
+        if seconds and not re.search("[dhms]", text, re.IGNORECASE):
+            raise InputError(f"'{text}' has no unit", hint="write it, as in 7d, 12h, 30m or 90s")
         if not (1.0 <= seconds <= LONGEST.total_seconds() and seconds.is_integer()):
             hint = "give whole seconds, from 1 s to 366 days, as in '30 min' or '1 h 30 min'"
             raise InputError(f"'{text[:60]}' is no period", hint=hint)

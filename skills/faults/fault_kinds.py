@@ -1,7 +1,6 @@
 """Kinds of faults that can be injected by name: patterns of words, and their effects on a robot's verbs."""
 
 import dataclasses
-import difflib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -10,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform
 
+from skills.inputs.errors import suggestion
 from skills.manipulation.arm.forces import levers_m
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import (
@@ -100,8 +100,7 @@ def verb_of(word: str) -> str:
     verb = _OTHER_WORDS.get(word, word)
     if verb not in VERBS:
         known = (*VERBS, *_OTHER_WORDS)
-        near = difflib.get_close_matches(word, known, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else f"name one such as {', '.join(_OTHER_WORDS)} or drive"
+        hint = suggestion(word, known, f"name one such as {', '.join(_OTHER_WORDS)} or drive")
         raise ValueError(f"'{word}' is no sensor or verb of the robot; {hint}")
     return verb
 
@@ -393,3 +392,5 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
     FaultKind(r"lease taken", "lease taken at 4 s", "another holder takes the lease, once", _lease),
 )
 """All faults that come with the project."""
+SUBJECTS: Final = frozenset((*VERBS, *_OTHER_WORDS, "sensors", "hand", "lease", "robot", "everything"))
+"""Words with which a fault begins."""

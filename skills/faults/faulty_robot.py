@@ -5,17 +5,18 @@ A fault is `SENSOR[.SOURCE]: WORDS`, or the words with the sensor or verb at the
 (always).
 """
 
-import difflib
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
-from skills.faults.fault_kinds import STANDARD_FAULTS, Call, Effect, FaultKind
+from skills.faults.fault_kinds import STANDARD_FAULTS, SUBJECTS, Call, Effect, FaultKind
+from skills.inputs.errors import nearest_name, suggestion
 from skills.quantities import seconds_in
 from skills.robot import Clock, Robot
 from skills.robot_wrapper import AnswerT, RobotWrapper
@@ -32,6 +33,7 @@ _SPAN: Final = re.compile(
     rf"(?: (?:and )?{_NUMBER} ?(?:min|mins|minutes?|s|sec|secs|seconds?)\b)*)"
 )
 _PREFIX: Final = re.compile(r"(?P<sensor>\w+)(?:\.(?P<source>[\w-]+))?: ?(?P<words>.+)")
+_NUMBERS: Final = re.compile(r" -?\d.*")
 _STREAM: Final = 11
 """Stream of the seed for random faults."""
 _EARLIEST_S = 5.0
@@ -77,10 +79,24 @@ def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS, *, cam
         if source is not None:
             _check_source(source, effect, cameras)
         return Fault(words, effect, *_span(words, when), int(when["calls"] or 0), source)
-    examples = [kind.example for kind in kinds]
-    near = difflib.get_close_matches(plain, examples, n=1, cutoff=0.5)
-    hint = f"did you mean '{near[0]}'?" if near else f"known are, for instance: {'; '.join(examples)}"
+    said = plain if when is None else when["what"]
+    known = _faults_of(nearest_name(said.partition(" ")[0], SUBJECTS), kinds)
+    hint = f"known are, for instance: {'; '.join(known.values())}"
+    if when is not None and (near := nearest_name(_NUMBERS.sub("", said), known)) is not None:
+        middle = " " if prefix is None else plain[prefix.end("sensor") : prefix.start("words")]
+        hint = f"did you mean '{known[near].replace(' ', middle, 1)}{when.string[when.end('what') :]}'?"
     raise ValueError(f"there is no fault '{words}'; {hint}")
+
+
+def _faults_of(subject: str | None, kinds: Sequence[FaultKind]) -> Mapping[str, str]:
+    """Returns the words of a subject's faults by the words without numbers; if there are none, all examples."""
+    found = list[str]()
+    for kind in kinds:
+        said = _WHEN.sub(r"\g<what>", kind.example).partition(" ")[2]
+        match = re.fullmatch(kind.pattern, f"{subject} {said}")
+        with suppress(ValueError):  # the subject cannot have this fault
+            found += [match[0]] if match is not None and kind.effect(match) else []
+    return {_NUMBERS.sub("", each): each for each in found or [kind.example for kind in kinds]}
 
 
 def _seconds(match: re.Match[str]) -> str:
@@ -106,9 +122,7 @@ def _check_source(source: str, effect: Effect, cameras: Sequence[str]) -> None:
     if effect.verbs != {"image"}:
         raise ValueError(f"'.{source}' names a camera, but this fault does not concern cameras; remove '.{source}'")
     if cameras and source not in cameras:
-        near = difflib.get_close_matches(source, cameras, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(cameras)}"
-        raise ValueError(f"the robot has no camera '{source}'; {hint}")
+        raise ValueError(f"the robot has no camera '{source}'; {suggestion(source, cameras)}")
 
 
 def random_faults(

@@ -8,7 +8,8 @@ import sys
 import pytest
 import yaml
 
-from tests.docs.documents import DOCS, ROOT, commands, links, unknown_command
+import executive
+from tests.docs.documents import DOCS, ROOT, blocks, commands, links, unknown_command
 
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 _TEST = re.compile(r"`((?:plugins/[\w-]+/)?tests/[\w/.]+\.py)(?:::(\w+)(?:\[([^\]]+)\])?)?`")
@@ -57,6 +58,15 @@ def test_every_test_link_file_and_command_of_a_page_exists(page):
         "commands": [fault for line in shown if (fault := unknown_command(line))],
     }
     assert missing == {"tests": [], "links": [], "files": [], "commands": []}
+
+
+def test_the_named_poses_of_the_page_on_pictures_are_free_in_the_flat(tmp_path):
+    places, steps = (
+        yaml.safe_load(each.text) for each in blocks(DOCS / "how-to" / "inspect.md") if each.kind == "yaml"
+    )
+    mission = {"name": "round", "world": "flat", "knowledge": places, **steps}
+    (tmp_path / "round.yaml").write_text(yaml.safe_dump(mission, sort_keys=False), encoding="utf-8")
+    assert executive.check(tmp_path / "round.yaml").ok
 
 
 def test_every_rule_has_a_test():

@@ -166,7 +166,7 @@ class Cases(tuple[Case, ...]):
 
 RESULTS_FILE: Final = FileKind(
     name="results file",
-    option="--results",
+    option="its path",
     application_id=0x45525256,  # "ERRV"
     version=2,
     absent="`errand evaluate FILE` writes one",

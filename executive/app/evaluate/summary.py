@@ -271,11 +271,7 @@ def summary_json(found: Results, against: Sequence[Case] | None = None) -> dict[
 
 
 def to_page(
-    found: Results,
-    evidence: Callable[[str], Evidence],
-    *,
-    against: Sequence[Case] | None = None,
-    other: str = "",
+    found: Results, evidence: Callable[[str], Evidence], *, against: Sequence[Case] | None = None, other: str = ""
 ) -> str:
     """Renders the results as one HTML file that needs no other file.
 

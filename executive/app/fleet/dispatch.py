@@ -58,7 +58,7 @@ class Dispatch(Assigner):
     A robot whose battery is low returns its mission once its gripper is empty, and charges by its mission `dock`.
     `prepare` returns a request for each robot that may do it, and the shortest duration (s) of these; each added
     mission extends the time limit by `each_s`. `tell` shows a line; `offers` builds the bids of the robots; `ended` is
-    called whenever a mission has ended. The queued missions `left_out` are only listed.
+    called whenever a mission has ended, with the `total` of them. The queued missions `left_out` are only listed.
     """
 
     store: MissionStore
@@ -71,7 +71,7 @@ class Dispatch(Assigner):
     log: EventLog | None = None
     left_out: Sequence[int] = ()
     each_s: float = 0.0
-    ended: Callable[[], None] = lambda: None
+    ended: Callable[..., None] = lambda **_: None
     offers: Callable[[Mapping[str, FleetRobot], BatteryFacts, Callable[[], float], Auction], Offers] = Offers
 
     def __post_init__(self) -> None:
@@ -421,9 +421,10 @@ class Dispatch(Assigner):
             self._auction.drop(number)
         self._given.settle()
         self._log_missions()
-        whole = self._given.all().get(number, NOT_GIVEN).part_of or number
+        given = self._given.all()
+        whole = given.get(number, NOT_GIVEN).part_of or number
         if self.store.mission(whole).state is not MissionState.RUNNING:
-            self.ended()
+            self.ended(total=sum(given.get(each, NOT_GIVEN).part_of is None for each in self.missions))
 
     def _log_missions(self) -> None:
         """Writes the assignments of the missions into the log."""

@@ -67,12 +67,12 @@ def run_fleet(
     page: PageView | None = None,
     live: LiveServer | None = None,
     first: Prepared | None = None,
-    ended: Callable[[], None] = lambda: None,
+    ended: Callable[..., None] = lambda **_: None,
 ) -> Verdict:
     """Runs until no mission can be assigned; writes log, recording and report into the folder `out`.
 
-    `page` shows the run, `live` sends the log's messages, and `ended` is called whenever a mission ends. The log begins
-    with the map of the `first` mission. Raises InputError if the page or the log cannot be opened.
+    `page` shows the run, `live` sends the log's messages, and `ended` is called with the `total` of missions whenever
+    one ends. The log begins with the map of the `first` mission. Raises InputError for an unusable page or log.
     """
     backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
     dispatch.ended, dispatch.each_s = ended, TIME_LIMIT_S if time_limit_s is None else 0.0

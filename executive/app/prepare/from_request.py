@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from executive.app.prepare.feasibility import refuse_impossible
 from executive.app.prepare.mission_files import mission_file
-from executive.app.prepare.placed_robots import knowledge_for, only_robot, placed_robots, refuse_blocked
+from executive.app.prepare.placed_robots import clearance_m, knowledge_for, only_robot, placed_robots, refuse_blocked
 from executive.app.prepare.prepared import Prepared, combine
 from executive.app.prepare.worlds import knowledge_of, open_world, refuse_blocked_poses, with_map
 from executive.language.parser import load_parser
@@ -162,7 +162,8 @@ class Setting:
         world = _with_imports(loaded, self.world)
         knowledge = knowledge_of_mission(loaded, with_own_objects(self.knowledge, world.own_objects))
         if knowledge.poses != self.knowledge.poses or "places" in (loaded.knowledge or {}):
-            refuse_blocked_poses(world, knowledge, lambda path, *why: loaded.error(("knowledge", *path), *why))
+            clear = partial(clearance_m, world, {each.kind for each in self.robots.values()})
+            refuse_blocked_poses(knowledge, lambda path, *why: loaded.error(("knowledge", *path), *why), clear)
         answer = self.answerer(self.request.questions or loaded.questions)
         mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
         world = _with_people(loaded, _with_objects(loaded, world, knowledge), knowledge)

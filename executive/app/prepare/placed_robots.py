@@ -121,11 +121,16 @@ def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRo
 
 def refuse_blocked(world: World, pose: Pose2D, name: str = "the robot", kind: str = DEFAULT_KIND) -> None:
     """Raises InputError unless a robot's body is in free space at a pose, by the world's surveyed map."""
-    discs = _discs(kind, pose)
-    if float(np.min(free_ground(world).distance_m(discs[:, :2]) - discs[:, 2])) < 0.0:
+    if clearance_m(world, [kind], pose) < 0.0:
         there = f"({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g})"
         hint = "give a free pose; `errand world show` draws the world"
         raise InputError(f"at the start {there} {name} stands in an obstacle or outside of {world.name}", hint=hint)
+
+
+def clearance_m(world: World, kinds: Iterable[str], pose: Pose2D) -> float:
+    """Clearance (m) of a body of one of these kinds, by default Spot's, at a pose; negative if none is free."""
+    bodies, ground = [_discs(kind, pose) for kind in kinds or [DEFAULT_KIND]], free_ground(world)
+    return max(float(np.min(ground.distance_m(discs[:, :2]) - discs[:, 2])) for discs in bodies)
 
 
 def _discs(kind: str, pose: Pose2D) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -22,8 +22,9 @@ from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.seeding import add_answers, add_crowd
 from plant.worlds.world import DoorRule, MoveRule, World, WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
+from skills.faults.fault_kinds import SUBJECTS
 from skills.faults.faulty_robot import parse_fault, random_faults
-from skills.inputs.errors import InputError, Problems, suggestion, with_article
+from skills.inputs.errors import InputError, Problems, nearest_name, suggestion, with_article
 from skills.inputs.schema import Name, Strict, Text, validate
 from skills.inputs.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import Coordinate, Delay, Height, Quantity
@@ -43,7 +44,7 @@ def with_scenario(request: Request, world: World, knowledge: Knowledge, robots: 
     cameras = tuple(camera.source for camera in spot_capabilities().cameras)
     scenario = request.scenario
     for words in scenario.faults:
-        _check_fault(words, robots, cameras, lambda what, hint: InputError(what, hint=hint))
+        check_fault(words, robots, cameras)
     imported = {name: each.object.class_name for name, each in world.imports.items()}
     objects = {rule.name: imported.get(rule.model, rule.model) for rule in world.seed_rules.objects}
     people = {rule.name: rule.route is not None for rule in world.seed_rules.people}
@@ -182,15 +183,20 @@ class ScenarioFile(Strict):
     )
 
 
-def _check_fault(
-    words: str, robots: Collection[str], cameras: tuple[str, ...], refusal: Callable[[str, str], InputError]
-) -> None:
-    """Raises the error that `refusal` builds from a sentence and a hint, if there is no such fault."""
+def check_fault(
+    words: str, robots: Collection[str], cameras: Sequence[str] = (), refusal: Callable[..., InputError] = InputError
+) -> tuple[str | None, str]:
+    """Splits words into the robot that they name (None: all) and its fault; raises a `refusal` for unknown ones."""
+    robot, said = named_robot(words, robots)
+    head = said.partition(":")[0].strip()
+    if robots and ":" in said and (nearest_name(head, robots) or not nearest_name(head.partition(".")[0], SUBJECTS)):
+        raise refusal(f"there is no robot '{head[:60]}'", hint=suggestion(head, robots))
     try:
-        parse_fault(named_robot(words, robots)[1], cameras=cameras)
+        parse_fault(said, cameras=cameras)
     except ValueError as error:
         what, _, hint = str(error).partition("; ")
-        raise refusal(what, suggestion(words.partition(":")[0], robots, hint)) from error
+        raise refusal(what, hint=hint) from error
+    return robot, said
 
 
 def read_scenario(
@@ -214,7 +220,7 @@ def read_scenario(
     file, problems = validate(ScenarioFile, source), Problems()
     for number, words in enumerate(file.faults):
         with problems:
-            _check_fault(words, robots, cameras, partial(source.error, ("faults", number)))
+            check_fault(words, robots, cameras, partial(source.error, ("faults", number)))
     walks = [number for number, event in enumerate(file.events) if event.person is not None]
     if len(walks) > MOST_PEOPLE:
         raise source.error(

@@ -14,6 +14,7 @@ from executive.words.knowledge import Knowledge, load_knowledge
 from plant.worlds.world import WORLDS_FOLDER, UnknownWorldError, World, WorldError, known_worlds, load_world
 from skills.inputs.errors import InputError, Problems, known_names, suggestion
 from skills.inputs.yaml_source import KeyPath, read_yaml
+from skills.robot import Pose2D
 
 if TYPE_CHECKING:
     from skills.estimate.grid_map import GridMap
@@ -66,7 +67,8 @@ def knowledge_of(world: World) -> Knowledge:
     """Loads the knowledge of a world and of its imported objects. Raises InputError."""
     knowledge = load_knowledge(world.knowledge_path, tuple(world.own_objects))
     if knowledge.poses:
-        refuse_blocked_poses(world, knowledge, read_yaml(world.knowledge_path).error)
+        ground, error = free_ground(world), read_yaml(world.knowledge_path).error
+        refuse_blocked_poses(knowledge, error, lambda at: ground.distance_m(np.array([[at.x_m, at.y_m]]))[0])
     return knowledge
 
 
@@ -79,15 +81,16 @@ def crossing_rooms(world: World, knowledge: Knowledge) -> tuple[InputError, ...]
     return tuple(source.error(at, f"{'.'.join(at)}: the outline crosses itself", hint) for at in places if source)
 
 
-def refuse_blocked_poses(world: World, knowledge: Knowledge, error: Callable[[KeyPath, str, str], InputError]) -> None:
-    """Raises InputError for a named pose in an obstacle or outside of the map; `error` gives it file and line."""
+def refuse_blocked_poses(
+    knowledge: Knowledge, error: Callable[[KeyPath, str, str], InputError], clearance_m: Callable[[Pose2D], float]
+) -> None:
+    """Raises InputError for a named pose without clearance (m) on the map; `error` gives it file and line."""
     problems, poses = Problems(), {name: knowledge.place_pose(name) for name in knowledge.poses}
-    middles = np.array([(pose.x, pose.y) for pose in poses.values()]).reshape(-1, 2)
-    clear_m = free_ground(world).distance_m(middles)
-    for (name, pose), free_m in zip(poses.items(), clear_m, strict=True):
+    for name, pose in poses.items():
         with problems:
-            if free_m <= 0.0:
-                what = f"places.{name}: ({pose.x:g}, {pose.y:g}) is in an obstacle or outside of {world.name}"
+            if clearance_m(Pose2D(pose.x, pose.y, pose.yaw)) <= 0.0:
+                at = f"({pose.x:g}, {pose.y:g}, {pose.yaw:g})"
+                what = f"places.{name}: at {at} the robot stands in an obstacle or outside of the map"
                 raise error(("places", name), what, "give a free pose; `errand world show` draws the world")
     problems.raise_any()
 

@@ -6,7 +6,8 @@ The file `run.json` of a folder says what was asked, when, and by which version;
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from importlib.metadata import version
@@ -43,7 +44,7 @@ class KeptRun:
     def undo(self) -> None:
         """Removes the folder of a run that could not begin; files of the run stay."""
         if {path.name for path in self.request.out.iterdir()} == {FACTS}:
-            shutil.rmtree(self.request.out)
+            _remove(self.request.out.parent, [self.request.out])
 
 
 def new_run(request: Request, now: datetime) -> KeptRun:
@@ -87,7 +88,9 @@ def kept_run(folder: Path) -> KeptRun:
 
 
 def kept_runs(out: Path) -> list[KeptRun]:
-    """Returns the runs below a folder, the oldest first. Raises InputError if a folder's run cannot be read."""
+    """Returns the runs below a folder, the oldest first. Raises InputError without a folder, or for a damaged run."""
+    if not out.is_dir():
+        raise InputError("there is no folder of runs", hint="begin a run, or name its folder by --out", file=out)
     found = [kept_run(file.parent) for file in out.glob(f"*/{FACTS}") if not file.parent.is_symlink()]
     return sorted(found, key=lambda kept: (kept.begun, kept.request.out.name))
 
@@ -95,9 +98,18 @@ def kept_runs(out: Path) -> list[KeptRun]:
 def remove_runs(out: Path, older_than: timedelta, now: datetime) -> list[Path]:
     """Removes the folders of runs that began before a time; returns these folders."""
     removed = [kept.request.out for kept in kept_runs(out) if now - kept.begun > older_than]
-    for folder in removed:
-        shutil.rmtree(folder)
+    _remove(out, removed)
     return removed
+
+
+def _remove(out: Path, folders: Iterable[Path]) -> None:
+    """Removes folders of runs; if `last` led to one of them, it leads to the newest run that is left, or is removed."""
+    for folder in folders:
+        shutil.rmtree(folder)
+    if (last := out / LAST).is_symlink() and not last.exists():
+        last.unlink()
+        with suppress(InputError, IndexError):  # a run cannot be read, or none is left
+            last.symlink_to(kept_runs(out)[-1].request.out.name)
 
 
 def _write(kept: KeptRun) -> None:

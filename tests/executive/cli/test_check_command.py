@@ -187,3 +187,7 @@ def test_a_sentence_is_checked_as_a_file_is():
 @pytest.mark.parametrize("words", [(), (GOOD, "--say", "go to the kitchen")])
 def test_either_files_or_a_sentence_is_checked(words):
     assert "name files, or give a sentence" in check(*words).stderr
+
+
+def test_an_empty_sentence_is_shown_as_the_user_typed_it():
+    assert errand("check", "--say", "").stdout == "✗ --say '': 1 error\n"

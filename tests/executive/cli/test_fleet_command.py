@@ -5,12 +5,13 @@ from dataclasses import replace
 import pytest
 
 from executive.app.fleet import fleet_run
+from executive.app.fleet.dispatch import Dispatch
 from executive.app.report.run_report import Verdict
 from executive.cli.fleet_command import _faults, _to_do
 from executive.mission.request import Request
 from executive.store.missions import GivenMissions, MissionState, MissionStore
 from skills.inputs.errors import InputError
-from tests.executive.cli.calls import errand
+from tests.executive.cli.calls import done, errand, json_of, refusal
 
 GO = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
 REQUEST = Request(commands=("Take ...",), name="work", world_name="flat")
@@ -48,6 +49,11 @@ def test_a_fault_is_for_the_robot_named_before_it_else_for_all():
         "Alice": ["lidar: dropout 1 s at 2 s"],
         "Bob": ["robot dies at 20 s", "lidar: dropout 1 s at 2 s"],
     }
+
+
+def test_a_fault_for_an_absent_robot_names_the_robots():
+    with pytest.raises(InputError, match=r"there is no robot 'carol'; known are Alice and Bob"):
+        _faults(["carol: camera fails"], ("Alice", "Bob"))
 
 
 def split_in_two(store):
@@ -103,6 +109,33 @@ def test_a_mission_that_cannot_be_prepared_is_left_out_with_its_cause_and_the_ot
     messages = [each.message for each in store.missions()]
     assert ["it is for the world" in message for message in messages] == [True, False, True]
     assert "2 missions are left in the queue" not in shown.output
+
+
+# the referee's verdicts on the missions, None: it did not judge; the verdict that `errand runs` shows
+@pytest.mark.parametrize(
+    ("verdicts", "shown"),
+    [
+        ([True, True], "fulfilled"),
+        ([True, False, None], "not fulfilled"),
+        ([None, True], "fulfilled"),
+        ([None], "not judged"),
+    ],
+)
+def test_runs_show_the_verdict_on_a_fleet(store, monkeypatch, verdicts, shown):
+    rows = [{"referee": None if verdict is None else {"success": verdict}} for verdict in verdicts]
+    monkeypatch.setattr(Dispatch, "rows", rows)
+    monkeypatch.setattr(fleet_run, "run_fleet", lambda *_, **__: Verdict("The fleet", True, "done", ""))
+    store.add(replace(REQUEST, commands=(GO,)), queued=True)
+    done("fleet", "run", store.path, "--robots", "alice=spot", "--no-record")
+    (kept,) = json_of(done("runs", "--out", store.path.parent, "--json"))["runs"]
+    assert kept["verdict"] == shown
+
+
+def test_a_page_that_cannot_be_served_is_refused_before_a_fleet_begins(store, tmp_path):
+    store.add(replace(REQUEST, commands=(GO,)), queued=True)
+    command = ("fleet", "run", store.path, "--robots", "alice=spot", "--view", "1", "--view-host", "nohost.example")
+    assert "cannot serve the page at nohost.example" in refusal(*command)
+    assert list(tmp_path.rglob("run.json")) == []
 
 
 @pytest.mark.parametrize(("named", "folder"), [("out/.errand/missions.sqlite", "out"), ("out", "out"), ("own.db", "")])

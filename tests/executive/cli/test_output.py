@@ -46,6 +46,12 @@ def test_a_bar_counts_steps_names_them_and_says_the_time_left(terminal):
     assert "reading" in shown and "writing" in shown and "2/3" in shown and "left" in shown
 
 
+def test_a_bar_counts_up_to_the_new_total_after_steps_were_added(terminal):
+    with progress_bar(terminal, "missions", 2) as advance:
+        advance(total=3)
+    assert "1/3" in terminal.file.getvalue()
+
+
 @pytest.mark.parametrize("total", [0, 1])
 def test_a_single_step_has_no_bar(terminal, total):
     with progress_bar(terminal, "runs", total) as advance:

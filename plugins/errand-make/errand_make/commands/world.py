@@ -47,6 +47,8 @@ def list_worlds(
     ] = Path(),
 ) -> None:
     """Lists the worlds that come with Errand, and those in a folder, with rooms and robots."""
+    if not folder.is_dir():
+        raise InputError("there is no such folder", hint="name the folder of your worlds", file=folder)
     own = sorted(str(file.parent) for file in folder.glob("*/world.dmd.yaml"))
     rows = []
     for name in (*known_worlds(), *own):

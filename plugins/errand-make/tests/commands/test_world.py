@@ -154,6 +154,11 @@ def test_a_model_of_a_known_class_is_added_under_its_own_name(own, mesh, tmp_pat
     assert load_knowledge(own / "knowledge.yaml").usual_surfaces("wrench") == ("rack",)
 
 
+def test_a_missing_folder_of_worlds_is_refused(tmp_path):
+    refused = errand("world", "list", tmp_path / "extra")
+    assert (refused.exit_code, "extra: there is no such folder" in refused.stderr) == (2, True)
+
+
 def test_worlds_are_listed_with_rooms_and_robots(own, tmp_path):
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "world.dmd.yaml").write_text("directives: []\n")

@@ -147,7 +147,8 @@ class Fleet:
         self.rows = rows = missions_json(self.store, list(dispatch.missions))
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
 
-    def _note_end(self, dispatch):
+    def _note_end(self, dispatch, total):
+        assert total <= len(dispatch.missions)
         self.ended.append(sum(mission.ended is not None for mission in dispatch.missions.values()))
 
     def _robot(self, name):

@@ -207,7 +207,11 @@ def test_a_mask_is_read_again_before_each_run_and_refused_where_it_cannot_be(tmp
     assert (caught.value.file, caught.value.line) == (tmp_path / "mask.yaml", 1)
 
 
-@pytest.mark.parametrize(("at", "right"), [("x: 8.4, y: 6.5", True), ("x: 7.5, y: 8.6", False), ("x: -3, y: 1", False)])
+# the third pose is free ground, but Spot's body would stand in the wall beside it
+@pytest.mark.parametrize(
+    ("at", "right"),
+    [("x: 8.4, y: 6.5", True), ("x: 7.5, y: 8.6", False), ("x: 3.0, y: 4.0, yaw: 1.57", False), ("x: -3, y: 1", False)],
+)
 def test_a_named_pose_of_a_mission_is_on_free_ground(tmp_path, at, right):
     pump = f"knowledge:\n  places:\n    pump: {{pose: {{{at}}}}}\n"
     file = tmp_path / "go.yaml"
@@ -216,7 +220,7 @@ def test_a_named_pose_of_a_mission_is_on_free_ground(tmp_path, at, right):
         (command,) = prepare(Request(file=file), ask=None).tree.commands
         assert command.goal == "pump"
         return
-    with pytest.raises(InputError, match=r"places\.pump: .* is in an obstacle or outside of flat") as caught:
+    with pytest.raises(InputError, match=r"places\.pump: .* stands in an obstacle or outside of the map") as caught:
         prepare(Request(file=file), ask=None)
     assert (caught.value.file, caught.value.line) == (file, 4)
 

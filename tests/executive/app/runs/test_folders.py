@@ -58,6 +58,21 @@ def test_a_run_that_could_not_begin_leaves_no_folder_but_keeps_files(asked):
     ]
 
 
+def test_after_an_undone_run_last_leads_to_the_run_before_it(asked):
+    before, undone = new_run(asked, NOON), new_run(asked, NOON)
+    undone.undo()
+    assert (asked.out / "last").resolve() == before.request.out.resolve()
+
+
+# ages of the runs in days, in the order in which they begin; the age of the run that `last` leads to after a clean
+@pytest.mark.parametrize(("ages", "newest"), [((9, 3, 1), 1), ((3, 1, 9), 1), ((1, 3, 9), 1), ((9, 8), None)])
+def test_last_leads_to_the_newest_run_that_is_left(asked, ages, newest):
+    folders = {age: new_run(asked, NOON - timedelta(days=age)).request.out for age in ages}
+    remove_runs(asked.out, timedelta(days=7), NOON)
+    last = asked.out / "last"
+    assert (last.resolve() if last.is_symlink() else None) == (folders[newest].resolve() if newest else None)
+
+
 def test_only_folders_of_runs_that_are_older_are_removed(asked):
     days = [new_run(asked, NOON - timedelta(days=age)).request.out for age in (9, 8, 1)]
     (asked.out / "2026-11-01-1200-mine").mkdir()

@@ -18,13 +18,13 @@ LINES = {
     "executive/tree": 8838,
     "executive/run": 3295,
     "executive/record": 1099,
-    "executive/store": 1602,
+    "executive/store": 1604,
     "executive/conversation": 595,
     "executive/view": 1922,
     "executive/testing": 860,
-    "executive/app": 8206,
-    "executive/cli": 3883,
-    "skills": 28376,
+    "executive/app": 8230,
+    "executive/cli": 3901,
+    "skills": 28391,
     "plant": 11378,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 422, 61, 7

@@ -24,7 +24,7 @@ LINES = {
     "executive/testing": 860,
     "executive/app": 8230,
     "executive/cli": 3901,
-    "skills": 28391,
+    "skills": 28397,
     "plant": 11378,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 422, 61, 7

@@ -179,8 +179,7 @@ class Detect(LookingSkill[DetectInputs]):
 
         The body stays high when the objects are found, which may be occluded from lower down.
         """
-        capabilities = self.context.robot.capabilities()
-        raised_m = capabilities.height_range_m[1] - capabilities.standing_height_m - _BELOW_TOP_M
+        raised_m = self._raised_m()
         if self.object_camera.on_hand or raised_m < _RAISED_M or self._has_enough(inputs):
             return
         for p_WT in targets_W:
@@ -274,8 +273,15 @@ class Detect(LookingSkill[DetectInputs]):
         return sure_tracks(self._matching(inputs), inputs, self._views(inputs))
 
     def _views(self, inputs: DetectInputs) -> int:
-        """Number of viewpoints that a reliable track needs: one where the camera is fixed to the body."""
-        return 1 if inputs.seen_before is not None or self.object_camera.mount is Mount.BODY else 2
+        """Number of viewpoints that a reliable track needs: one where the camera cannot change its position."""
+        mount = self.object_camera.mount
+        stays = mount is Mount.BODY or (mount is Mount.HEAD and self._raised_m() < _RAISED_M)
+        return 1 if inputs.seen_before is not None or stays else 2
+
+    def _raised_m(self) -> float:
+        """Height by which the body can rise for a view from above."""
+        capabilities = self.context.robot.capabilities()
+        return capabilities.height_range_m[1] - capabilities.standing_height_m - _BELOW_TOP_M
 
     def look(
         self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray], raised_m: float = 0.0

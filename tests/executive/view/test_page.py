@@ -938,7 +938,7 @@ def scene(page, feed):
 
 def test_the_scene_gets_the_poses_and_whether_its_camera_follows(page, scene):
     scene.tell({"followed": "Alice/body", "poses": {"Alice/body": [1.0]}})
-    page.wait_for_timeout(1000)
+    scene.frame.wait_for_function("document.title")
     assert scene.posted() == {"followed": "Alice/body", "poses": {"Alice/body": [1.0]}, "follows": True, "count": 1}
     page.uncheck("#beside")
     assert scene.posted()["follows"] is False

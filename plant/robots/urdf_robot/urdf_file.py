@@ -85,11 +85,13 @@ class UrdfFile:
         self.links = self._by_name(robot.findall("link"))
         self.joints = {name: self._joint(each) for name, each in self._by_name(robot.findall("joint")).items()}
         self._to = {joint.child: joint for joint in self.joints.values()}
-        roots = [name for name in self.links if name not in self._to]
-        if len(roots) != 1 or len(self._to) != len(self.joints):
-            names = ", ".join(roots) or "none"
-            raise InputError(f"its links are no tree; links without a parent: {names}", hint="join them", file=path)
-        self.root = roots[0]
+        for joint in (each for each in self.joints.values() if each is not self._to[each.child]):
+            what = f"joints {joint.name} and {self._to[joint.child].name} have the same child {joint.child}"
+            raise self.error(self._to[joint.child].line, what, "a link hangs on one joint: remove one of the two")
+        if len(roots := [name for name in self.links if name not in self._to]) > 1 or not self.links:
+            what = f"links {' and '.join(roots[:8])} have no parent" if roots else "it has no links"
+            raise self.error(self.links[roots[1]] if roots else robot, what, "join them by joints to a single base")
+        self.root = next(iter(roots), "")
         _ = self.order
         simulated = ((each.get("reference", ""), each.iter("sensor")) for each in robot.findall("gazebo"))
         self.sensors = [(link, sensor.get("type", "")) for link, sensors in simulated for sensor in sensors]
@@ -141,10 +143,10 @@ class UrdfFile:
             found = [float(word) for word in text.split()]
         except ValueError:
             found = []
-        if len(found) != len(default.split()) or not np.isfinite(found).all():
+        if (count := len(default.split())) != len(found) or not np.isfinite(found).all():
             assert element is not None
-            count = len(default.split())
-            raise self.error(element, f"<{element.tag} {key}='{text[:60]}'> is not {count} numbers", "correct it")
+            what = f"<{element.tag} {key}='{text[:60]}'> is not {'a number' if count == 1 else f'{count} numbers'}"
+            raise self.error(element, what, "correct it")
         return found
 
     def origin(self, element: Element) -> RigidTransform:
@@ -163,9 +165,8 @@ class UrdfFile:
         for joint in order:
             order += below.get(joint.child, ())
         reached = {joint.child for joint in order}
-        for joint in self.joints.values():
-            if joint.child not in reached:
-                raise self.error(joint.line, f"joint {joint.name} is in a loop", "let the links be a tree")
+        for joint in (each for each in self.joints.values() if each.child not in reached):
+            raise self.error(joint.line, f"joint {joint.name} is in a loop", "turn or remove a joint of the loop")
         return tuple(order)
 
     def chain(self, link: str) -> list[UrdfJoint]:
@@ -202,8 +203,7 @@ class UrdfFile:
         name = mesh.get("filename", "")
         path = self.path.parent / name.removeprefix(f"package://{PACKAGE}/")
         if not name.startswith(f"package://{PACKAGE}/") or not path.is_file():
-            hint = "make the package by `errand new robot`, which copies meshes"
-            raise self.error(mesh, f"there is no mesh {name[:100]}", hint)
+            raise self.error(mesh, f"there is no mesh {name[:100]}", "make the package by `errand new robot`")
         return path
 
     def mesh_points(self, mesh: Element) -> FloatArray:

@@ -190,7 +190,9 @@ FORMS = {
     "STL in millimetres": MeshForm("m.stl", exported(scale=1000.0), refused="0.001 if its unit is millimetres"),
     "STL in centimetres": MeshForm("m.stl", exported(scale=100.0), refused="0.01 if its unit is centimetres"),
     "STL in inches": MeshForm("m.stl", exported(scale=1 / 0.0254), options={"scale": 0.0254}),
-    "STL in metres that should be divided": MeshForm("m.stl", exported(scale=0.001), refused="1000 if"),
+    "STL in metres that should be divided": MeshForm(
+        "m.stl", exported(scale=0.001), refused=r"--scale 1000 \(0.12 m long\), if"
+    ),
     "binary PLY": MeshForm("m.ply", exported()),
     "OFF": MeshForm("m.off", exported()),
     "GLB, y up": MeshForm("m.glb", lambda path: trimesh.creation.box(np.array(SIZE_M)[[0, 2, 1]]).export(path)),

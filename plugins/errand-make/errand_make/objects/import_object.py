@@ -43,9 +43,12 @@ USUAL_KG_M3: Final = 600.0
 LIGHTEST_KG, HEAVIEST_KG = 1e-4, 100.0
 """Limits of the mass that follows from the volume."""
 PERSON: Final = "person"
-_UNITS: Final = (("millimetres", 0.001), ("centimetres", 0.01), ("inches", 0.0254), ("feet", 0.3048), ("km", 1000.0))
+_UNITS: Final = (("metres", 1.0), ("millimetres", 0.001), ("centimetres", 0.01), ("inches", 0.0254), ("feet", 0.3048))
 _PLAUSIBLE_M: Final = (0.02, 1.5)
 """Plausible lengths of an object for a table."""
+_DIVIDED_BY: Final = (100, 1000)
+_FLAT_M: Final = 0.01
+"""Height of a resting object under which the robot does not recognise it by its model."""
 _UP: Final = {
     "x": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
     "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
@@ -146,7 +149,8 @@ def import_content(
     reports.step(closing)
     body = _at_rest(_placed(content, options))
     size_m = np.ptp(body.solid.points, axis=0)
-    for note in (*content.notes, *_size_doubts(size_m, options.scale), *_apart_doubts(body.solid)):
+    doubts = (*_size_doubts(size_m, options.scale), *_flat_doubts(size_m, options), *_apart_doubts(body.solid))
+    for note in (*content.notes, *doubts):
         reports.note(note)
     mass = scale_mass(_mass(body.solid), _mass_kg(body.solid, options))
     _refuse_impossible(mass)
@@ -221,6 +225,15 @@ def _size_doubts(size_m: FloatArray, scale: float) -> tuple[str, ...]:
     return (f"it is {largest_m:.3g} m long; if that is wrong, {_scale_hint(largest_m, scale)}",)
 
 
+def _flat_doubts(size_m: FloatArray, options: ImportOptions) -> tuple[str, ...]:
+    """Remark on an object without a class that lies too flat to be recognised."""
+    high_m = float(size_m[2])
+    if options.class_name is not None or high_m >= _FLAT_M:
+        return ()
+    what = f"it is {high_m:.2g} m high, and the robot does not recognise objects under {_FLAT_M:g} m by their models"
+    return (f"{what}; give --class if it is of a known class",)
+
+
 def _apart_doubts(solid: Solid) -> tuple[str, ...]:
     """Remark on several bodies with wide gaps between them, which one model moves as one."""
     many, gap_m = solid.bodies_apart()
@@ -231,12 +244,21 @@ def _apart_doubts(solid: Solid) -> tuple[str, ...]:
     )
 
 
+def _is_plausible(length_m: float) -> bool:
+    return _PLAUSIBLE_M[0] <= length_m <= _PLAUSIBLE_M[1]
+
+
 def _scale_hint(largest_m: float, scale: float) -> str:
     """Hint on the unit that gives the object a plausible length."""
-    fitting = [(unit, factor) for unit, factor in _UNITS if _PLAUSIBLE_M[0] <= factor * largest_m <= _PLAUSIBLE_M[1]]
+    units = largest_m / scale
+    fitting = [(unit, unit_m) for unit, unit_m in _UNITS if unit_m != scale and _is_plausible(unit_m * units)]
     if not fitting:
+        scales = (f"{by} ({by * units:.3g} m long)" for by in _DIVIDED_BY if _is_plausible(by * units))
+        found = " or ".join(scales)
+        if found:
+            return f"give --scale {found}, if its lengths were divided by that when it was saved"
         return "give --scale, the metres of one unit of the file"
-    scales = (f"{factor * scale:g} if its unit is {unit} ({factor * largest_m:.3g} m long)" for unit, factor in fitting)
+    scales = (f"{unit_m:g} if its unit is {unit} ({unit_m * units:.3g} m long)" for unit, unit_m in fitting)
     return f"give --scale {', '.join(scales)}"
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from errand_make.robots.base import LIDAR, floor_m, front_rotation, motion_of, outline_polygon
+from errand_make.robots.checks import check_limits
 from errand_make.robots.gripper import arm_places, hand_axes, measure_gripper, rounded, why_no_gripper
 from errand_make.robots.inertia import repair_masses
 from errand_make.robots.parts import Arm, Drive, Parts, find_parts, is_camera, standing_legs
@@ -85,8 +86,10 @@ class Inference:
             self._add_arm(self.found.arm)
         self._add_held()
         driven = [*self.data.get("head", ()), *self.data.get("arm", {}).get("joints", ())]
-        if note := repair_masses(self.found.tree, [*driven, *self.data.get("gripper", {}).get("joints", ())]):
-            self.notes.append(("urdf", note))
+        driven += self.data.get("gripper", {}).get("joints", ())
+        check_limits(urdf, driven)
+        wheels = [each.joint.child for each in self.found.parts.wheels]
+        self.notes += [("urdf", note) for note in repair_masses(self.found.tree, driven, wheels)]
 
     def text(self) -> str:
         """Text of the URDF with its repairs and added links."""

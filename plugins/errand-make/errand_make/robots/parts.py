@@ -34,7 +34,9 @@ _CAMERA: Final = re.compile(
     r"camera|kinect|realsense|rgbd|d4[0-9]5|zed|xtion|stereo|optical|webcam|astra|orbbec|imager|(^|_)cam(_|\d|$)",
     re.IGNORECASE,
 )
-_NO_CAMERA: Final = re.compile(r"imu|gyro|accel|screw|mount|laser|lidar|scan|infra|plug", re.IGNORECASE)
+_NO_CAMERA: Final = re.compile(
+    r"imu|gyro|accel|screw|mount|laser|lidar|scan|infra|plug|aruco|apriltag|marker", re.IGNORECASE
+)
 _LEGS: Final = 4
 _ANGLES_RAD: Final = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
 _ROLLERS: Final = re.compile(r"mecanum|omni_?(wheel|base|drive)|swedish|planar_move", re.IGNORECASE)

@@ -10,6 +10,7 @@ from typing import Any, Final
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
+from errand_make.robots.checks import check_mimics, first_xacro
 from plant.robots.urdf_robot.urdf_file import UrdfFile, is_xacro, read_urdf_text
 from skills.inputs.errors import InputError
 
@@ -22,26 +23,31 @@ def read_source(path: Path, packages: Mapping[str, Path]) -> UrdfFile:
     Raises InputError.
     """
     text = read_urdf_text(path)
-    return UrdfFile(path, _expanded(path, packages) if is_xacro(text) else text)
+    urdf = UrdfFile(path, _expanded(path, text, packages) if is_xacro(text) else text)
+    check_mimics(urdf)
+    return urdf
 
 
-def _expanded(path: Path, packages: Mapping[str, Path]) -> str:
-    """Text of a xacro file's expansion. Raises InputError."""
+def _expanded(path: Path, text: str, packages: Mapping[str, Path]) -> str:
+    """Expansion of a xacro file. Raises InputError."""
+    line, found = first_xacro(text)
     try:
         xacro, arguments = import_module("xacro"), import_module("xacro.substitution_args")
     except ImportError as error:
         hint = f"install it by `pip install xacro`, or expand the file where ROS is: `xacro {path.name} > robot.urdf`"
-        raise InputError("it is a xacro file, and the package xacro is not installed", hint=hint, file=path) from error
+        what = f"it is a xacro file ({found}), and the package xacro is not installed"
+        raise InputError(what, hint=hint, file=path, line=line) from error
     missing = list[str]()
     with _finding(arguments, packages, path, missing):
         try:
             return str(xacro.process_file(str(path)).toprettyxml(indent=" "))
         except Exception as error:  # xacro evaluates the file's own expressions
-            what, hint = f"xacro does not expand it: {str(error)[:200]}", "correct it, or expand it where ROS is"
+            what = f"xacro does not expand it, from {found} on: {str(error)[:200]}"
+            hint = "correct it, or expand it where ROS is"
             if missing:
                 what = f"there is no folder of package '{missing[0]}'"
                 hint = f"give its folder: --package {missing[0]}=DIR"
-            raise InputError(what, hint=hint, file=path) from error
+            raise InputError(what, hint=hint, file=path, line=line) from error
 
 
 @contextmanager

@@ -45,6 +45,9 @@ _BESIDE_DOOR_M: Final = 0.4
 _FAR_M: Final = 1.0
 """Largest distance between a named vertex and a pose that is free for the body."""
 _HINT: Final = "save the building again in the traffic editor"
+_SUFFIXES: Final = (".building.yaml", ".building.yml")
+_MOST_APART: Final = 1.05
+"""Largest ratio of the scales that two measurements give without a warning."""
 _LEFT_OUT: Final = ("models", "fiducials", "human_lanes")
 
 Segment = tuple[Point, Point]
@@ -73,8 +76,9 @@ class Building:
 
 
 def is_building(source: YamlSource) -> bool:
-    """Returns whether a YAML file has the form of a building of Open-RMF."""
-    return isinstance(source.data, dict) and isinstance(source.data.get("levels"), dict)
+    """Returns whether a YAML file has the name or the form of a building of Open-RMF."""
+    named = source.path.name.endswith(_SUFFIXES)
+    return named or (isinstance(source.data, dict) and "levels" in source.data)
 
 
 def read_building(source: YamlSource, *, level: str | None, scale_m: float | None) -> Building:
@@ -82,10 +86,9 @@ def read_building(source: YamlSource, *, level: str | None, scale_m: float | Non
 
     Raises InputError when the level is not there, its coordinates are geographic, or an edge names no vertex.
     """
-    levels, notes = source.data["levels"], list[str]()
-    if not levels or (level is not None and level not in levels):
-        what = f"there is no level '{level}'" if levels else "it has no levels"
-        raise source.error(("levels",), what, suggestion(level or "", list(levels)) if levels else _HINT)
+    levels, notes = _levels(source), list[str]()
+    if level is not None and level not in levels:
+        raise source.error(("levels",), f"there is no level '{level}'", suggestion(level, list(levels)))
     name = level or next(iter(levels))
     if level is None and len(levels) > 1:
         notes.append(f"it has the levels {', '.join(map(str, levels))}: {name} is taken (--level takes another)")
@@ -99,13 +102,17 @@ def read_building(source: YamlSource, *, level: str | None, scale_m: float | Non
     edges = {key: list(_edges(source, path, part, key, len(vertices))) for key in _EDGES}
     flip = 1.0 if system == "cartesian_meters" else -1.0
     if system == "reference_image":
-        scale_m = scale_m or _measured_scale(vertices, edges["measurements"], notes)
+        scale_m = scale_m or _measured_scale(source, (*path, "measurements"), vertices, edges["measurements"], notes)
     points = [((scale_m or 1.0) * x, flip * (scale_m or 1.0) * y) for x, y, _, _ in vertices]
     floors = tuple(tuple(points[n] for n in each) for each in _floors(source, path, part, len(vertices)))
-    named = dict[str, Point]()
-    for point, (_, _, each, _) in zip(points, vertices, strict=True):
-        if each:
-            named.setdefault(each, point)
+    named, first = dict[str, Point](), dict[str, int]()
+    for n, (point, (_, _, each, _)) in enumerate(zip(points, vertices, strict=True)):
+        line = source.line((*path, "vertices", n))
+        if each and each in named:
+            what = f"lines {first[each]} and {line} have vertices of the name '{each}'"
+            notes.append(f"{what}: the later one is left out; give it a name of its own")
+        elif each:
+            named[each], first[each] = point, line
     starts = [
         each for _, _, each, facts in vertices if each and (facts.get("is_charger") or facts.get("spawn_robot_name"))
     ]
@@ -116,7 +123,24 @@ def read_building(source: YamlSource, *, level: str | None, scale_m: float | Non
     made = Building(segments["walls"], segments["doors"], segments["lanes"], floors, named, tuple(starts), tuple(notes))
     if not len(made.points):
         raise source.error(path, f"the level {name} has no walls, floors, lanes or names", _HINT)
+    if not made.walls:
+        what = f"line {source.line(path)}: the level {name} has no walls, so nothing bounds or divides its rooms"
+        return replace(made, notes=(*made.notes, f"{what}; draw them in the traffic editor"))
     return made
+
+
+def _levels(source: YamlSource) -> dict[str, Any]:
+    """Levels of a building by name. Raises InputError for a file without any."""
+    if source.data is None:
+        raise source.error((), "the building file is empty", _HINT)
+    if not isinstance(source.data, dict):
+        raise source.error((), "it is no building of Open-RMF: a building begins with the key levels", _HINT)
+    levels = source.data.get("levels")
+    if not levels:
+        raise source.error(("levels",), "the building has no levels", _HINT)
+    if not isinstance(levels, dict):
+        raise source.error(("levels",), "the levels of the building have no names", _HINT)
+    return levels
 
 
 def _left_out(source: YamlSource, path: tuple[str | int, ...], part: Any) -> Iterator[str]:
@@ -131,9 +155,7 @@ def _left_out(source: YamlSource, path: tuple[str | int, ...], part: Any) -> Ite
 _EDGES: Final = ("walls", "doors", "lanes", "measurements")
 
 
-def _vertices(
-    source: YamlSource, path: tuple[str | int, ...], part: Any
-) -> Iterator[tuple[float, float, str, dict[str, Any]]]:
+def _vertices(source: YamlSource, path: tuple[str | int, ...], part: Any) -> Iterator[tuple[float, float, str, dict[str, Any]]]:
     """Coordinates, name and facts of each vertex. Raises InputError."""
     for n, each in enumerate(_listed(source, path, part, "vertices")):
         numbers = each[:2] if isinstance(each, list) else []
@@ -149,18 +171,29 @@ def _edges(
     """The two vertices and the facts of each edge. Raises InputError."""
     for n, each in enumerate(_listed(source, path, part, key)):
         ends = each[:2] if isinstance(each, list) else []
-        if len(ends) < 2 or not all(type(end) is int and 0 <= end < count for end in ends):
-            raise source.error((*path, key, n), f"an edge of {key} names no two of the {count} vertices", _HINT)
+        if len(ends) < 2:
+            raise source.error((*path, key, n), f"{key[:-1]} {n} does not begin with the numbers of 2 vertices", _HINT)
+        _check_vertices(source, (*path, key, n), f"{key[:-1]} {n}", ends, count)
         yield ends[0], ends[1], _facts(each[2:])
 
 
 def _floors(source: YamlSource, path: tuple[str | int, ...], part: Any, count: int) -> Iterator[list[int]]:
     for n, each in enumerate(_listed(source, path, part, "floors")):
         corners = each.get("vertices") if isinstance(each, dict) else None
-        if not isinstance(corners, list) or not all(type(end) is int and 0 <= end < count for end in corners):
-            raise source.error((*path, "floors", n), f"a floor names none of the {count} vertices", _HINT)
+        if not isinstance(corners, list):
+            raise source.error((*path, "floors", n), f"floor {n} has no list of vertices", _HINT)
+        _check_vertices(source, (*path, "floors", n), f"floor {n}", corners, count)
         if len(corners) > 2:
             yield corners
+
+
+def _check_vertices(source: YamlSource, path: tuple[str | int, ...], what: str, numbers: Sequence[Any], count: int) -> None:
+    """Raises InputError for the first number that no vertex has."""
+    for each in numbers:
+        if type(each) is not int or not 0 <= each < count:
+            known = f"the level has the vertices 0 to {count - 1}" if count else "the level has no vertices"
+            hint = f"correct the number, or {_HINT}"
+            raise source.error(path, f"{what} names vertex {each!s:.40}, and {known}", hint)
 
 
 def _listed(source: YamlSource, path: tuple[str | int, ...], part: Any, key: str) -> list[Any]:
@@ -177,17 +210,31 @@ def _facts(rest: Sequence[Any]) -> dict[str, Any]:
 
 
 def _measured_scale(
-    vertices: Sequence[tuple[float, float, str, Any]], measured: Sequence[tuple[int, int, Any]], notes: list[str]
+    source: YamlSource,
+    path: tuple[str | int, ...],
+    vertices: Sequence[tuple[float, float, str, Any]],
+    measured: Sequence[tuple[int, int, Any]],
+    notes: list[str],
 ) -> float:
-    """Metres of a pixel: the mean of the measurements; without any, that of the traffic editor, with a note."""
-    scales = list[float]()
-    for a, b, facts in measured:
+    """Metres of a pixel: the mean of the measurements; without any, that of the traffic editor.
+
+    Notes say when there is none, or when two contradict each other.
+    """
+    scales = list[tuple[float, int]]()
+    for n, (a, b, facts) in enumerate(measured):
         pixels, metres = math.dist(vertices[a][:2], vertices[b][:2]), facts.get("distance")
         if pixels > 0.0 and type(metres) in (int, float) and 0.0 < metres < math.inf:
-            scales.append(metres / pixels)
+            scales.append((metres / pixels, source.line((*path, n))))
     if not scales:
         notes.append(f"no measurement gives its scale: a pixel counts as {_USUAL_SCALE_M:g} m (--scale sets another)")
-    return sum(scales) / len(scales) if scales else _USUAL_SCALE_M
+        return _USUAL_SCALE_M
+    mean_m = sum(scale for scale, _ in scales) / len(scales)
+    (low, at), (high, other) = min(scales), max(scales)
+    if high > _MOST_APART * low:
+        each = f"a pixel is {low:.3g} m by line {at}, {high:.3g} m by line {other}"
+        taken = f"their mean of {mean_m:.3g} m is taken: correct the wrong one, or give --scale"
+        notes.append(f"its measurements contradict each other: {each}; {taken}")
+    return mean_m
 
 
 def building_grid(building: Building) -> Grid:

@@ -220,3 +220,42 @@ def test_bodies_far_apart_in_one_file_are_a_warning(tmp_path):
     notes = []
     import_object(tmp_path / "pair.stl", ImportOptions("pair"), tmp_path / "pair", ImportReports(note=notes.append))
     assert [note.split(",")[0] for note in notes] == ["it holds 2 bodies"]
+
+
+def remarks(tmp_path, mesh, **options):
+    """Remarks on the import of a mesh."""
+    mesh.export(tmp_path / "part.stl")
+    (tmp_path / "part").mkdir()
+    notes = []
+    reports = ImportReports(note=notes.append)
+    import_object(tmp_path / "part.stl", ImportOptions("part", 0.1, **options), tmp_path / "part", reports)
+    return notes
+
+
+def test_an_object_too_flat_to_be_recognised_is_a_warning(tmp_path):
+    (note,) = remarks(tmp_path, trimesh.creation.box((0.18, 0.02, 0.007)))
+    assert note.startswith("it is 0.007 m high, and the robot does not recognise objects under 0.01 m by their models")
+
+
+@pytest.mark.parametrize(
+    ("size", "options"), [((0.18, 0.02, 0.007), {"class_name": "screwdriver"}), ((0.18, 0.02, 0.011), {})]
+)
+def test_a_flat_object_of_a_known_class_and_a_higher_one_are_no_warning(tmp_path, size, options):
+    assert remarks(tmp_path, trimesh.creation.box(size), **options) == []
+
+
+#   edge of a cube, scale                                  hint
+@pytest.mark.parametrize(
+    ("edge", "scale", "hint"),
+    [
+        (0.001, 1.0, "give --scale 100 (0.1 m long) or 1000 (1 m long), if its lengths were divided by that"),
+        (0.1, 0.001, "give --scale 1 if its unit is metres (0.1 m long)"),
+        (8.0, 0.0001, "give --scale 0.01 if its unit is centimetres (0.08 m long), 0.0254 if its unit is inches"),
+        (1e-6, 1.0, "give --scale, the metres of one unit of the file"),
+        (300.0, 1.0, "give --scale 0.001 if its unit is millimetres (0.3 m long)"),
+    ],
+)
+def test_a_size_that_is_refused_has_a_hint_of_the_unit(tmp_path, edge, scale, hint):
+    with pytest.raises(ObjectImportError) as refused:
+        remarks(tmp_path, trimesh.creation.box((edge, edge, edge)), scale=scale)
+    assert refused.value.hint.startswith(hint)

@@ -4,7 +4,7 @@ import re
 
 import cart_urdf as cart
 import pytest
-from rover_urdf import joint
+from rover_urdf import joint, link
 
 from errand_make.robots.package import render_robot
 from skills.inputs.errors import InputError
@@ -53,3 +53,34 @@ def test_a_base_without_any_mass_is_named_as_the_file_names_it(render):
     with pytest.raises(InputError, match="link base_link has no mass") as refused:
         render(bare, cart.arm())
     assert refused.value.line == 3 and "body" not in refused.value.message
+
+
+def massless(part):
+    return re.sub("<inertial>.*</inertial>", "", part)
+
+
+def test_a_base_and_wheels_without_mass_are_noted(render):
+    left, *others = cart.wheels()
+    body, *sensors = cart.base()
+    notes = render(massless(body), *sensors, massless(left), *others)
+    assert "links base_link and left_wheel: no mass in the file" in notes
+
+
+def test_a_plate_without_mass_on_the_base_is_not_noted(render):
+    body, laser, *sensors = cart.base()
+    assert "no mass in the file" not in render(body, massless(laser), *sensors, cart.wheels())
+
+
+def test_a_driven_link_with_moments_of_a_speck_is_refused(render):
+    arm = list(cart.arm())
+    arm[4] = re.sub('(ixx|iyy|izz)="[^"]*"', r'\1="1e-12"', arm[4])
+    with pytest.raises(InputError, match=r"link arm_3 moves, and has moments of inertia of 1e-12") as refused:
+        render(cart.base(), cart.wheels(), arm)
+    assert refused.value.line and "kg m" in refused.value.hint
+
+
+def test_a_driven_link_without_mass_of_its_own_may_carry_a_heavy_one(render):
+    arm = list(cart.arm())
+    arm[4] = re.sub('<mass value="[^"]*"', '<mass value="1e-7"', arm[4])
+    ballast = [link("ballast", 1, "<sphere radius='0.02'/>"), joint("ballast_mount", "fixed", "arm_3", "ballast")]
+    assert "arm_3" not in render(cart.base(), cart.wheels(), arm, ballast)

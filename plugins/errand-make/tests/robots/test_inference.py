@@ -227,6 +227,12 @@ def test_a_camera_inside_a_chain_is_left_out(make):
     assert "left out, since no part points them: elbow_camera" in made.notes
 
 
+def test_a_marker_for_a_camera_is_no_camera(make):
+    marker = ['<link name="link_aruco_d405"/>', joint("tag", "fixed", "base_link", "link_aruco_d405", "-0.2 0 0.5")]
+    made = make(cart.base(), cart.wheels(), marker)
+    assert [each["link"] for each in made.data["cameras"].values()] == ["camera_link"]
+
+
 def test_a_lidar_is_added_where_no_link_looks_like_one(make):
     bare = [part.replace("laser", "bumper") for part in cart.base()]
     made = make(bare, cart.wheels())

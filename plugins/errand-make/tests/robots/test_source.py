@@ -31,6 +31,14 @@ def test_without_xacro_the_command_is_shown(file, monkeypatch):
     assert "`xacro robot.urdf.xacro > robot.urdf`" in refused.value.hint
 
 
+def test_a_substitution_that_is_left_over_is_named_with_its_line(file, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xacro", None)
+    text = '<robot>\n<!-- $(arg a)\n -->\n<link name="a"/>\n<mesh filename="$(find far)/part.stl"/>\n</robot>'
+    with pytest.raises(InputError, match=r"xacro file \(\$\(find far\)\)") as refused:
+        read_source(file(text), {})
+    assert refused.value.line == 5
+
+
 def test_a_xacro_file_is_expanded(file):
     pytest.importorskip("xacro")
     assert list(read_source(file(XACRO), {}).links) == ["2"]

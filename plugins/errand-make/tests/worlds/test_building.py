@@ -1,5 +1,6 @@
 """Worlds made of building files of Open-RMF's traffic editor; the files here are our own."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -92,6 +93,7 @@ NOTES = [
     (building(models=[{"name": "Sofa"}, {"name": "Sofa"}]), "2 models of the level: left out"),
     (building(), "1 lane of one direction is preferred ground in both"),
     ({**building(), "lifts": {"Lift1": {}}}, "1 lift: left out"),
+    (building(walls=[]), "the level L1 has no walls, so nothing bounds or divides its rooms"),
     ({**building(), "levels": {**building()["levels"], "L2": {}}}, "it has the levels L1, L2: L1 is taken"),
 ]
 
@@ -99,6 +101,26 @@ NOTES = [
 @pytest.mark.parametrize(("data", "note"), NOTES, ids=[note[:20] for _, note in NOTES])
 def test_the_report_names_what_is_not_taken(data, note):
     assert any(note in each for each in read(data).notes)
+
+
+def test_measurements_that_contradict_each_other_are_named_with_their_scales():
+    measured = [[0, 1, {"distance": [3, 4.0]}], [0, 5, {"distance": [3, 9.0]}]]
+    plan = read(building(measurements=measured))
+    (note,) = (each for each in plan.notes if "contradict" in each)
+    assert re.search(r"a pixel is 0.02 m by line \d+, 0.06 m by line \d+; their mean of 0.04 m is taken", note)
+
+
+def test_measurements_that_differ_by_the_width_of_a_click_are_averaged_silently():
+    measured = [[0, 1, {"distance": [3, 4.0]}], [0, 5, {"distance": [3, 3.06]}]]
+    assert not any("contradict" in each for each in read(building(measurements=measured)).notes)
+
+
+def test_the_second_vertex_of_a_name_is_left_out_with_both_lines():
+    vertices = building()["levels"]["L1"]["vertices"]
+    plan = read(building(vertices=[*vertices, [10, 10, 0, "desk"]]))
+    (note,) = (each for each in plan.notes if "'desk'" in each)
+    first, second = map(int, re.search(r"lines (\d+) and (\d+) have vertices of the name 'desk'", note).groups())
+    assert first < second and plan.names["desk"] == pytest.approx((6.8, -2.4))
 
 
 def test_metres_need_no_measurement_and_keep_their_signs():
@@ -113,13 +135,20 @@ def test_the_scale_may_be_given():
 #   a wrong file                                                 a part of the refusal
 WRONG = [
     ({**building(), "coordinate_system": "wgs84"}, "of the kind 'wgs84'"),
-    (building(walls=[[0, 99, {}]]), "an edge of walls names no two of the 11 vertices"),
-    (building(doors=[[0]]), "an edge of doors names no two"),
-    (building(floors=[{"vertices": [0, 1, 99]}]), "a floor names none of the 11 vertices"),
+    (building(walls=[[0, 99, {}]]), "wall 0 names vertex 99, and the level has the vertices 0 to 10"),
+    (building(lanes=[[-1, 0, {}]]), "lane 0 names vertex -1"),
+    (building(vertices=[], floors=[]), "wall 0 names vertex 0, and the level has no vertices"),
+    (building(doors=[[0]]), "door 0 does not begin with the numbers of 2 vertices"),
+    (building(floors=[{"vertices": [0, 1, 99]}]), "floor 0 names vertex 99"),
+    (building(floors=[{}]), "floor 0 has no list of vertices"),
     (building(vertices=[["a", 0, 0, ""]]), "vertex 0 has no x and y"),
     (building(vertices=[[0, float("nan"), 0, ""]]), "vertex 0 has no x and y"),
     (building(walls=3), "walls is no list"),
-    ({"levels": {}}, "it has no levels"),
+    ({"levels": {}}, "the building has no levels"),
+    ({"name": "b"}, "the building has no levels"),
+    ({"levels": ["L1"]}, "the levels of the building have no names"),
+    (None, "the building file is empty"),
+    (["L1"], "it is no building of Open-RMF"),
     ({"levels": {"L1": None}}, "has no walls, floors, lanes or names"),
     ({"levels": {"L1": [1]}}, "has no walls, floors, lanes or names"),
 ]

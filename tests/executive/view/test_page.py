@@ -938,7 +938,9 @@ def scene(page, feed):
 
 def test_the_scene_gets_the_poses_and_whether_its_camera_follows(page, scene):
     scene.tell({"followed": "Alice/body", "poses": {"Alice/body": [1.0]}})
-    scene.frame.wait_for_function("document.title")
+    for _ in range(100):
+        if not scene.posted():
+            page.wait_for_timeout(100)
     assert scene.posted() == {"followed": "Alice/body", "poses": {"Alice/body": [1.0]}, "follows": True, "count": 1}
     page.uncheck("#beside")
     assert scene.posted()["follows"] is False

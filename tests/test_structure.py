@@ -11,20 +11,20 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3461,
+    "executive/words": 3460,
     "executive/language": 8260,
     "executive/speech": 1663,
     "executive/mission": 1659,
-    "executive/tree": 8838,
+    "executive/tree": 8836,
     "executive/run": 3295,
     "executive/record": 1099,
     "executive/store": 1604,
     "executive/conversation": 595,
     "executive/view": 1922,
     "executive/testing": 860,
-    "executive/app": 8230,
+    "executive/app": 8228,
     "executive/cli": 3901,
-    "skills": 28397,
+    "skills": 28391,
     "plant": 11378,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 422, 61, 7

@@ -96,10 +96,6 @@ class RunContext(SkillContext):
         """Estimators that can exclude readings of other robots, whose poses are known."""
         return tuple(each for each in (self.localiser, self.costmap) if isinstance(each, ExcludesRobots))
 
-    def ahead_s(self, clock_s: float) -> float:
-        """Time from now until a time of day (s after midnight), in s."""
-        return time_ahead_s(clock_s, self.day_began_s + self.clock.now())
-
     def known_pose(self) -> Pose2D | None:
         """Returns the robot's estimated pose, the planar part of X_WB; None while it is not localised."""
         return self.pose() if self.localiser.estimate().localised else None

@@ -252,10 +252,9 @@ class Mission(_Whole):
         Three or more commands like the first are counted: "visit hall and 6 more".
         """
         commands = [command for step in steps for each in step.walk() for command in each.commands]
-        first = commands[0] if commands else None
-        if first is None:
-            name = type(steps[0]).__name__.lower() if steps else "do"
-        else:
+        name = type(steps[0]).__name__.lower() if steps else "do"
+        if commands:
+            first = commands[0]
             verb = "find" if first.verb in _STATES else first.verb or "do"
             more = sum(each.verb == first.verb for each in commands) - 1
             counted = f"and {more} more" if more > 1 else ""

@@ -74,8 +74,10 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         for camera in self._cameras(inputs.camera):
             self._camera, p_BT = camera, self.X_WB().inverse() @ np.array(p_WT)
             with PlanningAttempt() as attempt:
-                if inputs.top:
-                    _refuse_from_below(camera, self.X_WB(), p_WT[2])
+                high_m = (self.X_WB() @ camera.X_FC).translation()[2]
+                if inputs.top and camera.mount is Mount.BODY and high_m <= p_WT[2]:
+                    what = f"the {camera.source} camera, {high_m:.2f} m high, does not see a top {p_WT[2]:.2f} m high"
+                    raise SkillFailure(Cause.PLANNING, what)
                 yield from self.look_at(p_BT, self._viewpoints(p_BT), message)
             if attempt.failure is None:
                 image = yield from self.picture(message)
@@ -129,14 +131,6 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         picture = image.grey if image.colour is None else image.colour
         self.context.publish(PICTURES, {"caption": text, "image": picture, "pose": pose, **facts})
         return Succeeded(f"took a picture of {text}")
-
-
-def _refuse_from_below(camera: CameraCapabilities, X_WB: RigidTransform, top_m: float) -> None:
-    """Raises SkillFailure with cause PLANNING for a camera of the body that is lower than the top of a surface."""
-    high_m = (X_WB @ camera.X_FC).translation()[2]
-    if camera.mount is Mount.BODY and high_m <= top_m:
-        what = f"the {camera.source} camera, {high_m:.2f} m high, does not see a top {top_m:.2f} m high"
-        raise SkillFailure(Cause.PLANNING, what)
 
 
 def _hidden(image: Image, p_CT: FloatArray) -> str | None:

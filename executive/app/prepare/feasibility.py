@@ -21,7 +21,7 @@ from skills.api import Zone
 from skills.inputs.errors import Problems
 from skills.manipulation.arm.kinematics import arm_model
 from skills.perception.class_forms import class_forms, known_attributes, shipped_forms
-from skills.robot import CameraCapabilities, Capabilities, Mount, Pose2D
+from skills.robot import Capabilities, Mount, Pose2D
 from skills.stack import DEFAULT_FILE, ControllerComponent, default_component
 
 
@@ -138,6 +138,7 @@ def abilities_of(kind: str) -> Abilities:
     """Returns payload, reach and gripper of a kind of robot, and the least mass and width of each object class."""
     masses = {name: 0.0 if form.mass_kg is None else form.mass_kg[0] for name, form in class_forms().items()}
     capabilities = robot_kind(kind).capabilities()
+    above_m = capabilities.standing_height_m
     return Abilities(
         masses,
         0.0 if capabilities.arm is None else capabilities.arm.max_payload_kg,
@@ -149,14 +150,11 @@ def abilities_of(kind: str) -> Abilities:
         capabilities.gripper is not None and capabilities.arm is not None,
         capabilities.arm is not None,
         capabilities.object_camera is not None,
-        cameras={each.source: _height_m(each, capabilities) for each in capabilities.cameras},
+        cameras={
+            each.source: above_m + float(each.X_FC.translation()[2]) if each.mount is Mount.BODY else math.inf
+            for each in capabilities.cameras
+        },
     )
-
-
-def _height_m(camera: CameraCapabilities, capabilities: Capabilities) -> float:
-    """Height of a camera above the floor (m) while the robot stands; infinite for one on the hand or the head."""
-    fixed = camera.mount is Mount.BODY
-    return capabilities.standing_height_m + float(camera.X_FC.translation()[2]) if fixed else math.inf
 
 
 def reached_heights_m(capabilities: Capabilities) -> tuple[float, float]:

@@ -133,7 +133,8 @@ class Repeat(MemoryComposite):
         goes_on = self.resumed and self.count in self.board
         super()._restart()
         if self.until_clock_s is not None:
-            self._end_s = self.context.clock.now() + self.context.ahead_s(self.until_clock_s)
+            now_s = self.context.clock.now()
+            self._end_s = now_s + time_ahead_s(self.until_clock_s, self.context.day_began_s + now_s)
         if goes_on:
             self._enter_round()
             return

@@ -117,7 +117,8 @@ class WaitUntilClock(ExplainedLeaf):
 
     def initialise(self) -> None:
         """Computes when the wait ends."""
-        self._end_s = self.context.clock.now() + self.context.ahead_s(self.time_s)
+        now_s = self.context.clock.now()
+        self._end_s = now_s + time_ahead_s(self.time_s, self.context.day_began_s + now_s)
 
     def update(self) -> Status:
         """Returns SUCCESS once the time has come."""

@@ -155,7 +155,9 @@ def _left_out(source: YamlSource, path: tuple[str | int, ...], part: Any) -> Ite
 _EDGES: Final = ("walls", "doors", "lanes", "measurements")
 
 
-def _vertices(source: YamlSource, path: tuple[str | int, ...], part: Any) -> Iterator[tuple[float, float, str, dict[str, Any]]]:
+def _vertices(
+    source: YamlSource, path: tuple[str | int, ...], part: Any
+) -> Iterator[tuple[float, float, str, dict[str, Any]]]:
     """Coordinates, name and facts of each vertex. Raises InputError."""
     for n, each in enumerate(_listed(source, path, part, "vertices")):
         numbers = each[:2] if isinstance(each, list) else []
@@ -187,7 +189,9 @@ def _floors(source: YamlSource, path: tuple[str | int, ...], part: Any, count: i
             yield corners
 
 
-def _check_vertices(source: YamlSource, path: tuple[str | int, ...], what: str, numbers: Sequence[Any], count: int) -> None:
+def _check_vertices(
+    source: YamlSource, path: tuple[str | int, ...], what: str, numbers: Sequence[Any], count: int
+) -> None:
     """Raises InputError for the first number that no vertex has."""
     for each in numbers:
         if type(each) is not int or not 0 <= each < count:

@@ -208,13 +208,25 @@ def _obj_group(
     """Lines of one material; increases `counts` (vertices, texture coordinates, normals so far)."""
     lines, index = [], []
     for k, (key, rows, digits) in enumerate((("v", points, places), ("vt", uvs, 4), ("vn", normals, 3))):
-        unique, inverse = np.unique(np.round(rows, digits) + 0.0, axis=0, return_inverse=True)
-        lines += [f"{key} " + " ".join(f"{value:.{digits}f}" for value in row) for row in unique]
-        index.append(inverse.reshape(-1) + counts[k] + 1)
+        unique, inverse = unique_rows(np.round(rows, digits) + 0.0)
+        form = f"{key}{f' %.{digits}f' * unique.shape[1]}"
+        lines += [form % tuple(row) for row in unique.tolist()]
+        index.append(inverse + counts[k] + 1)
         counts[k] += len(unique)
     lines.append(f"usemtl {name}")
-    corners = [f"{v}/{t}/{n}" for v, t, n in zip(*index, strict=True)]
-    return lines + ["f " + " ".join(corners[i : i + 3]) for i in range(0, len(corners), 3)]
+    faces = np.column_stack(index).reshape(-1, 9).tolist()
+    return lines + ["f {}/{}/{} {}/{}/{} {}/{}/{}".format(*face) for face in faces]
+
+
+def unique_rows(rows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Different rows (U, K) in lexicographic order, and the index of each row (N,) among them."""
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    begins = np.ones(len(rows), dtype=bool)
+    begins[1:] = np.logical_or.reduce([column[1:] != column[:-1] for column in ordered.T])
+    inverse = np.empty(len(rows), dtype=np.intp)
+    inverse[order] = np.cumsum(begins) - 1
+    return ordered[begins], inverse
 
 
 def plain_colours(materials: Mapping[str, Material]) -> list[str]:

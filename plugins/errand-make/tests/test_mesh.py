@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from errand_make.mesh import Material, Mesh, mtl_text, obj_text, palette_picture, palette_uv
+from errand_make.mesh import Material, Mesh, mtl_text, obj_text, palette_picture, palette_uv, unique_rows
 
 MATERIALS = {
     "tiles": Material(texture="tiles.png", tile_m=(0.5, 0.5)),
@@ -93,3 +93,9 @@ def test_the_material_file_has_only_used_materials():
     add_box(mesh := Mesh(MATERIALS))
     text = mtl_text(mesh, "palette.png")
     assert [name in text for name in ("palette.png", "tiles.png")] == [True, False]
+
+
+def test_rows_are_unique_in_order_with_the_index_of_each():
+    rows = np.array([[1.0, 2.0], [0.0, 3.0], [1.0, 2.0], [0.0, 1.0]])
+    unique, index = unique_rows(rows)
+    assert unique.tolist() == [[0.0, 1.0], [0.0, 3.0], [1.0, 2.0]] and (unique[index] == rows).all()

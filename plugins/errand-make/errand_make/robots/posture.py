@@ -7,6 +7,8 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
 
 from errand_make.robots.tree import KinematicTree
 from plant.robots.urdf_robot.urdf_file import UrdfJoint
@@ -75,6 +77,25 @@ def outline(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     return points[:, :2].min(axis=0), points[:, :2].max(axis=0)
 
 
+class Obstacle:
+    """Box from `low` to `high` (3,) in the frame of a link L."""
+
+    def __init__(self, X_BL: RigidTransform, low: FloatArray, high: FloatArray) -> None:
+        self._X_LB, self._low, self._high = X_BL.inverse(), low, high
+        corners = X_BL @ np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3).T
+        self._bounds = list(zip(corners.min(axis=1), corners.max(axis=1), strict=True))
+        self._is_empty = bool((low >= high).any())
+
+    def contained(self, columns: FloatArray) -> NDArray[np.intp]:
+        """Indices of the points (3, N) in B that are in the box: first those in its bounds, then exactly."""
+        near = np.arange(0 if self._is_empty else columns.shape[1])
+        for column, (low, high) in zip(columns, self._bounds, strict=True):
+            values = column[near]
+            near = near[(values > low) & (values < high)]
+        points_L = (self._X_LB @ columns[:, near]).T
+        return np.asarray(near[((points_L > self._low) & (points_L < self._high)).all(axis=1)])
+
+
 class _Search:
     """Costs of the postures of a chain."""
 
@@ -96,7 +117,7 @@ class _Search:
         ]
         carried = {*leave, *(link for each in links for link in each)}
         self._obstacles = [
-            (tree.X_BL[link].inverse().GetAsMatrix34(), points.min(axis=0), points.max(axis=0))
+            Obstacle(tree.X_BL[link], points.min(axis=0) + _INSIDE_M, points.max(axis=0) - _INSIDE_M)
             for link in tree.urdf.links
             if link not in carried and len(points := tree.local_points(link))
         ]
@@ -113,7 +134,8 @@ class _Search:
                 p = p + np.einsum("qij,qj->qi", R, q[:, k, None] * joint.axis)
             else:
                 R = R @ _turns(joint.axis, q[:, k])
-            found.append(p[:, None] + np.einsum("qij,nj->qni", R, self._points[k]))
+            turned = (R.reshape(-1, 3) @ self._points[k].T).reshape(len(q), 3, -1)
+            found.append(p[:, None] + turned.transpose(0, 2, 1))
             before = joint.child
         return found
 
@@ -135,11 +157,11 @@ class _Search:
         bodies = self._bodies(q)
         points = np.concatenate(bodies, axis=1)
         outer = np.concatenate([points[:, :0], *bodies[_FREE_JOINTS:]], axis=1)
-        hits = np.zeros(len(q))
-        for X_LB, low, high in self._obstacles:
-            points_L = outer @ X_LB[:, :3].T + X_LB[:, 3]
-            inside = ((points_L > low + _INSIDE_M) & (points_L < high - _INSIDE_M)).all(axis=2)
-            hits += inside.mean(axis=1) if outer.shape[1] else 0.0
+        hits, many = np.zeros(len(q)), outer.shape[1]
+        columns = np.ascontiguousarray(outer.reshape(-1, 3).T)
+        for obstacle in self._obstacles if many else ():
+            inside = obstacle.contained(columns)
+            hits += np.bincount(inside // many, minlength=len(q)) / many
         top = points[..., 2].max(axis=1) if points.shape[1] else hits
         return np.asarray(self._overhang(points) + _HIT * hits + _UP * top + _BENT * np.abs(q - zero).sum(axis=1))
 

@@ -34,6 +34,8 @@ class KinematicTree:
     X_LB: RigidTransform
     posture: Mapping[str, float] = field(default_factory=dict)
     text: str = ""
+    _local: dict[str, FloatArray] = field(default_factory=dict, repr=False, compare=False)
+    """Corners of links that are known already; a tree at another posture has the same."""
 
     # -- bodies and joints ----------------------------------------------------------------------------------------
 
@@ -123,10 +125,6 @@ class KinematicTree:
     def place(self, joint: UrdfJoint) -> FloatArray:
         """Origin (3,) of a joint in B."""
         return np.asarray(self.frame(joint).translation())
-
-    @cached_property
-    def _local(self) -> dict[str, FloatArray]:
-        return {}
 
     def local_points(self, link: str) -> FloatArray:
         """Corners (N, 3) of a link's collision shapes, else of what is drawn, in its own frame."""

@@ -197,8 +197,8 @@ def _error(options: ExportedNetwork, what: str, hint: str) -> ModelFileError:
 def _names(options: ExportedNetwork, metadata: Mapping[str, str]) -> dict[int, str]:
     """Names of the labels, from the options or the metadata; a list counts from 0, and has them all."""
     named: Any = options.names
-    if isinstance(named, Path):
-        named = [line.strip() for line in read_text(named).rstrip().splitlines()]
+    if isinstance(options.names, Path):
+        named = [line.strip() for line in read_text(options.names).rstrip().splitlines()]
         if "" in named:
             hint = "each line names the next class: write its name there, or a table, 'names: {2: bottle}'"
             raise ModelFileError("the line is empty", hint=hint, file=options.names, line=named.index("") + 1)

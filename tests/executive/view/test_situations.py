@@ -309,14 +309,15 @@ def test_a_fleet_says_what_came_of_each_mission(start, tmp_path):
 
 
 def test_a_mission_that_is_added_on_the_page_of_a_fleet_is_done(start, tmp_path):
+    store = tmp_path / "queue.sqlite"
     added = [
         *ERRAND,
         "queue",
         "add",
         "--say",
         "wait in the office for 2 minutes",
-        "--out",
-        str(tmp_path / "queue"),
+        "--store",
+        str(store),
     ]
     subprocess.run(added, check=True, capture_output=True)
     out = tmp_path / "fleet"

@@ -195,7 +195,8 @@ class StackError(ValueError):
     """Error in a stack file: the `path` of keys to it, what is wrong, and a `hint` at what would fit."""
 
     def __init__(self, path: tuple[str | int, ...], message: str, hint: str = "") -> None:
-        super().__init__(f"{'.'.join(map(str, path)) or 'the stack'}: {message}")
+        words = [str(each) for each in path if f"a{each}".isidentifier()]  # no kinds, nor the text of a foreign file
+        super().__init__(f"{'.'.join(words) or 'the stack'}: {message}")
         self.path, self.message, self.hint = path, message, hint
 
 

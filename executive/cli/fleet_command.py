@@ -105,7 +105,7 @@ def status(queue: Queue, as_json: AS_JSON = False) -> None:
 def _store(queue: Path) -> Path:
     store = store_in(queue) if is_folder(queue) else queue
     if not is_there(store):
-        raise InputError("there is no queue", hint="name the folder that `errand queue add` writes to", file=queue)
+        raise InputError("there is no queue", hint="name its folder, as in `errand fleet run out`", file=queue)
     return store
 
 

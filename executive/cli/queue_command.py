@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from executive.app.runs.signals import ended_by_signals
+from executive.cli.defaults import runs_folder
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON, FOXGLOVE, HOST, PORT, QUIET, STORE, VIEW, StartCommand, takes_request
 from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer
@@ -24,6 +25,7 @@ from executive.store.trigger_source import installed_source
 from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, schedule_of
 from executive.store.wakeup import WakeupPipe, wake_server
 from skills.inputs.errors import InputError, listing
+from skills.inputs.outside import writing
 from skills.quantities import Count, Port, Wait
 
 if TYPE_CHECKING:
@@ -79,23 +81,30 @@ def add(
     refuse_unaddressed(request)
     load_stack(request.stack)
     prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
-    out, request = request.out, prepared.request.from_anywhere()
-    with MissionStore(store or store_in(out)) as missions:
+    request = prepared.request.from_anywhere()
+    with MissionStore(store or store_in(runs_folder())) as missions:
         if trigger is None:
             mission, standing = missions.add(request, queued=True), {}
         else:
             added = StandingMissions(missions).add(request, trigger, missed or Missed.SKIP)
             mission, standing = missions.mission(added.id), {added.id: added}
-    wake_server(store or store_in(out))
+    wake_server(missions.path)
     said = "is queued" if trigger is None else f"waits for `errand queue serve` to queue it ({trigger})"
     console_for(as_json).print(f"Mission {mission.id} {said}: {request.name}", markup=False)
     finish(_mission_json(mission, standing), as_json)
 
 
+def _store(out: Path, resumes: bool = False) -> Path:
+    """Store of `queue add`, or if it is missing, that in `out`; a resumed mission is sought in `out` first."""
+    usual = store_in(runs_folder())
+    stores = (store_in(out), usual) if resumes else (usual, store_in(out))
+    return next((each for each in stores if each.is_file()), usual)
+
+
 @queue.command(name="list")
 def show(out: Out = Path("out"), store: STORE = None, as_json: AS_JSON = False) -> None:
     """Lists all missions of the store with their states."""
-    with MissionStore(store or store_in(out), create=False) as missions:
+    with MissionStore(store or _store(out), create=False) as missions:
         known = missions.missions()
         standing = {each.id: each for each in StandingMissions(missions).missions()}
     header = ("mission", "state", "name", "world", "seed", "commands", "message", "trigger")
@@ -106,7 +115,7 @@ def show(out: Out = Path("out"), store: STORE = None, as_json: AS_JSON = False) 
 @queue.command()
 def remove(number: Number, out: Out = Path("out"), store: STORE = None) -> None:
     """Removes a mission; a mission with a trigger can be removed while a server runs."""
-    with MissionStore(store or store_in(out), create=False) as missions:
+    with MissionStore(store or _store(out), create=False) as missions:
         stands = missions.mission(number).state is MissionState.STANDING
         with nullcontext() if stands else missions.claim():
             missions.remove(number)
@@ -150,13 +159,16 @@ def _runs(
     view: float | None,
     address: tuple[str, int],
     foxglove: str | None,
+    resumes: bool = False,
 ) -> Iterator[tuple[MissionStore, MissionRuns]]:
     """Claims a store while the block runs; yields the store with the runner for its missions.
 
     With `view` each mission has a live page, and the last page stays as `errand run --view` says.
     """
-    folder = out or Path("out")
-    with MissionStore(store or store_in(folder), create=False) as missions, missions.claim():
+    folder = out or runs_folder()
+    with MissionStore(store or _store(folder, resumes), create=False) as missions, missions.claim():
+        with writing(folder, "name another --out"):
+            folder.mkdir(parents=True, exist_ok=True)
         from executive.app.runs.queue import MissionRuns
         from executive.cli.screen import ConsoleScreen, page_of
         from executive.view.foxglove import serve_live
@@ -297,7 +309,7 @@ def resume(
 ) -> None:
     """Resumes an interrupted or cancelled mission from its last finished step; then runs its queue."""
     console = console_for(as_json)
-    with _runs(store, out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
+    with _runs(store, out, console, quiet, view, (view_host, view_port), foxglove, True) as (missions, runs):
         ended = _in_turn(missions, runs, console, _interrupted(missions, mission))
     values = {**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]}
     finish(values, as_json, good=all(each.achieved for each in ended))

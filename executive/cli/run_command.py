@@ -28,7 +28,7 @@ from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_j
 from executive.mission.request import Request
 from executive.words.forms import OptionGroup as Group
 from skills.inputs.errors import InputError
-from skills.inputs.outside import is_file
+from skills.inputs.outside import is_file, writing
 from skills.inputs.yaml_source import read_yaml
 
 if TYPE_CHECKING:
@@ -80,6 +80,8 @@ def run(
         page = None if view is None else page_of(console, (view_host, view_port), kept_in, request.out)
         screen = ConsoleScreen(console, quiet, whole_tree, voice, page, live, timing)
         connection = real_runner(prepared, robot) if robot is not None else nullcontext()
+        with writing(request.out, "name another --out"):
+            request.out.mkdir(parents=True, exist_ok=True)
         with MissionStore(kept_in) as missions, missions.claim(), connection as runner:
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
             ended = MissionRuns(missions, screen, run=runner).run(mission, prepared)

@@ -138,4 +138,4 @@ def load_stack(path: Path | None) -> RobotStack:
     try:
         return stack_of(source.data or {}, path.parent)
     except StackError as error:
-        raise source.error(error.path, error.message, error.hint) from error
+        raise source.error(error.path, str(error), error.hint) from error

@@ -227,8 +227,8 @@ def _plain_hint(error: ErrorDetails, word: str | None = None) -> str:
         return f'put it in quotes: "{said}"' if word else f'put it in quotes, as in "{said}"'
     if error["type"] == "string_type" and isinstance(value, int | float):
         return f'put it in quotes: "{value if isinstance(value, float) else display_text(value)}"'
-    if error["type"] == "invalid_key":
-        return "put the key in quotes"
+    if error["type"] in ("invalid_key", "missing"):
+        return "put the key in quotes" if error["type"] == "invalid_key" else f"write '{error['loc'][-1]}: ...'"
     near = nearest_name(str(value), (word for word in _allowed(error) if word != str(value)))
     return f"it reads {display_text(value)} now" if near is None else f"did you mean '{near}'?"
 

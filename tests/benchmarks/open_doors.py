@@ -212,7 +212,7 @@ def other_ports(victim, page):
 def queue(missions: int = 20, half_open: int = 1500, slow: int = 300, sockets: int = 200, limit: float = 400.0):
     """Attacks the calls of a server with queued missions."""
     with tempfile.TemporaryDirectory(prefix="errand-doors-") as made:
-        out = ["--out", f"{made}/out"]
+        out = ["--out", f"{made}/out", "--store", f"{made}/out/.errand/missions.sqlite"]
         run_errand("queue", "add", "--say", "Hey Alice, go to the kitchen", "--on", "call patrol", *out)
         for _ in range(missions):
             asked = run_errand("queue", "add", "--say", "Hey Alice, go to the kitchen", "--seed", "1", *out)

@@ -81,8 +81,9 @@ def test_the_log_of_a_recorded_mission_of_two_robots_is_read_in_every_form(tmp_p
 
 def test_a_queue_goes_on_in_the_world_that_the_mission_before_left(tmp_path):
     for place in ("hall", "living room"):
-        errand("queue", "add", "--say", f"go to the {place}", "--no-wake", "--no-record", "--out", tmp_path)
-    done = CliRunner().invoke(app, ["queue", "run", "--out", str(tmp_path), "--quiet"])
+        errand("queue", "add", "--say", f"go to the {place}", "--no-wake", "--no-record", "--store", tmp_path / "q.db")
+    where = ["--store", str(tmp_path / "q.db"), "--out", str(tmp_path)]
+    done = CliRunner().invoke(app, ["queue", "run", *where, "--quiet"])
     assert done.exit_code == 0, done.output
     logs = [read_events(log) for log in sorted(tmp_path.rglob("log.mcap"))]
     first, second = sorted(logs, key=lambda events: events[0].stamp_s)
@@ -144,10 +145,10 @@ def test_zones_of_a_sentence_hold_while_it_is_done(tmp_path):
 
 def test_a_fleet_goes_on_when_a_robot_dies(tmp_path):
     for place in ("hall", "kitchen"):
-        errand("queue", "add", "--say", f"Go to the {place}", "--no-wake", "--no-record", "--out", tmp_path)
+        errand("queue", "add", "--say", f"Go to the {place}", "--no-wake", "--no-record", "--store", tmp_path / "q.db")
     robots = "alice=spot@8.7,4.0,1.57,bob=spot@8.4,6.5,1.57"
     options = ("--robots", robots, "--seed", 2, "--no-record", "--fault", "alice: robot dies at 1 s")
-    missions = errand("fleet", "run", tmp_path, *options)[0]["missions"]
+    missions = errand("fleet", "run", tmp_path / "q.db", *options)[0]["missions"]
     assert [(each["robot"], each["outcome"]) for each in missions] == [("Bob", "success")] * 2
     assert all(each["referee"]["success"] for each in missions)
 

@@ -155,9 +155,9 @@ def _as_text(value: Value) -> str:
 
 
 def _speak_plan(assembler: Assembler, block: Speak, builder: PlanBuilder) -> Assembled:
+    assembler.check_template(block.text, builder)
     if not block.text.names:
         return Assembled((builder.skill("speak", {"text": block.text.fill({})}),))
-    assembler.check_template(block.text, builder)
     key = builder.key("text")
     fill = set_plan(assembler.flow, builder, {key: block.text}, {key: str}, "fill", "put the values in")
     return Assembled((builder.sequence("speak", fill, builder.skill("speak", {"text": FromBoard(key)})),))

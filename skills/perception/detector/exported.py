@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 USUAL_PX: Final = (640, 640)
 _DTYPES: Final = {"tensor(float)": np.float32, "tensor(float16)": np.float16, "tensor(int64)": np.int64}
 _ALTERNATIVE_SCORE: Final = 0.1
+_NAMES_HINT: Final = "write 'names: [bottle, cup, ...]', 'names: {1: bottle}' or 'names: FILE'"
 Level = Annotated[float, Quantity(ge=0.0, le=255.0)]
 
 
@@ -194,13 +195,18 @@ def _error(options: ExportedNetwork, what: str, hint: str) -> ModelFileError:
 
 
 def _names(options: ExportedNetwork, metadata: Mapping[str, str]) -> dict[int, str]:
-    """Names of the labels, from the options or the metadata; a list counts from 0."""
+    """Names of the labels, from the options or the metadata; a list counts from 0, and has them all."""
     named: Any = options.names
-    if isinstance(named, Path):
-        named = [line.strip() for line in read_text(named).splitlines()]
+    if isinstance(options.names, Path):
+        named = [line.strip() for line in read_text(options.names).rstrip().splitlines()]
+        if "" in named:
+            hint = "each line names the next class: write its name there, or a table, 'names: {2: bottle}'"
+            raise ModelFileError("the line is empty", hint=hint, file=options.names, line=named.index("") + 1)
     try:
-        named = named or ast.literal_eval(metadata.get("names") or metadata.get("class_names") or "()")
-        pairs = named.items() if isinstance(named, Mapping) else enumerate(named)
+        own = ast.literal_eval(metadata.get("names") or metadata.get("class_names") or "()")
+        if named and not isinstance(named, Mapping) and len(named) < len(own):
+            raise _error(options, f"it has {len(own)} classes, and 'names' has {len(named)}", _NAMES_HINT)
+        pairs = (named or own).items() if isinstance(named or own, Mapping) else enumerate(named or own)
         return {int(label): str(name) for label, name in pairs if name}
     except (ValueError, SyntaxError, TypeError):
         return {}
@@ -216,7 +222,11 @@ def _size_px(session: InferenceSession, options: ExportedNetwork, metadata: Mapp
         raise _error(options, what, "export the network with an input (1, 3, height, width) of floats")
     told = [int(side) for side in re.findall(r"\d+", metadata.get("imgsz", ""))]
     width, height = options.size_px or (told[::-1] if len(told) == 2 else USUAL_PX)
-    return sides[2] or width, sides[1] or height
+    size_px = (sides[2] or width, sides[1] or height)
+    if options.size_px not in (None, size_px):
+        what = f"'size_px' is {list(options.size_px or ())}, and its input is fixed at {list(size_px)}"
+        raise _error(options, what, "leave out 'size_px', or export the network again with an input of this size")
+    return size_px
 
 
 def _layout(session: InferenceSession, options: ExportedNetwork, facts: Facts) -> str:
@@ -236,16 +246,18 @@ def _layout(session: InferenceSession, options: ExportedNetwork, facts: Facts) -
         raise _error(options, f"there is no layout {name!r}", suggestion(name, LAYOUTS))
     try:
         boxes, scores = decode(outputs, name, facts)
-        fits = boxes.shape == (len(scores), 4)
+        fits, columns = boxes.shape == (len(scores), 4), scores.shape[1]
+        if LAYOUTS[name].scores == "logits" and options.names and not isinstance(options.names, Mapping):
+            every = decode(outputs, name, replace(facts, classes=None))[1].shape[1]  # perhaps with one for no object
+            columns = columns if columns >= every - 1 else every
     except (ValueError, IndexError, KeyError):
         fits = False
     if not fits:
         what = f"its outputs are not of layout {name} ({LAYOUTS[name].about}): {ports}"
         raise _error(options, what, "leave out 'layout', or export it again")
-    if facts.classes is None or scores.shape[1] != facts.classes:
-        what = f"its layout is {name} with {scores.shape[1] or 'some'} classes, and {facts.classes or 'none'} are named"
-        hint = "write 'names: [bottle, cup, ...]', 'names: {1: bottle}' or 'names: FILE'"
-        raise _error(options, f"{what}: {ports}", hint)
+    if facts.classes is None or columns != facts.classes:
+        what = f"its layout is {name} with {columns or 'some'} classes, and {facts.classes or 'none'} are named"
+        raise _error(options, f"{what}: {ports}", _NAMES_HINT)
     return name
 
 

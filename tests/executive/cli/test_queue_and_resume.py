@@ -208,6 +208,43 @@ def test_a_resumed_mission_writes_into_the_folder_that_it_is_given(plant):
     assert [len(folders(out)) for out in ("elsewhere", "out")] == [1, 1]
 
 
+FOUND = ["", " --out mine"]
+
+
+@pytest.mark.parametrize("command", ["queue run --quiet", "queue serve --quiet --until-idle --port 0"])
+@pytest.mark.parametrize("added", FOUND)
+@pytest.mark.parametrize("ran", FOUND)
+def test_a_mission_is_found_whether_it_was_queued_with_or_without_a_folder(plant, command, added, ran):
+    calls.errand(*shlex.split(f"queue add first.yaml{added}"))
+    assert "first" in calls.errand(*shlex.split(f"queue list{ran}")).output
+    assert calls.errand(*shlex.split(f"{command}{ran}")).exit_code == 0
+    assert len(folders("mine" if added or ran else "out")) == 1
+
+
+def test_the_queue_is_in_the_folder_that_errand_toml_names(plant):
+    Path("errand.toml").write_text('out = "runs"\n')
+    calls.errand("queue", "add", "first.yaml", "--out", "mine")
+    assert calls.errand("queue", "run", "--quiet", "--out", "other").exit_code == 0
+    assert Path("runs/.errand/missions.sqlite").is_file() and len(folders("other")) == 1
+
+
+def test_a_mission_that_ran_in_another_folder_is_resumed_there_although_a_queue_exists(plant):
+    plant.outcomes = ["killed"]
+    calls.errand("queue", "add", "first.yaml")
+    with pytest.raises(GoneError):
+        calls.errand("run", "alone.yaml", "--quiet", "--out", "mine")
+    assert calls.errand("resume", "--quiet", "--out", "mine").exit_code == 0
+    assert states() == ["queued"] and [len(folders("mine")), Path("out/last").exists()] == [1, False]
+
+
+@pytest.mark.parametrize("command", ["run alone.yaml", "queue run", "queue serve --port 0", "resume"])
+def test_a_file_as_the_folder_of_runs_is_refused_and_the_queue_stays(plant, command):
+    calls.errand("queue", "add", "first.yaml")
+    result = calls.errand(*shlex.split(command), "--quiet", "--out", "second.yaml")
+    assert result.exit_code == 2 and "name another --out" in result.output, result.output
+    assert states() == ["queued"]
+
+
 # The mission that runs, the robot that is told to go elsewhere, and what is run when the mission is resumed.
 CORRECTED = [
     ("first", "Alice", "bathroom", "go bathroom 2", [[GO % "bathroom"]]),

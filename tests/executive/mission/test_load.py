@@ -23,6 +23,22 @@ def test_a_file_sets_options_and_an_unknown_one_is_refused_with_its_line(tmp_pat
     assert (error.value.file, error.value.line) == (file, 3)
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("", "detector.file: is missing; write 'file: ...'"),
+        (", file: a.onnx, threshold: 50", "detector.threshold: should be from 0 to 1; it reads 50 now"),
+        (", file: a.onnx, std: [1, 0, 1]", "detector.std.1: should be above 0"),
+        (", file: a.onnx, names: 5", "detector.names: should be a mapping"),
+    ],
+)
+def test_an_error_in_a_stack_file_names_the_option(tmp_path, options, message):
+    (tmp_path / "stack.yaml").write_text(f"detector: {{use: onnx{options}}}\n")
+    with pytest.raises(InputError) as error:
+        load_stack(tmp_path / "stack.yaml")
+    assert str(error.value).startswith(f"{tmp_path / 'stack.yaml'}:1: {message}")
+
+
 def test_shipped_stack_is_found_by_its_name():
     assert load_stack(stack_file(Path("no_map"))).names["localiser"] == "dead_reckoning"
 

@@ -293,10 +293,10 @@ def test_two_robots_have_states_of_their_own(start):
 
 
 def test_a_fleet_says_what_came_of_each_mission(start, tmp_path):
+    store = tmp_path / "queue.sqlite"
     for sentence in ("go to the office", "go to the kitchen"):
-        added = [*ERRAND, "queue", "add", "--say", sentence, "--out", str(tmp_path / "queue")]
+        added = [*ERRAND, "queue", "add", "--say", sentence, "--store", str(store)]
         subprocess.run(added, check=True, capture_output=True)
-    store = next((tmp_path / "queue").rglob("*.sqlite"))
     out = tmp_path / "fleet"
     run = start("fleet", "run", str(store), "--robots", "alice=spot,bob=spot", "--quiet", "--no-record", out=out)
     run.until(3.0)
@@ -309,17 +309,17 @@ def test_a_fleet_says_what_came_of_each_mission(start, tmp_path):
 
 
 def test_a_mission_that_is_added_on_the_page_of_a_fleet_is_done(start, tmp_path):
+    store = tmp_path / "queue.sqlite"
     added = [
         *ERRAND,
         "queue",
         "add",
         "--say",
         "wait in the office for 2 minutes",
-        "--out",
-        str(tmp_path / "queue"),
+        "--store",
+        str(store),
     ]
     subprocess.run(added, check=True, capture_output=True)
-    store = next((tmp_path / "queue").rglob("*.sqlite"))
     out = tmp_path / "fleet"
     run = start("fleet", "run", str(store), "--robots", "alice=spot,bob=spot", "--quiet", "--no-record", out=out)
     run.page.click("#pause")

@@ -540,7 +540,7 @@ def killed_after(time_s, process):
 
 
 def test_a_server_process_runs_a_called_mission_and_ends_at_sigterm(tmp_path):
-    where = ["--out", str(tmp_path)]
+    where = ["--out", str(tmp_path), "--store", str(tmp_path / ".errand" / "missions.sqlite")]
     added = CliRunner().invoke(app, ["queue", "add", "go_to_pose", "--on", "call pose", "--no-record", *where])
     assert added.exit_code == 0, added.output
     serve = [sys.executable, "-m", "executive.cli", "queue", "serve", "--quiet", "--json", "--port", "0", *where]

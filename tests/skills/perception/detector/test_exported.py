@@ -87,10 +87,42 @@ def test_a_better_class_without_a_word_keeps_the_box(tmp_path):
 
 
 def test_names_come_from_options_a_file_or_a_table_of_labels(tmp_path):
-    (tmp_path / "names.txt").write_text("bottle\n\nhammer\n")
+    (tmp_path / "names.txt").write_text("bottle\nchair\nhammer\n\n")
     for names in (("bottle", "coke", "hammer"), {1: "coke", 2: "hammer"}):
         assert network(tmp_path, metadata={}, names=names).build().class_names == ("coke", "hammer")
     assert network(tmp_path, metadata={}, names=tmp_path / "names.txt").build().class_names == ("hammer",)
+
+
+def rfdetr(classes):
+    return {"dets": np.full((1, 8, 4), 0.5, np.float32), "labels": np.zeros((1, 8, classes), np.float32)}
+
+
+@pytest.mark.parametrize(
+    ("outputs", "metadata", "expected"),
+    [
+        (rfdetr(5), {}, "its layout is rfdetr with 5 classes, and 2 are named"),
+        ({"output0": np.ones((1, 300, 6), np.float32)}, THREE, "it has 3 classes, and 'names' has 2"),
+    ],
+)
+def test_fewer_names_than_the_network_has_classes_are_refused(tmp_path, outputs, metadata, expected):
+    assert expected in refusal(network(tmp_path, outputs, metadata=metadata, names=("bottle", "coke")))
+
+
+@pytest.mark.parametrize("names", [("bottle", "coke", "beer", "hammer"), {1: "coke"}])
+def test_a_class_for_no_object_needs_no_name_and_a_table_names_some(tmp_path, names):
+    assert "coke" in network(tmp_path, rfdetr(5), metadata={}, names=names).build().class_names
+
+
+def test_an_empty_line_between_names_is_refused_with_its_place(tmp_path):
+    (tmp_path / "names.txt").write_text("bottle\n\nhammer\n")
+    message = refusal(network(tmp_path, metadata={}, names=tmp_path / "names.txt"))
+    assert f"{tmp_path / 'names.txt'}:2: the line is empty; each line names the next class" in message
+
+
+def test_another_size_than_that_of_a_fixed_input_is_refused(tmp_path):
+    expected = "'size_px' is [32, 48], and its input is fixed at [64, 64]; leave out 'size_px'"
+    assert expected in refusal(network(tmp_path, size_px=(32, 48)))
+    assert network(tmp_path, size_px=(64, 64)).build().facts.size_px == (64, 64)
 
 
 def test_several_classes_may_stand_for_one_word(tmp_path):

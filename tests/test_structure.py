@@ -22,9 +22,9 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1922,
     "executive/testing": 860,
-    "executive/app": 8228,
-    "executive/cli": 3901,
-    "skills": 28391,
+    "executive/app": 8227,
+    "executive/cli": 3914,
+    "skills": 28403,
     "plant": 11378,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 422, 61, 7

@@ -96,9 +96,8 @@ def add(
 
 def _store(out: Path, resumes: bool = False) -> Path:
     """Store of `queue add`, or if it is missing, that in `out`; a resumed mission is sought in `out` first."""
-    usual = store_in(runs_folder())
-    stores = (store_in(out), usual) if resumes else (usual, store_in(out))
-    return next((each for each in stores if each.is_file()), usual)
+    stores = (store_in(runs_folder()), store_in(out))
+    return next((each for each in stores[:: -1 if resumes else 1] if each.is_file()), stores[0])
 
 
 @queue.command(name="list")

@@ -274,9 +274,8 @@ class Detect(LookingSkill[DetectInputs]):
 
     def _views(self, inputs: DetectInputs) -> int:
         """Number of viewpoints that a reliable track needs: one where the camera cannot change its position."""
-        mount = self.object_camera.mount
-        stays = mount is Mount.BODY or (mount is Mount.HEAD and self._raised_m() < _RAISED_M)
-        return 1 if inputs.seen_before is not None or stays else 2
+        mount, rises = self.object_camera.mount, self._raised_m() >= _RAISED_M
+        return 2 if inputs.seen_before is None and (mount is Mount.HAND or (mount is Mount.HEAD and rises)) else 1
 
     def _raised_m(self) -> float:
         """Height by which the body can rise for a view from above."""

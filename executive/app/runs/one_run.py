@@ -189,9 +189,8 @@ def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> 
 
 def _settings(prepared: Prepared) -> RunSettings:
     """Returns the settings of a run: seed, time of day and time limit."""
-    request = prepared.request
-    time_s = None if request.time_of_day is None else clock_s(request.time_of_day)
-    return RunSettings(seed=request.seed, time_limit_s=prepared.time_limit_s, time_of_day_s=time_s)
+    time_s = None if (day := prepared.request.time_of_day) is None else clock_s(day)
+    return RunSettings(prepared.request.seed, time_limit_s=prepared.time_limit_s, time_of_day_s=time_s)
 
 
 def log_name(start: int) -> str:

@@ -24,7 +24,7 @@ LINES = {
     "executive/testing": 860,
     "executive/app": 8227,
     "executive/cli": 3914,
-    "skills": 28403,
+    "skills": 28402,
     "plant": 11378,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 422, 61, 7

@@ -53,8 +53,7 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         Cause.PRECONDITION: "the robot has no such camera, or nothing is named to point it at",
         Cause.PLANNING: "the arm reaches no viewpoint, and no other camera sees it from here",
         Cause.EXECUTION: "the arm did not reach its viewpoint, or the camera shows nothing",
-        Cause.POSTCONDITION: "no scan after the picture confirms the robot's place, or the point is not in the picture "
-        "or hidden",
+        Cause.POSTCONDITION: "no later scan confirms the robot's place, or the point is hidden or not in the picture",
     }
     default_timeout_s = 60.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 1.0, "joints": 0.5, "gripper": 0.5}

@@ -208,25 +208,26 @@ def _obj_group(
     """Lines of one material; increases `counts` (vertices, texture coordinates, normals so far)."""
     lines, index = [], []
     for k, (key, rows, digits) in enumerate((("v", points, places), ("vt", uvs, 4), ("vn", normals, 3))):
-        unique, inverse = unique_rows(np.round(rows, digits) + 0.0)
-        form = f"{key}{f' %.{digits}f' * unique.shape[1]}"
-        lines += [form % tuple(row) for row in unique.tolist()]
+        rounded = np.round(rows, digits) + 0.0
+        first, inverse = unique_rows(rounded)
+        form = f"{key}{f' %.{digits}f' * rows.shape[1]}"
+        lines += [form % tuple(row) for row in rounded[first].tolist()]
         index.append(inverse + counts[k] + 1)
-        counts[k] += len(unique)
+        counts[k] += len(first)
     lines.append(f"usemtl {name}")
     faces = np.column_stack(index).reshape(-1, 9).tolist()
     return lines + ["f {}/{}/{} {}/{}/{} {}/{}/{}".format(*face) for face in faces]
 
 
-def unique_rows(rows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Different rows (U, K) in lexicographic order, and the index of each row (N,) among them."""
+def unique_rows(rows: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Indices (U,) of the first of equal rows (N, K), in lexicographic order, and the place of each row (N,) there."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     begins = np.ones(len(rows), dtype=bool)
     begins[1:] = np.logical_or.reduce([column[1:] != column[:-1] for column in ordered.T])
-    inverse = np.empty(len(rows), dtype=np.intp)
+    inverse = np.empty(len(rows), dtype=np.int64)
     inverse[order] = np.cumsum(begins) - 1
-    return ordered[begins], inverse
+    return np.asarray(order[begins]), inverse
 
 
 def plain_colours(materials: Mapping[str, Material]) -> list[str]:

@@ -95,7 +95,8 @@ def test_the_material_file_has_only_used_materials():
     assert [name in text for name in ("palette.png", "tiles.png")] == [True, False]
 
 
-def test_rows_are_unique_in_order_with_the_index_of_each():
+def test_the_first_of_equal_rows_is_found_in_order_with_the_place_of_each():
     rows = np.array([[1.0, 2.0], [0.0, 3.0], [1.0, 2.0], [0.0, 1.0]])
-    unique, index = unique_rows(rows)
-    assert unique.tolist() == [[0.0, 1.0], [0.0, 3.0], [1.0, 2.0]] and (unique[index] == rows).all()
+    first, place = unique_rows(rows)
+    assert first.tolist() == [3, 1, 0] and (rows[first][place] == rows).all()
+    assert [len(each) for each in unique_rows(np.empty((0, 3)))] == [0, 0]

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from errand_make.errors import ObjectImportError, library
+from errand_make.mesh import unique_rows
 from skills.robot import FloatArray
 
 MOST_PIECES: Final = 1_000
@@ -355,9 +356,7 @@ def unique_points(triangles: FloatArray) -> tuple[FloatArray, Faces]:
     """Unique points (N, 3) and the indices of the triangles (T, 3); nearly equal points count as equal."""
     corners = triangles.reshape(-1, 3)
     step = max(float(np.ptp(corners, axis=0).max()) * _SAME_POINT, 1e-12)
-    _, first, index = np.unique(
-        np.round(corners / step).astype(np.int64), axis=0, return_index=True, return_inverse=True
-    )
+    first, index = unique_rows(np.round(corners / step))
     return corners[first], index.reshape(-1, 3)
 
 

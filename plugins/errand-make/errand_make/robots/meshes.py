@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from errand_make.errors import ObjectImportError
+from errand_make.mesh import unique_rows
 from errand_make.objects.import_object import hull_text, write_appearance
 from errand_make.objects.mesh_files import GREY, MOST_TRIANGLES, MeshContent, Patch, read_mesh
 from errand_make.objects.solid import bodies_apart
@@ -153,11 +154,10 @@ def coarser(content: MeshContent, most: int) -> tuple[Patch, ...]:
 def _clustered(patch: Patch, low: FloatArray, cell: float) -> Patch:
     """A patch whose corners are the means of those in their cell; triangles that shrink to a line are left out."""
     corners = patch.triangles.reshape(-1, 3)
-    _, label = np.unique(np.floor((corners - low) / cell).astype(np.int64), axis=0, return_inverse=True)
-    label = label.reshape(-1)
+    _, label = unique_rows(np.floor((corners - low) / cell))
     count = np.bincount(label)
     means = np.stack([np.bincount(label, weights=corners[:, k]) / count for k in range(3)], axis=1)
     faces = label.reshape(-1, 3)
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    _, first = np.unique(np.sort(faces[whole], axis=1), axis=0, return_index=True)
+    first, _ = unique_rows(np.sort(faces[whole], axis=1).astype(np.float64))
     return replace(patch, triangles=means[faces[whole]][first], uvs=patch.uvs[whole][first])

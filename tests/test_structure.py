@@ -15,7 +15,7 @@ LINES = {
     "executive/language": 8260,
     "executive/speech": 1663,
     "executive/mission": 1659,
-    "executive/tree": 8836,
+    "executive/tree": 8835,
     "executive/run": 3295,
     "executive/record": 1099,
     "executive/store": 1604,
@@ -23,8 +23,8 @@ LINES = {
     "executive/view": 1922,
     "executive/testing": 860,
     "executive/app": 8227,
-    "executive/cli": 3914,
-    "skills": 28402,
+    "executive/cli": 3916,
+    "skills": 28401,
     "plant": 11378,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 422, 61, 7

@@ -82,6 +82,8 @@ def add(
     load_stack(request.stack)
     prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
     request = prepared.request.from_anywhere()
+    with writing(request.out, "name another --out"):
+        request.out.mkdir(parents=True, exist_ok=True)
     with MissionStore(store or store_in(runs_folder())) as missions:
         if trigger is None:
             mission, standing = missions.add(request, queued=True), {}

@@ -18,8 +18,7 @@ DAY_S: Final = 86_400.0
 
 def time_ahead_s(clock_s: float, now_s: float) -> float:
     """Time from now until a time of day, in s; both are s after midnight; 0 if it passed at most 12 hours ago."""
-    ahead_s = (clock_s - now_s) % DAY_S
-    return ahead_s if ahead_s <= DAY_S / 2 else 0.0
+    return ahead_s if (ahead_s := (clock_s - now_s) % DAY_S) <= DAY_S / 2 else 0.0
 
 
 def leaf_seed(run_seed: int, path_id: str) -> int:

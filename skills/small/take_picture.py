@@ -22,8 +22,7 @@ _GOOD_HEALTH: Final = 0.5
 """Least health of an estimate that confirms where the robot stood."""
 _HIDES_M: Final = 0.25
 """Distance before the point, along the optical axis, from which on something hides it."""
-_AROUND_PX: Final = 4
-"""Half the side of the window of depth around the point."""
+_AROUND_PX: Final = 4  # half the side of the window of depth around the point
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ class Prepared:
         if self.request.time_limit_s is not None:
             return self.request.time_limit_s
         begin_s = clock_s(self.request.time_of_day or time.strftime("%H:%M"))
-        roots = (each.tree.root for each in self.all)
+        roots = [each.tree.root for each in self.all]
         return TIME_LIMIT_S + max(root.behaviour.waiting_s(root, begin_s) for root in roots)
 
     @property

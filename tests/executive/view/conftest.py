@@ -5,8 +5,7 @@ import shutil
 import pytest
 
 FLAGS = [
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
+    "--disable-gpu",
     "--no-sandbox",
     "--disable-background-networking",
     "--disable-component-update",

@@ -40,10 +40,15 @@
   }
 
   class Names {
-    // `inside` is the rectangle of the map, which names do not leave.
-    constructor(brush, inside) { Object.assign(this, { brush, inside, taken: [], later: [], placed: [] }); }
+    // `inside` is the rectangle of the map, which names do not leave; `layout` keeps the places of names in rooms.
+    constructor(brush, inside, layout) { Object.assign(this, { brush, inside, layout, family: css("--font"), taken: [], fixed: [], later: [], placed: [] }); }
 
-    keepClear(u, v, radius) { this.taken.push([u - radius, v - radius, u + radius, v + radius]); }
+    // Keeps a mark clear of names; the places of names in rooms are chosen beside marks that stay.
+    keepClear(u, v, radius, stays = false) {
+      const box = [u - radius, v - radius, u + radius, v + radius];
+      this.taken.push(box);
+      if (stays) this.fixed.push(box);
+    }
 
     // With `room`, an outline, the name stays in it.
     add(text, u, v, colour, { bold = false, room = null } = {}) { this.later.push({ text, u, v, colour, bold, room }); }
@@ -52,10 +57,11 @@
       const { brush } = this;
       brush.textAlign = "center";
       for (const name of this.later) {
-        const { box, lines, size, upright } = name.room ? this.inRoom(name) : this.anywhere(name);
+        const { box, lines, size, upright } = name.room ? this.keptInRoom(name) : this.anywhere(name);
         this.placed.push({ text: name.text, shown: (lines || []).join(" "), box, room: name.room });
         if (!box) continue;
         this.taken.push(box);
+        if (name.room) this.fixed.push(box);
         brush.font = this.font(name, size);
         brush.lineWidth = 3;
         brush.strokeStyle = halo;
@@ -69,7 +75,7 @@
       brush.textAlign = "left";
     }
 
-    font({ bold }, size) { return `${bold ? "600 " : ""}${size}px ${css("--font")}`; }
+    font({ bold }, size) { return `${bold ? "600 " : ""}${size}px ${this.family}`; }
 
     sizeOf(name, lines, size) {
       this.brush.font = this.font(name, size);
@@ -82,7 +88,7 @@
       return [left, top, left + wide, top + high];
     }
 
-    covered(box) { return this.taken.reduce((sum, other) => sum + overlap(box, other), 0); }
+    covered(box, taken = this.taken) { return taken.reduce((sum, other) => sum + overlap(box, other), 0); }
 
     // The box at the least cost: near the point, and above all on nothing else.
     best(boxes, { u, v }) {
@@ -96,8 +102,17 @@
       return { box: this.best(boxes, name), lines, size };
     }
 
+    // The first place of a name is chosen beside what stays; where something covers it, the name has a second one.
+    keptInRoom(name) {
+      const kept = this.layout.get(name.text) || [this.inRoom(name, this.fixed)];
+      let found = kept.find(({ box }) => !box || this.covered(box) === 0);
+      if (!found) kept[1] = found = this.inRoom(name, this.taken);
+      this.layout.set(name.text, kept);
+      return found;
+    }
+
     // The most legible form of a name for which its room has a place, upright in a narrow one; none where no letter fits.
-    inRoom(name) {
+    inRoom(name, taken) {
       const bounds = boundsOf(name.room).map((side, n) => (n < 2 ? Math.max : Math.min)(side, this.inside[n])), [west, north, east, south] = bounds, { text } = name;
       const short = Array.from({ length: text.length - 1 }, (_, n) => [`${text.slice(0, text.length - 1 - n).trimEnd()}…`]);
       const least = NAME_PX[NAME_PX.length - 1], lying = NAME_PX.flatMap((size) => wrapped(text).map((lines) => [lines, size, false]));
@@ -106,7 +121,7 @@
         const measured = this.sizeOf(name, lines, size), [wide, high] = upright ? measured.reverse() : measured, at = (n, from, to) => from + (n / ACROSS) * (to - from);
         if (wide > east - west + 2 || high > south - north + 2) continue;
         const grid = Array.from({ length: (ACROSS + 1) ** 2 }, (_, n) => [at(n % (ACROSS + 1), west, east), at(Math.floor(n / (ACROSS + 1)), north, south)]);
-        const boxes = [[name.u, name.v], ...grid].map(([u, v]) => this.boxAt(u, v, [wide, high], bounds)).filter((box) => this.isIn(box, name.room) && this.covered(box) === 0);
+        const boxes = [[name.u, name.v], ...grid].map(([u, v]) => this.boxAt(u, v, [wide, high], bounds)).filter((box) => this.isIn(box, name.room) && this.covered(box, taken) === 0);
         if (boxes.length) return { box: this.best(boxes, name), lines, size, upright };
       }
       return { box: null };
@@ -198,7 +213,9 @@
       brush.setTransform(ratio, 0, 0, ratio, 0, 0);
       brush.fillStyle = css("--unknown");
       brush.fillRect(0, 0, width, height);
-      const frame = this.frame(width, height), names = (this.names = new Names(brush, frame.inside));
+      const frame = this.frame(width, height), drawn = [width, height, ratio].join();
+      if (this.drawn !== drawn || this.laidOut !== this.map) Object.assign(this, { drawn, laidOut: this.map, layout: new Map() });
+      const names = (this.names = new Names(brush, frame.inside, this.layout));
       this.outlines = [];
       this.drawGrid(brush, frame);
       for (const zone of this.zones()) this.drawZone(brush, frame, zone);
@@ -240,7 +257,7 @@
         brush.lineWidth = 1;
         brush.fillRect(u - 5, v - 5, 10, 10);
         brush.strokeRect(u - 5, v - 5, 10, 10);
-        this.names.keepClear(u, v, 8);
+        this.names.keepClear(u, v, 8, true);
         this.names.add("dock", u, v, css("--text"), { room: this.roomAt(at, [u, v]) });
       }
       for (const { name, x, y } of this.map.places) this.names.add(name, ...at(x, y), css("--dim"), { room: this.roomAt(at, at(x, y), name) });

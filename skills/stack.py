@@ -57,7 +57,7 @@ DOORS: Final = "errand.doors"
 """Entry-point group of the plug-ins that open doors (`skills.doorway.DoorOpener`)."""
 BACKENDS: Final = "errand.backends"
 """Entry-point group of the backends that drive robots; an entry's name is the URL scheme, as in `spot://HOST`."""
-PLUGINS: Final[Mapping[Any, str]] = {"graph_nav": "errand-spot", "spot": "errand-spot"}
+PLUGINS: Final[Mapping[Any, str]] = {"graph_nav": "errand-spot", "rolling": "errand-make", "spot": "errand-spot"}
 """Plug-ins of this project, by the component or URL scheme that they provide."""
 PLUGIN: Final = "plugin"
 DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")

@@ -24,10 +24,10 @@ LINES = {
     "executive/testing": 860,
     "executive/app": 8227,
     "executive/cli": 3916,
-    "skills": 28401,
+    "skills": 28096,
     "plant": 11378,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 422, 61, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 421, 61, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

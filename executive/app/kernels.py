@@ -30,7 +30,7 @@ steps: [{skill: navigate, with: {x: 5.2, y: 4.5, yaw: 3.1416}}]
 
 _DRIVES: Final = (
     ("spot", None),
-    ("spot", "{localiser: {use: scan_matching}, costmap: {use: rolling}, controller: {use: mppi}}"),
+    ("spot", "{localiser: {use: scan_matching}, controller: {use: mppi}}"),
     ("fetch", None),
 )
 """Kinds of robots, and the components in place of their default ones."""

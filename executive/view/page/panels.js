@@ -246,7 +246,7 @@
       this.lost = true;
       if (!this.frame || this.ready) return;
       this.frame = null;
-      this.box.replaceChildren(element("p", "nothing", "The 3D scene is not there: the connection to Errand ended while it loaded."));
+      this.box.replaceChildren(element("p", "nothing", "The 3D scene is not there: the connection to Errand was lost while it loaded."));
     }
 
     // Show the recording at a time, with the camera beside a robot at a pose.

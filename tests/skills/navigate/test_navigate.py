@@ -6,13 +6,9 @@ import pytest
 from planar_robot import Bench, Box, NamingWorker
 
 from skills.api import Cause, Failed, Running, Succeeded
-from skills.estimate.localiser import DeadReckoning
-from skills.estimate.rolling_costmap import RollingCostmap
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.navigate.surroundings import NavigateOptions
 from skills.robot import BaseKind, Pose2D
 
-PILLAR = Box(6.2, 5.3, 6.4, 5.6, 0.0, 1.7)
 START, CORRIDOR, OTHER_ROOM = Pose2D(1.5, 2.0, 0.0), Pose2D(1.2, 5.5, math.pi), Pose2D(8.5, 2.0, -1.57)
 ALONG, END = Pose2D(2.8, 5.3, 0.0), Pose2D(6.6, 5.4, 0.0)
 """A drive along the corridor, for all that needs no door."""
@@ -253,24 +249,6 @@ def test_drive_is_equal_with_work_inline_or_in_a_thread():
         bench.worker.close()
     assert len(drives[0][0]) > 50
     assert drives[0] == drives[1]
-
-
-def test_robot_plans_around_a_new_obstacle_without_standing():
-    bench = Bench(Pose2D(2.2, 5.4, 0.0), component=DeadReckoning(), cameras=False)
-    bench.costmap = RollingCostmap()
-    bench.tick(10)
-    speeds = []
-
-    def pillar_appears():
-        x = bench.robot.pose.x_m
-        if x > 3.0 and PILLAR not in bench.robot.blocks:
-            bench.robot.blocks.append(PILLAR)
-        if 3.2 < x < 6.5:
-            speeds.append(float(bench.robot.velocity[0]))
-
-    arrives(bench, Pose2D(7.6, 5.4, 0.0), each=pillar_appears, options=NavigateOptions(review_m=5.0))
-    assert min(speeds) > 0.1
-    assert bench.worker.names.count("plan a path") >= 2
 
 
 @pytest.mark.parametrize(("obstacle_W", "where"), [(None, "ahead"), ((1.0, 2.0), "at (1.00, 2.00)")])

@@ -1,17 +1,23 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
-from planar_robot import TWO_ROOMS, Bench, Box
 
+from errand_make.maps.rolling_costmap import RollingCostmap, RollingCostmapOptions
+from executive.mission.load import load_stack, stack_file
+from skills.api import Succeeded
 from skills.estimate.localiser import DeadReckoning
-from skills.estimate.rolling_costmap import RollingCostmap, RollingCostmapOptions
+from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.surroundings import NavigateOptions
 from skills.robot import Pose2D
+from tests.skills.planar_robot import TWO_ROOMS, Bench, Box
 
 START = Pose2D(1.5, 5.4, 0.0)
 PERSON = Box(3.2, 5.2, 3.6, 5.6, 0.0, 1.7)
 
 
-def bench_of(*more, **options):
-    bench = Bench(START, surveyed=[*TWO_ROOMS, *more], component=DeadReckoning(), cameras=False)
+def bench_of(*more, start=START, **options):
+    bench = Bench(start, surveyed=[*TWO_ROOMS, *more], component=DeadReckoning(), cameras=False)
     bench.costmap = RollingCostmap(RollingCostmapOptions(**options))
     return bench
 
@@ -86,3 +92,25 @@ def test_only_new_obstacles_count_as_unexplained():
     ticked(bench, 2)
     near = bench.costmap.unexplained_returns()[1]
     assert np.count_nonzero(np.hypot(near[:, 0] - 3.3, near[:, 1] - 5.4) < 0.5) > 20
+
+
+def test_robot_plans_around_a_new_obstacle_without_standing():
+    bench, pillar = ticked(bench_of(start=Pose2D(2.2, 5.4, 0.0)), 10), Box(6.2, 5.3, 6.4, 5.6, 0.0, 1.7)
+    skill, speeds = Navigate(bench.context(), NavigateOptions(review_m=5.0)), []
+
+    def pillar_appears():
+        x = bench.robot.pose.x_m
+        if x > 3.0 and pillar not in bench.robot.blocks:
+            bench.robot.blocks.append(pillar)
+        if 3.2 < x < 6.5:
+            speeds.append(float(bench.robot.velocity[0]))
+
+    step = bench.run(skill, NavigateInputs(Pose2D(7.6, 5.4, 0.0)), each=pillar_appears)
+    assert isinstance(step, Succeeded), step.message
+    assert bench.robot.least_clearance_m > 0.03
+    assert min(speeds) > 0.1
+    assert bench.worker.names.count("plan a path") >= 2
+
+
+def test_the_stack_for_unknown_places_uses_it():
+    assert load_stack(stack_file(Path("no_map"))).names["costmap"] == "rolling"

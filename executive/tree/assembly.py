@@ -121,6 +121,7 @@ class Assembler:
 
     `pick_ups` and `move_aside` are defaults for steps; `flow` is the present data flow. Values that steps give have
     blackboard keys below `values_base`. `last_known` is where another robot last knew the mission's object.
+    `reported` are the classes of an own detector.
     """
 
     knowledge: Knowledge
@@ -131,13 +132,16 @@ class Assembler:
     move_aside: int = 0
     values_base: str = ""
     last_known: LastKnown | None = None
+    reported: frozenset[str] = frozenset()
     flow: Flow = field(default_factory=Flow)
 
     def builder(self, path_id: str, source: SourceLine | None) -> PlanBuilder:
         """Returns a builder for nodes that belong to no single command."""
         here = Command(goal=START)
         return PlanBuilder(
-            self.knowledge, self.registry, path_id, self.start_key, here, source, last_known=self.last_known
+            *(self.knowledge, self.registry, path_id, self.start_key, here, source),
+            last_known=self.last_known,
+            reported=self.reported,
         )
 
     def level(self, steps: Sequence[Step], base: str) -> Assembled:

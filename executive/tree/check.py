@@ -233,7 +233,7 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
     masses = [abilities.masses_kg[one] for one in classes if one in abilities.masses_kg]
     light = [one for one in classes if abilities.masses_kg.get(one, math.inf) <= abilities.lift_kg]
     narrowest_m = min((abilities.widths_m.get(one, 0.0) for one in light), default=0.0)
-    unseen = [one for one in classes if one not in abilities.classes]
+    unseen = [one for one in classes if not {one, item.name} & abilities.classes]
     unseen += [word for word in item.attributes if word not in abilities.attributes]
     if command.task is Task.GRASP and not masses:
         known = [one for one in knowledge.things if one in abilities.masses_kg]
@@ -245,7 +245,7 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
         message = f"'{item.name}' is too wide: {narrowest_m:g} m, and the gripper takes {abilities.opens_m:g} m"
         yield message, "ask for something narrower"
     elif unseen:
-        known = [one for one in knowledge.things if one in abilities.classes]
+        known = [one for one in knowledge.object_names() if one in abilities.classes]
         message = f"the robot does not know what {listing(unseen)} looks like"
         yield message, f"it knows {listing(known)} by sight"
 

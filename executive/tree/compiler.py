@@ -75,7 +75,12 @@ class CompiledTree:
 
 
 def compile_mission(
-    mission: Mission, *, knowledge: Knowledge, registry: Registry, last_known: LastKnown | None = None
+    mission: Mission,
+    *,
+    knowledge: Knowledge,
+    registry: Registry,
+    last_known: LastKnown | None = None,
+    reported: frozenset[str] = frozenset(),
 ) -> CompiledTree:
     """Compiles a mission to a tree and checks its wiring; each node has the line of the mission file that it is from.
 
@@ -84,6 +89,7 @@ def compile_mission(
         knowledge: the world's places, surfaces, objects and people.
         registry: the skills by name.
         last_known: where another robot last knew the mission's object; the search begins there.
+        reported: the classes of the robot's own detector, which may be categories; empty for the default one.
 
     Raises InputError when there are no steps, a place, object or skill is unknown, ports are wired wrongly, or a
     command cannot be carried out; with the file and line where known, and all further errors in `others`.
@@ -92,7 +98,8 @@ def compile_mission(
         raise InputError(f"the mission '{mission.name}' has no commands", hint="add at least one step")
     base, start = f"{slug(mission.robot_name)}/{slug(mission.name)}", start_key(mission.robot_name, mission.name)
     pick_ups = PICK_UPS if mission.pick_ups is None else mission.pick_ups
-    assembler = Assembler(knowledge, registry, PLANS, start, pick_ups, mission.move_aside or 0, last_known=last_known)
+    options = (pick_ups, mission.move_aside or 0)
+    assembler = Assembler(knowledge, registry, PLANS, start, *options, last_known=last_known, reported=reported)
     builder, steps = assembler.builder(base, mission.source), mission_plan(assembler, mission, base)
     root = watch_plan(builder, replace(whole_mission(mission, builder, steps.nodes), step=True))
     check_wiring(root)

@@ -88,6 +88,7 @@ class PlanBuilder:
     object that an earlier step has grasped. The robot picks up a dropped object at most `pick_ups` times, and moves at
     most `move_aside` blocking objects aside. `following` is the next command. `last_known` is where another robot last
     knew the mission's object. An earlier step has met the people in `met`.
+    `reported` are the classes of the robot's own detector, which may be categories; empty for the default one.
     """
 
     knowledge: Knowledge
@@ -105,6 +106,7 @@ class PlanBuilder:
     following: Command | None = None
     last_known: LastKnown | None = None
     met: frozenset[str] = frozenset()
+    reported: frozenset[str] = frozenset()
 
     def at(self, *parts: str) -> PlanBuilder:
         """Returns a builder for a subtree below this one."""
@@ -327,11 +329,13 @@ class PlanBuilder:
     def search_classes(self, name: str) -> tuple[str, ...]:
         """Returns the classes to search for an object by its name; `ANY_OBJECT` if the name stands for any object.
 
-        A question searches for known classes, because its answer names the found objects. Raises InputError for an
-        unknown name.
+        A category that the detector reports stands for those of its classes that the detector does not. A question
+        searches for known classes, because its answer names the found objects. Raises InputError for an unknown name.
         """
         classes = self.classes(name)
         unnamed = self.knowledge.object_name(name) in (ANYTHING, EVERYTHING)
+        if name in self.reported:
+            return tuple(dict.fromkeys((*(one for one in classes if one in self.reported), name)))
         return (ANY_OBJECT,) if unnamed and self.command.task is not Task.FIND else classes
 
     def error(self, message: str, hint: str) -> InputError:

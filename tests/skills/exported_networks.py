@@ -53,8 +53,11 @@ def mean_colour(file, *, size=64, metadata=None):
     return save(file, graph, metadata or {"names": "{0: 'red', 1: 'green', 2: 'blue'}"})
 
 
-def coloured_patch(file, colour, *, size=640, names="{0: 'can'}"):
-    """A network in the layout of YOLO26, which finds the bounding box of all pixels of a colour."""
+def coloured_patch(file, colour, *, tolerance=0.02, size=640, names="{0: 'can'}"):
+    """A network in the layout of YOLO26, which finds the bounding box of all pixels of a colour.
+
+    `tolerance`: greatest difference of a channel, from 0 to 1.
+    """
     steps = [
         ("Sub", ["images", "colour"], "difference", {}),
         ("Abs", ["difference"], "distance", {}),
@@ -79,7 +82,7 @@ def coloured_patch(file, colour, *, size=640, names="{0: 'can'}"):
     ]
     constants = {
         "colour": np.array(colour, np.float32).reshape(1, 3, 1, 1) / 255,
-        "tolerance": np.float32(0.02),
+        "tolerance": np.float32(tolerance),
         "ends": np.arange(1, size + 1, dtype=np.float32)[None],
         "backwards": np.arange(size, 0, -1, dtype=np.float32)[None],
         "size": np.float32([[size]]),

@@ -10,7 +10,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from executive.app.prepare.placed_robots import DEFAULT_KIND, robot_stack, shared_detector
+from executive.app.prepare.placed_robots import DEFAULT_KIND, reported_classes, robot_stack
 from executive.app.prepare.prepared import Prepared
 from executive.app.prepare.worlds import refuse_unusable
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
@@ -82,10 +82,9 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
     world, robot = prepared.world, prepared.robot
     abilities = abilities_in(world, robot.kind)
     tagged = frozenset(tag.on for tag in prepared.tree.tags if tag.on is not None)
-    stack = None if robot.stack_file is None else robot_stack(robot)
-    if stack is not None and stack.detector != default_component("detector"):
-        seen = frozenset(class_forms()) & {*shared_detector(stack).class_names} | {*world.own_objects}
-        abilities = replace(abilities, classes=seen)
+    if reported := reported_classes(robot):
+        words = {*class_forms(), *prepared.knowledge.categories()}
+        abilities = replace(abilities, classes=reported & words | world.own_objects.keys())
     return check_tree(
         prepared.tree,
         knowledge=prepared.knowledge,

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING
 
 from executive.app.prepare.feasibility import refuse_impossible
 from executive.app.prepare.mission_files import mission_file
-from executive.app.prepare.placed_robots import clearance_m, knowledge_for, only_robot, placed_robots, refuse_blocked
+from executive.app.prepare.placed_robots import (
+    clearance_m,
+    knowledge_for,
+    only_robot,
+    placed_robots,
+    refuse_blocked,
+    reported_classes,
+)
 from executive.app.prepare.prepared import Prepared, combine
 from executive.app.prepare.worlds import knowledge_of, open_world, refuse_blocked_poses, with_map
 from executive.language.parser import load_parser
@@ -187,13 +194,14 @@ class Setting:
                 world = add_passers_by(world, request.variation.people, request.seed)
             except WorldError as error:
                 raise InputError(str(error), hint="take --people out") from error
-        tree = compile_mission(mission, knowledge=self.knowledge, registry=installed_skills())
-        if masks := [Path(zone.mask.file) for zone in tree.zones if zone.mask is not None]:
-            _read_again(masks)
         request = replace(request, world_name=world.name, robot=mission.robot_name)
         name, robots = mission.robot_name, self.robots
         if not robots:
             robots = {name: only_robot(name, world, start=request.start, stack=request.stack, seed=request.seed)}
+        reported = reported_classes(robots[name])
+        tree = compile_mission(mission, knowledge=self.knowledge, registry=installed_skills(), reported=reported)
+        if masks := [Path(zone.mask.file) for zone in tree.zones if zone.mask is not None]:
+            _read_again(masks)
         return Prepared(request, mission, world, self.knowledge, tree, robots, meant).with_tree(tree)
 
 

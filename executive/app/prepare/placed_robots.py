@@ -20,7 +20,7 @@ from plant.worlds.world import World
 from skills.inputs.errors import InputError
 from skills.navigate.footprint import Footprint
 from skills.robot import FloatArray, Pose2D
-from skills.stack import DetectorComponent, RobotStack, default_stack
+from skills.stack import DetectorComponent, RobotStack, default_component, default_stack
 
 if TYPE_CHECKING:
     from skills.detection import Detector
@@ -37,6 +37,13 @@ _START_STREAM: Final = 7
 def robot_stack(robot: PlacedRobot) -> RobotStack:
     """Loads the components of a robot's stack. Raises InputError with file and line if the file cannot be used."""
     return load_stack(robot.stack_file)
+
+
+def reported_classes(robot: PlacedRobot) -> frozenset[str]:
+    """Classes of a robot's own detector; empty for the default one. Raises InputError if its files cannot be used."""
+    stack = None if robot.stack_file is None else robot_stack(robot)
+    own = stack is not None and stack.detector != default_component("detector")
+    return frozenset(shared_detector(stack).class_names if own else ())
 
 
 def placed_robots(world: World, knowledge: Knowledge, configs: Sequence[RobotConfig]) -> Mapping[str, PlacedRobot]:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from executive.app.prepare.placed_robots import reported_classes
 from executive.mission.request import TIME_LIMIT_S, Request
 from executive.tree.board import LastKnown
 from executive.tree.compiler import CompiledTree, compile_mission
@@ -59,8 +60,13 @@ class Prepared:
 
     def with_mission(self, mission: Mission) -> Prepared:
         """Compiles another mission in place of this one. Raises InputError if it cannot be compiled."""
-        known, registry = self.last_known, installed_skills()
-        tree = compile_mission(mission, knowledge=self.knowledge, registry=registry, last_known=known)
+        tree = compile_mission(
+            mission,
+            knowledge=self.knowledge,
+            registry=installed_skills(),
+            last_known=self.last_known,
+            reported=reported_classes(self.robot),
+        )
         return replace(self, mission=mission, meant=None).with_tree(tree)
 
     def with_tree(self, tree: CompiledTree) -> Prepared:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.detection import Detections, Detector
-from skills.inputs.errors import suggestion
+from skills.inputs.errors import nearest_name, suggestion
 from skills.inputs.outside import read_text
 from skills.perception.class_forms import class_forms
 from skills.perception.detector.boxes import SuppressionOptions, check_picture, detections_from, select_candidates
@@ -46,13 +46,13 @@ Level = Annotated[float, Quantity(ge=0.0, le=255.0)]
 class ExportedNetwork:
     """Detection network in an ONNX `file` that another tool exported, such as a YOLO, RT-DETR or RF-DETR.
 
-    `classes` maps its class names to words of Errand, `{bottle: beer}`; the robot uses these, and the classes that have
-    the same name here. `names`: where the metadata have none, the names in the order of the network's labels from 0 on,
-    a file with one a line, or a table of label and name. `layout`: what the outputs are, where their shapes leave it
-    open. `fit`, `scale`, `mean`, `std`, `colours`: how a picture becomes the input, where that is not as usual for the
-    layout; values are (byte * scale - mean) / std. `size_px`: width and height of an input of any size. `threshold`:
-    least score. `overlap`: boxes of a class that overlap by more are one object, where the network itself does not
-    suppress them. `objects`: folders written by `errand object import`.
+    `classes` maps its class names to words of Errand, `{bottle: beer}` or `{bottle: drink}` for a category; the robot
+    uses these, and the classes that have the same name here. `names`: where the metadata have none, the names in the
+    order of the network's labels from 0 on, a file with one a line, or a table of label and name. `layout`: what the
+    outputs are, where their shapes leave it open. `fit`, `scale`, `mean`, `std`, `colours`: how a picture becomes the
+    input, where that is not as usual for the layout; values are (byte * scale - mean) / std. `size_px`: width and
+    height of an input of any size. `threshold`: least score. `overlap`: boxes of a class that overlap by more are one
+    object, where the network itself does not suppress them. `objects`: folders written by `errand object import`.
     """
 
     file: Path
@@ -172,11 +172,14 @@ def load_exported(options: ExportedNetwork, threshold: float | None = None, *, e
     facts = Facts(size_px, count, metadata.get("task", "detect"), " ".join(metadata.values()))
     layout = _layout(session, options, facts)
     words = {label: classes.get(theirs, theirs) for label, theirs in names.items()}
-    reported = tuple(word for word in dict.fromkeys(words.values()) if every or word in forms)
-    wanted = [(theirs, names.values(), "is no class of the network") for theirs in classes]
-    for word, known, what in wanted + [(ours, forms.keys(), "has no class_forms") for ours in classes.values()]:
-        if word not in known:
-            raise _error(options, f"'classes' names {word!r}, which {what}", suggestion(word, known))
+    reported = tuple(word for word in dict.fromkeys(words.values()) if every or word in {*forms, *classes.values()})
+    for theirs in classes.keys() - names.values():
+        what = f"'classes' names {theirs!r}, which is no class of the network"
+        raise _error(options, what, suggestion(theirs, names.values()))
+    for ours in classes.values():  # any other word may be a category of the world's knowledge
+        if ours not in forms and (near := nearest_name(ours, forms)):
+            what = f"'classes' names {ours!r}, which has no class_forms"
+            raise _error(options, what, f"did you mean {near!r}?")
     if not reported:
         shown = textwrap.shorten(", ".join(names.values()), 200, placeholder=" ...")
         hint = "write 'classes: {THEIRS: OURS}', or give a class its class_forms"

@@ -3,17 +3,27 @@
 import os
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from executive.app.prepare import feasibility
-from executive.app.prepare.feasibility import RouteCache, abilities_in, abilities_of, reached_heights_m
+from executive.app.prepare.feasibility import (
+    RouteCache,
+    abilities_in,
+    abilities_of,
+    check_prepared,
+    reached_heights_m,
+)
+from executive.app.prepare.from_request import prepare
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import open_world
+from executive.mission.request import Request
 from executive.tree.estimate import Route
 from plant.robots.robot_kind import robot_kind
 from plant.worlds.world import load_world
 from skills.robot import Pose2D
 from skills.testing.robot import BASE_ONLY
+from tests.skills.exported_networks import export
 
 
 @pytest.mark.parametrize("kind", ["spot", "fetch"])
@@ -54,6 +64,30 @@ def test_people_who_take_objects_and_full_surfaces_are_those_of_the_world():
     assert all(name in world.surfaces and taken_m2 > 0.0 for name, taken_m2 in able.taken_m2.items())
     nobody = replace(world, seed_rules=world.seed_rules.model_copy(update={"people": ()}))
     assert abilities_in(nobody).takers == frozenset()
+
+
+TWO = {"names": "{0: 'bottle', 1: 'can'}"}
+
+
+# the classes of the network, the sentence, and what the robot looks for or why it cannot
+@pytest.mark.parametrize(
+    ("classes", "said", "expected"),
+    [
+        ("{bottle: drink}", "fetch me a drink", {("drink",)}),
+        ("{bottle: drink, can: coke}", "fetch me a drink", {("coke", "drink")}),
+        ("{bottle: drink}", "fetch me a coke", "the robot does not know what coke looks like"),
+        ("{can: coke}", "fetch me a drink", "the robot does not know what beer looks like"),
+    ],
+)
+def test_a_category_that_an_own_detector_reports_stands_for_its_classes(tmp_path, classes, said, expected):
+    export(tmp_path / "own.onnx", {"output0": np.zeros((1, 6, 84), np.float32)}, metadata=TWO)
+    stack = tmp_path / "stack.yaml"
+    stack.write_text(f"detector: {{use: onnx, file: own.onnx, classes: {classes}}}\n")
+    prepared = prepare(Request(sentence=said, world="flat", stack=stack))
+    errors = check_prepared(prepared).errors
+    detects = [node for node in prepared.tree.root.walk() if node.skill is not None and node.skill.name == "detect"]
+    looks = {node.options["inputs"]["classes"].value for node in detects}
+    assert expected in str(errors[0]) if errors else looks == expected
 
 
 HERE, THERE, NOWHERE = Pose2D(0.0, 0.0, 0.0), Pose2D(3.0, 4.0, 0.5), Pose2D(99.0, 0.0, 0.0)

@@ -52,6 +52,11 @@ def test_colour_order_scale_mean_and_deviation_come_from_the_options(colours):
     assert colours(scale=0.001, mean=(0.1, 0.0, 0.0), std=(0.5, 1.0, 1.0)) == {"red": 0.2}
 
 
+def test_a_word_that_is_no_class_may_be_a_category_of_a_world(tmp_path):
+    found = scores(load_exported(network(tmp_path, classes={"coke": "drink"}), every=False))
+    assert found == {"drink": 0.9}
+
+
 def test_a_wide_picture_is_padded_with_grey_above_and_below(colours):
     wide = np.full((32, 64, 3), 255, np.uint8)
     assert set(colours(wide).values()) == {round((1 + 114 / 255) / 2, 3)}

@@ -30,6 +30,7 @@ _OF_NAMES: Final = frozenset(
     {errno.ENAMETOOLONG, errno.ENOTDIR, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP, errno.EEXIST}
 )
 _SHOWN: Final = 100
+_MOST_LINES: Final = 50
 
 
 def console_for(as_json: bool) -> Console:
@@ -113,7 +114,8 @@ def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[
 def refuse(error: InputError | OSError) -> NoReturn:
     """Ends a command with exit status 2 for bad input, or for a file that cannot be used.
 
-    Prints a line on standard error for each error. Raises any other OSError again.
+    Prints a line on standard error for each error, and the number of those beyond `_MOST_LINES`. Raises any other
+    OSError again.
     """
     if isinstance(error, InputError):
         refused = error
@@ -122,8 +124,11 @@ def refuse(error: InputError | OSError) -> NoReturn:
     else:
         what = f"cannot use it ({error.strerror})"
         refused = InputError(what, hint="name another", file=str(error.filename)[:_SHOWN])
-    for each in (refused, *refused.others):
+    every = (refused, *refused.others)
+    for each in every[:_MOST_LINES]:
         typer.echo(f"errand: {each}", err=True)
+    if len(every) > _MOST_LINES:
+        typer.echo(f"errand: and {len(every) - _MOST_LINES} more; mend these first", err=True)
     raise typer.Exit(BAD_INPUT) from error
 
 

@@ -20,6 +20,7 @@ MOST_PIXELS: Final = 64_000_000
 MOST_BYTES: Final = 200_000_000
 _PNG: Final = b"\x89PNG\r\n\x1a\n"
 _WIDE_HEADS: Final = (b"II", b"MM", b"PF", b"Pf", b"#?")  # of TIFF, PFM and HDR, whose values may be float
+_BYTE: Final = 255
 _LIMIT_NAME: Final = "MAX_IMAGE_PIXELS"
 _JPEG_SIZES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _SPACE: Final = rb"(?:\s|#[^\n\r]*[\n\r])+"
@@ -133,8 +134,8 @@ def _content(file: Path, most_pixels: int) -> bytes:
 def _decoded(content: bytes, file: Path, flags: int) -> NDArray[Any]:
     try:
         with _silent():
-            if content[:2] in _WIDE_HEADS:
-                content = _narrowed(content)
+            if content[:2] in _WIDE_HEADS or (content.startswith(_PNG) and content[24:25] == b"\x10"):
+                content = _narrowed(content, file)
             pixels = cv2.imdecode(np.frombuffer(content, np.uint8), flags) if content else None
     except cv2.error as error:
         large = _LIMIT_NAME in str(error)
@@ -144,11 +145,18 @@ def _decoded(content: bytes, file: Path, flags: int) -> NDArray[Any]:
     return np.asarray(pixels)
 
 
-def _narrowed(content: bytes) -> bytes:
-    """Picture of 8 bits a value of one with float, signed or 32-bit values; white is 1, else 255, else the greatest."""
+def _narrowed(content: bytes, file: Path) -> bytes:
+    """Picture of 8 bits a value of one with float, signed or 32-bit values; white is 1, else 255, else the greatest.
+
+    One of 16 bits that fills only the lower eight is one of 8 bits. Raises InputError for one without any number.
+    """
     pixels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-    if pixels is None or pixels.dtype in (np.uint8, np.uint16):
+    if pixels is None or pixels.dtype == np.uint8 or (pixels.dtype == np.uint16 and pixels.max() > _BYTE):
         return content
+    if pixels.dtype == np.uint16:
+        return bytes(cv2.imencode(".png", pixels.astype(np.uint8))[1])
+    if not np.isfinite(pixels).any():
+        raise InputError("none of its values is a number", hint="save it again", file=file)
     values = np.nan_to_num(pixels.astype(np.float64), posinf=0.0, neginf=0.0)
     least, most = min(float(values.min()), 0.0), float(values.max())
     white = next((full for full in (1.0, 255.0) if least == 0.0 and most <= full), most)

@@ -19,6 +19,7 @@ from executive.app.fleet.fleet_mission import (
     charging_time_s,
     is_lost,
     is_plain,
+    limit_of,
     missions_json,
     missions_message,
     rest_of,
@@ -57,8 +58,9 @@ class Dispatch(Assigner):
 
     A robot whose battery is low returns its mission once its gripper is empty, and charges by its mission `dock`.
     `prepare` returns a request for each robot that may do it, and the shortest duration (s) of these; each added
-    mission extends the time limit by `each_s`. `tell` shows a line; `offers` builds the bids of the robots; `ended` is
-    called whenever a mission has ended, with the `total` of them. The queued missions `left_out` are only listed.
+    mission extends the time limit by its own if it is `extended`. `tell` shows a line; `offers` builds the bids of the
+    robots; `ended` is called whenever a mission has ended, with the `total` of them. The queued missions `left_out` are
+    only listed.
     """
 
     store: MissionStore
@@ -70,7 +72,7 @@ class Dispatch(Assigner):
     tell: Callable[[str], None] = silence
     log: EventLog | None = None
     left_out: Sequence[int] = ()
-    each_s: float = 0.0
+    extended: bool = False
     ended: Callable[..., None] = lambda **_: None
     offers: Callable[[Mapping[str, FleetRobot], BatteryFacts, Callable[[], float], Auction], Offers] = Offers
 
@@ -94,7 +96,7 @@ class Dispatch(Assigner):
         Raises InputError if no robot may do the mission, the time limit would end it, or the run is ending.
         """
         options, duration_s = self.prepare(request)
-        if duration_s > self._left_s + self.each_s:
+        if duration_s > self._left_s + (limit_of(options) if self.extended else 0.0):
             what = f"the time limit ends the run in {self._left_s:.0f} s, and it takes about {duration_s:.0f} s"
             raise InputError(what, hint=_NEXT_RUN)
         with self._adding, MissionStore(self.store.path) as store:
@@ -110,7 +112,7 @@ class Dispatch(Assigner):
             mission = self._added.popleft()
             self.missions[mission.number] = mission
             self._auction.add(mission.number)
-            self.more_s += self.each_s
+            self.more_s += limit_of(mission.options) if self.extended else 0.0
             self._log_missions()
 
     def stop(self, reason: str) -> None:

@@ -16,6 +16,7 @@ from executive.app.fleet.fleet_mission import (
     FleetRobot,
     charging_missions,
     fleet_mission,
+    limit_of,
     missions_message,
     options_for_fleet,
 )
@@ -75,8 +76,9 @@ def run_fleet(
     one ends. The log begins with the map of the `first` mission. Raises InputError for an unusable page or log.
     """
     backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
-    dispatch.ended, dispatch.each_s = ended, TIME_LIMIT_S if time_limit_s is None else 0.0
-    limit_s = TIME_LIMIT_S * max(1, len(dispatch.missions)) if time_limit_s is None else time_limit_s
+    dispatch.ended, dispatch.extended = ended, time_limit_s is None
+    limits_s = [limit_of(each.options) for each in dispatch.missions.values()] or [TIME_LIMIT_S]
+    limit_s = sum(limits_s) if time_limit_s is None else time_limit_s
     with closing(EventLog(out / "log.mcap", backend.clock, apart=True)) as log:
         dispatch.log = log
         if page is not None:

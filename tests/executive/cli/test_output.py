@@ -7,6 +7,7 @@ import typer
 from rich.console import Console
 
 from executive.cli.output import progress_bar, refuse
+from skills.inputs.errors import InputError, Problems
 from tests.executive.cli.calls import errand
 
 
@@ -17,6 +18,20 @@ def test_a_name_of_endless_length_is_refused_in_one_line(option):
     result = errand("queue", "add", *file, *filter(None, [option]), name)
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
     assert result.stderr.startswith("errand: ") and len(result.stderr) < 1500
+
+
+def test_of_many_errors_the_first_are_shown_and_the_rest_counted(capsys):
+    problems = Problems()
+    for number in range(2000):
+        problems.add(InputError(f"wrong {number}"))
+    with pytest.raises(InputError) as caught:
+        problems.raise_any()
+    with pytest.raises(typer.Exit):
+        refuse(caught.value)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) < 100
+    assert lines[0] == "errand: wrong 0"
+    assert lines[-1] == f"errand: and {2000 - len(lines) + 1} more; mend these first"
 
 
 def test_an_error_that_is_no_fault_of_a_name_is_raised():

@@ -2,6 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
+from skills.inputs.errors import InputError
 from skills.inputs.picture_files import read_brightness, read_pixels
 
 SHARES = np.linspace(0.0, 1.0, 20 * 30 * 3).reshape(20, 30, 3)
@@ -45,6 +46,18 @@ def test_values_that_are_no_numbers_are_black(tmp_path):
     values = np.where(SHARES > 0.5, np.nan, SHARES).astype(np.float32)
     pixels = read_pixels(written(tmp_path / "a.tiff", values), flags=cv2.IMREAD_COLOR)
     assert np.abs(pixels - 255 * np.nan_to_num(values)).max() <= 1.5
+
+
+def test_a_picture_without_any_number_is_refused(tmp_path):
+    file = written(tmp_path / "a.tiff", np.full((20, 30), np.nan, np.float32))
+    with pytest.raises(InputError, match=r"a\.tiff: none of its values is a number"):
+        read_pixels(file)
+
+
+@pytest.mark.parametrize("suffix", ["png", "tiff"])
+def test_bytes_in_a_picture_of_16_bits_are_read_as_bytes(tmp_path, suffix):
+    values = np.rint(255 * SHARES).astype(np.uint16)
+    assert (read_pixels(written(tmp_path / f"a.{suffix}", values), flags=cv2.IMREAD_COLOR) == values).all()
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])

@@ -14,8 +14,9 @@ from typer.testing import CliRunner
 
 from executive.app.fleet.auction import Bid
 from executive.app.fleet.dispatch import Dispatch
-from executive.app.fleet.fleet_mission import FleetMission, FleetRobot, Offers, missions_json
+from executive.app.fleet.fleet_mission import FleetMission, FleetRobot, Offers, limit_of, missions_json
 from executive.app.fleet.fleet_run import TIME_LIMIT_S, run_fleet
+from executive.app.prepare.from_request import prepare
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.page_view import PageView
 from executive.cli import entry
@@ -636,6 +637,12 @@ def test_each_added_mission_extends_a_time_limit_that_nobody_has_set(fleet, answ
     fleet.lines = [BEDROOM, KITCHEN]
     assert len(fleet.run()) == 3
     assert fleet.dispatch.more_s == 2 * TIME_LIMIT_S
+
+
+def test_the_waits_of_a_mission_lengthen_the_time_limit_of_its_fleet():
+    asked = Request(sentence="wait for 50 minutes and go to the kitchen", world="flat")
+    alone = prepare(replace(asked, sentence="go to the kitchen"))
+    assert limit_of({"Alice": alone, "Bob": prepare(asked)}) == TIME_LIMIT_S + 3000.0
 
 
 def test_nothing_is_added_to_a_fleet_that_has_ended(fleet):

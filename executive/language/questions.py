@@ -155,6 +155,7 @@ class RefusalKind(Enum):
     NOT_UNDERSTOOD = "not_understood"  # words outside the robot's abilities
     NOTHING_TO_DO = "nothing_to_do"  # it asks for no action
     NO_SUCH_DOOR = "no_such_door"
+    UNSEEN = "unseen"  # it asks for what no sensor shows
     ABOUT_PEOPLE = "about_people"  # whom to follow, guide or greet, or where to
     OTHER = "other"
 

@@ -292,7 +292,8 @@ class _Resolver:
             self.understood[sentence] = ask_until_clear(sentence, meaning, self.answer)
         meant = self.understood[sentence]
         if meant.status is not Status.OK:
-            hint = "say it in other words, or write take, to, do and object"
+            open_question = meant.status is Status.QUESTION
+            hint = "say which" if open_question else "say it in other words, or write take, to, do and object"
             raise error(path, (meant.reason or _NOT_UNDERSTOOD)[:REASON_LETTERS], hint)
         return meant
 

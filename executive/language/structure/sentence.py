@@ -328,7 +328,7 @@ class SentenceBuilder(DecisionBuilder):
         try:
             supposed = parse_condition(text, state, self.reader)
         except RefusalError as refusal:
-            said = refusal.question is not None or refusal.kind is RefusalKind.NO_SUCH_DOOR
+            said = refusal.question is not None or refusal.kind in (RefusalKind.NO_SUCH_DOOR, RefusalKind.UNSEEN)
             raise (refusal if said else plain) from None
         self.flush(row)
         found = supposed.condition

@@ -19,7 +19,6 @@ from executive.app.fleet.fleet_mission import (
     charging_time_s,
     is_lost,
     is_plain,
-    limit_of,
     missions_json,
     missions_message,
     rest_of,
@@ -30,7 +29,7 @@ from executive.app.report.report_page import EndedTree
 from executive.app.runs.backend import Backend
 from executive.app.runs.goal_conditions import Share
 from executive.app.runs.one_run import entry_for, robot_report
-from executive.mission.request import Request
+from executive.mission.request import TIME_LIMIT_S, Request
 from executive.mission.scenario import Scenario
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
@@ -50,6 +49,11 @@ _NEXT_RUN: Final = "`errand queue add` queues it for the next run"
 
 def silence(line: str) -> None:
     """Discards a line instead of showing it."""
+
+
+def limit_of(options: Mapping[str, Prepared]) -> float:
+    """Returns the time limit (s) of a mission by itself, for the robot that may take longest."""
+    return max((each.time_limit_s for each in options.values()), default=TIME_LIMIT_S)
 
 
 @dataclass

@@ -17,7 +17,7 @@ from executive.app.prepare.prepared import Prepared
 from executive.app.report.report_page import EndedTree
 from executive.app.runs.goal_conditions import Share
 from executive.language.addressees import RobotChoice
-from executive.mission.request import TIME_LIMIT_S, Request
+from executive.mission.request import Request
 from executive.run.visitor import RunEntry, TickNote
 from executive.store.missions import GivenMission, GivenMissions, MissionStore, StoredMission
 from executive.tree.board import LastKnown, LastKnownTracker
@@ -67,11 +67,6 @@ class FleetMission:
     def number(self) -> int:
         """Number of the mission in the store."""
         return self.stored.id
-
-
-def limit_of(options: Mapping[str, Prepared]) -> float:
-    """Returns the time limit (s) of a mission by itself, for the robot that may take longest."""
-    return max((each.time_limit_s for each in options.values()), default=TIME_LIMIT_S)
 
 
 def fleet_mission(

@@ -9,14 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from executive.app.fleet.dispatch import Dispatch, silence
+from executive.app.fleet.dispatch import Dispatch, limit_of, silence
 from executive.app.fleet.fleet_mission import (
     NOT_GIVEN,
     FleetMission,
     FleetRobot,
     charging_missions,
     fleet_mission,
-    limit_of,
     missions_message,
     options_for_fleet,
 )

@@ -13,8 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 from executive.app.fleet.auction import Bid
-from executive.app.fleet.dispatch import Dispatch
-from executive.app.fleet.fleet_mission import FleetMission, FleetRobot, Offers, limit_of, missions_json
+from executive.app.fleet.dispatch import Dispatch, limit_of
+from executive.app.fleet.fleet_mission import FleetMission, FleetRobot, Offers, missions_json
 from executive.app.fleet.fleet_run import TIME_LIMIT_S, run_fleet
 from executive.app.prepare.from_request import prepare
 from executive.app.prepare.prepared import Prepared

@@ -5,7 +5,8 @@
 A program of our own (`sdk_moves.py`) always runs. With the folder of the SDK's examples, by the option or the variable
 `ERRAND_SDK_EXAMPLES`, those that move run too, unchanged. Each runs alone against a new server in real time. What a
 command asks is read from its message with the SDK's own geometry. It is compared when the server reports that the
-command is done; a command that another one replaces before is `cut`, and not compared.
+command is done; a command that another one replaces before is `cut`, and not compared. What a program says as a whole
+stands in `sdk_promises.py`, and is compared with the whole path of body and hand.
 """
 
 import math
@@ -25,7 +26,7 @@ from bosdyn.api import arm_command_pb2, basic_command_pb2, robot_command_pb2
 from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 from bosdyn.client.frame_helpers import get_a_tform_b
 from bosdyn.client.math_helpers import SE2Pose, SE3Pose
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 
 from errand_spot.messages import frame_tree, seconds, transform
 from errand_spot.server.commands import RobotCommandService
@@ -35,28 +36,13 @@ from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import open_world
 from executive.app.runs.simulated import compile_first, simulate
 from plant.simulation import Simulation
+from skills.geometry import compose, inverse
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Pose2D
 from tests.benchmarks.harness import command, show
+from tests.benchmarks.sdk_promises import COLUMNS, OWN, PERIOD_S, PROGRAMS, deviation
 
 EXAMPLES = "ERRAND_SDK_EXAMPLES"
-OWN = Path(__file__).with_name("sdk_moves.py")
-PROGRAMS = (
-    "hello_spot/hello_spot.py",
-    "frame_trajectory_command/frame_trajectory_command.py --dx 0.6 --frame odom",
-    "frame_trajectory_command/frame_trajectory_command.py --dyaw 0.8 --frame vision",
-    "arm_simple/arm_simple.py",
-    "arm_stow_unstow/arm_stow_unstow.py",
-    "arm_joint_move/arm_joint_move.py",
-    "arm_joint_move/arm_joint_long_trajectory.py",
-    "arm_trajectory/arm_trajectory.py",
-    "arm_trajectory/arm_long_cartesian_trajectory.py",
-    "arm_and_mobility_command/arm_and_mobility_command.py",
-    "arm_gaze/arm_gaze.py",
-    "arm_with_body_follow/arm_with_body_follow.py",
-)
-ENDS_WITH_1 = ("arm_joint_long_trajectory.py",)
-"""Examples whose own last line ends them with 1 whatever has happened."""
 MOST_M = 0.1
 """Largest error of a motion; of a gaze in rad."""
 BASE = ("base", "height", "velocity")
@@ -94,6 +80,8 @@ class Judge:
     server: SpotServer
     simulation: Simulation
     asked: list[Asked] = field(default_factory=list)
+    track: list = field(default_factory=list)
+    X_WS: RigidTransform | None = None
 
     def X_W(self, link):
         """True pose of a link."""
@@ -195,7 +183,10 @@ class Judge:
         return error
 
     def look(self, service):
-        """Compares what is done now; called before each step of the plant."""
+        """Compares what is done now, and records the track; called before each step of the plant."""
+        now_s = self.server.computer.clock.now()
+        if self.asked and (not self.track or now_s - self.track[-1][0] > PERIOD_S - 1e-6):
+            self.track.append((now_s, self._row()))
         for each in (each for each in self.asked if each.error_then is None and each.cut is None):
             request = robot_command_pb2.RobotCommandFeedbackRequest(robot_command_id=each.command)
             told = service.RobotCommandFeedback(request, None).feedback.synchronized_feedback
@@ -205,13 +196,22 @@ class Judge:
             elif part.status == basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_OVERRIDDEN:
                 each.cut = (each.on_path or each.error)()
 
+    def _row(self):
+        """The values of `COLUMNS` now."""
+        X_WB, X_WH = self.X_W("body"), self.X_W("hand") @ RigidTransform([HAND_M, 0.0, 0.0])
+        if self.X_WS is None:
+            self.X_WS = Pose2D.from_transform(X_WB).transform(self.server.computer.capabilities.standing_height_m)
+        X_SB, X_SH = self.X_WS.InvertAndCompose(X_WB), self.X_WS.InvertAndCompose(X_WH)
+        angles, held = RollPitchYaw(X_SB.rotation()).vector(), X_WB.InvertAndCompose(X_WH)
+        return np.concatenate([X_SB.translation(), angles, X_SH.translation(), held.translation()])
+
 
 @contextmanager
-def judged(seed):
+def judged(seed, start=START):
     """Serves a simulated Spot whose commands are judged; the caller runs `server.computer`."""
     opened = open_world("flat")
     compile_first()
-    robots = {"Alice": only_robot("Alice", opened, seed=seed, start=START)}
+    robots = {"Alice": only_robot("Alice", opened, seed=seed, start=start)}
     simulation = simulate(opened, robots, seed=seed, record=False)
     robot, judges = simulation.robots["Alice"], []
     take = RobotCommandService.RobotCommand
@@ -224,7 +224,9 @@ def judged(seed):
 
     with tempfile.TemporaryDirectory() as folder, mock.patch.object(RobotCommandService, "RobotCommand", taken):
         solver = arm_model(robot.capabilities())
-        server = SpotServer(robot, simulation.clock, solver, credentials(Path(folder)), Options({"user": "simulated"}))
+        dock_O = compose(inverse(start), robots["Alice"].dock)
+        options = Options({"user": "simulated"}, dock_O=dock_O)
+        server = SpotServer(robot, simulation.clock, solver, credentials(Path(folder)), options)
         judges.append(Judge(server, simulation))
         service = next(each for each in server.services if isinstance(each, RobotCommandService))
         server.computer.watchers.append(lambda: judges[0].look(service))
@@ -232,11 +234,11 @@ def judged(seed):
             yield judges[0]
 
 
-def run(program, *, seed=1):
-    """Runs one program, a script with its arguments, to its end; returns its exit code and the errors by kind."""
-    script, *arguments = program.split()
+def run(program, folder, *, seed=1):
+    """Runs one program of a folder to its end; returns its exit code, the errors by kind, and those of its promises."""
+    script, *arguments = f"{folder}/{program.line}".split()
     code, ended = [], threading.Event()
-    with judged(seed) as judge:
+    with judged(seed, START if program.start is None else Pose2D(*program.start)) as judge:
         server = judge.server
         user = {"BOSDYN_CLIENT_USERNAME": "user", "BOSDYN_CLIENT_PASSWORD": "simulated"}
         launch = [sys.executable, "-m", "errand_spot.launch", str(server.certificate), str(server.port), "real"]
@@ -257,17 +259,20 @@ def run(program, *, seed=1):
         server.computer.run(ended)
         thread.join()
         compared = [each for each in judge.asked if each.error_then is not None]
-        worst = {
-            kind: max(e.error_then or 0.0 for e in compared if e.kind == kind) for kind in {e.kind for e in compared}
-        }
+        kinds = sorted({each.kind for each in compared})
+        worst = {kind: max(e.error_then or 0.0 for e in compared if e.kind == kind) for kind in kinds}
+        track = np.array([row for _, row in judge.track] or [np.zeros(len(COLUMNS))])
+        off = [deviation(track, promise) for promise in program.promises]
+        kept = all(error < promise.most for error, promise in zip(off, program.promises, strict=True))
         return {
-            "program": Path(program.split()[0]).name + " " + " ".join(arguments),
+            "program": program.line,
             "exit_code": code[0],
             "compared": len(compared),
             "cut": [(each.kind, each.cut and round(each.cut, 3)) for each in judge.asked if each.error_then is None],
-            "worst": {kind: round(error, 3) for kind, error in sorted(worst.items())},
-            "ended": code[0] == int(Path(script).name in ENDS_WITH_1),
-            "true": bool(compared) and all(error < MOST_M for error in worst.values()),
+            "worst": {kind: round(error, 3) for kind, error in worst.items()},
+            "promises": [(p.columns, round(error, 3), p.most) for p, error in zip(program.promises, off, strict=True)],
+            "ended": code[0] == program.exit_code,
+            "true": bool(compared or off) and kept and all(error < MOST_M for error in worst.values()),
         }
 
 
@@ -276,11 +281,12 @@ def measure(
     only: str = "",
     seed: int = 1,
 ):
-    programs = [str(OWN), *(f"{examples}/{each}" for each in PROGRAMS if examples)]
+    programs = [(OWN, Path(__file__).parent), *((each, examples) for each in PROGRAMS if examples)]
     results = []
-    for program in (each for each in programs if only in each):
-        results.append(run(program, seed=seed))
-        show(results[-1])
+    for program, folder in programs:
+        if only in program.line:
+            results.append(run(program, folder, seed=seed))
+            show(results[-1])
     return {"programs": len(results), "ended_and_true": sum(each["true"] and each["ended"] for each in results)}
 
 

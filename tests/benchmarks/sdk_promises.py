@@ -1,0 +1,219 @@
+"""What programs of Spot's SDK say that the robot does, as data; the programs that are refused, and those not run.
+
+A program of the SDK's examples stands in one of three tables, by its folder. `deviation` compares a promise with the
+recorded truth along the whole path.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+PERIOD_S = 0.1
+"""Time between two samples of a track."""
+COLUMNS = (
+    *("x", "y", "z", "roll", "pitch", "yaw"),
+    *("hand_x", "hand_y", "hand_z"),
+    *("in_body_x", "in_body_y", "in_body_z"),
+)
+"""Columns of a track in m and rad: the body and the hand in the pose in which the body first stands, the hand in it."""
+_ANGLES = ("roll", "pitch", "yaw")
+_STEP = 0.02
+
+
+@dataclass(frozen=True)
+class Promise:
+    """Values that columns of the track pass in this order, to within `most` (m or rad).
+
+    `along`: the robot keeps to the straight lines between the values. It stays at each value for `rests_s`.
+    """
+
+    columns: str
+    passes: tuple[tuple[float, ...], ...]
+    most: float
+    along: bool = False
+    rests_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Program:
+    """Program with its arguments, what it promises, its exit code, and its start (x, y, yaw) if it needs another."""
+
+    line: str
+    promises: tuple[Promise, ...] = ()
+    exit_code: int = 0
+    start: tuple[float, float, float] | None = None
+
+
+def deviation(track, promise):
+    """Error of a promise: its largest distance from the path that keeps it best (Frechet distance on samples)."""
+    names = promise.columns.split()
+    values = track[:, [COLUMNS.index(name) for name in names]]
+    points = np.array(promise.passes, dtype=float)
+    if promise.along:
+        points = _densified(points)
+    off = values[None] - points[:, None]
+    angles = [k for k, name in enumerate(names) if name in _ANGLES]
+    off[..., angles] = np.arctan2(np.sin(off[..., angles]), np.cos(off[..., angles]))
+    errors = np.linalg.norm(off, axis=2)
+    if (rest := round(promise.rests_s / PERIOD_S)) > 0:
+        errors = maximum_filter1d(errors, rest + 1, axis=1, origin=-(rest // 2), mode="constant", cval=np.inf)
+    reached = errors[0]
+    for row in errors[1:]:
+        reached = _kept(reached, row) if promise.along else np.maximum(row, np.minimum.accumulate(reached))
+    return float(reached.min())
+
+
+def _kept(before, row):
+    """Errors at the next point of a path, by the errors at the point before and the samples' distances from it."""
+    made, last = np.empty_like(row), (np.inf, np.inf)
+    for t, error in enumerate(row):
+        last = (before[t], max(error, min(before[t], *last)))
+        made[t] = last[1]
+    return made
+
+
+def _densified(points):
+    made = [points[:1]]
+    for a, b in pairwise(points):
+        count = max(1, int(np.ceil(np.linalg.norm(b - a) / _STEP)))
+        made.append(a + np.linspace(0.0, 1.0, count + 1)[1:, None] * (b - a))
+    return np.concatenate(made)
+
+
+_CIRCLE = tuple(
+    (1.0, 0.25 - 0.4 * float(np.cos(angle)), 0.4 * float(np.sin(angle))) for angle in np.linspace(0.0, np.pi * 2.0, 9)
+)
+
+OWN = Program(
+    "sdk_moves.py",
+    (
+        Promise("z", ((0.0,), (-0.08,), (0.0,)), 0.02),
+        Promise("x y", ((0.0, 0.0), (0.5, 0.1)), 0.05),
+        Promise("yaw", ((0.0,), (0.4,), (0.0,)), 0.05),
+    ),
+)
+"""Our own program, beside this file."""
+
+PROGRAMS = (
+    Program(
+        "hello_spot/hello_spot.py",
+        (
+            Promise("yaw", ((0.0,), (0.4,), (0.0,)), 0.05, rests_s=1.0),
+            Promise("x", ((0.0,), (0.075,), (0.0,)), 0.02),
+            Promise("pitch", ((0.0,), (0.349,), (0.0,)), 0.05),
+        ),
+    ),
+    Program(
+        "frame_trajectory_command/frame_trajectory_command.py --dx 0.6 --frame odom",
+        (Promise("x y yaw", ((0.0, 0.0, 0.0), (0.6, 0.0, 0.0)), 0.06, along=True),),
+    ),
+    Program(
+        "frame_trajectory_command/frame_trajectory_command.py --dyaw 45 --frame vision",
+        (Promise("x y yaw", ((0.0, 0.0, 0.0), (0.0, 0.0, 0.785)), 0.06, along=True),),
+    ),
+    Program("arm_simple/arm_simple.py", (Promise("hand_x hand_y hand_z", ((0.75, 0, 0.25), (0.75, 0, 0)), 0.04),)),
+    Program(
+        "arm_stow_unstow/arm_stow_unstow.py",
+        (Promise("in_body_x in_body_z", ((0.4, 0.2), (0.7, 0.25), (0.4, 0.2)), 0.2),),
+    ),
+    Program("arm_joint_move/arm_joint_move.py"),
+    Program("arm_joint_move/arm_joint_long_trajectory.py", exit_code=1),
+    Program(
+        "arm_trajectory/arm_trajectory.py",
+        (Promise("hand_x hand_y hand_z", ((0.75, 0, 0), (0.75, 0.4, 0), (0.75, -0.4, 0)), 0.05, along=True),),
+    ),
+    Program(
+        "arm_trajectory/arm_long_cartesian_trajectory.py",
+        (Promise("hand_y hand_z", ((0.25, 0), (0, 0.25), (-0.25, 0), (0, -0.25), (0.25, 0)), 0.06),),
+    ),
+    Program(
+        "arm_and_mobility_command/arm_and_mobility_command.py",
+        (
+            Promise("x y", ((0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5), (0, 0)), 0.08, along=True),
+            Promise("hand_x hand_y hand_z", _CIRCLE, 0.1),
+        ),
+    ),
+    Program("arm_gaze/arm_gaze.py", (Promise("hand_x hand_y hand_z", ((0.75, 0, 0), (0.75, 0, 0.25)), 0.06),)),
+    Program(
+        "arm_with_body_follow/arm_with_body_follow.py",
+        (
+            Promise("hand_x hand_y hand_z", ((1.25, 0, 0.25),), 0.05),
+            Promise("x y", ((0, 0), (0.5, 0)), 0.06, along=True),
+        ),
+    ),
+    Program(
+        "arm_freeze/arm_freeze_hand.py",
+        (
+            Promise("x hand_x hand_y", ((0, 0.75, -0.5), (1, 0.75, -0.5)), 0.08, along=True),
+            Promise("x in_body_x in_body_y", ((1, 0.75, -0.5), (0, 0.75, -0.5), (0.75, 0.75, -0.5)), 0.08, along=True),
+        ),
+    ),
+    Program("stance/stance_in_place.py", (Promise("x y", ((0, 0),), 0.05),), exit_code=124),
+    Program(
+        "user_nogo_regions/user_nogo_regions.py",
+        (Promise("x", ((0.0,), (0.3,)), 0.15, rests_s=2.0), Promise("x", ((0.3,), (2.0,), (0.0,)), 0.15)),
+    ),
+    Program(
+        "docking/dock_my_robot.py --dock-id 520",
+        (Promise("x y yaw", ((0, 0, 0), (1.92, 0.35, 3.1416)), 0.1, rests_s=1.0),),
+        start=(9.3, 4.6, 0.0),
+    ),
+)
+"""Examples of the SDK that move the robot, with what they log."""
+
+REFUSED = {
+    "arm_constrained_manipulation": "constrained manipulation",
+    "arm_door": "DoorService",
+    "arm_force_control": "an axis in force mode",
+    "arm_impedance_control": "arm_impedance_command",
+    "arm_surface_contact": "ArmSurfaceContactService",
+    "access_controlled_doors": "DoorService",
+    "animation_recorder": "ChoreographyService",
+    "audio_visual": "AudioVisualService",
+    "auto_return": "AutoReturnService",
+    "bddf_download": "DataService",
+    "data_acquisition_service": "DataAcquisitionService",
+    "data_service": "DataService",
+    "get_mission_state": "MissionService",
+    "joint_control": "RobotCommandStreamingService",
+    "mission_question_answerer": "MissionService",
+    "mission_recorder": "GraphNavRecordingService",
+    "record_autowalk": "GraphNavRecordingService",
+    "replay_mission": "MissionService",
+    "reset_safety_stop": "ResetSafetyStop",
+    "self_registration": "PayloadRegistrationService",
+    "payloads": "PayloadRegistrationService",
+    "upload_choreographed_sequence": "ChoreographyService",
+}
+"""Folders whose programs the server refuses, with what the refusal names."""
+
+NOT_MOVING = (
+    *("data_buffer", "directory", "estop", "fan_command", "get_depth_plus_visual_image", "get_image"),
+    *("get_robot_state", "get_robot_state_async", "get_world_objects", "gripper_camera_params", "log_status"),
+    *("ray_cast", "service_faults", "time_sync", "world_object_mutations", "world_object_with_image_coordinates"),
+    "disable_ir_emission",
+)
+"""Folders whose programs are served and move nothing."""
+
+NOT_RUN = {
+    **dict.fromkeys(("arm_grasp", "arm_walk_to_object"), "waits for a click into a picture"),
+    "arm_grasp_carry_overrides": "waits for a person who puts an object into the gripper",
+    **dict.fromkeys(("arm_wasd", "wasd", "xbox_controller", "network_compute_bridge"), "waits for keys of a person"),
+    **dict.fromkeys(("graph_nav_command_line", "graph_nav_anchoring_optimization"), "waits for lines of a person"),
+    **dict.fromkeys(("visualizer", "graph_nav_view_map", "graph_nav_view_gps", "edit_autowalk"), "opens a window"),
+    **dict.fromkeys(("stitch_front_images", "orbit", "cloud_upload", "tester_programs"), "needs another server"),
+    **dict.fromkeys(
+        ("spot_cam", "core_io_gpio", "spot_light", "gps_service", "metrics_over_coreio"), "needs a payload"
+    ),
+    **dict.fromkeys(("velodyne_client", "fiducial_follow"), "plots, or follows a person who carries a fiducial"),
+    **dict.fromkeys(("area_callback", "network_request_callback", "remote_mission_service"), "is itself a service"),
+    **dict.fromkeys(("service_customization", "extensions", "post_docking_callbacks"), "is itself a service"),
+    **dict.fromkeys(("graph_nav_extract_point_cloud", "extract_images_from_walk"), "reads files, no robot"),
+    **dict.fromkeys(("comms_mapping", "comms_test", "logging", "docs"), "no program for a robot"),
+    "arm_gcode": "needs a pen in the gripper",
+    "inverse_kinematics": "draws thousands of poses for an hour",
+    "spot_tensorflow_detector": "needs a network's weights",
+}
+"""Folders that the benchmark does not run, and why."""

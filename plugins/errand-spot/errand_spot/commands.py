@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
+import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Annotated, Final
 
+import numpy as np
 import typer
 
 from executive.cli.number_options import quantity_option
+from executive.cli.options import START, start_pose
 from executive.cli.output import console_for
 from skills.inputs.errors import InputError
 from skills.inputs.outside import writing
 from skills.quantities import Port, Seed
+from skills.robot import Pose2D
 
 if TYPE_CHECKING:
     from errand_spot.server.server import SpotServer
@@ -28,6 +33,9 @@ if TYPE_CHECKING:
 USER: Final = "user"
 PASSWORD: Final = "simulated"  # of a simulator that only this machine reaches
 _FOLDER: Final = "spot-api"
+LAUNCH: Final = str(Path(__file__).with_name("launch.py"))
+_AROUND_M, _BESIDE_M, _FROM_PEOPLE_M, _FARTHEST_M = 1.1, 0.5, 1.8, 4.0
+"""Free floor around the robot's start and beside its way ahead, its distance from people, and the longest such way."""
 _SPOT: Final = re.compile(r"spot://(?P<host>[A-Za-z0-9.-]+)(:(?P<port>\d{1,5}))?")
 WORLD = Annotated[str, typer.Option("--world", help="A world by name or folder.")]
 SEED = Annotated[int, quantity_option(Seed, help="Seed of the objects and of all noise.")]
@@ -47,6 +55,9 @@ PACE = Annotated[
     PaceOption, typer.Option("--pace", help="Wall time, or the client's calls step the robot, which is repeatable.")
 ]
 
+PYTHON = Annotated[
+    str, typer.Option("--python", metavar="COMMAND", help="Interpreter of the program; by default that of Errand.")
+]
 GRAPH = Annotated[
     Path | None, typer.Option("--graph", metavar="FOLDER", help="Writes a GraphNav map of the world there first.")
 ]
@@ -59,9 +70,10 @@ def serve(
     no_tablet: NO_TABLET = False,
     pace: PACE = PaceOption.REAL,
     graph: GRAPH = None,
+    start: START = None,
 ) -> None:
     """Serves Spot's API for a simulated Spot, until Ctrl-C."""
-    with _server(world, seed, port, pace, tablet=not no_tablet, graph=graph) as server:
+    with _server(world, seed, port, pace, tablet=not no_tablet, graph=graph, start=start_pose(start)) as server:
         console = console_for(False)
         console.print(f"Spot's API: 127.0.0.1:{server.port} (Ctrl-C ends it)\n", markup=False)
         for name, value in _environment(server).items():
@@ -88,15 +100,23 @@ def run_program(
     no_tablet: NO_TABLET = False,
     pace: PACE = PaceOption.REAL,
     graph: GRAPH = None,
+    start: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option("--start", metavar="X Y YAW", help="Start of the robot, in metres and radians."),
+    ] = None,
+    python: PYTHON = sys.executable,
 ) -> None:
     """Runs a program of Spot's SDK, unchanged, with a simulated Spot; exits as the program does."""
     if not script.is_file():
         raise InputError(f"{script}: there is no such program", hint="name a Python file, after the options of Errand")
-    with _server(world, seed, 0, pace, tablet=not no_tablet, graph=graph) as server:
+    if (interpreter := shutil.which(python)) is None:
+        raise InputError(f"--python {python}: there is no such program", hint="name a Python interpreter with the SDK")
+    pose = None if start is None else start_pose(" ".join(map(str, start)))
+    with _server(world, seed, 0, pace, tablet=not no_tablet, graph=graph, start=pose) as server:
         ended, code = Event(), list[int]()
 
         def run() -> None:
-            code.append(_run(script, arguments or [], server, pace))
+            code.append(_run([interpreter, LAUNCH], [str(script), *(arguments or [])], server, pace))
             ended.set()
 
         program = Thread(target=run, name="sdk-program", daemon=True)
@@ -113,11 +133,11 @@ def _drive_clock(server: SpotServer, ended: Event) -> None:
     (server.computer.run if server.computer.pace is Pace.REAL else server.computer.serve)(ended)
 
 
-def _run(script: Path, arguments: list[str], server: SpotServer, pace: PaceOption) -> int:
+def _run(interpreter: Sequence[str], program: Sequence[str], server: SpotServer, pace: PaceOption) -> int:
     """Runs a program in a process of its own; returns its exit code."""
-    certificate = _environment(server)["SPOT_CERTIFICATE"]
-    launch = [sys.executable, "-m", "errand_spot.launch", certificate, str(server.port), pace.value]
-    return subprocess.run([*launch, str(script), *arguments], env={**os.environ, **_environment(server)}).returncode
+    environment = _environment(server)
+    launch = [*interpreter, environment["SPOT_CERTIFICATE"], str(server.port), pace.value]
+    return subprocess.run([*launch, *program], env={**os.environ, **environment}).returncode
 
 
 def _environment(server: SpotServer) -> dict[str, str]:
@@ -140,9 +160,30 @@ def _write_graph(world: World, folder: Path) -> None:
         write_map(world_map(world), folder)
 
 
+def _free_floor(world: World) -> Pose2D:
+    """Pose nearest to the world's start with free floor around, away from people, in the direction with most space."""
+    from executive.app.prepare.worlds import free_ground
+    from plant.worlds.seeding import standing_points_W
+
+    ground, start = free_ground(world), world.start
+    people_W = np.array([*standing_points_W(world), (math.inf, math.inf)])
+    places = ground.centres(np.argwhere(ground.distance > _AROUND_M))
+    places = places[(np.hypot(*(places[:, None] - people_W).transpose(2, 0, 1)) > _FROM_PEOPLE_M).all(axis=1)]
+    if not len(places):
+        return start
+    x, y = places[np.argmin(np.hypot(*(places - [start.x_m, start.y_m]).T))]
+
+    def ahead_m(yaw_rad: float) -> float:
+        line = [x, y] + np.outer(np.arange(0.0, _FARTHEST_M, 0.1), [math.cos(yaw_rad), math.sin(yaw_rad)])
+        free = np.hypot(*(line[:, None] - people_W).transpose(2, 0, 1)).min(axis=1) > _AROUND_M
+        return float(np.argmin([*(free & (ground.distance_m(line) > _BESIDE_M)), False]))
+
+    return Pose2D(float(x), float(y), max((start.yaw_rad + 0.25 * math.pi * k for k in range(8)), key=ahead_m))
+
+
 @contextmanager
 def _server(
-    world: str, seed: int, port: int, pace: PaceOption, *, tablet: bool, graph: Path | None
+    world: str, seed: int, port: int, pace: PaceOption, *, tablet: bool, graph: Path | None, start: Pose2D | None
 ) -> Iterator[SpotServer]:
     """Builds the simulation with Alice, and serves her. Raises InputError without the SDK or a free port."""
     from errand_spot.perception import SpotPerception
@@ -151,7 +192,7 @@ def _server(
     from errand_spot.server.estop import Tablet
     from errand_spot.server.identity import credentials
     from errand_spot.server.server import Options, SpotServer
-    from executive.app.prepare.placed_robots import only_robot
+    from executive.app.prepare.placed_robots import only_robot, refuse_blocked
     from executive.app.prepare.worlds import knowledge_of, open_world
     from executive.app.runs.simulated import compile_first, simulate
     from plant.models.catalogue import user_cache
@@ -161,7 +202,9 @@ def _server(
     opened = open_world(world)
     if graph is not None:
         _write_graph(opened, graph)
-    placed = only_robot("Alice", opened, seed=seed)
+    if start is not None:
+        refuse_blocked(opened, start)
+    placed = only_robot("Alice", opened, seed=seed, start=start or _free_floor(opened))
     compile_first()
     simulation = simulate(opened, {"Alice": placed}, seed=seed, record=False)
     robot = simulation.robots["Alice"]

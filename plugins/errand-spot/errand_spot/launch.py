@@ -1,9 +1,9 @@
 """Runs a program of the SDK unchanged against a server on this machine.
 
-    python -m errand_spot.launch CERTIFICATE PORT real|client SCRIPT [ARGUMENT ...]
+    python launch.py CERTIFICATE PORT real|client SCRIPT [ARGUMENT ...]
 
-A program that names no certificate of its own trusts the server's, and its robots are reached at the server's port.
-With `client` the program steps the robot whenever its main thread sleeps.
+The interpreter needs the SDK, and nothing of Errand. A program that names no certificate trusts the server's, and its
+robots are reached at the server's port. With `client` the program steps the robot whenever its main thread sleeps.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from scipy.interpolate import PchipInterpolator
 
 from errand_spot.messages import InvalidRequestError, duration, finite, points_of, seconds
 from errand_spot.server.computer import Computer
-from errand_spot.server.mobility import soon
+from errand_spot.server.refusals import soon
 from skills.robot import ArmTrajectory, CommandState, FloatArray
 
 Status = basic_command_pb2.RobotCommandFeedbackStatus

@@ -26,6 +26,8 @@ from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer, Motion, Motors, Snapshot
 from errand_spot.server.identity import DOMAIN, TimeSyncService
 from errand_spot.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
+from errand_spot.server.posture import Posture
+from errand_spot.server.refusals import LONGEST_S, RefusedError, end_of, unsupported
 
 Status = robot_command_pb2.RobotCommandResponse
 Progress = basic_command_pb2.RobotCommandFeedbackStatus
@@ -83,10 +85,8 @@ class PowerService(Service):
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Response(lease_use_result=used, status=Response.STATUS_UNKNOWN)
         lasts_s = seconds(request.duration)
-        if not 0 <= request.percent_power <= 100 or not 0.0 < lasts_s <= mobility.LONGEST_S:
-            raise InvalidRequestError(
-                f"percent_power must be 0 to 100, and duration at most {mobility.LONGEST_S:.0f} s"
-            )
+        if not 0 <= request.percent_power <= 100 or not 0.0 < lasts_s <= LONGEST_S:
+            raise InvalidRequestError(f"percent_power must be 0 to 100, and duration at most {LONGEST_S:.0f} s")
         number, end_s = next(self._ids), self._computer.now_s() + lasts_s
         self._fan_ends_s[number] = end_s
         return Response(
@@ -147,7 +147,7 @@ class RobotCommandService(Service):
         status, message, number = Status.STATUS_OK, "", 0
         try:
             number = self._start(request)
-        except mobility.RefusedError as refused:
+        except RefusedError as refused:
             status, message = refused.status, str(refused)
         except InvalidRequestError as invalid:
             status, message = Status.STATUS_INVALID_REQUEST, str(invalid)
@@ -173,13 +173,13 @@ class RobotCommandService(Service):
         snapshot = computer.snapshot
         whole = _whole_motion(command.full_body_command) if command.HasField("full_body_command") else None
         if snapshot.motors is not Motors.ON and not isinstance(whole, _PowerOff | _StopAll):
-            raise mobility.RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off")
+            raise RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off")
         if whole is None and computer.docked() and _leaves_dock(command.synchronized_command):
-            raise mobility.RefusedError(Status.STATUS_DOCKED, "the robot is docked: undock it first")
+            raise RefusedError(Status.STATUS_DOCKED, "the robot is docked: undock it first")
         parts: Mapping[str, Any] = {}
         if whole is None:
             if _has_end_time(command) and not self._clocks.knows(request.clock_identifier):
-                raise mobility.RefusedError(Status.STATUS_NO_TIMESYNC, "the client has not synchronised its clock")
+                raise RefusedError(Status.STATUS_NO_TIMESYNC, "the client has not synchronised its clock")
             parts = self._motions(command.synchronized_command, snapshot)
         commanded = _Commanded(parts, whole)
         with self._lock:
@@ -199,12 +199,12 @@ class RobotCommandService(Service):
             made[MOBILITY] = _base_motion(command.mobility_command, self._computer, snapshot, now_s)
         if command.HasField("arm_command"):
             if self._computer.solver is None:
-                raise mobility.unsupported("arm_command of a robot without an arm")
+                raise unsupported("arm_command of a robot without an arm")
             made[ARM] = _arm_motion(command.arm_command, self._computer, snapshot, now_s)
         if command.HasField("gripper_command"):
             can = self._computer.capabilities.gripper
             if can is None:
-                raise mobility.unsupported("gripper_command of a robot without a gripper")
+                raise unsupported("gripper_command of a robot without a gripper")
             request = command.gripper_command.claw_gripper_command
             made[GRIPPER] = gripper.Claw(request, can.widest, can.max_force_n)
         if not made:
@@ -245,22 +245,24 @@ def _leaves_dock(command: Any) -> bool:
 def _base_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: float) -> mobility.BaseMotion:
     """Motion of the base."""
     params, which = mobility.mobility_params(request), request.WhichOneof("command")
+    posture = Posture(params, computer, snapshot)
 
     def velocity() -> mobility.BaseMotion:
         given = request.se2_velocity_request
-        return mobility.Velocity(given, params, mobility.end_of(given, now_s, "se2_velocity_request"))
+        end_s = end_of(given, now_s, "se2_velocity_request")
+        return mobility.Velocity(given, params, end_s, posture.walking())
 
     def trajectory() -> mobility.BaseMotion:
         given = request.se2_trajectory_request
-        end_s = mobility.end_of(given, now_s, "se2_trajectory_request")
-        return mobility.Trajectory(given, params, end_s, snapshot)
+        end_s = end_of(given, now_s, "se2_trajectory_request")
+        return mobility.Trajectory(given, params, end_s, snapshot, posture.walking())
 
     def stance() -> mobility.BaseMotion:
-        mobility.end_of(request.stance_request, now_s, "stance_request")
+        end_of(request.stance_request, now_s, "stance_request")
         return mobility.Halt("stance_feedback")
 
     made: dict[str, Callable[[], mobility.BaseMotion]] = {
-        "stand_request": lambda: mobility.Stand(*mobility.posture(params, computer)),
+        "stand_request": lambda: mobility.Stand(posture),
         "sit_request": mobility.Sit,
         "se2_velocity_request": velocity,
         "se2_trajectory_request": trajectory,
@@ -270,7 +272,7 @@ def _base_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: fl
         "freeze_request": lambda: mobility.Halt("freeze_feedback"),
     }
     if which not in made:
-        raise mobility.unsupported(f"mobility_command: {which or 'no command'}")
+        raise unsupported(f"mobility_command: {which or 'no command'}")
     return made[which]()
 
 
@@ -280,7 +282,7 @@ def _arm_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: flo
 
     def velocity() -> arm.ArmMotion:
         given = request.arm_velocity_command
-        return hand.Moving(given, snapshot, mobility.end_of(given, now_s, "arm_velocity_command"))
+        return hand.Moving(given, snapshot, end_of(given, now_s, "arm_velocity_command"))
 
     made: dict[str, Callable[[], arm.ArmMotion]] = {
         "arm_joint_move_command": lambda: arm.JointMove(
@@ -293,7 +295,7 @@ def _arm_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: flo
         "arm_stop_command": arm.ArmHalt,
     }
     if which not in made:
-        raise mobility.unsupported(f"arm_command: {which or 'no command'}")
+        raise unsupported(f"arm_command: {which or 'no command'}")
     return made[which]()
 
 
@@ -355,4 +357,4 @@ def _whole_motion(request: Any) -> _Whole:
     if which == "safe_power_off_request":
         made.safe_power_off_feedback.status = basic_command_pb2.SafePowerOffCommand.Feedback.STATUS_IN_PROGRESS
         return _PowerOff(made)
-    raise mobility.unsupported(f"full_body_command: {which or 'no command'}")
+    raise unsupported(f"full_body_command: {which or 'no command'}")

@@ -23,6 +23,7 @@ from pydrake.math import RigidTransform
 from errand_spot.messages import Frames, pose_between
 from errand_spot.server.estop import EstopService
 from errand_spot.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
+from errand_spot.server.obstacles import Region
 from skills.robot import (
     Battery,
     Capabilities,
@@ -194,6 +195,10 @@ class Computer:
         self.capabilities: Capabilities = robot.capabilities()
         self.motors, self._motors_since_s = Motors.OFF, 0.0
         self.settling, self.grip = False, Grip()
+        self.feet_O: Pose2D | None = None
+        """Pose of the feet in `odom` while the body moves over them; None while they walk with it."""
+        self.regions: Sequence[Region] = ()
+        """No-go regions of clients."""
         self._motions: dict[str, Motion] = {}
         self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._started_s = time.time() if pace is Pace.REAL else _CLIENT_START_S
@@ -328,6 +333,8 @@ class Computer:
             if (before := self._motions.pop(part, None)) is not None:
                 before.end(OVERRIDDEN)
             self._motions[part] = motion
+        if MOBILITY in motions and not getattr(motions[MOBILITY], "keeps_feet", False):
+            self.feet_O = None
         for motion in dict.fromkeys(motions.values()):
             motion.begin(self)
 
@@ -431,7 +438,7 @@ class Computer:
             edges["hand"] = ("arm0.link_wr1", RigidTransform([HAND_X_M, 0.0, 0.0]))
         for camera in self.capabilities.cameras:
             parent = "body" if camera.mount is Mount.BODY else "arm0.link_wr1"
-            edges[sensor_frame(camera.source)] = (parent, camera.X_FC)
+            edges[picture_frame(camera.source)] = edges[depth_frame(camera.source)] = (parent, camera.X_FC)
         return edges
 
     def arm_rad(self, joints: Joints | None = None) -> FloatArray:
@@ -441,6 +448,11 @@ class Computer:
         return np.array([read.position_rad[name] for name in self.capabilities.arm.joint_names])
 
 
-def sensor_frame(source: str) -> str:
-    """Name of a camera's frame in the API."""
-    return "hand_color_image_sensor" if source == "hand" else source
+def picture_frame(source: str) -> str:
+    """Name in the API of the frame of a camera's picture."""
+    return "hand_color_image_sensor" if source == "hand" else f"{source}_fisheye"
+
+
+def depth_frame(source: str) -> str:
+    """Name in the API of the frame of a camera's depth, which has the same pose here."""
+    return "hand_depth_sensor" if source == "hand" else source

@@ -15,7 +15,7 @@ from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer, Motors
 from errand_spot.server.identity import DOMAIN, TimeSyncService
 from errand_spot.server.leases import LeaseService
-from errand_spot.server.mobility import LONGEST_S
+from errand_spot.server.refusals import LONGEST_S
 from errand_spot.server.task import WHOLE, Steps, Task, stow, walk
 from skills.robot import Pose2D
 

@@ -20,8 +20,8 @@ from errand_spot.server.computer import Computer, MapLocaliser, Motors, Percepti
 from errand_spot.server.graph_map import GraphMap, InvalidGraphError, Poses
 from errand_spot.server.identity import DOMAIN, TimeSyncService
 from errand_spot.server.leases import MOBILITY, LeaseService
-from errand_spot.server.mobility import RefusedError, end_of
 from errand_spot.server.pictures import LocalGridService, PointCloudService
+from errand_spot.server.refusals import RefusedError, end_of
 from errand_spot.server.route import Course, Feedback, FollowRoute, Place
 from errand_spot.server.state import RobotStateService, WorldObjectService, kinematic_state
 from skills.robot import Pose2D

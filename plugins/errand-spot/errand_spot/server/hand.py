@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -11,11 +12,12 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from errand_spot.messages import finite, points_of, seconds, transform, vector
-from errand_spot.server.arm import USUAL_RAD_S, ArmMotion, Status
+from errand_spot.messages import finite, points_of, transform, vector
+from errand_spot.server.arm import USUAL_RAD_S, ArmMotion, Named, Status
 from errand_spot.server.computer import HAND_X_M, Computer, Snapshot, Solver
 from errand_spot.server.leases import ARM
-from errand_spot.server.mobility import BaseMotion, Trajectory, soon, unknown_frame, unsupported, way_to
+from errand_spot.server.mobility import BaseMotion, Trajectory, way_to
+from errand_spot.server.refusals import times_of, unknown_frame, unsupported
 from skills.robot import ArmTrajectory, FloatArray, Pose2D
 
 _USUAL_M_S, _SLOWEST_M_S = 0.4, 0.02
@@ -25,6 +27,9 @@ _BEHIND_M: Final = 0.75
 _FOLLOWING_S: Final = 60.0
 _PER_SEGMENT: Final = 6
 _FARTHEST_M: Final = 2.0
+_FOLDED_RAD, _CLOSE_M = 0.3, 0.05
+_GAZE_STEP_S: Final = 0.25
+_Positions: Final = arm_command_pb2.NamedArmPositionsCommand
 X_HAND: Final = RigidTransform([HAND_X_M, 0.0, 0.0])
 """Pose of the API's frame `hand` in `link_wr1`, the default tool."""
 
@@ -36,6 +41,7 @@ class Cartesian(ArmMotion):
     """Moves a tool of the wrist through poses in a frame; a goal out of reach ends it as stalled."""
 
     field = "arm_cartesian_feedback"
+    _unfolding: Named | None = None
     complete = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
     going = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_IN_PROGRESS
     stalled = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_STALLED
@@ -54,9 +60,7 @@ class Cartesian(ArmMotion):
         self._out_of_reach = self._tracks = False
         self._tracked_s, self._stays = 0.0, frame in ("odom", "vision")
         given, field = request.pose_trajectory_in_task, "arm_cartesian_command.pose_trajectory_in_task"
-        points = points_of(given, field)
-        offset_s = seconds(given.reference_time) - now_s if given.HasField("reference_time") else 0.0
-        self._times_s = [soon(offset_s + seconds(point.time_since_reference), field) for point in points]
+        points, self._times_s = points_of(given, field), times_of(given, now_s, field)
         X_OR = snapshot.X_AB("odom", frame)
         self._X_OW = [X_OR @ X_RT @ transform(point.pose, "pose") @ X_WT.inverse() for point in points]
         self._X_WT = X_WT
@@ -68,10 +72,20 @@ class Cartesian(ArmMotion):
         return np.asarray((self._X_OW[-1] @ self._X_WT).translation())
 
     def begin(self, computer: Computer) -> None:
-        """Starts to move straight from pose to pose; poses in `odom` and `vision` stay there while the body moves."""
+        """Unfolds a stowed arm, then moves straight from pose to pose, of which those in the world stay there."""
+        self._begun_s, arm = computer.clock.now(), computer.capabilities.arm
+        q, self._unfolding = computer.arm_rad(), None
+        in_reach = _posture_at(computer, computer.snapshot.X_AB("body", "odom") @ self._X_OW[-1], q) is not None
+        if arm is not None and np.abs(q - np.array(arm.stowed_rad)).max() < _FOLDED_RAD and (self._stays or in_reach):
+            self._unfolding = Named(_Positions.Request(position=_Positions.POSITIONS_READY))
+            self._unfolding.begin(computer)
+        else:
+            self._start(computer)
+
+    def _start(self, computer: Computer) -> None:
         X_OW, end_s, self._path = computer.snapshot.X_AB("odom", "link_wr1"), computer.clock.now(), list[_Passed]()
-        begun_s = end_s
-        self._path.append((begun_s, X_OW))
+        begun_s = self._begun_s
+        self._path.append((end_s, X_OW))
         for goal_s, X_OGoal in zip(self._times_s, self._X_OW, strict=True):
             far_m = float(np.linalg.norm(X_OGoal.translation() - X_OW.translation()))
             end_s, X_OW = max(begun_s + goal_s, end_s + 1.5 * far_m / self._fastest_m_s), X_OGoal
@@ -111,7 +125,10 @@ class Cartesian(ArmMotion):
         if later:
             (a_s, X_OA), (b_s, X_OB) = self._path[later - 1 : later + 1]
             X_OW = _between(X_OA, X_OB, (ahead_s - a_s) / (b_s - a_s))
-        posture = _posture_at(computer, computer.snapshot.X_AB("body", "odom") @ X_OW, q)
+        turned = computer.snapshot.odometry.velocity
+        X_BAhead = Pose2D(*(2.0 * _TRACK_S * value for value in turned)).transform()
+        X_OB = computer.snapshot.X_AB("odom", "body") @ X_BAhead
+        posture = _posture_at(computer, X_OB.InvertAndCompose(X_OW), q)
         if posture is not None:
             most = 2.0 * _TRACK_S * USUAL_RAD_S
             trajectory = ArmTrajectory(
@@ -121,8 +138,10 @@ class Cartesian(ArmMotion):
 
     def tick(self, computer: Computer) -> None:
         """Goes on along the path, and reports how far the hand is from its goal."""
+        if self._unfolds(computer):
+            return
         done = self.feedback.arm_cartesian_feedback.status == self.complete
-        live = self._stays and not done and self.status == Status.STATUS_PROCESSING
+        live = self._stays and self.status == Status.STATUS_PROCESSING
         off = self._X_OB.InvertAndCompose(computer.snapshot.X_AB("odom", "body"))
         moved = float(np.linalg.norm(off.translation())) > _MOVED_M or off.rotation().ToAngleAxis().angle() > _MOVED_RAD
         moves = computer.base_moves(shifted=moved)
@@ -130,11 +149,11 @@ class Cartesian(ArmMotion):
             self._track(computer)
         elif live and (moved or self._tracks):
             self._plan(computer)
-        if live and (moves or moved):
+        if live and not done and (moves or moved):
             self.feedback = self._made(self.going)
-        elif not done and self._out_of_reach:
+        elif self._out_of_reach:
             self.feedback = self._made(self.stalled)
-        else:
+        elif not done:
             super().tick(computer)
         X_WG = computer.snapshot.X_AB("link_wr1", "odom") @ self._X_OW[-1]
         made = arm_command_pb2.ArmCommand.Feedback()
@@ -142,6 +161,17 @@ class Cartesian(ArmMotion):
         made.arm_cartesian_feedback.measured_pos_distance_to_goal = float(np.linalg.norm(X_WG.translation()))
         made.arm_cartesian_feedback.measured_rot_distance_to_goal = X_WG.rotation().ToAngleAxis().angle()
         self.feedback = made
+
+    def _unfolds(self, computer: Computer) -> bool:
+        """Goes on unfolding the arm; returns whether it still unfolds."""
+        if self._unfolding is None or self.status != Status.STATUS_PROCESSING:
+            return self._unfolding is not None
+        self._unfolding.tick(computer)
+        if self._unfolding.feedback.named_arm_position_feedback.status == self._unfolding.going:
+            return True
+        self._unfolding = None
+        self._start(computer)
+        return False
 
 
 class FollowArm(BaseMotion):
@@ -193,30 +223,41 @@ class Gaze(ArmMotion):
     stalled = arm_command_pb2.GazeCommand.Feedback.STATUS_TOOL_TRAJECTORY_STALLED
 
     def __init__(self, request: Any, snapshot: Snapshot) -> None:
-        frame = _known(request.frame1_name, snapshot)
-        points = points_of(request.target_trajectory_in_frame1, "arm_gaze_command.target_trajectory_in_frame1")
-        target = vector(points[-1].point, "target")
-        self._target_O = snapshot.X_AB("odom", frame) @ np.array(target)
-        self._at_O: FloatArray | None = None
-        if request.tool_trajectory_in_frame2.points:
+        field, now_s = "arm_gaze_command.target_trajectory_in_frame1", snapshot.time_s
+        X_OF, given = snapshot.X_AB("odom", _known(request.frame1_name, snapshot)), request.target_trajectory_in_frame1
+        self._targets_O = [X_OF @ np.array(vector(point.point, field)) for point in points_of(given, field)]
+        self._times_s, self._tool_times_s = times_of(given, now_s, field), [0.0]
+        self._tools_O: list[FloatArray] = []
+        if (tool := request.tool_trajectory_in_frame2).points:
+            field = "arm_gaze_command.tool_trajectory_in_frame2"
             X_OF = snapshot.X_AB("odom", _known(request.frame2_name, snapshot))
-            X_OT = X_OF @ transform(request.tool_trajectory_in_frame2.points[-1].pose, "tool")
-            self._at_O = np.asarray(X_OT.translation())
+            self._tools_O = [(X_OF @ transform(each.pose, field)).translation() for each in points_of(tool, field)]
+            self._tool_times_s = times_of(tool, now_s, field)
         super().__init__()
 
     def begin(self, computer: Computer) -> None:
-        """Starts to turn; nearer or lower where the hand cannot look from there."""
+        """Starts to turn, and follows the target; the hand is nearer or lower where it cannot look from there."""
         X_BO, now = computer.snapshot.X_AB("body", "odom"), computer.arm_rad()
-        target_B = np.asarray(X_BO @ self._target_O)
+        lasts_s = max(self._times_s[-1], self._tool_times_s[-1])
+        times_s = np.linspace(0.0, lasts_s, 1 + math.ceil(lasts_s / _GAZE_STEP_S))
+        targets_B = [X_BO @ _at(time_s, self._times_s, self._targets_O) for time_s in times_s]
         hand_B = np.asarray(computer.snapshot.X_AB("body", "hand").translation())
-        ready_B = np.array([0.75, 0.0, 0.25])
-        for at_B in ([] if self._at_O is None else [np.asarray(X_BO @ self._at_O)]) + [hand_B, ready_B]:
-            away = target_B - at_B
-            if np.linalg.norm(away) < 0.05:
-                continue
-            X_BW = RigidTransform(_looking(away), at_B) @ X_HAND.inverse()
-            if (posture := _posture_at(computer, X_BW, now)) is not None:
-                self._follow(computer, [1.5 * float(np.abs(posture - now).max()) / USUAL_RAD_S], [posture])
+        places = [[each] * len(times_s) for each in (hand_B, np.array([0.75, 0.0, 0.25]))]
+        if self._tools_O:
+            places.insert(0, [X_BO @ _at(time_s, self._tool_times_s, self._tools_O) for time_s in times_s])
+        for at_B in places:
+            postures = [now]
+            for target_B, hand in zip(targets_B, at_B, strict=True):
+                away = target_B - hand
+                X_BW = RigidTransform(_looking(away), hand) @ X_HAND.inverse()
+                posture = _posture_at(computer, X_BW, postures[-1]) if np.linalg.norm(away) > _CLOSE_M else None
+                if posture is None:
+                    break
+                postures.append(posture)
+            if len(postures) > len(times_s):
+                first_s = 1.5 * float(np.abs(postures[1] - now).max()) / USUAL_RAD_S
+                timed = [each for each in zip(times_s.tolist(), postures[1:], strict=True) if each[0] >= first_s]
+                self._follow(computer, *zip(*(timed or [(first_s, postures[-1])]), strict=True))
                 return
         self.feedback = self._made(self.stalled)
 
@@ -232,6 +273,11 @@ def _between(X_AB: RigidTransform, X_AC: RigidTransform, share: float) -> RigidT
     turn = X_AB.rotation().InvertAndCompose(X_AC.rotation()).ToAngleAxis()
     moved = (1.0 - share) * X_AB.translation() + share * X_AC.translation()
     return RigidTransform(X_AB.rotation() @ RotationMatrix(AngleAxis(share * turn.angle(), turn.axis())), moved)
+
+
+def _at(time_s: float, times_s: Sequence[float], points: Sequence[FloatArray]) -> FloatArray:
+    """Point (3,) of a path at a time."""
+    return np.array([np.interp(time_s, times_s, column) for column in np.array(points).T])
 
 
 def _looking(away: FloatArray) -> RotationMatrix:

@@ -7,60 +7,34 @@ from collections.abc import Callable
 from typing import Any, ClassVar, Final
 
 import numpy as np
-from bosdyn.api import basic_command_pb2, mobility_command_pb2, robot_command_pb2
+from bosdyn.api import basic_command_pb2, mobility_command_pb2, trajectory_pb2
 from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
+from scipy.interpolate import PchipInterpolator, make_interp_spline
 
-from errand_spot.messages import InvalidRequestError, finite, points_of, seconds, transform
+from errand_spot.messages import InvalidRequestError, finite, points_of
 from errand_spot.server.computer import PERIOD_S, Computer, Snapshot
+from errand_spot.server.obstacles import Clearance
+from errand_spot.server.posture import Posture
+from errand_spot.server.refusals import times_of, unknown_frame
+from skills.geometry import compose, inverse
 from skills.robot import FloatArray, Pose2D
 
 Status = basic_command_pb2.RobotCommandFeedbackStatus
-Answer = robot_command_pb2.RobotCommandResponse
 Feedback = mobility_command_pb2.MobilityCommand.Feedback
-LONGEST_S: Final = 600.0
 _GAIN_1_S: Final = 1.5
 _NEAR_M, _NEAR_RAD = 0.02, 0.03
 _STILL_M_S, _STILL_RAD_S = 0.02, 0.04
 _USUAL_M_S, _USUAL_RAD_S = 0.8, 1.0
+_SET_M, _SET_RAD, _MOVES = 0.006, 0.01, 0.05
+"""Tolerances of a body over its feet, and the least velocity (m/s, rad/s) of a body that moves."""
+_SHIFT_GAIN_1_S, _SHIFT_MOST = 2.0, 0.3
+_STOPPING_M: Final = 0.2
+_STUCK_S, _PROGRESS = 1.5, 0.03
+"""Time without progress (m plus rad) after which a robot counts as blocked."""
+_SLOPE_S: Final = 0.05
 FLAT_FRAMES: Final = ("odom", "vision", "body", "flat_body", "gpe")
 """Frames in which a planar motion may be given."""
-
-
-class RefusedError(Exception):
-    """Error of a refused command, with a status of the API and the reason."""
-
-    def __init__(self, status: int, message: str) -> None:
-        self.status = status
-        super().__init__(message)
-
-
-def unsupported(command: str) -> RefusedError:
-    """Returns the error of a command that the simulated robot cannot do."""
-    return RefusedError(Answer.STATUS_UNSUPPORTED, f"{command} is not simulated")
-
-
-def unknown_frame(name: str) -> RefusedError:
-    """Returns the error of a command in a frame that the robot does not know."""
-    return RefusedError(Answer.STATUS_UNKNOWN_FRAME, f"frame {name!r} is unknown")
-
-
-def end_of(message: Any, now_s: float, name: str) -> float:
-    """Returns a command's end time (robot time). Raises RefusedError or InvalidRequestError."""
-    if not message.HasField("end_time"):
-        raise InvalidRequestError(f"{name}: end_time is missing")
-    end_s = seconds(message.end_time)
-    if end_s <= now_s:
-        raise RefusedError(Answer.STATUS_EXPIRED, f"{name}: end_time was {now_s - end_s:.2f} s ago")
-    return now_s + soon(end_s - now_s, f"{name}: end_time")
-
-
-def soon(ahead_s: float, name: str) -> float:
-    """Returns the duration until a time (s), 0 for a past one. Raises RefusedError for one too far ahead."""
-    if ahead_s > LONGEST_S:
-        said = f"{name} is {ahead_s:.0f} s ahead; at most {LONGEST_S:.0f} s are allowed"
-        raise RefusedError(Answer.STATUS_TOO_DISTANT, said)
-    return max(0.0, ahead_s)
 
 
 class BaseMotion:
@@ -68,6 +42,8 @@ class BaseMotion:
 
     field: ClassVar[str]
     """Field of the feedback."""
+    keeps_feet: ClassVar[bool] = False
+    """Whether the feet stay where they are."""
 
     def __init__(self) -> None:
         self.status: int = Status.STATUS_PROCESSING
@@ -102,22 +78,44 @@ class BaseMotion:
 
 
 class Stand(BaseMotion):
-    """Stands at the height and pitch of the mobility parameters."""
+    """Stands in a posture; the feet stay where they are."""
 
-    field = "stand_feedback"
+    field, keeps_feet = "stand_feedback", True
 
-    def __init__(self, height_m: float, pitch_rad: float) -> None:
-        self._height_m, self._pitch_rad = height_m, pitch_rad
+    def __init__(self, posture: Posture) -> None:
+        self._posture = posture
+        self._rows: FloatArray | None = None
+        self._given: tuple[float, float] | None = None
+        self._begun, self._begun_s, self._shifts = np.zeros(5), 0.0, False
         super().__init__()
 
     def begin(self, computer: Computer) -> None:
-        """Starts to stand up."""
-        self._command = computer.stand(self._height_m, self._pitch_rad)
+        """Starts to stand up, and to move the body."""
+        self._begun_s = computer.now_s()
+        X_OB = computer.snapshot.odometry.X_OB
+        self._begun[3:] = X_OB.translation()[2], RollPitchYaw(X_OB.rotation()).pitch_angle()
         self.tick(computer)
 
     def tick(self, computer: Computer) -> None:
-        """Reports whether the robot stands."""
-        done = computer.stands(self._command, self._height_m)
+        """Moves the body on, and reports whether the robot stands in its last posture."""
+        if self.status != Status.STATUS_PROCESSING:
+            return
+        odometry, since_s = computer.snapshot.odometry, computer.now_s() - self._begun_s
+        if self._rows is None and float(np.abs(odometry.velocity).max()) < _MOVES:
+            computer.feet_O = feet_O = computer.feet_O or odometry.pose
+            body_F = compose(inverse(feet_O), odometry.pose)
+            self._begun[:3], self._rows = (body_F.x_m, body_F.y_m, body_F.yaw_rad), self._posture.rows(feet_O)
+            planar = np.abs([*self._rows[:, :3], self._begun[:3]]).max(axis=0)
+            self._shifts = bool(planar[:2].max() > _SET_M or planar[2] > _SET_RAD)
+        posture = self._posture.last
+        if self._rows is not None:
+            values = self._posture.at(self._rows, self._begun, since_s)
+            posture = float(values[3]), float(values[4])
+            self._shift(computer, values[:3], over=since_s >= self._posture.ends_s)
+        if self._given is None or math.dist(posture, self._given) > 1e-4:
+            self._command, self._given = computer.stand(*posture), posture
+        ended = self._rows is not None and since_s >= self._posture.ends_s and not self._shifts
+        done = ended and computer.stands(self._command, posture[0])
         part = basic_command_pb2.StandCommand.Feedback
         self.feedback = self._made(
             part(
@@ -126,11 +124,27 @@ class Stand(BaseMotion):
             )
         )
 
+    def _shift(self, computer: Computer, goal: FloatArray, *, over: bool) -> None:
+        """Moves the body towards a pose over its feet, until it is there and its time is `over`."""
+        feet_O = computer.feet_O
+        if not self._shifts or feet_O is None:
+            return
+        odometry = computer.snapshot.odometry
+        error = error_to(odometry.pose, compose(feet_O, Pose2D(*goal.tolist())))
+        still = float(np.abs(odometry.velocity).max()) < _MOVES
+        near = math.hypot(error[0], error[1]) < _SET_M and abs(error[2]) < _SET_RAD
+        self._shifts = not (over and near and still)
+        drive(
+            computer,
+            np.clip(_SHIFT_GAIN_1_S * error, -_SHIFT_MOST, _SHIFT_MOST) if self._shifts else np.zeros(3),
+            math.inf,
+        )
+
 
 class Sit(BaseMotion):
     """Sits down."""
 
-    field = "sit_feedback"
+    field, keeps_feet = "sit_feedback", True
 
     def begin(self, computer: Computer) -> None:
         """Starts to sit down."""
@@ -145,6 +159,8 @@ class Sit(BaseMotion):
 
 class Halt(BaseMotion):
     """Stops, freezes, or stays in its stance."""
+
+    keeps_feet = True
 
     def __init__(self, field: str) -> None:
         self.field = field  # type: ignore[misc]
@@ -162,6 +178,8 @@ class _Driving(BaseMotion):
     """Drives until its end; then it has timed out."""
 
     end_s: float
+    posture: tuple[float, float] | None
+    """Height (m) and pitch (rad) of the body; None for those that it has."""
 
     @property
     def moving(self) -> bool:
@@ -178,10 +196,10 @@ class _Driving(BaseMotion):
     def _drive(self, computer: Computer) -> None:
         raise NotImplementedError
 
-    def _posture(self, computer: Computer, params: Any) -> None:
-        """Stands up if the robot sits, at the height and pitch of the parameters."""
-        if computer.sits or params.HasField("body_control"):
-            computer.stand(*posture(params, computer))
+    def _stand(self, computer: Computer) -> None:
+        """Stands up if the robot sits, or in the posture of the command."""
+        if computer.sits or self.posture is not None:
+            computer.stand(*(self.posture or (computer.capabilities.standing_height_m, 0.0)))
 
 
 class Velocity(_Driving):
@@ -189,19 +207,19 @@ class Velocity(_Driving):
 
     field = "se2_velocity_feedback"
 
-    def __init__(self, request: Any, params: Any, end_s: float) -> None:
+    def __init__(self, request: Any, params: Any, end_s: float, posture: tuple[float, float] | None = None) -> None:
         v = request.velocity
         self._velocity = tuple(
             finite(value, f"se2_velocity_request.velocity.{name}")
             for name, value in (("linear.x", v.linear.x), ("linear.y", v.linear.y), ("angular", v.angular))
         )
-        self._frame, self._params, self.end_s = known_frame(request.se2_frame_name), params, end_s
+        self._frame, self.posture, self.end_s = known_frame(request.se2_frame_name), posture, end_s
         self._limit = speed_limit(params)
         super().__init__()
 
     def begin(self, computer: Computer) -> None:
         """Starts to drive."""
-        self._posture(computer, self._params)
+        self._stand(computer)
         self._drive(computer)
 
     def _drive(self, computer: Computer) -> None:
@@ -213,64 +231,106 @@ class Velocity(_Driving):
 
 
 class Trajectory(_Driving):
-    """Drives along poses in a frame, and stops at the last."""
+    """Drives along poses in a frame at their times, and stops at the last, or in front of an obstacle."""
 
     field = "se2_trajectory_feedback"
-    at_goal: Final[int] = basic_command_pb2.SE2TrajectoryCommand.Feedback.STATUS_AT_GOAL
+    Part: Final = basic_command_pb2.SE2TrajectoryCommand.Feedback
 
-    def __init__(self, request: Any, params: Any, end_s: float, snapshot: Snapshot) -> None:
-        """Takes the poses over into `odom`, in which they stay."""
-        frame = known_frame(request.se2_frame_name)
-        points = points_of(request.trajectory, "se2_trajectory_request.trajectory")
-        X_OF = snapshot.X_AB("odom", frame)
-        self._poses = [Pose2D.from_transform(X_OF @ _planar(point.pose)) for point in points]
-        self._times_s = [seconds(point.time_since_reference) for point in points]
-        if any(later < earlier for earlier, later in zip(self._times_s, self._times_s[1:], strict=False)):
-            raise InvalidRequestError("se2_trajectory_request.trajectory: the times of its points must increase")
-        self._params, self.end_s, self._limit = params, end_s, speed_limit(params)
-        self._begun_s = 0.0
+    def __init__(
+        self,
+        request: Any,
+        params: Any,
+        end_s: float,
+        snapshot: Snapshot,
+        posture: tuple[float, float] | None = None,
+    ) -> None:
+        """Takes the poses over into `odom`, in which they stay. Raises RefusedError or InvalidRequestError."""
+        field, X_OF = "se2_trajectory_request.trajectory", snapshot.X_AB("odom", known_frame(request.se2_frame_name))
+        poses = [Pose2D.from_transform(X_OF @ _planar(point.pose)) for point in points_of(request.trajectory, field)]
+        self._times_s, self._goal = times_of(request.trajectory, snapshot.time_s, field), poses[-1]
+        headings = np.unwrap([snapshot.odometry.pose.yaw_rad, *(pose.yaw_rad for pose in poses)])[1:]
+        self._rows = np.array([[pose.x_m, pose.y_m, yaw] for pose, yaw in zip(poses, headings, strict=True)])
+        self._cubic = request.trajectory.interpolation == trajectory_pb2.POS_INTERP_CUBIC
+        self.posture, self.end_s, self._limit = posture, end_s, speed_limit(params)
+        self._clearance = Clearance(params.obstacle_params)
+        self._begun_s, self._moved_s, self._moved_from = 0.0, 0.0, snapshot.odometry.pose
         super().__init__()
 
     def begin(self, computer: Computer) -> None:
         """Starts to drive."""
-        self._begun_s = computer.now_s()
-        self._posture(computer, self._params)
+        pose, self._begun_s = computer.snapshot.odometry.pose, computer.now_s()
+        self._moved_s, self._moved_from = self._begun_s, pose
+        ahead = [k for k, time_s in enumerate(self._times_s) if time_s > 0.0] or [len(self._times_s) - 1]
+        times_s = np.array([0.0, *(self._times_s[k] for k in ahead)]) + 1e-6 * np.arange(len(ahead) + 1)
+        rows = np.array([[pose.x_m, pose.y_m, pose.yaw_rad], *self._rows[ahead]])
+        self._path = PchipInterpolator(times_s, rows) if self._cubic else make_interp_spline(times_s, rows, k=1)
+        self._lasts_s = float(times_s[-1])
+        self._stand(computer)
         self._drive(computer)
 
     def _drive(self, computer: Computer) -> None:
-        odometry, goal = computer.snapshot.odometry, self._poses[-1]
-        error = error_to(odometry.pose, self._target(computer.now_s() - self._begun_s))
-        to_goal, speed = error_to(odometry.pose, goal), np.abs(odometry.velocity)
-        arrived = bool(math.hypot(*to_goal[:2]) < _NEAR_M and abs(to_goal[2]) < _NEAR_RAD)
+        odometry, now_s = computer.snapshot.odometry, computer.now_s()
+        pose, speed, left_s = odometry.pose, np.abs(odometry.velocity), self._begun_s + self._times_s[-1] - now_s
+        target, velocity = self._target(now_s - self._begun_s, pose)
+        to_goal = error_to(pose, self._goal)
+        far_m = math.hypot(*to_goal[:2])
+        arrived = bool(left_s <= 0.0 and far_m < _NEAR_M and abs(to_goal[2]) < _NEAR_RAD)
         still = bool(speed[:2].max() < _STILL_M_S and speed[2] < _STILL_RAD_S)
-        part = basic_command_pb2.SE2TrajectoryCommand.Feedback
+        error = error_to(pose, target)
+        velocity = np.zeros(3) if arrived else self._limit(velocity + _GAIN_1_S * error)
+        drive(computer, self._clearance.limit(computer, velocity), self.end_s)
+        blocked, near = self._stuck(error, pose, now_s) and still, left_s <= 0.0 and far_m < _STOPPING_M
+        self._report(arrived=arrived, still=still, blocked=blocked, near=near)
+
+    def _stuck(self, error: FloatArray, pose: Pose2D, now_s: float) -> bool:
+        """Returns whether the robot is behind its path and has not moved for a while."""
+        moved = error_to(self._moved_from, pose)
+        if math.hypot(*moved[:2]) + abs(moved[2]) > _PROGRESS or np.abs(error).max() < 2.0 * _NEAR_RAD:
+            self._moved_s, self._moved_from = now_s, pose
+        return now_s - self._moved_s > _STUCK_S
+
+    def _report(self, *, arrived: bool, still: bool, blocked: bool, near: bool) -> None:
+        part, status = self.Part, self.Part.STATUS_STOPPING if near or arrived else self.Part.STATUS_IN_PROGRESS
+        goal = part.FINAL_GOAL_STATUS_ACHIEVABLE if arrived else part.FINAL_GOAL_STATUS_IN_PROGRESS
+        if blocked:
+            goal = part.FINAL_GOAL_STATUS_BLOCKED
         self.feedback = self._made(
             part(
-                status=self.at_goal if arrived and still else part.STATUS_GOING_TO_GOAL,
+                status=part.STATUS_STOPPED if (arrived and still) or blocked else status,
                 body_movement_status=part.BODY_STATUS_SETTLED if still else part.BODY_STATUS_MOVING,
-                final_goal_status=part.FINAL_GOAL_STATUS_ACHIEVABLE if arrived else part.FINAL_GOAL_STATUS_IN_PROGRESS,
+                final_goal_status=goal,
             )
         )
-        velocity = np.zeros(3) if arrived else self._limit(_GAIN_1_S * error)
-        drive(computer, velocity, self.end_s)
 
     @property
     def moving(self) -> bool:
-        """Returns whether it drives and is not at its last pose."""
-        return super().moving and bool(self._part().status != self.at_goal)
+        """Returns whether it drives and has not stopped at its last pose, or in front of an obstacle."""
+        return super().moving and bool(self._part().status != self.Part.STATUS_STOPPED)
 
-    def _target(self, since_s: float) -> Pose2D:
-        """Pose at a time since the start: with one pose this one, else between two."""
-        later = next((k for k, time_s in enumerate(self._times_s) if time_s > since_s), len(self._poses) - 1)
-        return self._poses[later]
+    @property
+    def arrived(self) -> bool:
+        """Returns whether it has stopped at its last pose."""
+        part = self._part()
+        achieved = part.final_goal_status == self.Part.FINAL_GOAL_STATUS_ACHIEVABLE
+        return bool(part.status == self.Part.STATUS_STOPPED and achieved)
+
+    def _target(self, since_s: float, pose: Pose2D) -> tuple[Pose2D, FloatArray]:
+        """Pose at a time since the start, and its velocity (3,) in the frame of the body at `pose`."""
+        times_s = np.minimum([since_s, since_s + _SLOPE_S], self._lasts_s)
+        here, there = self._path(times_s)
+        vx, vy, wz = (there - here) / _SLOPE_S
+        c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+        return Pose2D(*here.tolist()), np.array([c * vx + s * vy, c * vy - s * vx, wz])
 
 
 def way_to(goal_O: Pose2D, end_s: float, snapshot: Snapshot) -> Trajectory:
-    """Returns a motion straight to a pose in `odom`, until a robot time."""
+    """Returns a motion straight to a pose in `odom`, until a robot time; it does not wait for obstacles."""
     request = basic_command_pb2.SE2TrajectoryCommand.Request(se2_frame_name="odom")
+    params = spot_command_pb2.MobilityParams()
     goal = request.trajectory.points.add().pose
     goal.position.x, goal.position.y, goal.angle = goal_O.x_m, goal_O.y_m, goal_O.yaw_rad
-    return Trajectory(request, spot_command_pb2.MobilityParams(), end_s, snapshot)
+    params.obstacle_params.disable_vision_body_obstacle_avoidance = True
+    return Trajectory(request, params, end_s, snapshot)
 
 
 def error_to(pose: Pose2D, goal: Pose2D) -> FloatArray:
@@ -309,18 +369,6 @@ def mobility_params(request: Any) -> Any:
     if request.HasField("params") and not request.params.Unpack(params):
         raise InvalidRequestError(f"mobility_command.params is a {request.params.TypeName()}, not a MobilityParams")
     return params
-
-
-def posture(params: Any, computer: Computer) -> tuple[float, float]:
-    """Height (m) and pitch (rad) of the body by the mobility parameters, within the robot's range."""
-    can = computer.capabilities
-    X = RigidTransform()
-    if (points := params.body_control.base_offset_rt_footprint.points) and len(points):
-        X = transform(points[0].pose, "body_control.base_offset_rt_footprint")
-    r = X.rotation().matrix()
-    pitch_rad = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
-    height_m = can.standing_height_m + float(X.translation()[2])
-    return float(np.clip(height_m, *can.height_range_m)), float(np.clip(pitch_rad, *can.pitch_range_rad))
 
 
 def speed_limit(params: Any) -> Callable[[FloatArray], FloatArray]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import cv2
@@ -12,45 +13,97 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 from scipy.ndimage import distance_transform_edt
 
-from errand_spot.messages import frame_tree, timestamp
+from errand_spot.messages import InvalidRequestError, frame_tree, timestamp
 from errand_spot.server.calls import Call, Service
-from errand_spot.server.computer import Computer, Snapshot, sensor_frame
+from errand_spot.server.computer import Computer, Snapshot, depth_frame, picture_frame
 from errand_spot.server.identity import DOMAIN
 from skills.robot import CameraCapabilities, Image, Intrinsics, NoImageError, Scan
 
 _PICTURE_TIMEOUT_S: Final = 5.0
+_Pixels: Final = image_pb2.Image
+_BODY_SIZE: Final = (640, 480)
+_BODY_DEPTH: Final = Intrinsics(424, 240, 213.0, 213.0, 212.0, 120.0)
+_HAND_DEPTH: Final = Intrinsics(224, 171, 208.0, 208.0, 112.0, 85.5)
+"""Lenses of a Spot's depth cameras, by pictures that owners have published."""
 
 
+@dataclass(frozen=True)
 class _Source:
-    """One source of the image service: a camera, its picture or its depth, and the encoding."""
+    """One source of the image service: a camera, its picture or its depth, and its lens.
 
-    def __init__(self, name: str, camera: CameraCapabilities, *, coloured: bool = False) -> None:
-        self.name, self.camera, self.coloured = name, camera, coloured
-        self.depth = "_depth" in name
-        self._as_picture = name.endswith("_frame")
+    `lens` is None for the lens of the picture, which a robot's body cameras have at `size`.
+    """
 
-    def intrinsics(self, image: Image) -> Intrinsics:
-        return image.depth_intrinsics if self.depth and not self._as_picture else image.intrinsics
+    name: str
+    camera: CameraCapabilities
+    frame: str
+    coloured: bool = False
+    lens: Intrinsics | None = None
 
-    def pixels(self, image: Image) -> NDArray[Any]:
-        """Depth (H, W) in mm as uint16, perhaps with the picture's size, or the picture (H, W) or (H, W, 3) RGB."""
+    @property
+    def depth(self) -> bool:
+        """Whether it gives depth."""
+        return "_depth" in self.name and "_color_in_" not in self.name
+
+    @property
+    def pixel_formats(self) -> Sequence[int]:
+        """Formats that it offers, its own first."""
+        if self.depth:
+            return (_Pixels.PIXEL_FORMAT_DEPTH_U16,)
+        both = (_Pixels.PIXEL_FORMAT_RGB_U8, _Pixels.PIXEL_FORMAT_GREYSCALE_U8)
+        return both if self.coloured else both[::-1]
+
+    @property
+    def image_formats(self) -> Sequence[int]:
+        """Formats of the data, its own first."""
+        return (_Pixels.FORMAT_RAW,) if self.depth else (_Pixels.FORMAT_JPEG, _Pixels.FORMAT_RAW)
+
+    def intrinsics(self, image: Image, size: tuple[int, int]) -> Intrinsics:
+        """Lens of the pixels; `size` is that of the hand's colour camera."""
+        if self.lens is not None:
+            return self.lens
+        own, (width, height) = image.intrinsics, size if self.camera.source == "hand" else _BODY_SIZE
+        scale = width / own.width
+        cy = own.cy * scale - 0.5 * (own.height * scale - height)
+        return Intrinsics(width, height, own.fx * scale, own.fy * scale, own.cx * scale, cy)
+
+    def pixels(self, image: Image, lens: Intrinsics) -> NDArray[Any]:
+        """Depth (H, W) in mm as uint16, or the picture (H, W) or (H, W, 3) RGB, through a lens."""
         if not self.depth:
-            return image.grey if image.colour is None else image.colour
-        depth: NDArray[Any] = np.clip(np.nan_to_num(image.depth_m, posinf=0.0) * 1000.0, 0.0, 65535.0).astype(np.uint16)
-        size = (image.intrinsics.width, image.intrinsics.height)
-        return np.asarray(cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST)) if self._as_picture else depth
+            seen = image.grey if image.colour is None or not self.coloured else image.colour
+            return _through(seen, image.intrinsics, lens, cv2.INTER_LINEAR)
+        depth = np.clip(np.nan_to_num(image.depth_m, posinf=0.0) * 1000.0, 0.0, 65535.0).astype(np.uint16)
+        return _through(depth, image.depth_intrinsics, lens, cv2.INTER_NEAREST)
+
+
+def _through(pixels: NDArray[Any], own: Intrinsics, lens: Intrinsics, interpolation: int) -> NDArray[Any]:
+    """Pixels as another lens in the same pose shows them, 0 where the own lens does not look."""
+    if own == lens:
+        return pixels
+    x, y = lens.fx / own.fx, lens.fy / own.fy
+    mapped = np.array([[x, 0.0, lens.cx - x * own.cx], [0.0, y, lens.cy - y * own.cy]])
+    return np.asarray(cv2.warpAffine(pixels, mapped, (lens.width, lens.height), flags=interpolation))
 
 
 def _sources(cameras: tuple[CameraCapabilities, ...]) -> Mapping[str, _Source]:
     """The sources of a real Spot that the cameras have."""
     made: list[_Source] = []
     for camera in cameras:
+        colour, depth = picture_frame(camera.source), depth_frame(camera.source)
         if camera.source == "hand":
-            made.append(_Source("hand_color_image", camera, coloured=True))
-            made += [_Source(name, camera) for name in ("hand_image", "hand_depth", "hand_depth_in_hand_color_frame")]
+            made += [
+                _Source("hand_color_image", camera, colour, coloured=True),
+                _Source("hand_image", camera, depth, lens=_HAND_DEPTH),
+                _Source("hand_depth", camera, depth, lens=_HAND_DEPTH),
+                _Source("hand_depth_in_hand_color_frame", camera, colour),
+                _Source("hand_color_in_hand_depth_frame", camera, depth, coloured=True, lens=_HAND_DEPTH),
+            ]
         else:
-            kinds = ("fisheye_image", "depth", "depth_in_visual_frame")
-            made += [_Source(f"{camera.source}_{kind}", camera) for kind in kinds]
+            made += [
+                _Source(f"{camera.source}_fisheye_image", camera, colour),
+                _Source(f"{camera.source}_depth", camera, depth, lens=_BODY_DEPTH),
+                _Source(f"{camera.source}_depth_in_visual_frame", camera, colour),
+            ]
     return {source.name: source for source in made}
 
 
@@ -59,17 +112,16 @@ class ImageService(Service):
 
     name, type, authority = "image", "bosdyn.api.ImageService", f"api.{DOMAIN}"
 
-    def __init__(self, computer: Computer) -> None:
+    def __init__(self, computer: Computer, gripper_camera: GripperCameraParamService) -> None:
         self._computer, self._sources = computer, _sources(computer.capabilities.cameras)
-        self._seen: dict[str, Intrinsics] = {}
+        self._gripper_camera = gripper_camera
 
     def ListImageSources(self, _request: Any, _call: Call) -> Any:
         """Lists all sources."""
         made = image_pb2.ListImageSourcesResponse(transforms_snapshot=frame_tree(self._computer.snapshot.frames))
         for source in self._sources.values():
-            if source.name not in self._seen:
-                self._seen[source.name] = source.intrinsics(self._take(source))
-            made.image_sources.append(self._described(source, self._seen[source.name]))
+            lens = source.lens or source.intrinsics(self._take(source), self._gripper_camera.size)
+            made.image_sources.append(self._described(source, lens))
         return made
 
     def GetImage(self, request: Any, _call: Call) -> Any:
@@ -95,25 +147,29 @@ class ImageService(Service):
         if not 0.0 < ratio <= 1.0:
             made.status = Response.STATUS_UNSUPPORTED_RESIZE_RATIO_REQUESTED
             return
+        if request.image_format and request.image_format not in source.image_formats:
+            made.status = Response.STATUS_UNSUPPORTED_IMAGE_FORMAT_REQUESTED
+            return
+        coded = request.pixel_format or source.pixel_formats[0]
+        if coded not in source.pixel_formats:
+            made.status = Response.STATUS_UNSUPPORTED_PIXEL_FORMAT_REQUESTED
+            return
         try:
             image = self._take(source)
         except (NoImageError, TimeoutError):
             made.status = Response.STATUS_IMAGE_DATA_ERROR
             return
         snapshot = self._computer.snapshot
-        pixels, coded = _converted(source, source.pixels(image), request)
-        if pixels is None:
-            made.status = Response.STATUS_UNSUPPORTED_PIXEL_FORMAT_REQUESTED
-            return
+        lens = source.intrinsics(image, self._gripper_camera.size)
+        pixels = _converted(source.pixels(image, lens), coded)
         if ratio < 1.0:
             size = (max(1, round(pixels.shape[1] * ratio)), max(1, round(pixels.shape[0] * ratio)))
             pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_NEAREST if source.depth else cv2.INTER_AREA)
-        self._seen[source.name] = source.intrinsics(image)
         made.status = Response.STATUS_OK
-        made.source.CopyFrom(self._described(source, self._seen[source.name], ratio))
+        made.source.CopyFrom(self._described(source, lens, ratio))
         made.shot.acquisition_time.CopyFrom(timestamp(snapshot.time_s))
         made.shot.transforms_snapshot.CopyFrom(frame_tree(snapshot.frames))
-        made.shot.frame_name_image_sensor = sensor_frame(source.camera.source)
+        made.shot.frame_name_image_sensor = source.frame
         _encode(made.shot.image, pixels, coded, request)
 
     def _described(self, source: _Source, lens: Intrinsics, ratio: float = 1.0) -> Any:
@@ -122,52 +178,33 @@ class ImageService(Service):
         k = made.pinhole.intrinsics
         k.focal_length.x, k.focal_length.y = lens.fx * ratio, lens.fy * ratio
         k.principal_point.x, k.principal_point.y = lens.cx * ratio, lens.cy * ratio
-        Source, Pixels = image_pb2.ImageSource, image_pb2.Image
+        Source = image_pb2.ImageSource
         made.image_type = Source.IMAGE_TYPE_DEPTH if source.depth else Source.IMAGE_TYPE_VISUAL
-        if source.depth:
-            made.depth_scale = 1000.0
-            made.pixel_formats.append(Pixels.PIXEL_FORMAT_DEPTH_U16)
-            made.image_formats.append(Pixels.FORMAT_RAW)
-        else:
-            made.pixel_formats.append(
-                Pixels.PIXEL_FORMAT_RGB_U8 if source.coloured else Pixels.PIXEL_FORMAT_GREYSCALE_U8
-            )
-            made.image_formats.extend([Pixels.FORMAT_JPEG, Pixels.FORMAT_RAW])
+        made.depth_scale = 1000.0 if source.depth else 0.0
+        made.pixel_formats.extend(source.pixel_formats)
+        made.image_formats.extend(source.image_formats)
         return made
 
 
-def _converted(source: _Source, pixels: NDArray[Any], request: Any) -> tuple[NDArray[Any] | None, int]:
-    """Pixels in the requested format, or that of the source; None for an unsupported one."""
-    Pixels, wanted = image_pb2.Image, request.pixel_format
-    own = (
-        Pixels.PIXEL_FORMAT_DEPTH_U16
-        if source.depth
-        else Pixels.PIXEL_FORMAT_RGB_U8
-        if source.coloured
-        else Pixels.PIXEL_FORMAT_GREYSCALE_U8
-    )
-    asked = wanted or own
-    if source.depth:
-        return (pixels if asked == own else None), own
-    if asked == Pixels.PIXEL_FORMAT_RGB_U8:
-        return (pixels if pixels.ndim == 3 else cv2.cvtColor(pixels, cv2.COLOR_GRAY2RGB)), asked
-    if asked == Pixels.PIXEL_FORMAT_GREYSCALE_U8:
-        return (pixels if pixels.ndim == 2 else cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY)), asked
-    return None, asked
+def _converted(pixels: NDArray[Any], wanted: int) -> NDArray[Any]:
+    """Pixels in a format that the source offers."""
+    if wanted == _Pixels.PIXEL_FORMAT_RGB_U8:
+        return pixels if pixels.ndim == 3 else cv2.cvtColor(pixels, cv2.COLOR_GRAY2RGB)
+    if wanted == _Pixels.PIXEL_FORMAT_GREYSCALE_U8:
+        return pixels if pixels.ndim == 2 else cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY)
+    return pixels
 
 
 def _encode(made: Any, pixels: NDArray[Any], pixel_format: int, request: Any) -> None:
     """Fills in the data of an image: JPEG by default, raw for depth and on request."""
-    Pixels = image_pb2.Image
     made.rows, made.cols, made.pixel_format = pixels.shape[0], pixels.shape[1], pixel_format
-    raw = pixels.dtype == np.uint16 or request.image_format in (Pixels.FORMAT_RAW, Pixels.FORMAT_RLE)
-    if raw:
-        made.format, made.data = Pixels.FORMAT_RAW, np.ascontiguousarray(pixels).tobytes()
+    if pixels.dtype == np.uint16 or request.image_format == _Pixels.FORMAT_RAW:
+        made.format, made.data = _Pixels.FORMAT_RAW, np.ascontiguousarray(pixels).tobytes()
         return
     quality = int(min(100.0, max(1.0, request.quality_percent or 75.0)))
     bgr = pixels if pixels.ndim == 2 else cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR)
     _, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])
-    made.format, made.data = Pixels.FORMAT_JPEG, data.tobytes()
+    made.format, made.data = _Pixels.FORMAT_JPEG, data.tobytes()
 
 
 class PointCloudService(Service):
@@ -267,7 +304,7 @@ class LocalGridService(Service):
 
 
 class GripperCameraParamService(Service):
-    """Stores parameters of the hand's camera, without an effect on its pictures."""
+    """Stores parameters of the hand's camera; its mode sets the size of the colour picture, the others do nothing."""
 
     name, type, authority = "gripper-camera-param", "bosdyn.api.GripperCameraParamService", f"api.{DOMAIN}"
 
@@ -275,12 +312,20 @@ class GripperCameraParamService(Service):
         Params = gripper_camera_param_pb2.GripperCameraParams
         self._params = Params(camera_mode=Params.MODE_640_480)
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the colour picture, which the name of the mode says."""
+        _, width, height, *_ = self._params.CameraMode.Name(self._params.camera_mode).split("_")
+        return int(width), int(height)
+
     def GetParams(self, _request: Any, _call: Call) -> Any:
         """Returns the parameters."""
         return gripper_camera_param_pb2.GripperCameraGetParamResponse(params=self._params)
 
     def SetParams(self, request: Any, _call: Call) -> Any:
-        """Changes the given parameters."""
+        """Changes the given parameters. Raises InvalidRequestError for an unknown mode."""
+        if request.params.camera_mode not in request.params.CameraMode.values():
+            raise InvalidRequestError("params.camera_mode is unknown")
         changed = gripper_camera_param_pb2.GripperCameraParams()
         changed.CopyFrom(self._params)
         changed.MergeFrom(request.params)

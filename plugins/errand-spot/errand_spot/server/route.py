@@ -18,7 +18,8 @@ from errand_spot.messages import finite, pose
 from errand_spot.server.computer import Computer, Snapshot
 from errand_spot.server.graph_map import GraphMap, Poses
 from errand_spot.server.mobility import drive, error_to, speed_limit
-from skills.robot import CommandId, FloatArray, Pose2D, Scan
+from errand_spot.server.obstacles import ScanPoints
+from skills.robot import CommandId, FloatArray, Pose2D
 
 Feedback = graph_nav_pb2.NavigationFeedbackResponse
 _NEXT_M: Final = 0.25
@@ -30,7 +31,6 @@ _OUTLINE_M: Final = (0.6, 0.31)
 """Half length and half width of the body, with a margin."""
 _BRAKING_S, _CLOSE_M = 0.7, 0.03
 """Least time to a collision with an obstacle, and the distance at which the robot waits."""
-_HEIGHTS_M: Final = (0.15, 1.0)
 _STILL, _MOVED = 0.03, 0.05
 """Largest velocity (m/s, rad/s) of a standing robot, and the least motion (m plus rad) that counts."""
 STUCK_S: Final = 5.0
@@ -97,8 +97,7 @@ class FollowRoute:
         self._graph, self._place, self._cause = graph, place, cause
         self.status: int = Feedback.STATUS_FOLLOWING_ROUTE
         self._next, self._blocked, self._ko_tform_goal = 0, False, RigidTransform()
-        self._scan: Scan | None = None
-        self._obstacles_O = np.empty((0, 3))
+        self._scans = ScanPoints()
         self._standing: CommandId | None = None
         self._moved_s, self._moved_from = -math.inf, Pose2D(math.inf, 0.0, 0.0)
 
@@ -158,11 +157,9 @@ class FollowRoute:
         scan, speed = snapshot.scan, float(np.hypot(velocity[0], velocity[1]))
         if scan is None or speed == 0.0:
             return math.inf
-        if scan is not self._scan:
-            points_O = (scan.X_OB @ scan.points_B().T).T
-            inside = (points_O[:, 2] > _HEIGHTS_M[0]) & (points_O[:, 2] < _HEIGHTS_M[1])
-            self._scan, self._obstacles_O = scan, points_O[inside]
-        points = (snapshot.odometry.pose.transform().inverse() @ self._obstacles_O.T).T[:, :2]
+        pose = snapshot.odometry.pose
+        c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+        points = (self._scans.points_O(scan) - [pose.x_m, pose.y_m]) @ np.array([[c, -s], [s, c]])
         points = points[(np.abs(points) > _OUTLINE_M).any(axis=1)]  # not the robot itself
         direction = velocity[:2] / speed
         along, across = points @ direction, points @ np.array([-direction[1], direction[0]])

@@ -169,6 +169,7 @@ class SpotServer:
             pictures.LocalGridService(computer),
             state.WorldObjectService(computer, options.perception),
         )
+        gripper_camera = pictures.GripperCameraParamService()
         made: list[Service] = [
             auth,
             identity.RobotIdService(robot_name),
@@ -181,8 +182,8 @@ class SpotServer:
             KeepaliveService(computer),
             PowerService(computer, leases),
             RobotCommandService(computer, leases, clocks),
-            pictures.ImageService(computer),
-            pictures.GripperCameraParamService(),
+            pictures.ImageService(computer, gripper_camera),
+            gripper_camera,
             rays.RayCastService(computer),
             manipulation.ManipulationService(computer, leases, options.picker),
             docking.DockingService(computer, leases, clocks),

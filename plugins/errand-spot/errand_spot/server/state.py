@@ -37,6 +37,7 @@ from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer, Motors, Perception, SeenTag, Snapshot
 from errand_spot.server.hand import X_HAND, solutions
 from errand_spot.server.identity import DOMAIN
+from errand_spot.server.obstacles import Region, region_of
 from skills.robot import Mount, NoImageError
 
 RUNTIME_S: Final = 5400.0
@@ -146,12 +147,13 @@ class RobotStateService(Service):
             made.timestamp.CopyFrom(stamp)
 
     def _feet(self, state: Any, snapshot: Snapshot) -> None:
-        height_m = float(snapshot.odometry.X_OB.translation()[2])
+        feet_O = self._computer.feet_O or snapshot.odometry.pose
+        X_BF = snapshot.odometry.X_OB.InvertAndCompose(feet_O.transform())
         for foot in _FEET:
             x = 0.32 if foot.startswith("f") else -0.32
             y = 0.17 if foot.endswith("l") else -0.17
             made = state.foot_state.add(contact=robot_state_pb2.FootState.CONTACT_MADE)
-            made.foot_position_rt_body.CopyFrom(vec3((x, y, -height_m)))
+            made.foot_position_rt_body.CopyFrom(vec3(X_BF @ np.array([x, y, 0.0])))
             made.terrain.frame_name = "odom"
             made.terrain.ground_mu_est = 0.8
 
@@ -195,6 +197,7 @@ class WorldObjectService(Service):
         """No tags are seen without `perception`."""
         self._computer, self._perception = computer, perception
         self._lock, self._ids, self._objects = Lock(), count(1), dict[int, Any]()
+        self._ends_s, self._regions = dict[int, float](), dict[int, Region | None]()
         self._looking, self._looked_s, self._seen = Lock(), -math.inf, dict[int, SeenTag]()
 
     def ListWorldObjects(self, request: Any, _call: Call) -> Any:
@@ -211,7 +214,8 @@ class WorldObjectService(Service):
         """All objects; `look` takes pictures first."""
         seen = [self._described(tag) for tag in self.tags()] if look else []
         with self._lock:
-            return [*self._objects.values(), *seen]
+            now_s = self._computer.snapshot.time_s
+            return [*(each for number, each in self._objects.items() if self._ends_s[number] > now_s), *seen]
 
     def tags(self) -> Sequence[SeenTag]:
         """The tags that the body's cameras see now, or saw a moment ago."""
@@ -243,9 +247,13 @@ class WorldObjectService(Service):
         return made
 
     def MutateWorldObjects(self, request: Any, _call: Call) -> Any:
-        """Adds, changes or deletes an object of a client."""
+        """Adds, changes or deletes an object of a client, which lasts as long as it says."""
         Response, Mutation = world_object_pb2.MutateWorldObjectResponse, world_object_pb2.MutateWorldObjectRequest
         action, given = request.mutation.action, request.mutation.object
+        snapshot = self._computer.snapshot
+        lasts_s = seconds(given.object_lifetime) if given.HasField("object_lifetime") else math.inf
+        stored = world_object_pb2.WorldObject()
+        stored.CopyFrom(given)
         with self._lock:
             if action == Mutation.ACTION_ADD:
                 number = next(self._ids)
@@ -255,11 +263,13 @@ class WorldObjectService(Service):
                 return Response(status=Response.STATUS_INVALID_MUTATION_ID)
             if action == Mutation.ACTION_DELETE:
                 del self._objects[number]
+                self._regions.pop(number, None)
             else:
-                stored = world_object_pb2.WorldObject()
-                stored.CopyFrom(given)
+                region = region_of(given, snapshot.time_s + lasts_s, snapshot)
                 stored.id = number
-                self._objects[number] = stored
+                self._objects[number], self._ends_s[number] = stored, snapshot.time_s + lasts_s
+                self._regions[number] = region
+            self._computer.regions = [each for each in self._regions.values() if each is not None]
         return Response(status=Response.STATUS_OK, mutated_object_id=number)
 
 

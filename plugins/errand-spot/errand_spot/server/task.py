@@ -84,5 +84,5 @@ def walk(computer: Computer, goal_O: Pose2D) -> Generator[None, None, bool]:
         yield
         motion.tick(computer)
         if motion.status == Status.STATUS_PROCESSING and not motion.moving:
-            return True
+            return motion.arrived
     return False

@@ -296,6 +296,40 @@ def test_the_body_follows_a_hand_whose_goal_is_out_of_reach_at_the_distance_aske
     assert hand_in(spot, "odom") == pytest.approx(goal, abs=0.02)
 
 
+def test_an_arm_that_is_stowed_unfolds_before_it_follows_a_goal_in_the_world(spot):
+    block(spot, sent(spot, Build.build_synchro_command(follow(), pose_of_hand(1.25, 0.0, 0.77, "odom", 5.0))))
+    assert body_x_m(spot) == pytest.approx(0.5, abs=0.04)
+    assert hand_in(spot, "odom") == pytest.approx((1.25, 0.0, 0.77), abs=0.02)
+
+
+@pytest.mark.parametrize(("frame", "moves"), [("vision", False), ("body", True)])
+def test_a_hand_whose_goal_is_in_the_world_stays_there_while_the_body_walks_on(spot, frame, moves):
+    number = sent(spot, pose_of_hand(0.75, -0.5, 0.2 if moves else 0.72, frame))
+    block(spot, number)
+    before = hand_in(spot, "odom")
+    walk = sent(spot, Build.synchro_se2_trajectory_point_command(0.4, 0.0, 0.0, "odom"))
+    off = []
+    while base_feedback(spot, walk).se2_trajectory_feedback.status != 1:
+        time.sleep(0.1)
+        off.append(math.dist(hand_in(spot, "odom"), before))
+    assert (max(off) > 0.3) is moves and (max(off) < 0.06) is not moves
+    assert arm_feedback(spot, number).arm_cartesian_feedback.status == Cartesian.STATUS_TRAJECTORY_COMPLETE
+
+
+def test_a_gaze_follows_its_target(spot):
+    ready(spot)
+    command = Build.arm_gaze_command(3.0, 1.0, 0.3, "odom")
+    points = command.synchronized_command.arm_command.arm_gaze_command.target_trajectory_in_frame1.points
+    points.add(point={"x": 3.0, "y": -1.0, "z": 0.3}).time_since_reference.FromSeconds(4)
+    number, seen = sent(spot, command), []
+    for _ in range(40):
+        time.sleep(0.1)
+        target = get_a_tform_b(spot.tree, "odom", "hand").rot.to_yaw()
+        seen.append(target)
+    assert seen[19] == pytest.approx(0.0, abs=0.12) and seen[9] > 0.1 > -0.1 > seen[29]
+    block(spot, number)
+
+
 def test_a_body_that_follows_no_goal_stays(spot):
     block(spot, sent(spot, Build.build_synchro_command(follow(), Build.arm_ready_command())))
     assert body_x_m(spot) == pytest.approx(0.0, abs=0.01)

@@ -1,0 +1,189 @@
+"""Walks along trajectories: in time, up to obstacles and no-go regions. A wall stands 1.7 m ahead of the robot."""
+
+import time
+
+import numpy as np
+import pytest
+from bosdyn.api import basic_command_pb2, geometry_pb2, robot_command_pb2, world_object_pb2
+from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
+from bosdyn.client.exceptions import InvalidRequestError
+from bosdyn.client.robot_command import InvalidRequestError as InvalidCommandError
+from bosdyn.util import seconds_to_duration
+
+from errand_spot.server.computer import Pace
+from errand_spot.server.obstacles import Clearance, Region
+from tests.tables import table
+
+PACE = Pace.CLIENT
+Walk = basic_command_pb2.SE2TrajectoryCommand.Feedback
+
+
+def path(points, times=(), frame="odom", params=None):
+    """Command of a trajectory through points (x, y, yaw) at times."""
+    command = robot_command_pb2.RobotCommand()
+    base = command.synchronized_command.mobility_command
+    base.se2_trajectory_request.se2_frame_name = frame
+    for k, (x, y, yaw) in enumerate(points):
+        point = base.se2_trajectory_request.trajectory.points.add()
+        point.pose.position.x, point.pose.position.y, point.pose.angle = x, y, yaw
+        if times:
+            point.time_since_reference.CopyFrom(seconds_to_duration(times[k]))
+    base.params.Pack(params or spot_command_pb2.MobilityParams())
+    return command
+
+
+def sent(spot, command, ahead_s=30.0):
+    return spot.commands.robot_command(command, end_time_secs=time.time() + ahead_s)
+
+
+def feedback(spot, number):
+    synchronized = spot.commands.robot_command_feedback(number).feedback.synchronized_feedback
+    return synchronized.mobility_command_feedback.se2_trajectory_feedback
+
+
+def walked(spot, number, seconds=20.0):
+    """Waits until a walk has stopped; returns its true path (N, 3), sampled each 0.1 s, and its last feedback."""
+    poses, until = [], time.monotonic() + seconds
+    while (told := feedback(spot, number)).status != Walk.STATUS_STOPPED and time.monotonic() < until:
+        pose = spot.served.scripted.pose
+        poses.append((pose.x_m, pose.y_m, pose.yaw_rad))
+        time.sleep(0.1)
+    return np.array(poses), told
+
+
+def nearest_m(poses, x, y):
+    return float(np.hypot(*(poses[:, :2] - [x, y]).T).min())
+
+
+SQUARE = ((0.5, 0.0, 0.0), (0.5, 0.5, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("frame", ["odom", "vision", "body"])
+def test_a_closed_square_is_walked_along_its_corners_in_time(spot, frame):
+    began = time.monotonic()
+    poses, told = walked(spot, sent(spot, path(SQUARE, (2.0, 4.0, 6.0, 8.0), frame)))
+    assert [nearest_m(poses, x, y) < 0.05 for x, y, _ in SQUARE] == [True] * 4
+    assert 8.0 <= time.monotonic() - began < 9.5
+    assert told.final_goal_status == Walk.FINAL_GOAL_STATUS_ACHIEVABLE
+    at_4_s = poses[40]
+    assert at_4_s[:2] == pytest.approx((0.5, 0.5), abs=0.08)
+
+
+def test_a_way_out_and_back_is_walked_though_it_ends_where_it_begins(spot):
+    poses, _ = walked(spot, sent(spot, path([(0.6, 0.0, 0.0), (0.0, 0.0, 0.0)], (2.0, 4.0))))
+    assert poses[:, 0].max() == pytest.approx(0.6, abs=0.06)
+    assert spot.served.scripted.pose.x_m == pytest.approx(0.0, abs=0.03)
+
+
+def test_a_turn_past_half_a_turn_goes_the_way_of_its_points(spot):
+    poses, _ = walked(spot, sent(spot, path([(0, 0, 2.0), (0, 0, 4.0), (0, 0, 6.0)], (3.0, 6.0, 9.0))))
+    assert np.unwrap(poses[:, 2])[-1] == pytest.approx(6.0, abs=0.1)
+
+
+def test_points_of_the_past_are_left_out(spot):
+    command = path([(-0.5, 0.0, 0.0), (0.3, 0.0, 0.0)], (1.0, 5.0))
+    trajectory = command.synchronized_command.mobility_command.se2_trajectory_request.trajectory
+    trajectory.reference_time.CopyFrom(spot.robot.time_sync.robot_timestamp_from_local_secs(time.time() - 2.0))
+    poses, _ = walked(spot, sent(spot, command))
+    assert poses[:, 0].min() > -0.02
+    assert spot.served.scripted.pose.x_m == pytest.approx(0.3, abs=0.03)
+
+
+def test_a_walk_into_a_wall_stops_before_it_and_is_blocked(spot):
+    number = sent(spot, path([(3.0, 0.0, 0.0)]))
+    poses, told = walked(spot, number)
+    standing = np.flatnonzero(np.abs(np.diff(poses[:, 0])) < 0.002)
+    assert told.final_goal_status == Walk.FINAL_GOAL_STATUS_BLOCKED
+    assert told.body_movement_status == Walk.BODY_STATUS_SETTLED
+    assert 0.9 < spot.served.scripted.pose.x_m < 1.7 - 0.56
+    assert 0.1 * len(standing) < 3.0
+
+
+def test_a_blocked_robot_goes_on_when_its_way_clears(spot):
+    number = sent(spot, path([(2.0, 0.0, 0.0)]))
+    walked(spot, number)
+    spot.served.scripted.blocks.clear()
+    time.sleep(4.0)
+    told = feedback(spot, number)
+    assert (told.status, told.final_goal_status) == (Walk.STATUS_STOPPED, Walk.FINAL_GOAL_STATUS_ACHIEVABLE)
+    assert spot.served.scripted.pose.x_m == pytest.approx(2.0, abs=0.03)
+
+
+def params(**obstacles):
+    return spot_command_pb2.MobilityParams(obstacle_params=spot_command_pb2.ObstacleParams(**obstacles))
+
+
+# obstacle parameters -> where a walk to 3 m ahead ends
+@pytest.mark.parametrize(
+    ("given", "x_m"),
+    [({"obstacle_avoidance_padding": 0.4}, 0.74), ({"disable_vision_body_obstacle_avoidance": True}, 3.0)],
+)
+def test_obstacle_parameters_set_the_distance_from_obstacles_or_switch_avoidance_off(spot, given, x_m):
+    walked(spot, sent(spot, path([(3.0, 0.0, 0.0)], params=params(**given))))
+    assert spot.served.scripted.pose.x_m == pytest.approx(x_m, abs=0.1)
+
+
+@pytest.mark.parametrize("padding", [-0.1, float("nan")])
+def test_a_padding_below_zero_is_an_invalid_request(spot, padding):
+    with pytest.raises(InvalidCommandError) as refused:
+        sent(spot, path([(1.0, 0.0, 0.0)], params=params(obstacle_avoidance_padding=padding)))
+    assert "padding" in refused.value.response.message
+
+
+def region(frame="odom", lasts_s=0.0, **properties):
+    """World object of a box across the way 0.9 m ahead."""
+    box = geometry_pb2.Box2WithFrame(frame_name=frame)
+    box.box.size.x, box.box.size.y = 0.2, 3.0
+    box.frame_name_tform_box.position.x, box.frame_name_tform_box.rotation.w = 0.9, 1.0
+    given = world_object_pb2.NoGoRegionProperties(box=box, **properties)
+    made = world_object_pb2.WorldObject(name="box", nogo_region_properties=given)
+    if lasts_s:
+        made.object_lifetime.CopyFrom(seconds_to_duration(lasts_s))
+    return made
+
+
+def mutate(spot, **mutation):
+    made = world_object_pb2.MutateWorldObjectRequest.Mutation(**mutation)
+    request = world_object_pb2.MutateWorldObjectRequest(mutation=made)
+    return spot.robot.ensure_client("world-objects").mutate_world_objects(request).mutated_object_id
+
+
+Mutation = world_object_pb2.MutateWorldObjectRequest
+
+
+def test_the_robot_stops_before_a_no_go_region_until_a_client_deletes_it(spot):
+    number = mutate(spot, action=Mutation.ACTION_ADD, object=region())
+    _, told = walked(spot, sent(spot, path([(1.0, 0.0, 0.0)])))
+    assert told.final_goal_status == Walk.FINAL_GOAL_STATUS_BLOCKED
+    assert 0.1 < spot.served.scripted.pose.x_m < 0.8 - 0.56
+    mutate(spot, action=Mutation.ACTION_DELETE, object=world_object_pb2.WorldObject(id=number))
+    walked(spot, sent(spot, path([(1.0, 0.0, 0.0)])))
+    assert spot.served.scripted.pose.x_m == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_no_go_region_ends_with_its_lifetime(spot):
+    mutate(spot, action=Mutation.ACTION_ADD, object=region(lasts_s=3.0))
+    number = sent(spot, path([(1.0, 0.0, 0.0)]))
+    time.sleep(2.5)
+    assert spot.served.scripted.pose.x_m < 0.3
+    assert len(spot.robot.ensure_client("world-objects").list_world_objects().world_objects) == 1
+    time.sleep(4.0)
+    assert not spot.robot.ensure_client("world-objects").list_world_objects().world_objects
+    assert feedback(spot, number).final_goal_status == Walk.FINAL_GOAL_STATUS_ACHIEVABLE
+
+
+@pytest.mark.parametrize(*table(__file__, "regions"))
+def test_a_region_that_cannot_be_used_is_an_invalid_request(spot, box, frame, said):
+    made = region(frame)
+    made.nogo_region_properties.box.box.size.x = box
+    with pytest.raises(InvalidRequestError, match=said):
+        mutate(spot, action=Mutation.ACTION_ADD, object=made)
+
+
+def test_a_robot_that_touches_an_obstacle_may_leave_it(spot):
+    computer = spot.served.server.computer
+    computer.regions = [Region(np.array([[0.58, 0.0]]), float("inf"))]
+    clearance = Clearance(spot_command_pb2.ObstacleParams(disable_vision_body_obstacle_avoidance=True))
+    back, ahead = np.array([-0.5, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])
+    assert clearance.limit(computer, back) == pytest.approx(back)
+    assert clearance.limit(computer, ahead) == pytest.approx(0.0)

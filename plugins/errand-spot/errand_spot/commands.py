@@ -34,8 +34,8 @@ USER: Final = "user"
 PASSWORD: Final = "simulated"  # of a simulator that only this machine reaches
 _FOLDER: Final = "spot-api"
 LAUNCH: Final = str(Path(__file__).with_name("launch.py"))
-_AROUND_M, _BESIDE_M, _FROM_PEOPLE_M, _FARTHEST_M = 1.1, 0.5, 1.8, 4.0
-"""Free floor around the robot's start and beside its way ahead, its distance from people, and the longest such way."""
+_AROUND_M, _BESIDE_M, _AHEAD_M, _MOST_TRIED = 1.0, 0.5, 3.0, 1000
+"""Free floor around the robot's start and beside its way ahead, that way's length, and the places that are tried."""
 _SPOT: Final = re.compile(r"spot://(?P<host>[A-Za-z0-9.-]+)(:(?P<port>\d{1,5}))?")
 WORLD = Annotated[str, typer.Option("--world", help="A world by name or folder.")]
 SEED = Annotated[int, quantity_option(Seed, help="Seed of the objects and of all noise.")]
@@ -161,24 +161,21 @@ def _write_graph(world: World, folder: Path) -> None:
 
 
 def _free_floor(world: World) -> Pose2D:
-    """Pose nearest to the world's start with free floor around, away from people, in the direction with most space."""
+    """Pose nearest to the world's start with free floor around and ahead, away from people; else the start itself."""
     from executive.app.prepare.worlds import free_ground
     from plant.worlds.seeding import standing_points_W
 
-    ground, start = free_ground(world), world.start
+    ground, start, steps_m = free_ground(world), world.start, np.arange(0.0, _AHEAD_M, 0.1)
     people_W = np.array([*standing_points_W(world), (math.inf, math.inf)])
     places = ground.centres(np.argwhere(ground.distance > _AROUND_M))
-    places = places[(np.hypot(*(places[:, None] - people_W).transpose(2, 0, 1)) > _FROM_PEOPLE_M).all(axis=1)]
-    if not len(places):
-        return start
-    x, y = places[np.argmin(np.hypot(*(places - [start.x_m, start.y_m]).T))]
-
-    def ahead_m(yaw_rad: float) -> float:
-        line = [x, y] + np.outer(np.arange(0.0, _FARTHEST_M, 0.1), [math.cos(yaw_rad), math.sin(yaw_rad)])
-        free = np.hypot(*(line[:, None] - people_W).transpose(2, 0, 1)).min(axis=1) > _AROUND_M
-        return float(np.argmin([*(free & (ground.distance_m(line) > _BESIDE_M)), False]))
-
-    return Pose2D(float(x), float(y), max((start.yaw_rad + 0.25 * math.pi * k for k in range(8)), key=ahead_m))
+    far_m = np.hypot(*(places - [start.x_m, start.y_m]).T)
+    for x, y in places[np.argsort(far_m, kind="stable")][:: max(1, len(places) // _MOST_TRIED)].tolist():
+        for yaw_rad in (start.yaw_rad + 0.25 * math.pi * np.arange(8)).tolist():
+            line = [x, y] + np.outer(steps_m, [math.cos(yaw_rad), math.sin(yaw_rad)])
+            from_people_m = np.hypot(*(line[:, None] - people_W).transpose(2, 0, 1)).min()
+            if from_people_m > _AROUND_M and ground.distance_m(line).min() > _BESIDE_M:
+                return Pose2D(x, y, math.remainder(yaw_rad, math.tau))
+    return start
 
 
 @contextmanager

@@ -7,10 +7,12 @@ right password   in no file, log or report
 """
 
 import json
+import math
 import sys
 import threading
 import time
 
+import numpy as np
 import pytest
 
 from executive.record.history import read_history
@@ -60,6 +62,47 @@ def test_a_program_walks_the_robot_and_its_exit_code_is_kept(tmp_path, capfd, pa
     result = errand("sdk", "--seed", "2", "--pace", pace, str(program), "127.0.0.1")
     said = capfd.readouterr().out
     assert (result.exit_code, "walked 0.2 640" in said) == (7, True), said + result.output
+
+
+def test_the_robot_starts_on_free_floor_away_from_people_with_space_ahead():
+    from errand_spot.commands import _free_floor
+    from executive.app.prepare.worlds import free_ground, open_world
+    from plant.worlds.seeding import standing_points_W
+
+    world = open_world("flat")
+    start, ground = _free_floor(world), free_ground(world)
+    line = [(start.x_m + d * math.cos(start.yaw_rad), start.y_m + d * math.sin(start.yaw_rad)) for d in (0.0, 1.0, 2.0)]
+    assert min(ground.distance_m(np.array(line))) > 0.5
+    assert min(math.dist(at, each) for at in line for each in standing_points_W(world)) > 1.0
+
+
+# options of the command -> what the refusal says
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--start", "0", "0", "0"], "stands in an obstacle"),
+        (["--start", "nan", "0", "0"], "--start"),
+        (["--python", "no-such-python"], "--python no-such-python: there is no such program"),
+    ],
+)
+def test_a_start_or_an_interpreter_that_cannot_be_used_is_refused(tmp_path, options, said):
+    pytest.importorskip("bosdyn.client", reason="not installed: pip install errand-spot")
+    (tmp_path / "walk.py").write_text("")
+    result = errand("sdk", *options, str(tmp_path / "walk.py"))
+    assert (result.exit_code, said in result.output.replace("\n", " ")) == (2, True), result.output
+
+
+@pytest.mark.mission
+def test_the_program_runs_under_the_interpreter_and_from_the_start_that_are_named(tmp_path, capfd):
+    pytest.importorskip("bosdyn.client", reason="not installed: pip install errand-spot")
+    program, interpreter = tmp_path / "which.py", tmp_path / "python-with-the-sdk"
+    program.write_text("import sys; print('runs under', sys.argv, sys.flags.dev_mode); sys.exit(3)")
+    interpreter.write_text(f'#!/bin/sh\nexec {sys.executable} -X dev "$@"\n')
+    interpreter.chmod(0o755)
+    options = ["--start", "8.6", "3.9", "1.5", "--python", str(interpreter)]
+    result = errand("sdk", *options, str(program), "--start", "5")
+    said = capfd.readouterr().out
+    assert (result.exit_code, "'--start', '5'] True" in said) == (3, True), said + result.output
 
 
 def test_nothing_but_the_server_loads_the_sdk():

@@ -86,6 +86,42 @@ def test_depth_is_in_millimetres_and_makes_a_point_cloud(robot):
     assert (len(depth), len(depth_image_to_pointcloud(answer))) == (image.rows * image.cols, np.count_nonzero(depth))
 
 
+# source -> width and height as on the robot, and the frame of its sensor
+@pytest.mark.parametrize(*table(__file__, "sources"))
+def test_pictures_have_the_size_and_the_frame_that_those_of_a_spot_have(robot, source, size, frame):
+    (answer,) = robot.ensure_client("image").get_image_from_sources([source])
+    assert [answer.shot.image.cols, answer.shot.image.rows] == size
+    assert answer.shot.frame_name_image_sensor == frame
+
+
+def test_depth_through_a_spots_lens_lies_on_the_wall(robot):
+    (answer,) = robot.ensure_client("image").get_image_from_sources(["frontleft_depth"])
+    body = get_a_tform_b(answer.shot.transforms_snapshot, "body", answer.shot.frame_name_image_sensor)
+    points = body.transform_cloud(depth_image_to_pointcloud(answer))
+    ahead = points[points[:, 2] > -0.2]
+    assert len(ahead) > 100 and np.median(ahead[:, 0]) == pytest.approx(1.7, abs=0.05)
+
+
+@pytest.mark.parametrize(("mode", "size"), [("MODE_1280_720", (1280, 720)), ("MODE_4208_3120", (4208, 3120))])
+def test_the_mode_of_the_gripper_camera_changes_its_picture(robot, mode, size):
+    client = robot.ensure_client("gripper-camera-param")
+    mode = gripper_camera_param_pb2.GripperCameraParams.CameraMode.Value(mode)
+    client.set_camera_params(gripper_camera_param_pb2.GripperCameraParamRequest(params={"camera_mode": mode}))
+    colour, depth, registered = robot.ensure_client("image").get_image_from_sources(
+        ["hand_color_image", "hand_depth", "hand_depth_in_hand_color_frame"]
+    )
+    assert (colour.shot.image.cols, colour.shot.image.rows) == size
+    assert (registered.shot.image.cols, registered.shot.image.rows) == size
+    assert colour.source.pinhole.intrinsics.principal_point.y == pytest.approx(size[1] / 2, rel=0.05)
+    assert (depth.shot.image.cols, depth.shot.image.rows) == (224, 171)
+
+
+def test_an_unknown_mode_of_the_gripper_camera_is_an_invalid_request(robot):
+    client = robot.ensure_client("gripper-camera-param")
+    with pytest.raises(InvalidRequestError):
+        client.set_camera_params(gripper_camera_param_pb2.GripperCameraParamRequest(params={"camera_mode": 99}))
+
+
 @pytest.mark.parametrize(*table(__file__, "pictures"))
 def test_a_picture_that_cannot_be_given_says_why(robot, source, options, status):
     request = image_pb2.GetImageRequest(image_requests=[build_image_request(source, **options)])

@@ -1,6 +1,6 @@
 """Motion of SDK programs beside what they ask: base, height, hand and gaze, by the plant's truth. Prints JSON.
 
-    python -m tests.benchmarks.sdk_motion [--examples FOLDER] [--only NAME] [--seed 1]
+    python -m tests.benchmarks.sdk_motion [--examples FOLDER] [--only NAME] [--seed 1] [--pace real|client]
 
 A program of our own (`sdk_moves.py`) always runs. With the folder of the SDK's examples, by the option or the variable
 `ERRAND_SDK_EXAMPLES`, those that move run too, unchanged. Each runs alone against a new server in real time. What a
@@ -19,6 +19,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 from unittest import mock
 
 import numpy as np
@@ -30,6 +31,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from errand_spot.messages import frame_tree, seconds, transform
 from errand_spot.server.commands import RobotCommandService
+from errand_spot.server.computer import Pace
 from errand_spot.server.identity import credentials
 from errand_spot.server.server import Options, SpotServer
 from executive.app.prepare.placed_robots import only_robot
@@ -207,7 +209,7 @@ class Judge:
 
 
 @contextmanager
-def judged(seed, start=START):
+def judged(seed, start=START, pace=Pace.REAL):
     """Serves a simulated Spot whose commands are judged; the caller runs `server.computer`."""
     opened = open_world("flat")
     compile_first()
@@ -225,7 +227,7 @@ def judged(seed, start=START):
     with tempfile.TemporaryDirectory() as folder, mock.patch.object(RobotCommandService, "RobotCommand", taken):
         solver = arm_model(robot.capabilities())
         dock_O = compose(inverse(start), robots["Alice"].dock)
-        options = Options({"user": "simulated"}, dock_O=dock_O)
+        options = Options({"user": "simulated"}, dock_O=dock_O, pace=pace)
         server = SpotServer(robot, simulation.clock, solver, credentials(Path(folder)), options)
         judges.append(Judge(server, simulation))
         service = next(each for each in server.services if isinstance(each, RobotCommandService))
@@ -234,17 +236,17 @@ def judged(seed, start=START):
             yield judges[0]
 
 
-def run(program, folder, *, seed=1):
+def run(program, folder, *, seed=1, pace=Pace.REAL):
     """Runs one program of a folder to its end; returns its exit code, the errors by kind, and those of its promises."""
     script, *arguments = f"{folder}/{program.line}".split()
     code, ended = [], threading.Event()
-    with judged(seed, START if program.start is None else Pose2D(*program.start)) as judge:
+    with judged(seed, START if program.start is None else Pose2D(*program.start), pace) as judge:
         server = judge.server
         user = {"BOSDYN_CLIENT_USERNAME": "user", "BOSDYN_CLIENT_PASSWORD": "simulated"}
-        launch = [sys.executable, "-m", "errand_spot.launch", str(server.certificate), str(server.port), "real"]
+        launch = [sys.executable, "-m", "errand_spot.launch", str(server.certificate), str(server.port)]
 
         def execute():
-            line, environment = [*launch, script, *arguments, "127.0.0.1"], {**os.environ, **user}
+            line, environment = [*launch, pace.value, script, *arguments, "127.0.0.1"], {**os.environ, **user}
             try:
                 with tempfile.TemporaryDirectory() as folder:
                     done = subprocess.run(line, env=environment, cwd=folder, capture_output=True, timeout=_LIMIT_S)
@@ -256,7 +258,7 @@ def run(program, folder, *, seed=1):
 
         thread = threading.Thread(target=execute)
         thread.start()
-        server.computer.run(ended)
+        (server.computer.run if pace is Pace.REAL else server.computer.serve)(ended)
         thread.join()
         compared = [each for each in judge.asked if each.error_then is not None]
         kinds = sorted({each.kind for each in compared})
@@ -280,12 +282,13 @@ def measure(
     examples: Path | None = Path(os.environ[EXAMPLES]) if EXAMPLES in os.environ else None,
     only: str = "",
     seed: int = 1,
+    pace: Literal["real", "client"] = "real",
 ):
     programs = [(OWN, Path(__file__).parent), *((each, examples) for each in PROGRAMS if examples)]
     results = []
     for program, folder in programs:
         if only in program.line:
-            results.append(run(program, folder, seed=seed))
+            results.append(run(program, folder, seed=seed, pace=Pace(pace)))
             show(results[-1])
     return {"programs": len(results), "ended_and_true": sum(each["true"] and each["ended"] for each in results)}
 

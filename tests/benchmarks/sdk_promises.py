@@ -116,7 +116,7 @@ PROGRAMS = (
     Program("arm_simple/arm_simple.py", (Promise("hand_x hand_y hand_z", ((0.75, 0, 0.25), (0.75, 0, 0)), 0.04),)),
     Program(
         "arm_stow_unstow/arm_stow_unstow.py",
-        (Promise("in_body_x in_body_z", ((0.4, 0.2), (0.7, 0.25), (0.4, 0.2)), 0.2),),
+        (Promise("in_body_x in_body_z", ((0.54, 0.31), (1.01, 0.18), (0.54, 0.31)), 0.05),),
     ),
     Program("arm_joint_move/arm_joint_move.py"),
     Program("arm_joint_move/arm_joint_long_trajectory.py", exit_code=1),

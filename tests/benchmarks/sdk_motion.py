@@ -55,6 +55,7 @@ HAND_M = 0.19557
 JOINTS = ("sh0", "sh1", "el0", "el1", "wr0", "wr1")
 Error = Callable[[], float]
 _LIMIT_S = 150.0
+_ACHIEVED = basic_command_pb2.SE2TrajectoryCommand.Feedback.FINAL_GOAL_STATUS_ACHIEVABLE
 
 
 @dataclass
@@ -193,7 +194,8 @@ class Judge:
             request = robot_command_pb2.RobotCommandFeedbackRequest(robot_command_id=each.command)
             told = service.RobotCommandFeedback(request, None).feedback.synchronized_feedback
             part = told.mobility_command_feedback if each.kind in BASE else told.arm_command_feedback
-            if (getattr(part, each.feedback) if each.feedback else part).status == each.status:
+            done = getattr(part, each.feedback) if each.feedback else part
+            if done.status == each.status and getattr(done, "final_goal_status", _ACHIEVED) == _ACHIEVED:
                 each.error_then = each.error()
             elif part.status == basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_OVERRIDDEN:
                 each.cut = (each.on_path or each.error)()

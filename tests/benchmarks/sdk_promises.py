@@ -135,7 +135,7 @@ PROGRAMS = (
             Promise("hand_x hand_y hand_z", _CIRCLE, 0.1),
         ),
     ),
-    Program("arm_gaze/arm_gaze.py", (Promise("hand_x hand_y hand_z", ((0.75, 0, 0), (0.75, 0, 0.25)), 0.06),)),
+    Program("arm_gaze/arm_gaze.py", (Promise("hand_x hand_y hand_z", ((0.75, 0, 0), (0.75, 0, 0.25)), 0.1),)),
     Program(
         "arm_with_body_follow/arm_with_body_follow.py",
         (
@@ -150,14 +150,20 @@ PROGRAMS = (
             Promise("x in_body_x in_body_y", ((1, 0.75, -0.5), (0, 0.75, -0.5), (0.75, 0.75, -0.5)), 0.08, along=True),
         ),
     ),
-    Program("stance/stance_in_place.py", (Promise("x y", ((0, 0),), 0.05),), exit_code=124),
+    Program(
+        "frame_trajectory_command/frame_trajectory_command.py --dx 2.5 --frame odom",
+        (Promise("x", ((0.75,),), 0.1, rests_s=3.0),),
+        exit_code=1,  # a wall stands 1.5 m ahead
+        start=(8.6, 3.9, 1.5708),
+    ),
     Program(
         "user_nogo_regions/user_nogo_regions.py",
-        (Promise("x", ((0.0,), (0.3,)), 0.15, rests_s=2.0), Promise("x", ((0.3,), (2.0,), (0.0,)), 0.15)),
+        (Promise("x", ((0.25,),), 0.1, rests_s=2.0), Promise("x", ((0.3,), (2.0,), (0.0,)), 0.15)),
+        start=(9.09, 3.79, -0.785),
     ),
     Program(
         "docking/dock_my_robot.py --dock-id 520",
-        (Promise("x y yaw", ((0, 0, 0), (1.92, 0.35, 3.1416)), 0.1, rests_s=1.0),),
+        (Promise("x y yaw", ((1.92, 0.35, 3.1416),), 0.1, rests_s=1.0),),
         start=(9.3, 4.6, 0.0),
     ),
 )
@@ -184,6 +190,7 @@ REFUSED = {
     "replay_mission": "MissionService",
     "reset_safety_stop": "ResetSafetyStop",
     "self_registration": "PayloadRegistrationService",
+    "stance": "STATUS_TOO_FAR_AWAY: feet wider apart than the robot stands",
     "payloads": "PayloadRegistrationService",
     "upload_choreographed_sequence": "ChoreographyService",
 }

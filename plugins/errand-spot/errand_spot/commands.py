@@ -34,8 +34,8 @@ USER: Final = "user"
 PASSWORD: Final = "simulated"  # of a simulator that only this machine reaches
 _FOLDER: Final = "spot-api"
 LAUNCH: Final = str(Path(__file__).with_name("launch.py"))
-_AROUND_M, _BESIDE_M, _AHEAD_M, _MOST_TRIED = 1.0, 0.5, 3.0, 1000
-"""Free floor around the robot's start and beside its way ahead, that way's length, and the places that are tried."""
+_AROUND_M, _BESIDE_M, _FROM_PEOPLE_M, _AHEAD_M, _MOST_TRIED = 1.0, 0.5, 1.0, 3.0, 1000
+"""Free floor around the robot's start, beside its way ahead and from people; that way's length; places to try."""
 _SPOT: Final = re.compile(r"spot://(?P<host>[A-Za-z0-9.-]+)(:(?P<port>\d{1,5}))?")
 WORLD = Annotated[str, typer.Option("--world", help="A world by name or folder.")]
 SEED = Annotated[int, quantity_option(Seed, help="Seed of the objects and of all noise.")]
@@ -162,18 +162,21 @@ def _write_graph(world: World, folder: Path) -> None:
 
 def _free_floor(world: World) -> Pose2D:
     """Pose nearest to the world's start with free floor around and ahead, away from people; else the start itself."""
-    from executive.app.prepare.worlds import free_ground
-    from plant.worlds.seeding import standing_points_W
+    from skills.estimate.grid_map import load_grid_map
 
-    ground, start, steps_m = free_ground(world), world.start, np.arange(0.0, _AHEAD_M, 0.1)
-    people_W = np.array([*standing_points_W(world), (math.inf, math.inf)])
+    ground, start = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked(), world.start
+    people = [np.mean(each.ranges[:2], axis=1) for each in world.seed_rules.people if each.ranges is not None]
+    people_W = [
+        (start.x_m + far_m * math.cos(start.yaw_rad + turn), start.y_m + far_m * math.sin(start.yaw_rad + turn))
+        for far_m, turn in [*people, (1e6, 0.0)]
+    ]
     places = ground.centres(np.argwhere(ground.distance > _AROUND_M))
     far_m = np.hypot(*(places - [start.x_m, start.y_m]).T)
     for x, y in places[np.argsort(far_m, kind="stable")][:: max(1, len(places) // _MOST_TRIED)].tolist():
         for yaw_rad in (start.yaw_rad + 0.25 * math.pi * np.arange(8)).tolist():
-            line = [x, y] + np.outer(steps_m, [math.cos(yaw_rad), math.sin(yaw_rad)])
-            from_people_m = np.hypot(*(line[:, None] - people_W).transpose(2, 0, 1)).min()
-            if from_people_m > _AROUND_M and ground.distance_m(line).min() > _BESIDE_M:
+            line = [x, y] + np.outer(np.arange(0.0, _AHEAD_M, 0.1), [math.cos(yaw_rad), math.sin(yaw_rad)])
+            people_m = np.hypot(*(line[:, None] - people_W).transpose(2, 0, 1)).min()
+            if people_m > _FROM_PEOPLE_M and ground.distance_m(line).min() > _BESIDE_M:
                 return Pose2D(x, y, math.remainder(yaw_rad, math.tau))
     return start
 

@@ -129,3 +129,13 @@ def our_joint(name: str) -> str:
     """Name of an API's joint in the robot's description: `fl.hx` is `fl_hx`, `arm0.sh0` is `arm_sh0`."""
     limb, _, joint = name.partition(".")
     return f"{'arm' if limb == 'arm0' else limb}_{joint}"
+
+
+def picture_frame(source: str) -> str:
+    """Name in the API of the frame of a camera's picture."""
+    return "hand_color_image_sensor" if source == "hand" else f"{source}_fisheye"
+
+
+def depth_frame(source: str) -> str:
+    """Name in the API of the frame of a camera's depth, which has the same pose here."""
+    return "hand_depth_sensor" if source == "hand" else source

@@ -258,8 +258,8 @@ def _base_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: fl
         return mobility.Trajectory(given, params, end_s, snapshot, posture.walking())
 
     def stance() -> mobility.BaseMotion:
-        end_of(request.stance_request, now_s, "stance_request")
-        return mobility.Halt("stance_feedback")
+        end_s = end_of(request.stance_request, now_s, "stance_request")
+        return mobility.Stance(request.stance_request, end_s, snapshot)
 
     made: dict[str, Callable[[], mobility.BaseMotion]] = {
         "stand_request": lambda: mobility.Stand(posture),

@@ -20,10 +20,10 @@ import numpy as np
 from bosdyn.api import basic_command_pb2, estop_pb2, robot_state_pb2
 from pydrake.math import RigidTransform
 
-from errand_spot.messages import Frames, pose_between
+from errand_spot.messages import Frames, depth_frame, picture_frame, pose_between
 from errand_spot.server.estop import EstopService
 from errand_spot.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
-from errand_spot.server.obstacles import Region
+from errand_spot.server.obstacles import Region, ScanPoints
 from skills.robot import (
     Battery,
     Capabilities,
@@ -197,6 +197,7 @@ class Computer:
         self.settling, self.grip = False, Grip()
         self.feet_O: Pose2D | None = None
         """Pose of the feet in `odom` while the body moves over them; None while they walk with it."""
+        self.scan_points = ScanPoints()
         self.regions: Sequence[Region] = ()
         """No-go regions of clients."""
         self._motions: dict[str, Motion] = {}
@@ -273,6 +274,7 @@ class Computer:
         self._watch()
         self.clock.advance(PERIOD_S)
         self.snapshot = self._sensed()
+        self.scan_points.take(self.snapshot.scan)
         for motion in dict.fromkeys(self._motions.values()):
             motion.tick(self)
 
@@ -446,13 +448,3 @@ class Computer:
         assert self.capabilities.arm is not None
         read = joints or self.robot.joints()
         return np.array([read.position_rad[name] for name in self.capabilities.arm.joint_names])
-
-
-def picture_frame(source: str) -> str:
-    """Name in the API of the frame of a camera's picture."""
-    return "hand_color_image_sensor" if source == "hand" else f"{source}_fisheye"
-
-
-def depth_frame(source: str) -> str:
-    """Name in the API of the frame of a camera's depth, which has the same pose here."""
-    return "hand_depth_sensor" if source == "hand" else source

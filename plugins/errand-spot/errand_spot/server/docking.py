@@ -51,6 +51,8 @@ class _Docking(Task):
             return int(Progress.STATUS_DOCKED)
         if self.behaviour != Api.PREP_POSE_UNDOCK:
             yield from stow(computer)
+            here_O = computer.snapshot.odometry.pose  # there is more space to turn than before the dock
+            yield from walk(computer, Pose2D(here_O.x_m, here_O.y_m, self._dock_O.yaw_rad))
         if self.behaviour != Api.PREP_POSE_SKIP_POSE:
             if not (yield from walk(computer, self._prep_O)):
                 return int(Progress.STATUS_ERROR_STUCK)

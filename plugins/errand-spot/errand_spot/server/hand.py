@@ -27,8 +27,9 @@ _BEHIND_M: Final = 0.75
 _FOLLOWING_S: Final = 60.0
 _PER_SEGMENT: Final = 6
 _FARTHEST_M: Final = 2.0
-_FOLDED_RAD, _CLOSE_M = 0.3, 0.05
-_GAZE_STEP_S: Final = 0.25
+_FOLDED_RAD, _CLOSE_M, _GAZE_STEP_S = 0.3, 0.05, 0.25
+_TRIES, _SMALL_RAD, _DAMPING, _TURN_WEIGHT, _MOST_OFF_M = 15, 1e-4, 1e-3, 0.05, 0.2
+"""Steps, finite difference, damping and weight of turns for a goal that the hand reaches only turned otherwise."""
 _Positions: Final = arm_command_pb2.NamedArmPositionsCommand
 X_HAND: Final = RigidTransform([HAND_X_M, 0.0, 0.0])
 """Pose of the API's frame `hand` in `link_wr1`, the default tool."""
@@ -128,7 +129,10 @@ class Cartesian(ArmMotion):
         turned = computer.snapshot.odometry.velocity
         X_BAhead = Pose2D(*(2.0 * _TRACK_S * value for value in turned)).transform()
         X_OB = computer.snapshot.X_AB("odom", "body") @ X_BAhead
-        posture = _posture_at(computer, X_OB.InvertAndCompose(X_OW), q)
+        X_BW = X_OB.InvertAndCompose(X_OW)
+        posture = _posture_at(computer, X_BW, q)
+        if posture is None and computer.solver is not None:
+            posture = _turned_posture(computer.solver, X_BW, q)
         if posture is not None:
             most = 2.0 * _TRACK_S * USUAL_RAD_S
             trajectory = ArmTrajectory(
@@ -364,3 +368,24 @@ def _posture_at(computer: Computer, X_BW: RigidTransform, near_rad: FloatArray) 
     """Joint angles that put the wrist at a pose, the nearest to a posture; None out of reach."""
     found = [] if computer.solver is None else solutions(computer.solver, X_BW)
     return min(found, key=lambda q: float(np.abs(q - near_rad).max()), default=None)
+
+
+def _turned_posture(solver: Solver, X_BW: RigidTransform, near_rad: FloatArray) -> FloatArray | None:
+    """Joint angles that put the hand at the place of a pose, turned otherwise if need be; None out of reach.
+
+    Damped least squares (Wampler, 1986) from a posture, in which turns weigh less than places.
+    """
+    q, goal = near_rad, X_BW @ X_HAND
+    for _ in range(_TRIES):
+        off = _off(solver.X_BH(q) @ X_HAND, goal)
+        steps = _SMALL_RAD * np.eye(len(q))
+        J = np.column_stack([off - _off(solver.X_BH(q + step) @ X_HAND, goal) for step in steps]) / _SMALL_RAD
+        q = np.clip(q + J.T @ np.linalg.solve(J @ J.T + _DAMPING * np.eye(6), off), solver.lower_rad, solver.upper_rad)
+    return q if np.linalg.norm(_off(solver.X_BH(q) @ X_HAND, goal)[:3]) < _MOST_OFF_M else None
+
+
+def _off(X_BH: RigidTransform, X_BG: RigidTransform) -> FloatArray:
+    """Way (3) in metres and turn (3), weighed, from a pose to a goal."""
+    turn = X_BH.rotation().InvertAndCompose(X_BG.rotation()).ToAngleAxis()
+    turn_B = X_BH.rotation() @ (turn.angle() * turn.axis())
+    return np.concatenate([X_BG.translation() - X_BH.translation(), _TURN_WEIGHT * turn_B])

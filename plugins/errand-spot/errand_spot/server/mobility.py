@@ -17,11 +17,13 @@ from errand_spot.server.computer import PERIOD_S, Computer, Snapshot
 from errand_spot.server.obstacles import Clearance
 from errand_spot.server.posture import Posture
 from errand_spot.server.refusals import times_of, unknown_frame
-from skills.geometry import compose, inverse
+from skills.geometry import compose, relative_pose
 from skills.robot import FloatArray, Pose2D
 
 Status = basic_command_pb2.RobotCommandFeedbackStatus
 Feedback = mobility_command_pb2.MobilityCommand.Feedback
+Held = tuple[float, float] | None
+"""Height (m) and pitch (rad) of a body that walks; None for those that it has."""
 _GAIN_1_S: Final = 1.5
 _NEAR_M, _NEAR_RAD = 0.02, 0.03
 _STILL_M_S, _STILL_RAD_S = 0.02, 0.04
@@ -29,10 +31,13 @@ _USUAL_M_S, _USUAL_RAD_S = 0.8, 1.0
 _SET_M, _SET_RAD, _MOVES = 0.006, 0.01, 0.05
 """Tolerances of a body over its feet, and the least velocity (m/s, rad/s) of a body that moves."""
 _SHIFT_GAIN_1_S, _SHIFT_MOST = 2.0, 0.3
-_STOPPING_M: Final = 0.2
+_STOPPING_M, _SLOPE_S = 0.2, 0.05
 _STUCK_S, _PROGRESS = 1.5, 0.03
 """Time without progress (m plus rad) after which a robot counts as blocked."""
-_SLOPE_S: Final = 0.05
+_STANCE_M, _STANCE_RAD = 0.5, 0.7
+"""Farthest stance to which the robot steps."""
+FEET_M: Final = {"fl": (0.32, 0.17), "fr": (0.32, -0.17), "hl": (-0.32, 0.17), "hr": (-0.32, -0.17)}
+"""Positions of the feet around their middle."""
 FLAT_FRAMES: Final = ("odom", "vision", "body", "flat_body", "gpe")
 """Frames in which a planar motion may be given."""
 
@@ -103,7 +108,7 @@ class Stand(BaseMotion):
         odometry, since_s = computer.snapshot.odometry, computer.now_s() - self._begun_s
         if self._rows is None and float(np.abs(odometry.velocity).max()) < _MOVES:
             computer.feet_O = feet_O = computer.feet_O or odometry.pose
-            body_F = compose(inverse(feet_O), odometry.pose)
+            body_F = relative_pose(feet_O, odometry.pose)
             self._begun[:3], self._rows = (body_F.x_m, body_F.y_m, body_F.yaw_rad), self._posture.rows(feet_O)
             planar = np.abs([*self._rows[:, :3], self._begun[:3]]).max(axis=0)
             self._shifts = bool(planar[:2].max() > _SET_M or planar[2] > _SET_RAD)
@@ -134,11 +139,8 @@ class Stand(BaseMotion):
         still = float(np.abs(odometry.velocity).max()) < _MOVES
         near = math.hypot(error[0], error[1]) < _SET_M and abs(error[2]) < _SET_RAD
         self._shifts = not (over and near and still)
-        drive(
-            computer,
-            np.clip(_SHIFT_GAIN_1_S * error, -_SHIFT_MOST, _SHIFT_MOST) if self._shifts else np.zeros(3),
-            math.inf,
-        )
+        most = _SHIFT_MOST if self._shifts else 0.0
+        drive(computer, np.clip(_SHIFT_GAIN_1_S * error, -most, most), math.inf)
 
 
 class Sit(BaseMotion):
@@ -158,16 +160,13 @@ class Sit(BaseMotion):
 
 
 class Halt(BaseMotion):
-    """Stops, freezes, or stays in its stance."""
+    """Stops or freezes."""
 
     keeps_feet = True
 
     def __init__(self, field: str) -> None:
         self.field = field  # type: ignore[misc]
         super().__init__()
-        if field == "stance_feedback":
-            part = basic_command_pb2.StanceCommand.Feedback
-            self.feedback = self._made(part(status=part.STATUS_STANCED))
 
     def begin(self, computer: Computer) -> None:
         """Stops the base where it is."""
@@ -178,8 +177,7 @@ class _Driving(BaseMotion):
     """Drives until its end; then it has timed out."""
 
     end_s: float
-    posture: tuple[float, float] | None
-    """Height (m) and pitch (rad) of the body; None for those that it has."""
+    posture: Held
 
     @property
     def moving(self) -> bool:
@@ -207,7 +205,7 @@ class Velocity(_Driving):
 
     field = "se2_velocity_feedback"
 
-    def __init__(self, request: Any, params: Any, end_s: float, posture: tuple[float, float] | None = None) -> None:
+    def __init__(self, request: Any, params: Any, end_s: float, posture: Held = None) -> None:
         v = request.velocity
         self._velocity = tuple(
             finite(value, f"se2_velocity_request.velocity.{name}")
@@ -236,20 +234,12 @@ class Trajectory(_Driving):
     field = "se2_trajectory_feedback"
     Part: Final = basic_command_pb2.SE2TrajectoryCommand.Feedback
 
-    def __init__(
-        self,
-        request: Any,
-        params: Any,
-        end_s: float,
-        snapshot: Snapshot,
-        posture: tuple[float, float] | None = None,
-    ) -> None:
+    def __init__(self, request: Any, params: Any, end_s: float, snapshot: Snapshot, posture: Held = None) -> None:
         """Takes the poses over into `odom`, in which they stay. Raises RefusedError or InvalidRequestError."""
         field, X_OF = "se2_trajectory_request.trajectory", snapshot.X_AB("odom", known_frame(request.se2_frame_name))
         poses = [Pose2D.from_transform(X_OF @ _planar(point.pose)) for point in points_of(request.trajectory, field)]
         self._times_s, self._goal = times_of(request.trajectory, snapshot.time_s, field), poses[-1]
-        headings = np.unwrap([snapshot.odometry.pose.yaw_rad, *(pose.yaw_rad for pose in poses)])[1:]
-        self._rows = np.array([[pose.x_m, pose.y_m, yaw] for pose, yaw in zip(poses, headings, strict=True)])
+        self._rows = np.array([[pose.x_m, pose.y_m, pose.yaw_rad] for pose in poses])
         self._cubic = request.trajectory.interpolation == trajectory_pb2.POS_INTERP_CUBIC
         self.posture, self.end_s, self._limit = posture, end_s, speed_limit(params)
         self._clearance = Clearance(params.obstacle_params)
@@ -263,6 +253,7 @@ class Trajectory(_Driving):
         ahead = [k for k, time_s in enumerate(self._times_s) if time_s > 0.0] or [len(self._times_s) - 1]
         times_s = np.array([0.0, *(self._times_s[k] for k in ahead)]) + 1e-6 * np.arange(len(ahead) + 1)
         rows = np.array([[pose.x_m, pose.y_m, pose.yaw_rad], *self._rows[ahead]])
+        rows[:, 2] = np.unwrap(rows[:, 2])
         self._path = PchipInterpolator(times_s, rows) if self._cubic else make_interp_spline(times_s, rows, k=1)
         self._lasts_s = float(times_s[-1])
         self._stand(computer)
@@ -279,8 +270,15 @@ class Trajectory(_Driving):
         error = error_to(pose, target)
         velocity = np.zeros(3) if arrived else self._limit(velocity + _GAIN_1_S * error)
         drive(computer, self._clearance.limit(computer, velocity), self.end_s)
-        blocked, near = self._stuck(error, pose, now_s) and still, left_s <= 0.0 and far_m < _STOPPING_M
-        self._report(arrived=arrived, still=still, blocked=blocked, near=near)
+        part, near = self.Part, left_s <= 0.0 and far_m < _STOPPING_M
+        status = part.STATUS_STOPPING if near else part.STATUS_IN_PROGRESS
+        goal = part.FINAL_GOAL_STATUS_ACHIEVABLE if arrived else part.FINAL_GOAL_STATUS_IN_PROGRESS
+        if self._stuck(error, pose, now_s) and still:
+            goal = part.FINAL_GOAL_STATUS_BLOCKED
+        if still and goal != part.FINAL_GOAL_STATUS_IN_PROGRESS:
+            status = part.STATUS_STOPPED
+        body = part.BODY_STATUS_SETTLED if arrived and still else part.BODY_STATUS_MOVING
+        self.feedback = self._made(part(status=status, body_movement_status=body, final_goal_status=goal))
 
     def _stuck(self, error: FloatArray, pose: Pose2D, now_s: float) -> bool:
         """Returns whether the robot is behind its path and has not moved for a while."""
@@ -288,19 +286,6 @@ class Trajectory(_Driving):
         if math.hypot(*moved[:2]) + abs(moved[2]) > _PROGRESS or np.abs(error).max() < 2.0 * _NEAR_RAD:
             self._moved_s, self._moved_from = now_s, pose
         return now_s - self._moved_s > _STUCK_S
-
-    def _report(self, *, arrived: bool, still: bool, blocked: bool, near: bool) -> None:
-        part, status = self.Part, self.Part.STATUS_STOPPING if near or arrived else self.Part.STATUS_IN_PROGRESS
-        goal = part.FINAL_GOAL_STATUS_ACHIEVABLE if arrived else part.FINAL_GOAL_STATUS_IN_PROGRESS
-        if blocked:
-            goal = part.FINAL_GOAL_STATUS_BLOCKED
-        self.feedback = self._made(
-            part(
-                status=part.STATUS_STOPPED if (arrived and still) or blocked else status,
-                body_movement_status=part.BODY_STATUS_SETTLED if still else part.BODY_STATUS_MOVING,
-                final_goal_status=goal,
-            )
-        )
 
     @property
     def moving(self) -> bool:
@@ -331,6 +316,52 @@ def way_to(goal_O: Pose2D, end_s: float, snapshot: Snapshot) -> Trajectory:
     goal.position.x, goal.position.y, goal.angle = goal_O.x_m, goal_O.y_m, goal_O.yaw_rad
     params.obstacle_params.disable_vision_body_obstacle_avoidance = True
     return Trajectory(request, params, end_s, snapshot)
+
+
+class Stance(BaseMotion):
+    """Steps until the feet stand where a client wants them, if they keep their distances and are near."""
+
+    field = "stance_feedback"
+    Part: Final = basic_command_pb2.StanceCommand.Feedback
+
+    def __init__(self, request: Any, end_s: float, snapshot: Snapshot) -> None:
+        """Raises RefusedError or InvalidRequestError."""
+        stance, field = request.stance, "stance_request.stance"
+        if set(stance.foot_positions) != set(FEET_M):
+            raise InvalidRequestError(f"{field}.foot_positions: {', '.join(FEET_M)} are needed")
+        pose_O = Pose2D.from_transform(snapshot.X_AB("odom", known_frame(stance.se2_frame_name)))
+        places = [stance.foot_positions[foot] for foot in FEET_M]
+        wanted = np.array([[finite(p.x, field), finite(p.y, field)] for p in places])
+        x, y = wanted.mean(axis=0)
+        yaw = math.atan2(*(wanted[:2].mean(axis=0) - [x, y])[::-1])
+        c, s = math.cos(yaw), math.sin(yaw)
+        stands = [x, y] + np.array(list(FEET_M.values())) @ np.array([[c, s], [-s, c]])
+        off_m = float(np.linalg.norm(stands - wanted, axis=1).max())
+        goal_O = compose(pose_O, Pose2D(float(x), float(y), yaw))
+        away = error_to(snapshot.odometry.pose, goal_O)
+        near = math.hypot(*away[:2]) < _STANCE_M and abs(away[2]) < _STANCE_RAD
+        fits = near and off_m < min(max(finite(stance.accuracy, field) or 0.05, 0.02), 0.1)
+        self._way = way_to(goal_O, end_s, snapshot) if fits else None
+        super().__init__()
+        self._report()
+
+    def begin(self, computer: Computer) -> None:
+        """Starts to step."""
+        if self._way is not None:
+            self._way.begin(computer)
+
+    def tick(self, computer: Computer) -> None:
+        """Steps on."""
+        if self._way is not None and self.status == Status.STATUS_PROCESSING:
+            self._way.tick(computer)
+            self.status = self._way.status
+            self._report()
+
+    def _report(self) -> None:
+        status = self.Part.STATUS_TOO_FAR_AWAY
+        if self._way is not None:
+            status = self.Part.STATUS_STANCED if self._way.arrived else self.Part.STATUS_GOING_TO_STANCE
+        self.feedback = self._made(self.Part(status=status))
 
 
 def error_to(pose: Pose2D, goal: Pose2D) -> FloatArray:

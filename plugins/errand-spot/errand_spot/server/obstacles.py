@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 HEIGHTS_M: Final = (0.15, 1.0)
 _PADDING_M: Final = 0.05
 _NEAR_M, _CARRIED_M = 2.0, 0.35
+_REMEMBERED_S, _CELL_M = 15.0, 0.05
 _SPACING_M, _LARGEST_M = 0.05, 100.0
-_BRAKING_S, _WAITS_S = 0.7, 0.04
+_BRAKING_S, _WAITS_S = 0.5, 0.04
 """Time to a collision from which on the robot slows down, and at which it waits."""
 _AHEAD_S: Final = np.linspace(0.05, _BRAKING_S, 14)
 
@@ -33,19 +34,29 @@ class Region:
 
 
 class ScanPoints:
-    """Points of the last scan at the height of the body, in `odom`."""
+    """Highest points of the last scan, up to the body's height, and of earlier ones below what the LiDAR sees now."""
 
     def __init__(self) -> None:
         self._scan: Scan | None = None
-        self._points_O = np.empty((0, 2))
+        self._points = np.empty((0, 4))  # x, y, z in `odom`, and their time
+        self.points_O: FloatArray = self._points[:, :2]
 
-    def points_O(self, scan: Scan | None) -> FloatArray:
-        """Points (N, 2) of a scan; the last ones again without a new scan."""
-        if scan is not None and scan is not self._scan:
-            points_O = (scan.X_OB @ scan.points_B().T).T
-            high = (points_O[:, 2] > HEIGHTS_M[0]) & (points_O[:, 2] < HEIGHTS_M[1])
-            self._scan, self._points_O = scan, points_O[high, :2]
-        return self._points_O
+    def take(self, scan: Scan | None) -> None:
+        """Takes in a scan; nothing without a new one."""
+        if scan is None or scan is self._scan:
+            return
+        points_O = (scan.X_OB @ scan.points_B().T).T
+        points_O = points_O[(points_O[:, 2] > HEIGHTS_M[0]) & (points_O[:, 2] < HEIGHTS_M[1])]
+        away = self._points[:, :3] - (scan.X_OB @ scan.X_BL).translation()
+        far_m = np.hypot(away[:, 0], away[:, 1])
+        lowest = far_m * math.tan(float(scan.elevations_rad.min())) - _CELL_M
+        low = (away[:, 2] < lowest) & (far_m < _NEAR_M)
+        kept = self._points[low & (self._points[:, 3] > scan.stamp_s - _REMEMBERED_S)]
+        highest = points_O[np.argsort(-points_O[:, 2], kind="stable")]
+        _, first = np.unique(np.round(highest[:, :2] / _CELL_M), axis=0, return_index=True)
+        new = np.column_stack([highest[first], np.full(len(first), scan.stamp_s)])
+        self._scan, self._points = scan, np.concatenate([kept, new])
+        self.points_O = self._points[:, :2]
 
 
 class Clearance:
@@ -57,7 +68,7 @@ class Clearance:
         if given_m < 0.0:
             raise InvalidRequestError(f"obstacle_params.obstacle_avoidance_padding is {given_m}; it must be >= 0")
         self._padding_m = given_m or _PADDING_M
-        self._scans = None if params.disable_vision_body_obstacle_avoidance else ScanPoints()
+        self._sees = not params.disable_vision_body_obstacle_avoidance
 
     def limit(self, computer: Computer, velocity: FloatArray) -> FloatArray:
         """Returns a velocity (3,) of the body that stops before it touches an obstacle."""
@@ -83,19 +94,16 @@ class Clearance:
     def _points_B(self, computer: Computer) -> FloatArray:
         """Points (N, 2) near the body, without those at what the hand carries."""
         snapshot = computer.snapshot
-        points_O = [] if self._scans is None else [self._scans.points_O(snapshot.scan)]
+        points_O = [computer.scan_points.points_O] if self._sees else []
         points_O += [region.outline_O for region in computer.regions if region.until_s > snapshot.time_s]
         if not points_O:
             return np.empty((0, 2))
-        pose = snapshot.odometry.pose
-        away = np.concatenate(points_O) - [pose.x_m, pose.y_m]
-        away = away[(np.abs(away) < _NEAR_M).all(axis=1)]
-        c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-        points_B = away @ np.array([[c, -s], [s, c]])
+        points_B = seen_from(snapshot.odometry.pose, np.concatenate(points_O))
+        points_B = points_B[(np.abs(points_B) < _NEAR_M).all(axis=1)]
         if snapshot.gripper.holding and "hand" in snapshot.frames:
             hand_B = snapshot.X_AB("body", "hand").translation()[:2]
             points_B = points_B[np.linalg.norm(points_B - hand_B, axis=1) > _CARRIED_M]
-        return np.asarray(points_B)
+        return points_B
 
 
 def region_of(message: Any, until_s: float, snapshot: Snapshot) -> Region | None:
@@ -109,23 +117,16 @@ def region_of(message: Any, until_s: float, snapshot: Snapshot) -> Region | None
         raise InvalidRequestError(f"nogo_region_properties.{kind}.frame_name must be odom or vision")
     field = f"nogo_region_properties.{kind}"
     X_OR = snapshot.X_AB("odom", placed.frame_name) @ transform(getattr(placed, f"frame_name_tform_{kind}"), field)
-    outline = _box(placed.box.size, field) if kind == "box" else _circle(placed.circle, field)
-    pose = Pose2D.from_transform(X_OR)
-    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-    return Region(outline @ np.array([[c, s], [-s, c]]) + [pose.x_m, pose.y_m], until_s)
-
-
-def _box(size: Any, field: str) -> FloatArray:
-    x, y = 0.5 * _size(size.x, field), 0.5 * _size(size.y, field)
-    corners = [(-x, -y), (x, -y), (x, y), (-x, y), (-x, -y)]
-    return np.concatenate([np.linspace(a, b, _count(math.dist(a, b))) for a, b in pairwise(corners)])
-
-
-def _circle(circle: Any, field: str) -> FloatArray:
-    radius_m = _size(circle.radius, field)
-    angles = np.linspace(0.0, math.tau, _count(math.tau * radius_m))
-    middle = [circle.center_pt.x, circle.center_pt.y]
-    return np.asarray(radius_m * np.column_stack([np.cos(angles), np.sin(angles)]) + middle)
+    if kind == "box":
+        x, y = 0.5 * _size(placed.box.size.x, field), 0.5 * _size(placed.box.size.y, field)
+        corners = np.array([(-x, -y), (x, -y), (x, y), (-x, y), (-x, -y)])
+    else:
+        angles, middle = np.linspace(0.0, math.tau, 37), placed.circle.center_pt
+        around = _size(placed.circle.radius, field) * np.column_stack([np.cos(angles), np.sin(angles)])
+        corners = around + [finite(middle.x, field), finite(middle.y, field)]
+    sides = [np.linspace(a, b, 2 + math.ceil(math.dist(a, b) / _SPACING_M)) for a, b in pairwise(corners)]
+    outline = np.concatenate(sides)
+    return Region((X_OR @ np.column_stack([outline, np.zeros(len(outline))]).T).T[:, :2], until_s)
 
 
 def _size(value: float, field: str) -> float:
@@ -134,5 +135,7 @@ def _size(value: float, field: str) -> float:
     return value
 
 
-def _count(length_m: float) -> int:
-    return 2 + math.ceil(length_m / _SPACING_M)
+def seen_from(pose: Pose2D, points_O: FloatArray) -> FloatArray:
+    """Points (N, 2) of `odom` in the frame of a body at a pose."""
+    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    return np.asarray((points_O - [pose.x_m, pose.y_m]) @ np.array([[c, -s], [s, c]]))

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 from scipy.ndimage import distance_transform_edt
 
-from errand_spot.messages import InvalidRequestError, frame_tree, timestamp
+from errand_spot.messages import InvalidRequestError, depth_frame, frame_tree, picture_frame, timestamp
 from errand_spot.server.calls import Call, Service
-from errand_spot.server.computer import Computer, Snapshot, depth_frame, picture_frame
+from errand_spot.server.computer import Computer, Snapshot
 from errand_spot.server.identity import DOMAIN
 from skills.robot import CameraCapabilities, Image, Intrinsics, NoImageError, Scan
 
@@ -29,10 +29,7 @@ _HAND_DEPTH: Final = Intrinsics(224, 171, 208.0, 208.0, 112.0, 85.5)
 
 @dataclass(frozen=True)
 class _Source:
-    """One source of the image service: a camera, its picture or its depth, and its lens.
-
-    `lens` is None for the lens of the picture, which a robot's body cameras have at `size`.
-    """
+    """One source of the image service: a camera, its picture or depth, and its lens (None: that of the picture)."""
 
     name: str
     camera: CameraCapabilities

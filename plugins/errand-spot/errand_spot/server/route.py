@@ -15,10 +15,10 @@ from bosdyn.api.spot import robot_command_pb2
 from pydrake.math import RigidTransform
 
 from errand_spot.messages import finite, pose
-from errand_spot.server.computer import Computer, Snapshot
+from errand_spot.server.computer import Computer
 from errand_spot.server.graph_map import GraphMap, Poses
 from errand_spot.server.mobility import drive, error_to, speed_limit
-from errand_spot.server.obstacles import ScanPoints
+from errand_spot.server.obstacles import seen_from
 from skills.robot import CommandId, FloatArray, Pose2D
 
 Feedback = graph_nav_pb2.NavigationFeedbackResponse
@@ -97,7 +97,6 @@ class FollowRoute:
         self._graph, self._place, self._cause = graph, place, cause
         self.status: int = Feedback.STATUS_FOLLOWING_ROUTE
         self._next, self._blocked, self._ko_tform_goal = 0, False, RigidTransform()
-        self._scans = ScanPoints()
         self._standing: CommandId | None = None
         self._moved_s, self._moved_from = -math.inf, Pose2D(math.inf, 0.0, 0.0)
 
@@ -142,7 +141,7 @@ class FollowRoute:
             self.status = Feedback.STATUS_REACHED_GOAL if still else self.status
             return
         velocity = self.course.limit(_velocity(error, last=last))
-        speed, free_m = float(np.hypot(velocity[0], velocity[1])), self._free_m(computer.snapshot, velocity)
+        speed, free_m = float(np.hypot(velocity[0], velocity[1])), self._free_m(computer, velocity)
         self._blocked = speed > 0.0 and free_m < _CLOSE_M
         velocity[:2] *= 0.0 if self._blocked else min(1.0, free_m / _BRAKING_S / max(speed, 1e-6))
         drive(computer, velocity, self.end_s)
@@ -152,14 +151,12 @@ class FollowRoute:
         elif computer.clock.now() - self._moved_s > self.course.wait_s:
             self.status = Feedback.STATUS_STUCK
 
-    def _free_m(self, snapshot: Snapshot, velocity: FloatArray) -> float:
+    def _free_m(self, computer: Computer, velocity: FloatArray) -> float:
         """Free distance of the body in the direction of a velocity, by the obstacles of the last scan."""
-        scan, speed = snapshot.scan, float(np.hypot(velocity[0], velocity[1]))
-        if scan is None or speed == 0.0:
+        speed = float(np.hypot(velocity[0], velocity[1]))
+        if speed == 0.0:
             return math.inf
-        pose = snapshot.odometry.pose
-        c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-        points = (self._scans.points_O(scan) - [pose.x_m, pose.y_m]) @ np.array([[c, -s], [s, c]])
+        points = seen_from(computer.snapshot.odometry.pose, computer.scan_points.points_O)
         points = points[(np.abs(points) > _OUTLINE_M).any(axis=1)]  # not the robot itself
         direction = velocity[:2] / speed
         along, across = points @ direction, points @ np.array([-direction[1], direction[0]])

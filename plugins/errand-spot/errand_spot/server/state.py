@@ -37,6 +37,7 @@ from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer, Motors, Perception, SeenTag, Snapshot
 from errand_spot.server.hand import X_HAND, solutions
 from errand_spot.server.identity import DOMAIN
+from errand_spot.server.mobility import FEET_M
 from errand_spot.server.obstacles import Region, region_of
 from skills.robot import Mount, NoImageError
 
@@ -53,7 +54,6 @@ _FIELDS: Final[Mapping[int, str]] = {
     _Kinds.WORLD_OBJECT_USER_NOGO: "nogo_region_properties",
 }
 """Field of an object of each type; others are never listed."""
-_FEET: Final = ("fl", "fr", "hl", "hr")
 
 
 class RobotStateService(Service):
@@ -97,7 +97,7 @@ class RobotStateService(Service):
         """Returns the links and the description (URDF) of the robot."""
         made = robot_state_pb2.RobotHardwareConfigurationResponse()
         made.hardware_configuration.skeleton.urdf = self._computer.capabilities.description
-        names = ["body", *(f"{foot}.{part}" for foot in _FEET for part in ("hip", "uleg", "lleg"))]
+        names = ["body", *(f"{foot}.{part}" for foot in FEET_M for part in ("hip", "uleg", "lleg"))]
         arm = self._computer.capabilities.arm
         names += [f"arm0.link_{joint}" for joint in (*JOINTS, "fngr")] if arm is not None else []
         for name in names:
@@ -149,9 +149,7 @@ class RobotStateService(Service):
     def _feet(self, state: Any, snapshot: Snapshot) -> None:
         feet_O = self._computer.feet_O or snapshot.odometry.pose
         X_BF = snapshot.odometry.X_OB.InvertAndCompose(feet_O.transform())
-        for foot in _FEET:
-            x = 0.32 if foot.startswith("f") else -0.32
-            y = 0.17 if foot.endswith("l") else -0.17
+        for x, y in FEET_M.values():
             made = state.foot_state.add(contact=robot_state_pb2.FootState.CONTACT_MADE)
             made.foot_position_rt_body.CopyFrom(vec3(X_BF @ np.array([x, y, 0.0])))
             made.terrain.frame_name = "odom"

@@ -71,7 +71,7 @@ def test_height_pitch_and_turn_go_together(spot):
     assert body(spot)[2] == pytest.approx(-0.2, abs=0.02)
 
 
-def test_what_is_out_of_range_is_clipped(spot):
+def test_the_body_stays_within_its_range(spot):
     stood(spot, turned(1.5, pitch=1.2, height=0.5))
     assert spot.served.scripted.height_m == pytest.approx(0.58, abs=0.01)
     assert (spot.served.scripted.pitch_rad, body(spot)[2]) == (
@@ -133,7 +133,7 @@ MOON = body_pose((0.0, SE3Pose(0.0, 0.0, 0.5, Quat())), root="moon")
     ],
     ids=["roll", "assist", "frame", "no points", "turned walk"],
 )
-def test_what_the_body_cannot_do_is_refused(spot, command, params, error, said):
+def test_the_robot_refuses_a_posture_that_its_body_cannot_take(spot, command, params, error, said):
     command.synchronized_command.mobility_command.params.Pack(params)
     with pytest.raises(error) as refused:
         spot.commands.robot_command(command, end_time_secs=time.time() + 5.0)

@@ -8,6 +8,7 @@ from bosdyn.api import basic_command_pb2, geometry_pb2, robot_command_pb2, world
 from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 from bosdyn.client.exceptions import InvalidRequestError
 from bosdyn.client.robot_command import InvalidRequestError as InvalidCommandError
+from bosdyn.client.robot_command import RobotCommandBuilder as Build
 from bosdyn.util import seconds_to_duration
 
 from errand_spot.server.computer import Pace
@@ -94,7 +95,7 @@ def test_a_walk_into_a_wall_stops_before_it_and_is_blocked(spot):
     poses, told = walked(spot, number)
     standing = np.flatnonzero(np.abs(np.diff(poses[:, 0])) < 0.002)
     assert told.final_goal_status == Walk.FINAL_GOAL_STATUS_BLOCKED
-    assert told.body_movement_status == Walk.BODY_STATUS_SETTLED
+    assert told.body_movement_status == Walk.BODY_STATUS_MOVING  # settled means: at the goal
     assert 0.9 < spot.served.scripted.pose.x_m < 1.7 - 0.56
     assert 0.1 * len(standing) < 3.0
 
@@ -187,3 +188,32 @@ def test_a_robot_that_touches_an_obstacle_may_leave_it(spot):
     back, ahead = np.array([-0.5, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])
     assert clearance.limit(computer, back) == pytest.approx(back)
     assert clearance.limit(computer, ahead) == pytest.approx(0.0)
+
+
+def stance(spot, x=0.32, y=0.17, dx=0.0, **changes):
+    """Command of a stance whose middle lies dx ahead; returns its feedback after 3 s."""
+    feet = {"fl": (x, y), "fr": (x, -y), "hl": (-x, y), "hr": (-x, -y)}
+    command = Build.stance_command("odom", *(geometry_pb2.Vec2(x=a + dx, y=b) for a, b in feet.values()))
+    number = sent(spot, command)
+    time.sleep(3.0)
+    synchronized = spot.commands.robot_command_feedback(number).feedback.synchronized_feedback
+    return synchronized.mobility_command_feedback.stance_feedback.status
+
+
+Feet = basic_command_pb2.StanceCommand.Feedback
+
+
+# stance -> status, and where the robot stands then
+@pytest.mark.parametrize(
+    ("given", "status", "x_m"),
+    [
+        ({}, Feet.STATUS_STANCED, 0.0),
+        ({"dx": 0.3, "y": 0.2}, Feet.STATUS_STANCED, 0.3),
+        ({"dx": 1.0}, Feet.STATUS_TOO_FAR_AWAY, 0.0),
+        ({"x": 0.3, "y": 0.3}, Feet.STATUS_TOO_FAR_AWAY, 0.0),
+    ],
+    ids=["here", "a step ahead", "too far", "too wide"],
+)
+def test_a_stance_moves_the_feet_or_says_that_it_is_too_far_away(spot, given, status, x_m):
+    assert stance(spot, **given) == status
+    assert spot.served.scripted.pose.x_m == pytest.approx(x_m, abs=0.03)

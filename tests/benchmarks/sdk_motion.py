@@ -151,7 +151,11 @@ class Judge:
             yield "hand", error, "arm_cartesian_feedback", done, on_path
         if arm.HasField("arm_joint_move_command"):
             trajectory, model = arm.arm_joint_move_command.trajectory, arm_model(self.server.computer.capabilities)
-            q = [np.array([getattr(each.position, name).value for name in JOINTS]) for each in trajectory.points]
+            q = [self.server.computer.arm_rad()]
+            for each in trajectory.points:  # an omitted joint keeps its angle
+                given = [each.position.HasField(name) for name in JOINTS]
+                q.append(np.where(given, [getattr(each.position, name).value for name in JOINTS], q[-1]))
+            q = q[1:]
 
             def joint_error(wanted):
                 return self._hand_error_m((self.X_W("body") @ model.X_BH(wanted)).translation())

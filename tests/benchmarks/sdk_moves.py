@@ -13,6 +13,8 @@ from bosdyn.client.lease import LeaseKeepAlive
 from bosdyn.client.math_helpers import SE3Pose
 from bosdyn.client.robot_command import RobotCommandBuilder as Build
 from bosdyn.client.robot_command import block_for_trajectory_cmd, block_until_arm_arrives, blocking_stand
+from bosdyn.geometry import EulerZXY
+from bosdyn.util import seconds_to_duration
 
 
 def main():
@@ -41,9 +43,24 @@ def main():
             tree = states.get_robot_state().kinematic_state.transforms_snapshot
             return Build.synchro_trajectory_command_in_body_frame(x, y, yaw, tree)
 
+        def square(side, each_s):
+            """Command of a closed square to the left of the robot, a corner each `each_s`."""
+            command = walk(0.0, 0.0, 0.0)
+            trajectory = command.synchronized_command.mobility_command.se2_trajectory_request.trajectory
+            corners = ((side, 0.0), (side, side), (0.0, side), (0.0, 0.0))
+            del trajectory.points[:]
+            for k, (x, y) in enumerate(corners):
+                corner = in_odom(x, y, 0.0)
+                point = trajectory.points.add(time_since_reference=seconds_to_duration((k + 1) * each_s))
+                point.pose.position.x, point.pose.position.y, point.pose.angle = corner.x, corner.y, corner.rot.to_yaw()
+            return command
+
         def block(command):
             block_until_arm_arrives(commands, command, timeout_sec=15)
 
+        for yaw in (0.4, 0.0):
+            blocking_stand(commands, timeout_sec=10, params=Build.mobility_params(footprint_R_body=EulerZXY(yaw=yaw)))
+        block_for_trajectory_cmd(commands, send(square(0.5, 2.0)), timeout_sec=10)
         blocking_stand(commands, timeout_sec=10, params=Build.mobility_params(body_height=-0.08))
         block_for_trajectory_cmd(commands, send(walk(0.5, 0.1, 0.4)), timeout_sec=10)
         block_for_trajectory_cmd(commands, send(walk(-0.3, 0.0, -0.4)), timeout_sec=10)

@@ -89,9 +89,10 @@ _CIRCLE = tuple(
 OWN = Program(
     "sdk_moves.py",
     (
-        Promise("z", ((0.0,), (-0.08,), (0.0,)), 0.02),
-        Promise("x y", ((0.0, 0.0), (0.5, 0.1)), 0.05),
-        Promise("yaw", ((0.0,), (0.4,), (0.0,)), 0.05),
+        Promise("x y yaw", ((0, 0, 0), (0, 0, 0.4), (0, 0, 0)), 0.05, along=True),
+        Promise("x y yaw", ((0, 0, 0), (0.5, 0, 0), (0.5, 0.5, 0), (0, 0.5, 0), (0, 0, 0)), 0.06, along=True),
+        Promise("z", ((0.0,), (-0.08,)), 0.02),
+        Promise("x y yaw", ((0, 0, 0), (0.5, 0.1, 0.4)), 0.06),
     ),
 )
 """Our own program, beside this file."""

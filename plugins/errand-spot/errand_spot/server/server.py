@@ -74,7 +74,7 @@ SERVICES: Final[tuple[type[Service], ...]] = (
 )
 """Services that are served."""
 MOTIONS: Final = (
-    "stand with height and pitch, sit, velocity, trajectory of poses, follow arm, stance, stop, freeze, safe power "
+    "stand with height, pitch, turn and shift, sit, velocity, trajectory, follow arm, stance, stop, freeze, safe power "
     "off, self-right; the arm's joint moves, named positions, Cartesian moves, gaze, velocity and stop; the gripper. "
     "Others are refused as unsupported."
 )

@@ -16,6 +16,7 @@ from executive.tree.registry import built_in_skills
 from executive.words.knowledge import load_knowledge
 from executive.words.mission import Mission
 from plant.worlds.world import load_world
+from tests.benchmarks.same_answers import compare, store
 
 SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
 FAMILIES = Path(__file__).parents[1] / "executive" / "language" / "sentences"
@@ -77,3 +78,11 @@ def test_the_parser_loads_in_a_fresh_process(benchmark):
 @pytest.mark.parametrize("sentence", ["fetch " * 10_000, "a" * 100_000, "no, " * 2500, "the " * 59 + "cup", "'" * 9999])
 def test_odd_input_takes_no_longer_than_a_second(benchmark, parser, sentence):
     assert benchmark.pedantic(seconds_for, args=(sentence, parser), rounds=1) < ODD_S
+
+
+def test_stored_answers_are_compared_by_sentence(tmp_path, capsys):
+    before, after = tmp_path / "before.json", tmp_path / "after.json"
+    assert store(before, only="wait in the hall")["sentences"] > 1
+    after.write_text(before.read_text().replace('"status": "ok"', '"status": "refused"', 1))
+    assert (compare(before, before), compare(before, after)) == (0, 1)
+    assert "1 of " in capsys.readouterr().out

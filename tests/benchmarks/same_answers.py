@@ -4,9 +4,9 @@
     python -m tests.benchmarks.same_answers compare before.json after.json
 
 `store` understands the sentences in the ways that their tables are asked in: in a world ("flat", "shop", "lab", or the
-tests' own "home"), with open vocabulary ("open"), or by several robots ("Alice, Bob"). `--corpora` adds the sentences of
-the JSON lines in a folder, with open vocabulary. It writes the answers by way and sentence. `compare` prints the answers
-that differ, and exits with 1 if there are any.
+tests' own "home"), with open vocabulary ("open"), or by several robots ("Alice, Bob"). `--corpora` adds the sentences
+of the JSON lines in a folder, with open vocabulary. It writes the answers by way and sentence. `compare` prints the
+answers that differ, and exits with 1 if there are any.
 """
 
 import json
@@ -91,7 +91,7 @@ def answers(corpora=None, only=""):
     return found
 
 
-def store(file: Path, corpora: Path = None, only: str = ""):
+def store(file: Path, corpora: Path | None = None, only: str = ""):
     """Writes the answers to a file."""
     found = answers(corpora, only)
     file.write_text(json.dumps(found, indent=0, sort_keys=True), encoding="utf-8")

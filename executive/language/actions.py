@@ -307,7 +307,8 @@ def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
     extra = [place.text for place in (*sources[1:], *(place for place in goals[1:] if place is not HERE))]
     extra += [roles.searched.text] if roles.searched is not None else []
     source = next(iter(sources), None)
-    carried = _with_object(replace(blank, objects=tuple(roles.objects), source=source, goal=goal), extra)
+    found = replace(blank, objects=tuple(roles.objects), source=source, goal=goal, passes=tuple(roles.paths))
+    carried = _with_object(found, extra)
     yield carried
     yield from (replace(carried, goal=place) for place in shared)
 

@@ -80,6 +80,10 @@ class Separator(_Word):
     """Comma, "and", "or", "then"."""
 
 
+class Aside(Separator):
+    """Words that change nothing of what the robot does; a note names them."""
+
+
 class Unknown(_Word):
     """Word that does not fit anywhere in the sentence."""
 

@@ -174,11 +174,15 @@ def _somebody(phrase: Phrase) -> bool:
     return living or (owned and phrase.head.lemma in read_table("harm.yaml")["body"])
 
 
+def is_door(place: Location) -> bool:
+    """Returns whether a place on a route is a door, through which the robot goes in any case."""
+    return place.phrase is not None and place.phrase.head.lemma in read_table("relations.yaml")["doors"]
+
+
 def check_routes_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Action]) -> None:
     """Refuses a prescribed route, and relations to the speaker except "to me". Raises RefusalError."""
-    for place in (place for action in actions for place in action.passes):
-        if place.phrase is None or place.phrase.head.lemma not in read_table("relations.yaml")["doors"]:
-            raise _refused("go", place.preposition, place.name)
+    for place in (place for action in actions for place in action.passes if not is_door(place)):
+        raise _refused("go", place.preposition, place.name)
     for clause in clauses:
         act = "go" if isinstance(clause.verb, Verb) and clause.verb.kinds == {VerbKind.GO} else "bring"
         for chunk in clause.items:

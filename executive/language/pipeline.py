@@ -6,9 +6,10 @@ from typing import Final
 
 from executive.language.actions import Action, read_actions
 from executive.language.command_frames import CommandFrame, command_frames, spoken_command
+from executive.language.coverage import cover, indices
 from executive.language.disfluency import repair_disfluencies, unwanted_phrases
 from executive.language.grounding import check_unwanted, ground
-from executive.language.items import Being, Item, Predicate, drop_name, predicates
+from executive.language.items import Being, Chunk, Item, Predicate, drop_name, predicates
 from executive.language.lexicon import VerbKind
 from executive.language.limits import check_feasible, check_routes_and_speaker, not_understood, refuse_harm
 from executive.language.nouns import NounKind
@@ -36,7 +37,8 @@ class Trace:
     `lead` are items before the words, `asked` marks a statement to check, `elliptic` allows an omitted "it",
     `recipient` receives objects if the sentence names nobody.
 
-    `affirmed` is a checked statement without its negation, `unwanted` are phrases after "not", `meanings` are pronouns
+    `affirmed` is a checked statement without its negation, `unwanted` are phrases after "not", `taken_back` are those
+    and what the speaker has corrected, `meanings` are pronouns
     with their meanings, `notes` list names that were interpreted as others. `refused_at` is the step that refused the
     sentence. If it has conditions, loops or waits, `steps` is its mission and `parts` are its clauses.
     """
@@ -53,6 +55,7 @@ class Trace:
     affirmed: Affirmed | None = None
     items: tuple[Item, ...] = ()
     unwanted: tuple[Phrase, ...] = ()
+    taken_back: tuple[str, ...] = ()
     clauses: tuple[Predicate, ...] = ()
     actions: tuple[Action, ...] = ()
     resolved: tuple[Action, ...] = ()
@@ -104,7 +107,10 @@ class Pipeline:
         said = affirmation(trace.tokens, there=there) if trace.asked else Affirmed(trace.tokens)
         items = Reader(said.tokens, noun_phrases(said.tokens), silent=set(said.silent)).read(trace.lead)
         read = replace(trace, tokens=said.tokens, affirmed=said)
-        return replace(read, items=repair_disfluencies(items), unwanted=unwanted_phrases(items))
+        repaired = repair_disfluencies(items)
+        kept = {index for item in repaired if isinstance(item, Chunk) for index in indices(item)}
+        dropped = (item.spoken for item in items if isinstance(item, Chunk) and not kept & indices(item))
+        return replace(read, items=repaired, unwanted=unwanted_phrases(items), taken_back=tuple(dropped))
 
     def _split(self, trace: Trace) -> Trace:
         clauses = predicates(trace.items)
@@ -151,6 +157,13 @@ class Pipeline:
         check_unwanted(trace.unwanted, commands, self.knowledge)
         return replace(trace, commands=commands, notes=(*trace.notes, *notes))
 
+    def _cover(self, trace: Trace) -> Trace:
+        """Refuses the sentence if words of it are in no part of its meaning; notes those that change nothing."""
+        covered = cover(trace.items, trace.clauses, trace.actions, trace.taken_back)
+        if covered.lost:
+            raise not_understood(covered.lost, self.knowledge)
+        return replace(trace, notes=tuple(dict.fromkeys((*trace.notes, *covered.notes))))
+
 
 def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError:
     """Question that remains about phrases joined by "or" if only one of them is possible."""
@@ -174,4 +187,5 @@ _STEPS: Final[dict[str, Callable[[Pipeline, Trace], Trace]]] = {
     "feasibility": Pipeline._check_feasible,
     "command frames": lambda _, trace: replace(trace, frames=command_frames(trace.resolved)),
     "grounding": Pipeline._command,
+    "coverage": Pipeline._cover,
 }

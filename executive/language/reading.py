@@ -10,6 +10,7 @@ from executive.language.indirect import INDIRECT
 from executive.language.items import (
     LONGEST,
     Adverb,
+    Aside,
     Being,
     Chunk,
     Correction,
@@ -137,9 +138,9 @@ class Reader(Row):
             return None
         self.at += 1
         if ahead and ahead[0].word != "for" and (ahead[0].pos == "ADP" or ahead[0].tag in ("TO", "IN")):
-            return Separator("")
+            return Aside(token.text)
         if items and isinstance(items[-1], Chunk) and items[-1].role is not None:
-            return Separator("")
+            return Aside(token.text)
         verb = next((item for item in reversed(items) if isinstance(item, Verb | Being)), None)
         looks = not isinstance(verb, Verb) or VerbKind.FIND in verb.kinds
         return _place(token, PrepositionRole.AT if looks else PrepositionRole.GOAL)
@@ -221,7 +222,7 @@ class Reader(Row):
             self.at += 1
             return Separator("")
         if token.tag == "RB" and token.word in lexicon().manners:
-            return Separator(self.take(1).lower())
+            return Aside(self.take(1))
         before = token.pos in ("ADP", "ADV") and token.word not in ("of", "from")
         if before and behind and behind[0].word in ("here", "there"):
             self.at += 1

@@ -1,0 +1,90 @@
+"""Accounts for each word of a plain sentence: its meaning has it, a note names it, or it is lost.
+
+A word that the meaning lacks refuses the sentence in a request; in a statement it makes a note, since a statement asks
+for nothing. The fillers of words.yaml alone get no note.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from executive.language.actions import Action
+from executive.language.items import Aside, Being, Chunk, Item, Predicate, Verb, spoken_words
+from executive.language.lexicon import PrepositionRole
+from executive.language.limits import is_door
+from executive.language.phrases import Phrase
+from executive.language.roles import Location
+from skills.inputs.errors import listing
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Notes on words that change nothing, and the words that are lost, each with its clause."""
+
+    notes: tuple[str, ...] = ()
+    lost: tuple[tuple[str, str], ...] = ()
+
+
+def cover(
+    items: Sequence[Item], clauses: Sequence[Predicate], actions: Sequence[Action], taken_back: Sequence[str]
+) -> Coverage:
+    """Accounts for the items of a sentence by its actions; `taken_back` are phrases that the speaker has corrected."""
+    phrases = [phrase for action in actions for phrase in _phrases(action)]
+    used = {token.index for phrase in phrases for token in phrase.tokens}
+    described = {text for phrase in phrases for text in phrase.extra}
+    asides = [item.word for item in items if isinstance(item, Aside)]
+    asides += [f"{place.preposition} {place.text}" for action in actions for place in action.passes if not is_door(place)]
+    said, lost = list[str](), list[tuple[str, str]]()
+    for clause in clauses:
+        unused = [
+            one
+            for one in (clause.subject, *clause.items)
+            if isinstance(one, Chunk)
+            and not (one.phrase.speaker or one.phrase.addressed or used & indices(one) or one.phrase.text in described)
+        ]
+        words = _spoken(clause)
+        if _asks(clause, actions):
+            favours = [chunk for chunk in unused if chunk.role is PrepositionRole.FOR and chunk.phrase.person]
+            asides += [chunk.spoken for chunk in favours]
+            lost += [(chunk.spoken, words) for chunk in unused if chunk not in favours]
+        elif unused or (isinstance(clause.verb, Being) and clause.verb.narrated and " " in words):
+            said.append(words)
+    notes = {
+        "I leave out {}, and do the rest as usual": asides,
+        "I take {} to ask for nothing more": said,
+        "I take {} not to be meant": list(taken_back),
+    }
+    texts = (form.format(listing(map(repr, words))) for form, words in notes.items() if words)
+    return Coverage(tuple(texts), tuple(lost))
+
+
+def indices(chunk: Chunk) -> set[int]:
+    """Indices of the words that carry the meaning of a noun phrase."""
+    return {token.index for token in chunk.phrase.content}
+
+
+def _spoken(clause: Predicate) -> str:
+    verb = clause.verb
+    told = (verb.topic or verb.teller) if isinstance(verb, Being) else None
+    words = spoken_words(one for one in (clause.subject, verb, *clause.items) if one is not None).replace(" n't", "n't")
+    return words if told is None else f"{told.spoken} {words}"
+
+
+def _asks(clause: Predicate, actions: Sequence[Action]) -> bool:
+    """Returns whether a clause asks for an action, unlike a statement or a place that is only left."""
+    verb = clause.verb
+    if isinstance(verb, Being):
+        return verb.asked or clause.whether
+    return isinstance(verb, Verb) and not any(one.departs and one.verb == verb.text for one in actions)
+
+
+def _phrases(action: Action) -> Iterator[Phrase]:
+    """Yields the noun phrases that an action has."""
+    yield from action.objects
+    yield from (phrase for choice in action.choices for phrase in choice)
+    yield from (phrase for phrase in (action.teller, action.time) if phrase is not None)
+    for place in (action.source, action.goal, *action.passes):
+        around: Location | None = place
+        while around is not None:
+            if around.phrase is not None:
+                yield around.phrase
+            around = around.within

@@ -219,7 +219,7 @@ def _told_verb(row: Row) -> int:
         return 1
     if first.tag == "MD" and words[1:2] and words[1] in ("not", "n't", "nt") and tags[2:3] == ["VB"]:
         return 3
-    progressive = first.lemma == "be" and tags[1:2] == ["VBG"] and (words[1],) not in lexicon().fillers
+    progressive = first.lemma == "be" and tags[1:2] == ["VBG"] and words[1] not in lexicon().relative
     perfect = first.lemma == "have" and first.pos == "AUX" and tags[1:2] == ["VBN"]
     if progressive and words[1:] == ["going", "to"] and tags[3:] == ["VB"]:
         return 4

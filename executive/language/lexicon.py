@@ -60,7 +60,8 @@ class Lexicon:
             for phrase in self._phrases(kind.value):
                 kinds.setdefault(phrase, set()).add(kind)
         self.verbs = {phrase: frozenset(each) for phrase, each in kinds.items()}
-        self.fillers, self.needs, self.negations = map(self._phrases, ("fillers", "needs", "negations"))
+        names = ("fillers", "noted", "needs", "negations")
+        self.fillers, self.noted, self.needs, self.negations = map(self._phrases, names)
         roles = self._lists["prepositions"].items()
         self.prepositions = {tuple(one.split()): PrepositionRole(role) for role, each in roles for one in each}
         softness = self._lists["corrections"].items()

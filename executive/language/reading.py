@@ -221,8 +221,6 @@ class Reader(Row):
         if self._idle(items):
             self.at += 1
             return Separator("")
-        if token.tag == "RB" and token.word in lexicon().manners:
-            return Aside(self.take(1))
         before = token.pos in ("ADP", "ADV") and token.word not in ("of", "from")
         if before and behind and behind[0].word in ("here", "there"):
             self.at += 1
@@ -240,8 +238,18 @@ class Reader(Row):
             return Whether()
         if token.word == "but" and self.at > 0 and self._excepts(items):
             return None
-        filler = self._particle(items) or self.match(lexicon().fillers)
+        if token.word in lexicon().postures:
+            return self._posture(items)
+        filler, noted = self._particle(items) or self.match(lexicon().fillers), self.match(lexicon().noted)
+        if noted is not None and len(noted) > len(filler or ()):
+            return Aside(self.take(len(noted)))
         return None if filler is None else Separator(self.take_words(filler))
+
+    def _posture(self, items: Sequence[Item]) -> Item:
+        """Reads "standing": of somebody nothing that the robot can tell, of an object nothing but that it is there."""
+        last = next((item for item in reversed(items) if isinstance(item, Chunk)), None)
+        word = self.take(1)
+        return Unknown(word) if last is not None and last.phrase.person else Separator(word.lower())
 
     def _excepts(self, items: Sequence[Item]) -> bool:
         """Returns whether "but" means "except": after "everything", or after "all the drinks" if a noun follows."""

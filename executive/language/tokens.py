@@ -120,7 +120,7 @@ def _begins_command(tokens: Sequence[Token], at: int) -> bool:
 
 _IS: Final[Mapping[str, Callable[[Sequence[Token], int], bool]]] = {
     "verb": lambda tokens, at: (tokens[at].word,) in lexicon().verbs,
-    "filler": lambda tokens, at: (tokens[at].word,) in lexicon().fillers,
+    "filler": lambda tokens, at: (tokens[at].word,) in lexicon().fillers | lexicon().noted,
     "attribute": lambda tokens, at: is_attribute(tokens[at].text),
     "lower": lambda tokens, at: tokens[at].text.islower(),
     "command": _begins_command,

@@ -8,7 +8,7 @@ from typing import Final
 from executive.language.amounts import AMOUNTS, parse_seconds, parse_share, parse_time
 from executive.language.clauses import ACTS, CLAUSES
 from executive.language.items import verb
-from executive.language.lexicon import Patterns, any_of
+from executive.language.lexicon import Patterns, any_of, lexicon
 from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
@@ -30,6 +30,12 @@ from skills.inputs.errors import listing, with_article
 
 _INTRODUCTION: Final = "Hello, I am the robot here. I bring things, and I follow and guide people."
 _WAITING: Final = Patterns("structures.yaml", "waiting", AMOUNTS)
+
+_ADVERBIAL: Final = re.compile(
+    rf"(?!(?:the|a|an|my|your|our|his|her|their|this|all|every)\b)([\w' ]+?),? that (?=\w)|({any_of(map(' '.join, lexicon().noted))}) ",
+    re.IGNORECASE,
+)
+"""Words before what is told that say when or how it is told."""
 
 Done = tuple[Steps, State, tuple[str, ...]]
 """Steps, the state after them, and notes."""
@@ -195,6 +201,9 @@ def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser
         raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
     if said is None or re.fullmatch(r"so|it|that|about it|about that", said, re.IGNORECASE):
         return SpeechRequest(None, to)
+    adverbial = _ADVERBIAL.match(said)
+    if adverbial is not None and is_clause(said[adverbial.end() :], parser):
+        raise RefusalError(f"I tell it as soon as I am there, not {adverbial[1]!r}", [adverbial[1]])
     states = not (to.speaker or ACTS.question.match(said)) and is_clause(said, parser)
     if CLAUSES.greetings.fullmatch(said) or states:
         return SpeechRequest(_told(said), to)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from executive.language.actions import Action
 from executive.language.items import Aside, Being, Chunk, Item, Predicate, Verb, spoken_words
-from executive.language.lexicon import PrepositionRole
+from executive.language.lexicon import PrepositionRole, lexicon
 from executive.language.limits import is_door
 from executive.language.phrases import Phrase
 from executive.language.roles import Location
@@ -25,9 +25,17 @@ class Coverage:
 
 
 def cover(
-    items: Sequence[Item], clauses: Sequence[Predicate], actions: Sequence[Action], taken_back: Sequence[str]
+    items: Sequence[Item],
+    clauses: Sequence[Predicate],
+    actions: Sequence[Action],
+    taken_back: Sequence[str],
+    *,
+    known: bool,
 ) -> Coverage:
-    """Accounts for the items of a sentence by its actions; `taken_back` are phrases that the speaker has corrected."""
+    """Accounts for the items of a sentence by its actions.
+
+    `taken_back` are phrases that the speaker has corrected, `known` marks a sentence whose objects the world knows.
+    """
     phrases = [phrase for action in actions for phrase in _phrases(action)]
     used = {token.index for phrase in phrases for token in phrase.tokens}
     described = {text for phrase in phrases for text in phrase.extra}
@@ -48,13 +56,20 @@ def cover(
             lost += [(chunk.spoken, words) for chunk in unused if chunk not in favours]
         elif unused or (isinstance(clause.verb, Being) and clause.verb.narrated and " " in words):
             said.append(words)
+    owned = [one.spoken for one in (action.target for action in actions) if one is not None and _is_owned(one)]
     notes = {
         "I leave out {}, and do the rest as usual": asides,
         "I take {} to ask for nothing more": said,
         "I take {} not to be meant": list(taken_back),
     }
+    if known:
+        notes["I cannot tell whose it is: {}"] = owned
     texts = (form.format(listing(map(repr, words))) for form, words in notes.items() if words)
     return Coverage(tuple(texts), tuple(lost))
+
+
+def _is_owned(phrase: Phrase) -> bool:
+    return any(token.word in lexicon().owners for token in phrase.tokens[:-1])
 
 
 def indices(chunk: Chunk) -> set[int]:

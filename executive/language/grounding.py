@@ -22,6 +22,7 @@ from executive.words.command import Command, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
 from skills.api import ObjectKind
 from skills.inputs.errors import known_names, listing
+from skills.perception.class_forms import known_attributes
 
 
 def known_line(knowledge: Knowledge | None) -> str:
@@ -90,6 +91,10 @@ class _Grounder:
             return
         item = None if frame.item is None else self.taken(frame.item)
         target = None if frame.object is None else self.target(frame.object, frame.task)
+        for kind in filter(None, (item, target)):
+            if unseen := [word for word in kind.attributes if word not in known_attributes()]:
+                what = f"I cannot see which {kind.name} is {listing(map(repr, unseen))}"
+                raise RefusalError(f"{what}; I tell objects apart by colour, and big from small", unseen)
         if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
             raise RefusalError(f"which object? Known are {listing(self.knowledge.object_names())}", [target.name])
         people = target is not None and frame.task is Task.FIND and self.knowledge.somebody(target.name) is not None

@@ -159,7 +159,7 @@ class Pipeline:
 
     def _cover(self, trace: Trace) -> Trace:
         """Refuses the sentence if words of it are in no part of its meaning; notes those that change nothing."""
-        covered = cover(trace.items, trace.clauses, trace.actions, trace.taken_back)
+        covered = cover(trace.items, trace.clauses, trace.actions, trace.taken_back, known=self.knowledge is not None)
         if covered.lost:
             raise not_understood(covered.lost, self.knowledge)
         return replace(trace, notes=tuple(dict.fromkeys((*trace.notes, *covered.notes))))

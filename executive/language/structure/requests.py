@@ -203,7 +203,7 @@ def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser
         return SpeechRequest(None, to)
     adverbial = _ADVERBIAL.match(said)
     if adverbial is not None and is_clause(said[adverbial.end() :], parser):
-        raise RefusalError(f"I tell it as soon as I am there, not {adverbial[1]!r}", [adverbial[1]])
+        raise RefusalError(f"I tell it as soon as I am there, not {adverbial[1] or adverbial[2]!r}", [adverbial[0]])
     states = not (to.speaker or ACTS.question.match(said)) and is_clause(said, parser)
     if CLAUSES.greetings.fullmatch(said) or states:
         return SpeechRequest(_told(said), to)

@@ -58,6 +58,7 @@ class Action:
 
 
 _IT: Final = Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),))
+_BIN: Final = Location(Phrase((Token(0, 0, "bin", "bin", "NOUN", "NN", 0, "obl", kind=NounKind.PLACE),)), "to")
 _ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})
 _GIVING: Final = frozenset({"bring", "get", "fetch", "give", "take", "hand", "serve"})
 _THEN: Final = frozenset({"then", "after that", "afterwards", "next", "second", "subsequently"})
@@ -293,12 +294,17 @@ def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
         to_place = bool(goals) and not goals[0].person
         rest = [] if to_place and roles.favour else [roles.recipient]
         goals = [*goals, *rest] if to_place else [roles.recipient, *goals]
-    at_is_goal = blank.kind is VerbKind.PLACE or blank.verb in lexicon().at_is_goal or len(ats) > 1
+    discards, hurls = blank.verb in lexicon().discards, blank.verb in lexicon().hurls
+    lies_there = discards or (hurls and bool(ats) and ats[-1].preposition not in ("in", "inside"))
+    at_is_goal = (blank.kind is VerbKind.PLACE and not lies_there) or blank.verb in lexicon().at_is_goal or len(ats) > 1
     lies = any(place.role is not PrepositionRole.SOURCE for place in sources)  # the cup that is on the desk
     if ats and not goals and (at_is_goal or lies):
         goals.append(ats.pop())
     sources += ats
-    goal = next(iter(goals), HERE if blank.verb in lexicon().hands and not sources else None)
+    bare = _BIN if discards else HERE if blank.verb in lexicon().hands and not sources else None
+    goal = next(iter(goals), bare)
+    if goal is None and hurls:
+        blank = replace(blank, unknown=(*blank.unknown, blank.verb))
     each = len(roles.objects) == 1 and roles.objects[0].indefinite and not roles.objects[0].pronoun
     shared = roles.joined_goals if goal is not None and each else []
     candidates = [place.phrase for place in ([] if shared else [goal, *roles.joined_goals]) if place and place.phrase]

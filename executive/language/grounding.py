@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import Final
 
 from executive.language.command_frames import CommandFrame
+from executive.language.indirect import CONTENTS
 from executive.language.lexicon import lexicon
 from executive.language.limits import check_relation
 from executive.language.parser import DependencyParser
@@ -162,6 +163,9 @@ class _Grounder:
             goal, goal_at = self.place(location), None
         else:
             goal, goal_at = person, None if location.within is None else self.place(location.within)
+        if frame.object == CONTENTS and goal in self.knowledge.rooms:
+            what = f"I cannot tell whether all of the {goal} is empty; ask whether anybody is in it, or what is in it"
+            raise RefusalError(what, [location.text])
         if people and goal in self.knowledge.surfaces:
             raise RefusalError(f"I look for people in rooms, and the {goal} is none", [goal])
         own = (goal in self.knowledge.rooms, goal in (*self.knowledge.surfaces, *self.knowledge.poses), True)
@@ -199,6 +203,9 @@ class _Grounder:
             own = self.knowledge.room(exact)
             where = f"the {exact} is not {'in' if room in self.knowledge.places else 'on'} the {room}"
             raise RefusalError(where if own == exact else f"{where}, but in the {own}", [location.phrase.text])
+        if not inside and location.phrase.singular in (_BIN, *synonyms_for(_BIN)):
+            if not (inside := [name for name in self.knowledge.bins if room in (None, self.knowledge.room(name))]):
+                raise RefusalError("there is no bin here that I know of", [location.phrase.text])
         if not inside:
             raise self._unknown(Slot.PLACE, (location.phrase.text, location.phrase.singular), known)
         return self._only(inside, Slot.PLACE, Phrase(location.phrase.tokens).text)
@@ -312,4 +319,5 @@ def _last(name: str) -> str:
     return name.split()[-1].lower()
 
 
+_BIN: Final = "bin"
 _KINDS: Final = ("room", "surface", "person")

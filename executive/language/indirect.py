@@ -17,6 +17,9 @@ _WHERE: Final = frozenset({"in", "on", "into", "onto", "inside", "under", "next"
 _WANTS: Final = frozenset({"need", "want", "have", "like", "love", "say", "mean"})
 OBJECTS: Final = Phrase((Token(0, 0, "objects", "object", "NOUN", "NNS", 0, "obj", kind=NounKind.THING),))
 
+CONTENTS: Final = Phrase((replace(OBJECTS.head, relation="attr"),))
+"""All objects on a surface, as a question whether it is empty asks about them."""
+
 
 def _asks(items: Sequence[Item]) -> bool:
     """Returns whether the last item is a verb that asks to look for an object."""
@@ -86,12 +89,13 @@ def do_we_have(row: Row, items: list[Item]) -> Item | None:
 def what_is(row: Row, items: list[Item]) -> Item | None:
     """Reads "what is on the bench" or "is the bench empty" as a request to look for all objects there."""
     asks = _asks(items)
-    found = _whatever(row) or _fullness(row) if asks or may_begin_command(items) else None
+    whatever = _whatever(row) if asks or may_begin_command(items) else None
+    found = whatever or (_fullness(row) if asks or may_begin_command(items) else None)
     if found is None:
         return None
     if asks:
         items.pop()
-    items += [verb("find"), Chunk(OBJECTS)]
+    items += [verb("find"), Chunk(CONTENTS if whatever is None else OBJECTS)]
     return found
 
 

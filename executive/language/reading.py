@@ -249,7 +249,8 @@ class Reader(Row):
         """Reads "standing": of somebody nothing that the robot can tell, of an object nothing but that it is there."""
         last = next((item for item in reversed(items) if isinstance(item, Chunk)), None)
         word = self.take(1)
-        return Unknown(word) if last is not None and last.phrase.person else Separator(word.lower())
+        somebody = last is not None and (last.phrase.person or last.phrase.head.word in lexicon().anyone)
+        return Unknown(word) if somebody else Separator(word.lower())
 
     def _excepts(self, items: Sequence[Item]) -> bool:
         """Returns whether "but" means "except": after "everything", or after "all the drinks" if a noun follows."""

@@ -101,6 +101,7 @@ class SurfaceFacts(Strict):
     polygon: Polygon = Field(description="outline of the top, corners (x, y)")
     viewpoints: Annotated[tuple[Pose, ...], Field(min_length=1, description="poses from which it is seen whole")]
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
+    bin: bool = Field(default=False, description="whether what is thrown away goes there")
 
 
 class ObjectFacts(Strict):
@@ -194,6 +195,11 @@ class Knowledge(Strict):
             return self.surfaces[place].place
         rooms, pose = self.rooms, self.places[place].pose
         return place if place in rooms else min(rooms, key=lambda name: distance_m(rooms[name], (pose.x, pose.y)))
+
+    @property
+    def bins(self) -> tuple[str, ...]:
+        """Names of the surfaces where objects are thrown away, in the file's order."""
+        return tuple(name for name, surface in self.surfaces.items() if surface.bin)
 
     def surfaces_in(self, place: str) -> tuple[str, ...]:
         """Surfaces in a room, in the file's order; for a surface, only the surface itself."""

@@ -7,7 +7,7 @@ from typing import Final
 
 from executive.language.amounts import AMOUNTS, parse_seconds, parse_share, parse_time
 from executive.language.clauses import CLAUSES
-from executive.language.indirect import OBJECTS
+from executive.language.indirect import CONTENTS, OBJECTS
 from executive.language.items import Adverb, Chunk, Whether, verb
 from executive.language.lexicon import Patterns, any_of
 from executive.language.questions import RefusalError, RefusalKind, Slot, which_question
@@ -220,8 +220,8 @@ def _look(words: str, state: State, reader: PlainReader) -> SpokenCondition:
     match = _P.fullness.fullmatch(re.sub(r"n't\b", " not", words))
     if match is None:
         return reader.check(words, state)
-    place = with_preposition(reader.read_items(match["on"] or match["what"]), "on")
-    found = reader.look_by_items((verb("find"), Chunk(OBJECTS), *place), words, state)
+    place = with_preposition(reader.read_items(match["on"] or match["what"]), "on" if match["on"] else "at")
+    found = reader.look_by_items((verb("find"), Chunk(OBJECTS if match["on"] else CONTENTS), *place), words, state)
     empty = (match["how"] or "").lower() in ("empty", "free", "bare", "clear")
     return found.negate(words) if empty != bool(match["not"]) else found
 

@@ -87,7 +87,8 @@ class _Grounder:
 
     def commands(self, frame: CommandFrame) -> Iterator[Command]:
         """Converts one frame to a command, or to one for each room."""
-        if frame.goal is not None and frame.goal.every_room and frame.item is None and frame.task is None:
+        rooms = frame.goal is not None and frame.goal.every_room and frame.goal.within is None
+        if rooms and frame.item is None and frame.task is None:
             yield from (Command(goal=room, verb=frame.verb) for room in self.knowledge.rooms)
             return
         item = None if frame.item is None else self.taken(frame.item)

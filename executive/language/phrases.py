@@ -94,7 +94,7 @@ class Phrase:
     def pronoun(self) -> bool:
         """Returns whether the phrase refers to an earlier phrase ("it", "one", "two of them")."""
         word = self.head.word in lexicon().pronouns and not self.stands_for_one
-        return word and all(map(_is_determiner, self.tokens[:-1]))
+        return word and not self.extra and all(map(_is_determiner, self.tokens[:-1]))
 
     @property
     def stands_for_one(self) -> bool:
@@ -109,7 +109,7 @@ class Phrase:
     @property
     def speaker(self) -> bool:
         """Returns whether the phrase means the speaker."""
-        return len(self.tokens) == 1 and self.head.word in lexicon().speaker
+        return len(self.tokens) == 1 and self.head.word in lexicon().speaker and not self.extra
 
     @property
     def person(self) -> bool:

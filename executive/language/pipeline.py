@@ -6,10 +6,10 @@ from typing import Final
 
 from executive.language.actions import Action, read_actions
 from executive.language.command_frames import CommandFrame, command_frames, spoken_command
-from executive.language.coverage import cover, indices
+from executive.language.coverage import cover, left_out
 from executive.language.disfluency import repair_disfluencies, unwanted_phrases
 from executive.language.grounding import check_unwanted, ground
-from executive.language.items import Being, Chunk, Item, Predicate, drop_name, predicates
+from executive.language.items import Being, Item, Predicate, drop_name, predicates
 from executive.language.lexicon import VerbKind
 from executive.language.limits import check_feasible, check_routes_and_speaker, not_understood, refuse_harm
 from executive.language.nouns import NounKind
@@ -108,9 +108,7 @@ class Pipeline:
         items = Reader(said.tokens, noun_phrases(said.tokens), silent=set(said.silent)).read(trace.lead)
         read = replace(trace, tokens=said.tokens, affirmed=said)
         repaired = repair_disfluencies(items)
-        kept = {index for item in repaired if isinstance(item, Chunk) for index in indices(item)}
-        dropped = (item.spoken for item in items if isinstance(item, Chunk) and not kept & indices(item))
-        return replace(read, items=repaired, unwanted=unwanted_phrases(items), taken_back=tuple(dropped))
+        return replace(read, items=repaired, unwanted=unwanted_phrases(items), taken_back=left_out(items, repaired))
 
     def _split(self, trace: Trace) -> Trace:
         clauses = predicates(trace.items)

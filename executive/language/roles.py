@@ -47,7 +47,7 @@ class Location:
     @property
     def every_room(self) -> bool:
         """Returns whether the location means all rooms."""
-        return self.phrase is not None and self.phrase.universal and self.phrase.singular.split()[-1] == "room"
+        return self.phrase is not None and self.phrase.universal and self.phrase.singular == "room"
 
     @property
     def name(self) -> str:
@@ -59,7 +59,7 @@ class Location:
         """Words for the place, with the larger place around it."""
         if self.within is None:
             return self.name
-        return f"{self.name} {self.within.preposition} {self.within.text}"
+        return " ".join(filter(None, (self.name, self.within.preposition, self.within.text)))
 
 
 _JOINTS: Final = frozenset({",", ";", "and", "or", "then", "also", "plus", "second", "but"})

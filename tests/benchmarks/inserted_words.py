@@ -14,8 +14,8 @@ import re
 from collections import Counter
 from functools import cache
 
-from tests.benchmarks.harness import command, share
-from tests.benchmarks.same_answers import Asker, sentences
+from tests.benchmarks.harness import command
+from tests.benchmarks.same_answers import OPEN, Asker, sentences
 from tests.tables import yaml_beside
 
 _VOWEL = re.compile(r"[aeiou]", re.IGNORECASE)
@@ -33,7 +33,7 @@ def places(kind, tokens):
     tokens = [*tokens]
     end = len(tokens) - (bool(tokens) and tokens[-1].pos == "PUNCT")
     ends = [n for n in range(1, end) if tokens[n].word in _ENDS and tokens[n - 1].pos in ("NOUN", "PROPN", "PRON")]
-    nouns = [n for n in range(1, end) if tokens[n].pos == "NOUN" and tokens[n - 1].pos in ("DET", "NUM", "VERB", "ADP")]
+    nouns = [n for n in range(1, end) if tokens[n].pos == "NOUN" and tokens[n - 1].pos in ("DET", "NUM", "ADP")]
     behind = [n + 1 for n in range(end - 1) if tokens[n].pos == "NOUN" and tokens[n + 1].pos in ("ADP", "CCONJ", "PUNCT")]
     if kind == "adverbs":
         return [*(n for n in range(end) if tokens[n].tag == "VB"), *ends, end]
@@ -78,13 +78,14 @@ def measured(count: int = 1000, seed: int = 1, show: bool = False):
     for text, way, kind, word, longer in drawn(count, seed, ask):
         answer = ask(longer, way)
         same = said(answer) == said(ask(text, way))
-        of[kind] += 1
-        lost[kind] += same
+        asked = "open vocabulary" if way == OPEN else "a world"
+        of.update([kind, asked])
+        lost.update([kind, asked] if same else [])
         ends["lost" if same else answer.status.value] += 1
         if same and show:
             print(f"{kind}: {word!r}: {longer!r} ({way})")
-    shares = {kind: share([True] * lost[kind] + [False] * (of[kind] - lost[kind])) for kind in sorted(of)}
-    return {"seed": seed, "sentences": count, "lost_in_silence": lost.total() / count, **ends, "by_kind": shares}
+    shares = {f"in {kind}": round(lost[kind] / of[kind], 4) for kind in sorted(of)}
+    return {"seed": seed, "sentences": count, "lost_in_silence": ends["lost"] / count, **ends, **shares}
 
 
 if __name__ == "__main__":

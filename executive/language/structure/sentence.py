@@ -8,6 +8,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from executive.language.clauses import ACTS, Clause, Cue, cut, split, trailing_cue
+from executive.language.coverage import note_adverbs
 from executive.language.items import Adverb, Chunk, verb, without_objects
 from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
@@ -418,7 +419,9 @@ def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, mem
     parts = tuple(" | ".join(filter(None, (each.joint.strip(" ,;."), each.cue, each.text))) for each in clauses)
     commands = tuple(command for step in steps for each in step.walk() for command in each.commands)
     found = Trace(plain.text, state.memory, opened=plain.opened, tokens=plain.tokens, commands=commands)
-    notes = [*builder.notes, *([_BACK] if _returns_to_speaker(commands) else [])]
+    spoken = [each.speak for step in steps for each in step.walk() if isinstance(each, Speak)]
+    adverbs = note_adverbs(plain.text, [*spoken, *re.findall("'([^']+)'", " ".join(builder.notes))])
+    notes = [*builder.notes, *filter(None, [adverbs]), *([_BACK] if _returns_to_speaker(commands) else [])]
     return replace(found, notes=tuple(dict.fromkeys(notes)), parts=parts, steps=steps)
 
 

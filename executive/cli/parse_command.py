@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import typer
 
 import executive
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, print_json
-from executive.language.explain import arcs_svg, explain, explanation_lines
+from executive.language.explain import Use, arcs_svg, explain, explanation_lines, word_uses
 from executive.language.understand import Status, Understanding
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.steps import steps_to_yaml
@@ -77,7 +77,8 @@ def _values(meaning: Understanding, explained: bool) -> dict[str, object]:
 def _show(meaning: Understanding, as_json: bool, explained: bool) -> None:
     """Prints the commands on standard output, perhaps with the steps, or the reason for a refusal on standard error."""
     if explained and meaning.trace is not None:
-        _echo(explanation_lines(meaning.trace), as_json)
+        uses = (typer.style(word, fg=_COLOURS[use]) for word, use in word_uses(meaning.trace))
+        _echo([" ".join(uses), *explanation_lines(meaning.trace)], as_json)
     elif meaning.steps:
         _echo(steps_to_yaml(meaning.steps), as_json)
     elif meaning.commands:
@@ -86,6 +87,9 @@ def _show(meaning: Understanding, as_json: bool, explained: bool) -> None:
         typer.echo(f"errand: {meaning.reason}", err=True)
     else:
         _echo(meaning.notes, True)
+
+
+_COLOURS: Final = {Use.MEANING: "green", Use.NOTE: "yellow", Use.FILLER: "bright_black", Use.REFUSED: "red"}
 
 
 def _echo(lines: Iterable[str], as_json: bool) -> None:

@@ -260,7 +260,12 @@ def _waiting(blank: Action, roles: Roles) -> Action:
     """Waits for a time, here or in a place; a wait without a time only goes to the place."""
     times = [phrase for phrase in (roles.searched, *roles.objects) if phrase is not None]
     places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
-    fits = len(times) == 1 and times[0].head.word in TIME_UNITS_S and times[0].count > 0 and times[0].text == times[0].head.text
+    fits = (
+        len(times) == 1
+        and times[0].head.word in TIME_UNITS_S
+        and times[0].count > 0
+        and times[0].text == times[0].head.text
+    )
     extra = [phrase.spoken for phrase in (times[1:] if fits else times)] + ([] if fits else [blank.verb])
     extra += [place.text for place in (*places[1:], *_beyond(roles))]
     goal, time = next(iter(places), None), times[0] if fits else None

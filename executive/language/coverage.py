@@ -42,7 +42,9 @@ def cover(
     used = {token.index for phrase in phrases for token in phrase.tokens}
     described = {text for phrase in phrases for text in phrase.extra}
     asides = [item.word for item in items if isinstance(item, Aside)]
-    asides += [f"{place.preposition} {place.text}" for action in actions for place in action.passes if not is_door(place)]
+    asides += [
+        f"{place.preposition} {place.text}" for action in actions for place in action.passes if not is_door(place)
+    ]
     said, lost = list[str](), list[tuple[str, str]]()
     for clause in clauses:
         unused = [
@@ -83,7 +85,11 @@ def left_out(items: Sequence[Item], repaired: Sequence[Item]) -> tuple[str, ...]
     """Words of the items that the speaker's corrections and negations have removed."""
     kept = {index for item in repaired if isinstance(item, Chunk) for index in _indices(item)}
     chunks = (item for item in items if not isinstance(item, Chunk) or not kept & _indices(item))
-    gone = [item for item in chunks if isinstance(item, Chunk | Unknown | Aside) and not any(item is one for one in repaired)]
+    gone = [
+        item
+        for item in chunks
+        if isinstance(item, Chunk | Unknown | Aside) and not any(item is one for one in repaired)
+    ]
     return tuple(item.spoken if isinstance(item, Chunk) else item.word for item in gone)
 
 

@@ -1,21 +1,48 @@
 """Explains how a sentence became its commands: as JSON values, lines of text, or a drawing of the dependencies."""
 
+import enum
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from executive.language.actions import Action
 from executive.language.command_frames import spoken_command
 from executive.language.items import Predicate, spoken_words
+from executive.language.lexicon import any_of, lexicon
 from executive.language.pipeline import Trace
 from executive.language.tokens import Token
 from executive.words.steps import steps_to_yaml
 
 
+class Use(enum.Enum):
+    """Where a word of a sentence went."""
+
+    MEANING = "meaning"  # into the commands or the mission
+    NOTE = "note"  # nowhere else, and a note names it
+    FILLER = "filler"  # it changes nothing
+    REFUSED = "refused"  # the refusal names it
+
+
+def word_uses(trace: Trace) -> tuple[tuple[str, Use], ...]:
+    """Words of a sentence in order, each with where it went."""
+    refused = () if trace.refusal is None else trace.refusal.unknown
+    noted = re.findall(r"'((?:[^']|(?<=\w)'(?=\w))+)'", " ".join(trace.notes))
+    small = (*map(" ".join, lexicon().fillers), *lexicon().asides, *lexicon().openers, *lexicon().hesitations)
+    forms = {Use.REFUSED: refused, Use.NOTE: noted, Use.FILLER: filter(_WORD.search, small)}
+    groups = (rf"(?P<{use.name}>\b(?:{any_of(texts) or '(?!)'})(?!\w))" for use, texts in forms.items())
+    found = re.compile("|".join(groups), re.IGNORECASE)
+    uses = {n: Use[match.lastgroup or ""] for match in found.finditer(trace.text) for n in range(*match.span())}
+    return tuple((word[0], uses.get(word.start(), Use.MEANING)) for word in _WORD.finditer(trace.text))
+
+
+_WORD: Final = re.compile(r"[\w'-]*\w")
+
+
 def explain(trace: Trace) -> dict[str, Any]:
     """Explains each step of understanding a sentence, as JSON values; the steps after a refusal are empty.
 
-    `parts` are the clauses, `stands_for` the pronouns with their meanings, `frames` the commands with the spoken names,
-    and `refused_at` is the refusing step.
+    `uses` has each word with where it went, `parts` are the clauses, `stands_for` the pronouns with their meanings,
+    `frames` the commands with the spoken names, and `refused_at` is the refusing step.
     """
     subject = None
     if trace.actions:  # the addressed robot acts in every request
@@ -33,6 +60,7 @@ def explain(trace: Trace) -> dict[str, Any]:
         "commands": list(map(str, trace.commands)),
         "mission": [*steps_to_yaml(trace.steps)],
         "notes": [*trace.notes],
+        "uses": [[word, use.value] for word, use in word_uses(trace)],
         "refused_at": trace.refused_at,
         "reason": None if trace.refusal is None else trace.refusal.reason,
     }
@@ -84,6 +112,11 @@ def explanation_lines(trace: Trace) -> Iterator[str]:
         "stands for": [f"{word} = {meant}" for word, meant in trace.meanings],
         "command frames": values["frames"],
         "notes": trace.notes,
+        "where each word went": [
+            f"{use.value}: {', '.join(words)}"
+            for use in Use
+            if (words := [word for word, its in word_uses(trace) if its is use])
+        ],
         "commands": values["commands"],
         "mission": values["mission"],
         f"refused at {trace.refused_at!r}": [] if trace.refused_at is None else [values["reason"] or ""],

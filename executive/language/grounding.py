@@ -91,6 +91,8 @@ class _Grounder:
         if rooms and frame.item is None and frame.task is None:
             yield from (Command(goal=room, verb=frame.verb) for room in self.knowledge.rooms)
             return
+        if frame.verb in lexicon().stacks:
+            raise RefusalError("I put objects side by side, and stack none", [frame.verb])
         item = None if frame.item is None else self.taken(frame.item)
         target = None if frame.object is None else self.target(frame.object, frame.task)
         for kind in filter(None, (item, target)):
@@ -205,7 +207,8 @@ class _Grounder:
             where = f"the {exact} is not {'in' if room in self.knowledge.places else 'on'} the {room}"
             raise RefusalError(where if own == exact else f"{where}, but in the {own}", [location.phrase.text])
         if not inside and location.phrase.singular in (_BIN, *synonyms_for(_BIN)):
-            if not (inside := [name for name in self.knowledge.bins if room in (None, self.knowledge.room(name))]):
+            inside = [name for name in self.knowledge.bins if room in (None, self.knowledge.room(name))]
+            if not inside:
                 raise RefusalError("there is no bin here that I know of", [location.phrase.text])
         if not inside:
             raise self._unknown(Slot.PLACE, (location.phrase.text, location.phrase.singular), known)

@@ -182,7 +182,8 @@ def is_door(place: Location) -> bool:
 def check_routes_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Action]) -> None:
     """Refuses a prescribed route, and relations to the speaker except "to me". Raises RefusalError."""
     for place in (place for action in actions for place in action.passes if not is_door(place)):
-        raise _refused("go", place.preposition, place.name)
+        said = f"{place.preposition} {place.name if place.phrase is None else place.phrase.spoken}"
+        raise RefusalError(f"I find my own way, and do not go {said!r}", [said])
     for clause in clauses:
         act = "go" if isinstance(clause.verb, Verb) and clause.verb.kinds == {VerbKind.GO} else "bring"
         for chunk in clause.items:

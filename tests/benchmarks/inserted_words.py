@@ -34,7 +34,9 @@ def places(kind, tokens):
     end = len(tokens) - (bool(tokens) and tokens[-1].pos == "PUNCT")
     ends = [n for n in range(1, end) if tokens[n].word in _ENDS and tokens[n - 1].pos in ("NOUN", "PROPN", "PRON")]
     nouns = [n for n in range(1, end) if tokens[n].pos == "NOUN" and tokens[n - 1].pos in ("DET", "NUM", "ADP")]
-    behind = [n + 1 for n in range(end - 1) if tokens[n].pos == "NOUN" and tokens[n + 1].pos in ("ADP", "CCONJ", "PUNCT")]
+    behind = [
+        n + 1 for n in range(end - 1) if tokens[n].pos == "NOUN" and tokens[n + 1].pos in ("ADP", "CCONJ", "PUNCT")
+    ]
     if kind == "adverbs":
         return [*(n for n in range(end) if tokens[n].tag == "VB"), *ends, end]
     return nouns if kind in ("adjectives", "participles") else [*behind, end]

@@ -16,6 +16,7 @@ from executive.tree.registry import built_in_skills
 from executive.words.knowledge import load_knowledge
 from executive.words.mission import Mission
 from plant.worlds.world import load_world
+from tests.benchmarks.inserted_words import measured
 from tests.benchmarks.same_answers import compare, store
 
 SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
@@ -86,3 +87,8 @@ def test_stored_answers_are_compared_by_sentence(tmp_path, capsys):
     after.write_text(before.read_text().replace('"status": "ok"', '"status": "refused"', 1))
     assert (compare(before, before), compare(before, after)) == (0, 1)
     assert "1 of " in capsys.readouterr().out
+
+
+def test_few_inserted_words_are_lost_in_silence():
+    found = measured(count=60, seed=11)
+    assert found["lost_in_silence"] <= 0.05 and found["refused"] > 10

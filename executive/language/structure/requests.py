@@ -31,9 +31,9 @@ from skills.inputs.errors import listing, with_article
 _INTRODUCTION: Final = "Hello, I am the robot here. I bring things, and I follow and guide people."
 _WAITING: Final = Patterns("structures.yaml", "waiting", AMOUNTS)
 
+_SUBJECTS: Final = r"(?:the|a|an|my|your|our|his|her|their|this|all|every)\b"
 _ADVERBIAL: Final = re.compile(
-    rf"(?!(?:the|a|an|my|your|our|his|her|their|this|all|every)\b)([\w' ]+?),? that (?=\w)|({any_of(map(' '.join, lexicon().noted))}) ",
-    re.IGNORECASE,
+    rf"(?!{_SUBJECTS})([\w' ]+?),? that (?=\w)|({any_of(map(' '.join, lexicon().noted))}) ", re.IGNORECASE
 )
 """Words before what is told that say when or how it is told."""
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import takewhile
+from itertools import chain, takewhile
 from typing import Final
 
 from executive.language.items import (
@@ -55,6 +55,13 @@ class Action:
     def target(self) -> Phrase | None:
         """Only object of the action, once pronouns are resolved; None if it has no object."""
         return self.objects[0] if self.objects else None
+
+    @property
+    def phrases(self) -> tuple[Phrase, ...]:
+        """Noun phrases of the action in any role."""
+        places = (place for place in (self.source, self.goal, *self.passes) if place is not None)
+        others = (phrase for phrase in (self.teller, self.time) if phrase is not None)
+        return (*self.objects, *others, *chain(*self.choices), *chain(*(place.phrases for place in places)))
 
 
 _IT: Final = Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),))
@@ -231,10 +238,9 @@ def _going(blank: Action, roles: Roles) -> Iterator[Action]:
     places = places or roles.paths
     if not places and blank.verb in lexicon().goes_back:
         places = [HERE]
-    recipient = None if roles.recipient is HERE and roles.favour else roles.recipient
-    extra = [part.text for part in (recipient, None if headed is not None else sought) if part is not None]
-    extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
-    blank = replace(blank, unknown=(*blank.unknown, *extra), passes=tuple(passed))
+    me = ["me"] if roles.recipient is HERE and not roles.favour else []
+    unknown = (*blank.unknown, *me, *([] if places else [blank.verb]))
+    blank = replace(blank, unknown=unknown, passes=tuple(passed))
     yield from (replace(blank, goal=place) for place in places) if places else (blank,)
 
 
@@ -247,11 +253,8 @@ def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
         objects = [roles.searched]
     places = places or [place for place in roles.goals if place == THERE]
     elsewhere = [] if roles.searched is None else places[1 : len(roles.objects)]
-    unfit = [place for place in roles.goals if place != THERE]
-    others = [place for place in unfit if place is not HERE]
-    extra = [place.text for place in (*places[1 + len(elsewhere) :], *others, *roles.paths)]
-    extra += ["here"] if HERE in unfit else []
-    found = _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), extra)
+    unfit = ["here"] if HERE in roles.goals else []
+    found = _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), unfit)
     yield found
     yield from (replace(found, source=place) for place in (*elsewhere, *roles.joined_goals))
 
@@ -266,27 +269,16 @@ def _waiting(blank: Action, roles: Roles) -> Action:
         and times[0].count > 0
         and times[0].text == times[0].head.text
     )
-    extra = [phrase.spoken for phrase in (times[1:] if fits else times)] + ([] if fits else [blank.verb])
-    extra += [place.text for place in (*places[1:], *_beyond(roles))]
     goal, time = next(iter(places), None), times[0] if fits else None
     if not times and goal is not None:
-        return replace(blank, kind=VerbKind.GO, goal=goal, unknown=(*blank.unknown, *extra[1:]))
-    return replace(blank, goal=goal, time=time, unknown=(*blank.unknown, *extra))
+        return replace(blank, kind=VerbKind.GO, goal=goal)
+    return replace(blank, goal=goal, time=time, unknown=(*blank.unknown, *([] if fits else [blank.verb])))
 
 
 def _charging(blank: Action, roles: Roles) -> Action:
     """Charges the robot's own battery at its dock; the robot charges nothing else and nowhere else."""
-    objects = [phrase.spoken for phrase in roles.objects if not phrase.addressed]
-    places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
-    docks = [place.text for place in places if place.phrase is None or place.phrase.head.lemma not in lexicon().docks]
-    searched = [] if roles.searched is None else [roles.searched.spoken]
-    return replace(blank, unknown=(*blank.unknown, *objects, *docks, *searched, *(p.text for p in _beyond(roles))))
-
-
-def _beyond(roles: Roles) -> Iterator[Location]:
-    """Yields the locations that do not fit a verb without motion: sources, paths, recipients, additional places."""
-    recipient = () if roles.recipient in (None, HERE) else (roles.recipient,)
-    yield from (place for place in (*roles.sources, *roles.paths, *recipient, *roles.joined_goals) if place)
+    docks = (place for place in (*roles.ats, *roles.goals) if place.phrase and place.phrase.text in lexicon().docks)
+    return replace(blank, passes=tuple(docks))
 
 
 def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
@@ -315,16 +307,13 @@ def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
     candidates = [place.phrase for place in ([] if shared else [goal, *roles.joined_goals]) if place and place.phrase]
     if len(candidates) > 1:
         blank = replace(blank, choices=(*blank.choices, tuple(candidates)))
-    extra = [place.text for place in (*sources[1:], *(place for place in goals[1:] if place is not HERE))]
-    extra += [roles.searched.text] if roles.searched is not None else []
     source = next(iter(sources), None)
     found = replace(blank, objects=tuple(roles.objects), source=source, goal=goal, passes=tuple(roles.paths))
-    carried = _with_object(found, extra)
+    carried = _with_object(found)
     yield carried
     yield from (replace(carried, goal=place) for place in shared)
 
 
-def _with_object(action: Action, extra: Sequence[str]) -> Action:
+def _with_object(action: Action, unknown: Sequence[str] = ()) -> Action:
     """Adds unknown words to the action, and the verb itself when its object is missing."""
-    missing = () if action.objects else (action.verb,)
-    return replace(action, unknown=(*action.unknown, *extra, *missing))
+    return replace(action, unknown=(*action.unknown, *unknown, *(() if action.objects else (action.verb,))))

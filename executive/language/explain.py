@@ -15,7 +15,7 @@ from executive.words.steps import steps_to_yaml
 
 
 class Use(enum.Enum):
-    """Where a word of a sentence went."""
+    """Part of an answer that has a word of the sentence."""
 
     MEANING = "meaning"  # into the commands or the mission
     NOTE = "note"  # nowhere else, and a note names it

@@ -123,10 +123,13 @@ class Pipeline:
 
     def _check(self, trace: Trace) -> Trace:
         """Refuses the whole sentence if some of its words were not understood."""
+        notes, lost = cover(trace.items, trace.clauses, trace.actions, known=self.knowledge is not None)
         unknown = [(word, action.said) for action in trace.actions for word in action.unknown]
-        if unknown:
-            raise not_understood(unknown, self.knowledge)
-        notes = []
+        lost = [one for one in lost if not any(word in one[0] or one[0] in word for word, _ in unknown)]
+        if unknown or lost:
+            raise not_understood([*unknown, *lost], self.knowledge)
+        if trace.taken_back:
+            notes.append(f"I take {listing(map(repr, trace.taken_back))} not to be meant")
         for choice, kind in ((choice, action.kind) for action in trace.actions for choice in action.choices):
             any_will_do = all(one.tokens[0].word in ("a", "an", "any", "some") and not one.person for one in choice)
             if kind is VerbKind.FIND or not any_will_do:
@@ -155,13 +158,6 @@ class Pipeline:
         check_unwanted(trace.unwanted, commands, self.knowledge)
         return replace(trace, commands=commands, notes=(*trace.notes, *notes))
 
-    def _cover(self, trace: Trace) -> Trace:
-        """Refuses the sentence if words of it are in no part of its meaning; notes those that change nothing."""
-        covered = cover(trace.items, trace.clauses, trace.actions, trace.taken_back, known=self.knowledge is not None)
-        if covered.lost:
-            raise not_understood(covered.lost, self.knowledge)
-        return replace(trace, notes=tuple(dict.fromkeys((*trace.notes, *covered.notes))))
-
 
 def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError:
     """Question that remains about phrases joined by "or" if only one of them is possible."""
@@ -185,5 +181,4 @@ _STEPS: Final[dict[str, Callable[[Pipeline, Trace], Trace]]] = {
     "feasibility": Pipeline._check_feasible,
     "command frames": lambda _, trace: replace(trace, frames=command_frames(trace.resolved)),
     "grounding": Pipeline._command,
-    "coverage": Pipeline._cover,
 }

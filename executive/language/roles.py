@@ -50,6 +50,12 @@ class Location:
         return self.phrase is not None and self.phrase.universal and self.phrase.singular == "room"
 
     @property
+    def phrases(self) -> tuple[Phrase, ...]:
+        """Noun phrases of the place and of the larger places around it."""
+        own = () if self.phrase is None else (self.phrase,)
+        return own if self.within is None else (*own, *self.within.phrases)
+
+    @property
     def name(self) -> str:
         """Words for the place itself, without articles; "start" for HERE."""
         return "start" if self.phrase is None else self.phrase.text

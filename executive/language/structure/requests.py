@@ -333,14 +333,10 @@ def steps_for_everyone(text: str, state: State, reader: PlainReader) -> tuple[St
         raise RefusalError(f"I know nobody in the {room} to bring anything to: {who}", [who])
     steps: list[Step] = []
     begun = state
-    others = tuple(
-        replace(one, items=tuple(item for item in one.items if getattr(item, "phrase", None) != to.phrase))
-        for one in trace.clauses
-    )
     for name in people:
         person = Location(phrase_of_name(name, NounKind.PERSON), "to", to.within)
         actions = [replace(one, goal=person) if one.goal == to else one for one in trace.actions]
-        reading = reader.commands_from_actions(replace(trace, clauses=others), actions, begun)
+        reading = reader.commands_from_actions(trace, actions, begun)
         if any(action.target is not None and not action.target.indefinite for action in reading.trace.resolved):
             raise RefusalError(f"there is only one of it, and I cannot bring it to {who}; name one person", [who])
         steps += steps_of_commands(reading.commands)

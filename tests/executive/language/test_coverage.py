@@ -50,7 +50,7 @@ def test_fillers_and_words_of_the_meaning_make_no_note(understood, sentence):
     "sentence",
     ["throw away the beer on the kitchen table", "put the beer from the kitchen table in the bin", "dump the beer"],
 )
-def test_what_is_thrown_away_goes_to_the_bin(understood, with_bin, sentence):
+def test_robot_throws_things_away_into_the_bin(understood, with_bin, sentence):
     answer = understood(sentence, knowledge=with_bin)
     taken, put = answer.commands
     assert (taken.goal, put.goal) == ("kitchen" if "dump" in sentence else "kitchen table", "night stand")

@@ -59,9 +59,9 @@ class Action:
     @property
     def phrases(self) -> tuple[Phrase, ...]:
         """Noun phrases of the action in any role."""
-        places = (place for place in (self.source, self.goal, *self.passes) if place is not None)
-        others = (phrase for phrase in (self.teller, self.time) if phrase is not None)
-        return (*self.objects, *others, *chain(*self.choices), *chain(*(place.phrases for place in places)))
+        places = (place for each in (self.source, self.goal, *self.passes) if each is not None for place in each.around)
+        others = (self.teller, self.time, *(place.phrase for place in places))
+        return (*self.objects, *chain(*self.choices), *(phrase for phrase in others if phrase is not None))
 
 
 _IT: Final = Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),))
@@ -263,12 +263,7 @@ def _waiting(blank: Action, roles: Roles) -> Action:
     """Waits for a time, here or in a place; a wait without a time only goes to the place."""
     times = [phrase for phrase in (roles.searched, *roles.objects) if phrase is not None]
     places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
-    fits = (
-        len(times) == 1
-        and times[0].head.word in TIME_UNITS_S
-        and times[0].count > 0
-        and times[0].text == times[0].head.text
-    )
+    fits = len(times) == 1 and times[0].text.lower() in TIME_UNITS_S and times[0].count > 0
     goal, time = next(iter(places), None), times[0] if fits else None
     if not times and goal is not None:
         return replace(blank, kind=VerbKind.GO, goal=goal)

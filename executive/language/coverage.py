@@ -16,9 +16,9 @@ from skills.inputs.errors import listing
 
 
 def cover(
-    items: Sequence[Item], clauses: Sequence[Predicate], actions: Sequence[Action], *, known: bool
+    items: Sequence[Item], clauses: Sequence[Predicate], actions: Sequence[Action]
 ) -> tuple[list[str], list[tuple[str, str]]]:
-    """Accounts for the items of a sentence by its actions; `known` marks a sentence whose objects the world knows.
+    """Accounts for the items of a sentence by its actions.
 
     Returns notes on the words that change nothing, and the words that are lost, each with its clause.
     """
@@ -37,9 +37,9 @@ def cover(
             favours = [chunk for chunk in unused if chunk.role is PrepositionRole.FOR and chunk.phrase.person]
             asides += [chunk.spoken for chunk in favours]
             lost += [(chunk.spoken, words) for chunk in unused if chunk not in favours]
-        elif unused or (isinstance(clause.verb, Being) and " " in words and _only_tells(clause, clause.verb)):
+        elif unused or (" " in words and _tells(clause)):
             told.append(words)
-    targets = [one.target for one in actions if known and one.target is not None]
+    targets = [one.target for one in actions if one.target is not None]
     owned = [one.spoken for one in targets if any(token.word in lexicon().owners for token in one.tokens[:-1])]
     notes = {
         _LEFT_OUT: asides,
@@ -74,14 +74,16 @@ _LEFT_OUT: Final = "I leave out {}, and do the rest as usual"
 
 def _spoken(clause: Predicate) -> str:
     verb = clause.verb
-    told = (verb.topic or verb.teller) if isinstance(verb, Being) else None
-    words = spoken_words(one for one in (clause.subject, verb, *clause.items) if one is not None)
-    return re.sub(r" (?='|n't)", "", words if told is None else f"{told.spoken} {words}")
+    topic = (verb.topic or verb.teller) if isinstance(verb, Being) else None
+    items = [Chunk(topic)] if topic is not None else []
+    words = spoken_words(one for one in (*items, clause.subject, verb, *clause.items) if one is not None)
+    return re.sub(r" (?='|n't)", "", words)
 
 
-def _only_tells(clause: Predicate, verb: Being) -> bool:
+def _tells(clause: Predicate) -> bool:
     """Returns whether a statement tells an event or a state, and no place."""
-    return verb.narrated or any(isinstance(item, Unknown) for item in clause.items)
+    states = any(isinstance(item, Unknown) for item in clause.items)
+    return isinstance(clause.verb, Being) and (clause.verb.narrated or states)
 
 
 def _asks(clause: Predicate, actions: Sequence[Action]) -> bool:

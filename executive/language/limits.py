@@ -90,17 +90,14 @@ def _outside(action: Action, moved: bool) -> Iterator[str]:
         odd = target.universal or target.addressed or target.counts
         if odd or not (moved or target.known or _holdable(target, action)):
             yield f"{action.verb} {target.spoken}"
-    for each in (action.source, action.goal):
-        place = each
-        while place is not None:
-            phrase = place.phrase
-            if phrase is not None and (
-                phrase.universal
-                or not _reachable(phrase, place)
-                or (action.kind is VerbKind.GO and _idle(phrase, place, action.verb))
-            ):
-                yield f"{action.verb} {place.preposition} {phrase.spoken}".replace("  ", " ")
-            place = place.within
+    for place in (place for each in (action.source, action.goal) if each is not None for place in each.around):
+        phrase = place.phrase
+        if phrase is not None and (
+            phrase.universal
+            or not _reachable(phrase, place)
+            or (action.kind is VerbKind.GO and _idle(phrase, place, action.verb))
+        ):
+            yield f"{action.verb} {place.preposition} {phrase.spoken}".replace("  ", " ")
 
 
 def _holdable(phrase: Phrase, action: Action) -> bool:

@@ -117,6 +117,11 @@ class Phrase:
         return self.head.lemma in lexicon().people or self.head.word in lexicon().people or self.named_person
 
     @property
+    def somebody(self) -> bool:
+        """Returns whether the phrase means a person, or anybody."""
+        return self.person or self.head.word in lexicon().anyone
+
+    @property
     def named_person(self) -> bool:
         """Returns whether the phrase is a person's name."""
         if self._determined() or (self.plural and self.head.kind is not NounKind.PERSON):

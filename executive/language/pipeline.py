@@ -123,7 +123,7 @@ class Pipeline:
 
     def _check(self, trace: Trace) -> Trace:
         """Refuses the whole sentence if some of its words were not understood."""
-        notes, lost = cover(trace.items, trace.clauses, trace.actions, known=self.knowledge is not None)
+        notes, lost = cover(trace.items, trace.clauses, trace.actions)
         unknown = [(word, action.said) for action in trace.actions for word in action.unknown]
         lost = [one for one in lost if not any(word in one[0] or one[0] in word for word, _ in unknown)]
         if unknown or lost:

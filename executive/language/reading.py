@@ -137,9 +137,8 @@ class Reader(Row):
         if token.word not in lexicon().levels:
             return None
         self.at += 1
-        if ahead and ahead[0].word != "for" and (ahead[0].pos == "ADP" or ahead[0].tag in ("TO", "IN")):
-            return Aside(token.text)
-        if items and isinstance(items[-1], Chunk) and items[-1].role is not None:
+        before = ahead and ahead[0].word != "for" and (ahead[0].pos == "ADP" or ahead[0].tag in ("TO", "IN"))
+        if before or (items and isinstance(items[-1], Chunk) and items[-1].role is not None):
             return Aside(token.text)
         verb = next((item for item in reversed(items) if isinstance(item, Verb | Being)), None)
         looks = not isinstance(verb, Verb) or VerbKind.FIND in verb.kinds
@@ -238,19 +237,12 @@ class Reader(Row):
             return Whether()
         if token.word == "but" and self.at > 0 and self._excepts(items):
             return None
-        if token.word in lexicon().postures:
-            return self._posture(items)
+        if token.word in lexicon().postures and any(item.phrase.somebody for item in chunks[-1:]):
+            return Unknown(self.take(1))
         filler, noted = self._particle(items) or self.match(lexicon().fillers), self.match(lexicon().noted)
         if noted is not None and len(noted) > len(filler or ()):
             return Aside(self.take(len(noted)))
         return None if filler is None else Separator(self.take_words(filler))
-
-    def _posture(self, items: Sequence[Item]) -> Item:
-        """Reads "standing": of somebody nothing that the robot can tell, of an object nothing but that it is there."""
-        last = next((item for item in reversed(items) if isinstance(item, Chunk)), None)
-        word = self.take(1)
-        somebody = last is not None and (last.phrase.person or last.phrase.head.word in lexicon().anyone)
-        return Unknown(word) if somebody else Separator(word.lower())
 
     def _excepts(self, items: Sequence[Item]) -> bool:
         """Returns whether "but" means "except": after "everything", or after "all the drinks" if a noun follows."""

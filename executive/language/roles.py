@@ -50,10 +50,9 @@ class Location:
         return self.phrase is not None and self.phrase.universal and self.phrase.singular == "room"
 
     @property
-    def phrases(self) -> tuple[Phrase, ...]:
-        """Noun phrases of the place and of the larger places around it."""
-        own = () if self.phrase is None else (self.phrase,)
-        return own if self.within is None else (*own, *self.within.phrases)
+    def around(self) -> tuple[Location, ...]:
+        """This place and the larger places around it."""
+        return (self,) if self.within is None else (self, *self.within.around)
 
     @property
     def name(self) -> str:
@@ -70,7 +69,6 @@ class Location:
 
 _JOINTS: Final = frozenset({",", ";", "and", "or", "then", "also", "plus", "second", "but"})
 _CLOSER: Final = (PrepositionRole.AT, PrepositionRole.BESIDE)
-_EVERYONE: Final = frozenset({"everyone", "everybody", "anyone", "anybody"})
 _LISTING: Final = frozenset({",", ""})
 HERE: Final = Location(None)
 THERE: Final = Location(None, preposition="there")
@@ -131,7 +129,7 @@ class Roles:
         if one.joint and places and not self.sources and not another:
             self.joined_goals.append(one.location)
             return
-        if one.within is not None and _somebody(phrase) and not self.objects:
+        if one.within is not None and phrase.somebody and not self.objects:
             self.first_at = one.within
         elif one.within is not None:
             self.ats.append(one.within)
@@ -173,7 +171,7 @@ def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) ->
         row.append(one)
     roles.goals += [HERE if item.here else THERE for item in items if isinstance(item, Adverb)]
     first = roles.objects[0] if roles.objects else None
-    them = first is not None and (first.stands_for_somebody or _somebody(first) or first.kind is NounKind.PERSON)
+    them = first is not None and (first.stands_for_somebody or first.somebody or first.kind is NounKind.PERSON)
     receives = first is not None and len(roles.objects) > 1 and (first.person or (them and not roles.listed))
     if first is not None and (first.speaker or receives):
         roles.objects.pop(0)  # give Robin a coke, bring me a coke
@@ -224,7 +222,7 @@ def _nested(spoken: Sequence[_Placed], puts: bool) -> Iterator[_Placed]:
         while rest and not apart:
             before, chunk = chain[-1], rest[0].chunk
             place = before.role in PLACES
-            place = place or (before.role in (None, PrepositionRole.FOR) and _somebody(before.phrase))
+            place = place or (before.role in (None, PrepositionRole.FOR) and before.phrase.somebody)
             closer = chunk.role in _CLOSER and not rest[0].joint and chunk.preposition != before.preposition
             if not (place and closer):
                 break
@@ -233,10 +231,6 @@ def _nested(spoken: Sequence[_Placed], puts: bool) -> Iterator[_Placed]:
         for chunk in reversed(chain[1:]):
             within = Location(chunk.phrase, chunk.preposition, within)
         yield replace(first, within=within)
-
-
-def _somebody(phrase: Phrase) -> bool:
-    return phrase.person or phrase.head.word in _EVERYONE
 
 
 def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:

@@ -13,15 +13,7 @@ from executive.language.lexicon import Patterns, any_of
 from executive.language.questions import RefusalError, RefusalKind, Slot, which_question
 from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
-from executive.language.structure.plain import (
-    IS,
-    IT,
-    PlainReader,
-    SpokenCondition,
-    State,
-    negate,
-    with_preposition,
-)
+from executive.language.structure.plain import IS, IT, PlainReader, SpokenCondition, State, with_preposition
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import DoorToOpen, OpenDoor
@@ -259,7 +251,7 @@ def _joined(words: str, state: State, reader: PlainReader) -> tuple[SpokenCondit
                 known = replace(state, goal=None, at=None, memory=replace(state.memory, person=person))
             both = (first.condition, second.condition)
             parts = tuple(each for one in both for each in (one.parts if isinstance(one, kind) else (one,)))
-            if any(negate(each) in parts for each in parts):
+            if any(isinstance(each, Not) and each.part in parts for each in parts):
                 raise RefusalError(f"'{words}' says one thing and its opposite; say one of the two", [words])
             return SpokenCondition(kind(parts=parts), words, known, state, (*first.notes, *second.notes)), None
     return None, left_open

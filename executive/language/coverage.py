@@ -26,6 +26,7 @@ def cover(
     used = {token.index for phrase in phrases for token in phrase.tokens}
     described = {text for phrase in phrases for text in phrase.extra}
     asides = [item.word for item in items if isinstance(item, Aside)]
+    asides += [token.text for phrase in phrases for token in phrase.tokens[:-1] if (token.word,) in lexicon().noted]
     asides += [f"{one.preposition} {one.text}" for action in actions for one in action.passes if not is_door(one)]
     told, lost = list[str](), list[tuple[str, str]]()
     for clause in clauses:
@@ -43,7 +44,7 @@ def cover(
     owned = [one.spoken for one in targets if any(token.word in lexicon().owners for token in one.tokens[:-1])]
     notes = {
         _LEFT_OUT: asides,
-        "I take {} to ask for nothing more": told,
+        TOLD: told,
         "I cannot tell whose it is: {}": owned,
     }
     return [form.format(listing(map(repr, words))) for form, words in notes.items() if words], lost
@@ -69,6 +70,8 @@ def note_adverbs(text: str, told: Iterable[str]) -> str | None:
     return _LEFT_OUT.format(listing(map(repr, words))) if words else None
 
 
+TOLD: Final = "I take {} to ask for nothing more"
+"""Note on a statement, with its words."""
 _LEFT_OUT: Final = "I leave out {}, and do the rest as usual"
 
 

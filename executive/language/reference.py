@@ -176,7 +176,8 @@ def _place(place: Location | None, memory: Memory) -> Location | None:
         return place
     meant = memory.person if phrase is not None and phrase.stands_for_somebody and memory.person else memory.place
     if phrase is not None and phrase.person:
-        return place if memory.person is None else replace(memory.person, preposition=place.preposition)
+        within = place.within or (None if memory.person is None else memory.person.within)
+        return replace(memory.person or place, preposition=place.preposition, within=within)
     if meant is None:
         word = THERE.preposition if phrase is None else phrase.text
         raise RefusalError(f"which place is {word!r}?", [word], question=True)

@@ -8,7 +8,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from executive.language.clauses import ACTS, Clause, Cue, cut, split, trailing_cue
-from executive.language.coverage import note_adverbs
+from executive.language.coverage import TOLD, note_adverbs
 from executive.language.items import Adverb, Chunk, verb, without_objects
 from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
@@ -164,6 +164,7 @@ class SentenceBuilder(DecisionBuilder):
             if refusal.kind is not RefusalKind.NOTHING_TO_DO or not is_clause(reasons, self.reader.pipeline.parser):
                 raise
             row.plain = []
+            self.notes.append(TOLD.format(repr(reasons)))
             named = [name for name in self.reader.knowledge.people if re.search(rf"\b{re.escape(name)}\b", reasons)]
             if len(named) == 1:
                 person = Location(phrase_of_name(named[0], NounKind.PERSON), "to")

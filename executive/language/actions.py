@@ -304,7 +304,8 @@ def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
         blank = replace(blank, choices=(*blank.choices, tuple(candidates)))
     source = next(iter(sources), None)
     found = replace(blank, objects=tuple(roles.objects), source=source, goal=goal, passes=tuple(roles.paths))
-    carried = _with_object(found)
+    beside = [word for word, place in (("here", HERE), ("there", THERE)) if place in roles.goals and goal != place]
+    carried = _with_object(found, beside)
     yield carried
     yield from (replace(carried, goal=place) for place in shared)
 

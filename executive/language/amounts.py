@@ -4,19 +4,10 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from executive.language.lexicon import Patterns, any_of, lexicon
+from executive.language.lexicon import lexicon
+from executive.language.templates import page
 
-_WORDS: Final = any_of(word for word in lexicon().numbers if word not in ("couple", "dozen"))
-_NUMBER: Final = rf"(?:\d+(?:\.\d+)?|(?:{_WORDS})(?:[ -](?:{_WORDS}))?)"
-_FORMS: Final = Patterns("amounts.yaml", words={"number": _NUMBER})
-AMOUNTS: Final = {name: _FORMS.text(name) for name in ("span", "times", "share")}
-"""Patterns of amounts for other tables."""
-_NAMED: Final = {"noon": 12, "midday": 12, "midnight": 0}
-_UNITS_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
-_SPANS_S: Final = {
-    **{"half hour": 1800.0, "hour": 3600.0, "minute": 60.0, "other minute": 120.0},
-    **{"quarter": 900.0, "three quarters of an hour": 2700.0},
-}
+_AMOUNTS: Final = page("amounts")
 
 
 @dataclass(frozen=True)
@@ -52,73 +43,45 @@ def parse_number(text: str) -> float | None:
 
 def parse_times(text: str) -> int | None:
     """Parses "three times" or "twice"; None for any text but whole numbers from 1 to 100."""
-    words = re.sub(r" in a row$", "", text.lower())
-    if words == "twice" or words == "a couple of times":
-        return 2
-    number = parse_number(re.sub(r" times$", "", words))
+    match = _AMOUNTS.times.fullmatch(text)
+    number = None if match is None else parse_number(match["count"])
     return int(number) if number is not None and number == int(number) and 1 <= number <= 100 else None
 
 
 def parse_seconds(text: str) -> float | None:
     """Parses a duration (s); None for any other text."""
-    words = re.sub(r"^(?:a )?quarter(?: of an)? hour$", "quarter", text.lower().strip())
-    if words in _SPANS_S:
-        return _SPANS_S[words]
-    match = re.fullmatch(r"(half an?|a couple of|.+?) ?(and a half )?([smh])[a-z]*( and a half)?", words)
-    if match is None:
+    match = _AMOUNTS.seconds.fullmatch(text)
+    count = None if match is None else parse_number(match["count"])
+    if match is None or count is None:
         return None
-    count = {"a": 1.0, "an": 1.0, "half a": 0.5, "half an": 0.5, "a couple of": 2.0}.get(
-        match[1], parse_number(match[1])
-    )
-    half = 0.5 if match[2] or match[4] else 0.0
-    return None if count is None or count + half <= 0 else (count + half) * _UNITS_S[match[3]]
+    return (count + float(match["half"] or 0)) * float(match["unit"] or 1) or None
 
 
 def parse_share(text: str) -> float | None:
     """Parses a fraction from 0 to 1, such as "thirty percent" or "half"."""
-    words = text.lower().strip()
-    if words.startswith("half"):
-        return 0.5
-    number = parse_number(re.sub(r" ?percent$", "", words))
+    match = _AMOUNTS.share.fullmatch(text)
+    number = None if match is None else parse_number(match["count"])
     return number / 100 if number is not None and 0 < number <= 100 else None
 
 
 def parse_time(text: str) -> TimeOfDay | None:
     """Parses a time of day; "one" to "six" without more words are in the afternoon."""
-    words = " ".join(text.lower().replace("o' clock", "o'clock").split())
-    if words in _NAMED:
-        return TimeOfDay(3600.0 * _NAMED[words])
-    for pattern in (_FORMS.clock, _FORMS.relative, _FORMS.full):
-        match = pattern.fullmatch(words)
-        if match is not None and (found := _time(match, words)) is not None:
-            return found
-    return None
-
-
-def _time(match: re.Match[str], words: str) -> TimeOfDay | None:
-    groups = match.groupdict()
-    hour, minute = parse_number(groups["hour"]), parse_number(groups.get("minute") or "0")
-    if groups.get("part"):
-        part = groups["part"]
-        minute = 30.0 if part == "half" else 15.0 if part.endswith("quarter") else parse_number(part)
-        if minute is not None and groups["side"] in ("to", "before"):
-            minute = -minute
-            if part == "half":
-                return None
-    if hour is None or minute is None or not (0 <= hour <= 24 and abs(minute) < 60 and hour == int(hour)):
+    match = _AMOUNTS.time.fullmatch(text.replace("o' clock", "o'clock"))
+    if match is None:
         return None
-    half = (groups["half"] or "").replace(".", "")
+    said, _, minutes = match["hour"].replace(".", ":").partition(":")
+    hour, minute = parse_number(said), parse_number(match["minute"] or minutes or "0")
+    if hour is None or minute is None or not (0 <= hour <= 24 and minute < 60 and hour == int(hour)):
+        return None
+    half = match["daytime"]
     if half and not 1 <= hour <= 12:
         return None
-    sure = hour > 12 or hour == 0 or words.startswith("0") or bool(half)
-    if half in ("pm", "in the afternoon", "in the evening", "this afternoon", "this evening"):
+    sure = bool(half or match["sure"]) or hour > 12 or hour == 0 or said.startswith("0")
+    if half == "pm" or (half == "night" and hour >= 6 and hour != 12):
         hour = hour % 12 + 12
-    elif half in ("am", "in the morning", "this morning"):
-        hour = hour % 12
-    elif half == "at night":
-        hour = hour % 12 + 12 if hour >= 6 and hour != 12 else hour % 12
     elif half:
-        return None
+        hour %= 12
     elif not sure and hour <= 6:
         hour += 12
+    minute *= -1 if match["side"] else 1
     return TimeOfDay((3600.0 * hour + 60.0 * minute) % 86400.0, taken=not sure and hour != 12)

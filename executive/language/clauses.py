@@ -5,16 +5,18 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import pairwise
 from typing import Final
 
 from executive.language.addressees import AddressedText, Addressee, addressees
-from executive.language.amounts import AMOUNTS
 from executive.language.items import Item
-from executive.language.lexicon import Patterns, any_of, lexicon, read_table
+from executive.language.lexicon import lexicon
+from executive.language.templates import Match, Words, page, words_of
 from executive.language.tokens import smooth
 
-CLAUSES: Final = Patterns("structures.yaml", words=AMOUNTS)
-ACTS: Final = Patterns("structures.yaml", "acts", AMOUNTS)
+CLAUSES: Final = page("clauses", asking=tuple(sorted(lexicon().openers, key=len, reverse=True)))
+_REWORDING: Final = page("rewording")
+CHECKS: Final = page("checks")
 
 
 class Cue(enum.Enum):
@@ -25,9 +27,9 @@ class Cue(enum.Enum):
     NOT = "not"  # "if not"
     OTHERWISE = "otherwise"
     UNLESS = "unless"
+    EVERY = "every"  # "every ten minutes"
     SOON = "soon"  # "as soon as"
     IF = "if"
-    EVERY = "every"  # "every ten minutes"
     TIMES = "times"  # "three times"
     WHILE = "while"  # "as long as"
     UNTIL = "until"
@@ -38,7 +40,8 @@ class Clause:
     """Clause: the words that join it to the previous clause, the cue (`kind`, and `cue` in words), and its other words.
 
     `part` is the addressee's text that contains the clause. `lead` are implied items before the clause, such as its
-    verb. `before` is the action before a trailing cue, as in "go home if ...".
+    verb. `before` is the action before a trailing cue, as in "go home if ...", and `amount` the interval or the number
+    of rounds in a cue.
     """
 
     joint: str
@@ -48,6 +51,7 @@ class Clause:
     lead: tuple[Item, ...] = ()
     part: AddressedText | None = field(default=None, compare=False, repr=False)
     before: str = ""
+    amount: str = ""
 
     @property
     def begins(self) -> bool:
@@ -62,12 +66,8 @@ class Clause:
     @property
     def anyway(self) -> bool:
         """Returns whether the clause runs at the end, whatever happens before."""
-        return CLAUSES.whatever.search(self.joint) is not None
-
-    @property
-    def ends_anyway(self) -> bool:
-        """Returns whether the last words say that the clause runs whatever happens before."""
-        return self.kind is None and CLAUSES.ends_anyway.search(self.text) is not None
+        said = self.kind is None and self.text != without_whatever(self.text)
+        return said or CLAUSES.whatever.search(self.joint) is not None
 
     @property
     def then(self) -> bool:
@@ -91,62 +91,80 @@ def split(text: str, robots: tuple[str, ...] = ()) -> Split:
     listener, parts = addressees(robots).parts(text) if len(robots) > 1 else (None, (AddressedText(None, text),))
     found: list[Clause] = []
     for part in parts:
-        said = smooth(part.text)
-        for form, meant in read_table("structures.yaml")["reworded"]:
-            said = CLAUSES.compiled(form).sub(meant, said)
+        said = _REWORDING.whole.reword(_REWORDING.parts.reword(smooth(part.text)), whole=True)
         found += (replace(clause, part=part) for clause in cut(said))
     return Split(tuple(found), listener)
 
 
 def cut(text: str) -> tuple[Clause, ...]:
     """Splits the text for one addressee at joining words and cues."""
-    cuts, found = list(_cuts(text)), []
-    for (start, begin), end in zip(cuts, (*(start for start, _ in cuts[1:]), len(text)), strict=True):
-        clause = Clause(text[start:begin], text[begin:end].strip(" ,;.!?:"))
-        if (kind := _kind(clause.text)) is not None:
-            rest = clause.text[len(kind[1]) :].strip(" ,;:")
-            rest = re.sub(r"^then\s+", "", rest, flags=re.IGNORECASE)
-            clause = replace(clause, kind=kind[0], cue=kind[1], text=rest)
-        found += [clause] if clause.text or clause.cue else []
-    return tuple(found)
+    found = list[Clause]()
+    for (start, begin), (end, _) in pairwise([*_cuts(text), (len(text), 0)]):
+        said = text[begin:end].strip(" ,;.!?:")
+        found.append(replace(leading_cue(said) or Clause("", said), joint=text[start:begin]))
+    return tuple(clause for clause in found if clause.text or clause.cue)
 
 
 def _cuts(text: str) -> Iterator[tuple[int, int]]:
     """Yields begin and end of the words that join two clauses."""
-    first = _joint().match(text)
-    begin = 0 if first is None else first.end()
-    yield 0, begin
-    for match in _joint().finditer(text, begin):
-        joined = match[0].strip() != "" or (_ELSE.match(text, match.end()) and not _SOME.search(text[: match.start()]))
-        sentence = re.search(r"[.!?;](?:\s|$)", match[0]) is not None
-        if match[0].strip().lower() in ("and", "please") and _ONE_VERB.search(text[: match.start()]):
-            continue
-        word = re.match(r"[\w']+", rest := text[match.end() :])
-        if joined and (sentence or (word and (word[0].lower() in _verbs() or _kind(rest) is not None))):
-            yield match.span()
+    words, at = words_of(text), 0
+    while not at or at < len(words.words):
+        behind = _behind_joint(words, at)
+        start, begin = words.spans[at - 1][1] if at else 0, words.start(behind)
+        joint, before = text[start:begin], words.word(at - 1)
+        bare = at > 0 and behind == at  # no words join, but "otherwise" may follow
+        cue = None if bare and not CLAUSES.otherwise.match(text, at) else leading_cue(text[begin:])
+        alone = before.endswith(_SOME) if bare else before in _ONE_VERB and joint.strip().lower() in ("and", "please")
+        begins = cue is not None or (not bare and begins_action(text[begin:])) or re.search(r"[.!?;](?:\s|$)", joint)
+        if not at or (begins and not alone):
+            yield start, begin
+        at = behind + (1 if cue is None else max(1, len(words_of(cue.cue).words)))
 
 
-def _kind(text: str) -> tuple[Cue, str] | None:
-    """Cue at the beginning of a clause; None if there is none. After a complete cue ("if not") a clause can begin."""
-    for kind, form in _kinds():
-        match = form.match(text)
-        behind_it = None if match is None or kind not in _WHOLE else _NEXT.match(text, match.end())
-        object_follows = match is not None and _WHOLE_WORDS.search(match[0]) is not None
-        begins = _verbs() | _SMALL | (_ARTICLES if object_follows else frozenset())
-        if match is not None and (behind_it is None or behind_it[1].lower() in begins):
-            return kind, match[0]
+def _behind_joint(words: Words, at: int) -> int:
+    """Index of the word behind the joining words that begin at a word."""
+    while words.word(at):
+        joints = (CLAUSES.joint, CLAUSES.outer, CLAUSES.whatever)
+        found = next((found.after for form in joints if (found := form.match(words.text, at)) is not None), at)
+        found += words.word(at) in _MARKS
+        if found == at:
+            break
+        at = found
+    return at
+
+
+def leading_cue(text: str) -> Clause | None:
+    """Clause by the cue at its beginning; None if there is none. Behind a complete cue ("if not") an action begins."""
+    words = words_of(text)
+    for kind in Cue:
+        for found in getattr(CLAUSES, kind.value).matches(text, 0):
+            behind, last = words.word(found.after), words.word(found.after - 1)
+            begins = {"", "then", "please", "just", *_MARKS, *(_ARTICLES if last in CLAUSES.table["objects"] else ())}
+            rest = text[found.end :].strip(" ,;:")
+            if kind not in _WHOLE or behind in begins or begins_action(rest):
+                return _clause(kind, found, re.sub(r"^then\s+", "", rest, flags=re.IGNORECASE))
     return None
 
 
 def trailing_cue(text: str) -> Clause | None:
     """First cue after an action in a clause, which makes the action conditional or repeated; None if there is none."""
-    forms = CLAUSES.mapping("behind")
-    found = [(match.start(), Cue(kind), match) for kind, form in forms for match in form.finditer(text, 1)]
-    found = [one for one in found if one[1] is not Cue.IF or not CLAUSES.asks_before.search(text[: one[0]])]
-    if not found:
-        return None
-    start, kind, match = min(found, key=lambda one: one[0])
-    return Clause("", text[match.end() :].strip(" ,"), kind, match[0], before=text[:start].strip(" ,"))
+    for at in range(1, len(words_of(text).words)):
+        for kind in _BEHIND:
+            found = getattr(CLAUSES, kind.value).match(text, at)
+            if found is not None and not (kind is Cue.IF and CLAUSES.asks_before.fullmatch(text[: found.start])):
+                before = text[: found.start].strip(" ,")
+                return replace(_clause(kind, found, text[found.end :].strip(" ,")), before=before)
+    return None
+
+
+def _clause(kind: Cue, cue: Match, text: str) -> Clause:
+    return Clause("", text, kind, cue.text, amount=cue["span"] or cue["times"])
+
+
+def without_whatever(text: str) -> str:
+    """Text without "whatever happens" at its end."""
+    found = CLAUSES.whatever_last.fullmatch(text)
+    return text if found is None else found["before"].rstrip(" ,")
 
 
 def begins_action(text: str) -> bool:
@@ -168,32 +186,15 @@ def join_clauses(clauses: Iterable[Clause]) -> str:
 
 
 @cache
-def _joint() -> re.Pattern[str]:
-    words = "|".join((*map(CLAUSES.text, ("outer", "whatever", "joints")), any_of(lexicon().openers)))
-    return re.compile(rf"(?:[\s,;.!?:]+|(?<![\w'])(?:{words})(?![\w']))+", re.IGNORECASE)
-
-
-@cache
 def _verbs() -> frozenset[str]:
-    return frozenset({first for first, *_ in lexicon().verbs} | set(read_table("structures.yaml")["openers"]))
+    return frozenset({first for first, *_ in lexicon().verbs} | set(CLAUSES.table["openers"]))
 
 
-@cache
-def _kinds() -> tuple[tuple[Cue, re.Pattern[str]], ...]:
-    table = read_table("structures.yaml")["kinds"]
-    return tuple((kind, CLAUSES.compiled(rf"{text}(?![\w'])")) for kind in Cue for text in table[kind.value])
-
-
+_BEHIND: Final = (Cue.EVERY, Cue.TIMES, Cue.WHILE, Cue.UNTIL, Cue.UNLESS, Cue.IF)
 _WHOLE: Final = frozenset({Cue.FAILED, Cue.SO, Cue.NOT})
-_NEXT: Final = re.compile(r"\s*([^\s,;:]\w*)")
-_SMALL: Final = frozenset({"then", "please", "just"})
-_ARTICLES: Final = frozenset({"a", "an", "the", "some", "another"})
-_WHOLE_WORDS: Final = re.compile(
-    r"(?:\b(?:none|one|any|it|them|that|this|failed|fails?|works?|out|(?:im)?possible|wrong|left|available)|^if not)$",
-    re.IGNORECASE,
-)
-"""Last words of cues before an object without a comma: "if there is none a beer"."""
-_ONE_VERB: Final = re.compile(r"(?:^|[\s,])(?:go|come|run|say)$", re.IGNORECASE)
+_MARKS: Final = frozenset(",;.!?:")
+_ARTICLES: Final = ("a", "an", "the", "some", "another")
+_ONE_VERB: Final = frozenset({"go", "come", "run", "say"})
 """Verbs after which "and" and "please" join no other clause: "go and charge"."""
-_ELSE: Final = re.compile(r"(?:or )?(?:else|otherwise)\b", re.IGNORECASE)
-_SOME: Final = re.compile(r"(?:some|any|every|no|body|thing|one|where|what|who)$", re.IGNORECASE)
+_SOME: Final = ("some", "any", "every", "no", "body", "thing", "one", "where", "what", "who")
+"""Ends of words before "else" in "somebody else"."""

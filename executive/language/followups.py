@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Final
 
-from executive.language.lexicon import Patterns, read_table
+from executive.language.lexicon import read_table
+from executive.language.templates import page
 from executive.words.command import Command, Task
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectKind
@@ -60,11 +61,8 @@ def parse_follow_up(text: str) -> FollowUp | None:
     if _FORMS.again.fullmatch(plain):
         return FollowUp(FollowUpKind.AGAIN)
     for kind in (FollowUpKind.CORRECTION, FollowUpKind.ADDITION):
-        for form in _FORMS.each(kind.value):
-            if (match := form.fullmatch(plain)) is not None:
-                found = {key: (value or "").strip(" ,.!?") for key, value in match.groupdict().items()}
-                preposition, said = _split(found["said"])
-                return FollowUp(kind, said, preposition, _split(found.get("old", ""))[1])
+        if (match := getattr(_FORMS, kind.value).fullmatch(plain)) is not None:
+            return FollowUp(kind, match["said"], match["preposition"].lower(), match["old"])
     return None
 
 
@@ -140,14 +138,8 @@ def _place_of(commands: Sequence[Command], by: Amendment) -> int:
     return next(iter([*named, *said[-1:], *goals[-1:], *sources]))
 
 
-def _split(said: str) -> tuple[str, str]:
-    """Splits off a preposition at the beginning of the words."""
-    match = _FORMS.placed.fullmatch(said)
-    return (match.group(1).lower(), match.group(2)) if match else ("", said)
-
-
 _START: Final = "start"
-_FORMS: Final = Patterns("followups.yaml")
+_FORMS: Final = page("followups")
 
 
 class Remark(enum.Enum):
@@ -169,7 +161,8 @@ class Remark(enum.Enum):
 def parse_remark(text: str) -> Remark | None:
     """Parses a whole sentence as a remark; None for any other sentence, such as a request."""
     words = " ".join(re.sub(r"[^\w\s']", " ", text[:_MOST_LETTERS].lower().replace("’", "'")).split())
-    return _remarks().get(words) or _remarks().get(_FORMS.polite.sub("", words).strip())
+    plain = page("remarks").remark.fullmatch(words)
+    return _remarks().get(words) or (None if plain is None else _remarks().get(plain["remark"]))
 
 
 @cache

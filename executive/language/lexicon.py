@@ -95,49 +95,33 @@ def any_of(phrases: Iterable[str]) -> str:
 
 
 class Patterns:
-    """Regular expressions from a table or from one of its sections, case-insensitive; each is compiled at first use.
+    """Regular expressions from a table, case-insensitive; each is compiled at first use.
 
-    {name} in an expression stands for another expression in the section, the table, or `words`.
+    {name} in an expression stands for another expression in the table, or in `words`.
     """
 
-    def __init__(self, table: str, section: str | None = None, words: Mapping[str, str] | None = None) -> None:
-        self._table, self._section, self._words = table, section, dict(words or {})
-        self._mappings: dict[str, tuple[tuple[str, re.Pattern[str]], ...]] = {}
+    def __init__(self, table: str, words: Mapping[str, str] | None = None) -> None:
+        self._table, self._words = table, dict(words or {})
 
     def __getattr__(self, name: str) -> re.Pattern[str]:
         if name.startswith("__"):
             raise AttributeError(name)
-        found = re.compile(self.text(name), re.IGNORECASE)
+        found = self.compiled(self.text(name))
         setattr(self, name, found)
         return found
 
     def compiled(self, text: str) -> re.Pattern[str]:
         """Compiles an expression that is not in any table."""
-        return re.compile(self._filled(text), re.IGNORECASE)
-
-    def each(self, name: str) -> tuple[re.Pattern[str], ...]:
-        """Expressions in a list."""
-        return tuple(form for _, form in self.mapping(name))
+        return re.compile(re.sub(r"\{([a-z_]+)\}", lambda match: self.text(match[1]), text), re.IGNORECASE)
 
     def mapping(self, name: str) -> tuple[tuple[str, re.Pattern[str]], ...]:
-        """Expressions in a mapping, each with its name; those in a list have numbers."""
-        if name not in self._mappings:
-            entry = self._entry(name)
-            rows = entry.items() if isinstance(entry, dict) else enumerate(entry)
-            self._mappings[name] = tuple((str(key), self.compiled(text)) for key, text in rows)
-        return self._mappings[name]
+        """Expressions in a mapping, each with its name."""
+        return tuple((key, self.compiled(text)) for key, text in read_table(self._table)[name].items())
 
     def text(self, name: str) -> str:
         """Text of an expression, with the named expressions inserted."""
-        return self._words[name] if name in self._words else self._filled(self._entry(name))
+        return self._words[name] if name in self._words else self.compiled(read_table(self._table)[name]).pattern
 
     def with_words(self, **words: str) -> Patterns:
         """Copies the patterns with more words that expressions may insert."""
-        return Patterns(self._table, self._section, {**self._words, **words})
-
-    def _entry(self, name: str) -> Any:
-        table = read_table(self._table)
-        return {**table, **(table[self._section] if self._section else {})}[name]
-
-    def _filled(self, text: str) -> str:
-        return re.sub(r"\{([a-z_]+)\}", lambda match: self.text(match[1]), text)
+        return Patterns(self._table, {**self._words, **words})

@@ -9,7 +9,7 @@ from executive.language.command_frames import CommandFrame, command_frames, spok
 from executive.language.coverage import cover, left_out
 from executive.language.disfluency import repair_disfluencies, unwanted_phrases
 from executive.language.grounding import check_unwanted, ground
-from executive.language.items import Being, Item, Predicate, drop_name, predicates
+from executive.language.items import Item, Predicate, drop_name, predicates
 from executive.language.lexicon import VerbKind
 from executive.language.limits import check_feasible, check_routes_and_speaker, not_understood, refuse_harm
 from executive.language.nouns import NounKind
@@ -19,7 +19,7 @@ from executive.language.questions import ABLE, RefusalError, RefusalKind, Slot, 
 from executive.language.reading import Reader
 from executive.language.reference import Memory, resolve
 from executive.language.roles import Location
-from executive.language.tokens import Affirmed, Token, affirmation, name_table, parse_with_names, rephrase
+from executive.language.tokens import Token, name_table, parse_with_names, rephrase
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
 from executive.words.step import Step
@@ -34,25 +34,22 @@ class Trace:
     """Result of each step for a sentence, in the order of the fields; steps after a refusal are empty.
 
     The first fields are inputs. `memory` has the referents from earlier sentences, and at the end those from this one.
-    `lead` are items before the words, `asked` marks a statement to check, `elliptic` allows an omitted "it",
-    `recipient` receives objects if the sentence names nobody.
+    `lead` are items before the words, `elliptic` allows an omitted "it", `recipient` receives objects if the sentence
+    names nobody.
 
-    `affirmed` is a checked statement without its negation, `unwanted` are phrases after "not", `taken_back` are those
-    and what the speaker has corrected, `meanings` are pronouns
-    with their meanings, `notes` list names that were interpreted as others. `refused_at` is the step that refused the
-    sentence. If it has conditions, loops or waits, `steps` is its mission and `parts` are its clauses.
+    `unwanted` are phrases after "not", `taken_back` are those and what the speaker has corrected, `meanings` are
+    pronouns with their meanings, `notes` list names that were interpreted as others. `refused_at` is the step that
+    refused the sentence. If it has conditions, loops or waits, `steps` is its mission and `parts` are its clauses.
     """
 
     text: str
     memory: Memory = field(default_factory=Memory)
     lead: tuple[Item, ...] = ()
-    asked: bool = False
     elliptic: bool = False
     recipient: Location | None = None
 
     opened: str = ""
     tokens: tuple[Token, ...] = ()
-    affirmed: Affirmed | None = None
     items: tuple[Item, ...] = ()
     unwanted: tuple[Phrase, ...] = ()
     taken_back: tuple[str, ...] = ()
@@ -103,12 +100,9 @@ class Pipeline:
         return replace(trace, tokens=parse_with_names(trace.opened, self.parser.parse, table))
 
     def _read(self, trace: Trace) -> Trace:
-        there = any(isinstance(item, Being) and item.existential for item in trace.lead)
-        said = affirmation(trace.tokens, there=there) if trace.asked else Affirmed(trace.tokens)
-        items = Reader(said.tokens, noun_phrases(said.tokens), silent=set(said.silent)).read(trace.lead)
-        read = replace(trace, tokens=said.tokens, affirmed=said)
+        items = Reader(trace.tokens, noun_phrases(trace.tokens)).read(trace.lead)
         repaired = repair_disfluencies(items)
-        return replace(read, items=repaired, unwanted=unwanted_phrases(items), taken_back=left_out(items, repaired))
+        return replace(trace, items=repaired, unwanted=unwanted_phrases(items), taken_back=left_out(items, repaired))
 
     def _split(self, trace: Trace) -> Trace:
         clauses = predicates(trace.items)

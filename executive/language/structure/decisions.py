@@ -5,10 +5,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from executive.language.amounts import parse_seconds, parse_time, parse_times
-from executive.language.clauses import ACTS, CLAUSES, Clause, Cue, cut, join_clauses, verb_positions
+from executive.language.clauses import (
+    CHECKS,
+    Clause,
+    Cue,
+    cut,
+    join_clauses,
+    leading_cue,
+    verb_positions,
+)
 from executive.language.items import verb
 from executive.language.questions import RefusalError
-from executive.language.structure.conditions import parse_condition
+from executive.language.structure.conditions import Done, parse_condition
 from executive.language.structure.plain import (
     LastCheck,
     PlainReader,
@@ -18,6 +26,7 @@ from executive.language.structure.plain import (
     State,
     StepRow,
     ambiguous_cue,
+    amount_of_cue,
     condition_at_source,
     end_of_scope,
     find_last_check,
@@ -27,13 +36,12 @@ from executive.language.structure.plain import (
     negate_supposed,
     one_errand,
     rounds_by,
-    seconds_of_cue,
     state_behind_both,
     statement_of,
     statement_of_check,
-    times_of_cue,
 )
-from executive.language.structure.requests import Done, escape_braces, parse_speech, wait_steps
+from executive.language.structure.requests import escape_braces, parse_speech, wait_steps
+from executive.language.templates import words_of
 from executive.words.command import Task
 from executive.words.leaf_steps import Awaited, Do, Speak, Wait, steps_of_commands
 from executive.words.step import OnFailure, Step
@@ -65,7 +73,13 @@ class DecisionBuilder:
         if not row.plain:
             return
         last = row.plain[-1].text
-        reading, row.plain = self.read_together(row.plain, row.state), []
+        try:
+            reading = self.read_together(row.plain, row.state)
+        except RefusalError:
+            for n in range(1, len(row.plain)):  # the first clause that cannot be understood
+                self.read_together(row.plain[:n], row.state)
+            raise
+        row.plain = []
         self.add(row, reading)
         if row.asked is not None and row.asked.looked:
             there = re.sub(r"^(?:is|are) there ", "there is ", last, flags=re.IGNORECASE)
@@ -90,25 +104,12 @@ class DecisionBuilder:
         self.put_done(row, ((block,), state, ()))
 
     def put_done(self, row: StepRow, done: Done) -> None:
-        """Adds steps, the state after them, and notes."""
+        """Adds steps, behind those of the pending clauses, the state after them, and notes."""
+        self.flush(row)
         steps, row.state, notes = done
         row.steps += steps
         row.asked = None
         self.notes += notes
-
-    def put_always(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
-        """Adds steps that run at the end, whatever happens."""
-        self.flush(row)
-        first = clauses[at]
-        if not row.steps:
-            raise RefusalError("say what I am to do first, before what I am to do in any case", [first.text])
-        ended = re.sub(rf"[, ]*{CLAUSES.whatever.pattern}$", "", first.text, flags=re.IGNORECASE)
-        ended = re.sub(r"[, ]+(?:at the end|in the end)$", "", ended, flags=re.IGNORECASE)
-        rest = [replace(first, text=ended), *clauses[at + 1 :]]
-        always, state = self.nest(rest, replace(row.state, goal=None, at=None))
-        row.steps = [Group(steps=tuple(row.steps), always=always)]
-        row.state, row.asked = state, None
-        return len(clauses)
 
     def decide(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
         """Builds a choice for "if" and "unless"."""
@@ -140,11 +141,14 @@ class DecisionBuilder:
             row, negate_supposed(supposed) if clause.kind is Cue.UNLESS else supposed, body, clauses, end
         )
 
+    def known(self, row: StepRow) -> State:
+        """State after the pending clauses."""
+        return self.read_together(row.plain, row.state).state if row.plain else row.state
+
     def _holds(self, text: str, row: StepRow) -> bool:
         """Returns whether the text is a complete condition."""
         try:
-            state = self.read_together(row.plain, row.state).state if row.plain else row.state
-            parse_condition(text, state, self.reader)
+            parse_condition(text, self.known(row), self.reader)
         except RefusalError:
             return False
         return True
@@ -152,7 +156,8 @@ class DecisionBuilder:
     def split(self, text: str, state: State, follows: Sequence[Clause]) -> tuple[SpokenCondition, str]:
         """Splits a condition from an action that follows without a comma."""
         refusal: RefusalError | None = None
-        objects = [match.end() for match in ACTS.object_behind.finditer(text)] if self.given is not None else []
+        begins = [start for start, _ in words_of(text).spans[1:]] if self.given is not None else []
+        objects = [start for start in begins if CHECKS.no_verb.fullmatch(text[start:])]
         for cut_at in (*([len(text)] if follows else []), *verb_positions(text), *objects, len(text)):
             rest = re.sub(r"^(?:then|please)\s+", "", text[cut_at:], flags=re.IGNORECASE)
             condition = re.sub(r"\s+(?:then|please|and)$", "", text[:cut_at].rstrip(" ,"), flags=re.IGNORECASE)
@@ -217,7 +222,7 @@ class DecisionBuilder:
         cue, words = clause.kind, [clause.cue]
         self.flush(row)
         asked, last = row.asked, row.steps[-1] if row.steps else None
-        if cue in (Cue.SO, Cue.NOT) and asked is None and ACTS.somebody.search(clause.cue):
+        if cue in (Cue.SO, Cue.NOT) and asked is None and CHECKS.somebody.search(clause.cue):
             supposed = parse_condition(re.sub(r"^if ", "", clause.cue, flags=re.IGNORECASE), row.state, self.reader)
             return self.choose(row, supposed, [*cut(clause.text), *clauses[at + 1 : both]], clauses, both)
         if not row.steps[row.begun :] and not (asked and row.steps):
@@ -284,7 +289,7 @@ class DecisionBuilder:
             return end
         rounds, rest = self._how_often(row, clause, clauses[at + 1 : end])
         body = [*cut(rest), *clauses[at + 1 : end]]
-        if clause.kind in (Cue.WHILE, Cue.UNTIL) and len(body) == 1 and ACTS.stays.fullmatch(body[0].text):
+        if clause.kind in (Cue.WHILE, Cue.UNTIL) and len(body) == 1 and CHECKS.stays.fullmatch(body[0].text):
             said = clause.text[: len(clause.text) - len(rest)].strip(" ,")
             where = body[0].text.partition(" ")[2]
             self.put_done(row, wait_steps(where, clause.kind.value, said, row.state, self.reader))
@@ -308,9 +313,9 @@ class DecisionBuilder:
         """Splits the number or interval of rounds from the action that follows."""
         text, state = clause.text, row.state
         if clause.kind is Cue.TIMES:
-            return Rounds(Loop(times=times_of_cue(clause.cue)), state), text
+            return Rounds(Loop(times=int(amount_of_cue(clause, parse_times, "number of times"))), state), text
         if clause.kind is Cue.EVERY:  # "for an hour" and "until three" may stand behind
-            every_s = seconds_of_cue(clause.cue)
+            every_s = amount_of_cue(clause, parse_seconds, "time")
             if not re.match(r"(?:for|until|till|as long as|while)\b", text, re.IGNORECASE):
                 return Rounds(Loop(every_s=every_s), state), text
             for cut_at in (*([len(text)] if follows else []), *verb_positions(text)):
@@ -327,35 +332,35 @@ class DecisionBuilder:
         """Parses the end of rounds in "for an hour", "until three o'clock" or "five times"; None for other texts."""
         if not text:
             return Rounds(Loop(every_s=every_s), state)
-        if (match := ACTS.for_span.fullmatch(text)) is not None:
-            seconds = parse_seconds(match[1])
+        if (match := CHECKS.for_span.fullmatch(text)) is not None:
+            seconds = parse_seconds(match["span"])
             if seconds is None or seconds < every_s:
                 raise RefusalError(f"'{text}' is shorter than one round", [text])
             return Rounds(Loop(times=int(seconds // every_s), every_s=every_s), state)
         if (count := parse_times(text)) is not None:
             return Rounds(Loop(times=count, every_s=every_s), state)
-        match = re.fullmatch(r"(?P<how>until|till|as long as|while) (?P<what>.+)", text, re.IGNORECASE)
-        if match is None:
+        cue = leading_cue(text)
+        if cue is None or cue.kind not in (Cue.UNTIL, Cue.WHILE):
             return None
-        if (time := parse_time(match["what"])) is not None:
-            self.notes += time.notes(match["what"])
+        if (time := parse_time(cue.text)) is not None:
+            self.notes += time.notes(cue.text)
             return Rounds(Loop(until_clock=time.text, every_s=every_s), state)
         try:
-            supposed = parse_condition(match["what"], state, self.reader)
+            supposed = parse_condition(cue.text, state, self.reader)
         except RefusalError:
             return None
-        rounds = rounds_by(Cue.UNTIL if match["how"].lower() in ("until", "till") else Cue.WHILE, supposed)
+        rounds = rounds_by(cue.kind, supposed)
         return replace(rounds, loop=rounds.loop.model_copy(update={"every_s": every_s}))
 
     def _on_the_way(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> bool:
         """Builds parallel steps for a simple "while driving to the kitchen, say ..."."""
         text = clause.text
-        match = ACTS.under_way.match(text) if clause.kind is Cue.WHILE else None
+        match = CHECKS.under_way.match(text) if clause.kind is Cue.WHILE else None
         if match is None:
             return False
         for cut_at in (*([len(text)] if follows else []), *verb_positions(text)):
-            going = text[match.end() : cut_at].strip(" ,")
-            if cut_at > match.end() and re.match(r"(?:to|into|through|from)\b", going, re.IGNORECASE):
+            going = text[match.end : cut_at].strip(" ,")
+            if cut_at > match.end and re.match(r"(?:to|into|through|from)\b", going, re.IGNORECASE):
                 self.put_together(row, going, [*cut(text[cut_at:]), *follows])
                 return True
         raise RefusalError(f"I do not understand '{clause.cue} {text}'", [text])
@@ -364,9 +369,9 @@ class DecisionBuilder:
         """Adds speech in parallel to a drive."""
         reading = self.reader.read_commands(where, row.state, (verb("go"),))
         said = parse_speech(body[0].text, self.reader) if len(body) == 1 else None
-        if said is None or said.text is None or said.to is not None or len(reading.commands) != 1:
+        if said is None or not said[0] or said[1].slots.keys() - {"text", "says"} or len(reading.commands) != 1:
             raise RefusalError("while I go somewhere I can only say something", [join_clauses(body)])
-        both = (Do.from_command(reading.commands[0]), Speak(speak=escape_braces(said.text)))
+        both = (Do.from_command(reading.commands[0]), Speak(speak=escape_braces(said[0])))
         self.put(row, Together(steps=both), reading.state)
 
     def modify(self, row: StepRow, clause: Clause, found: Clause) -> None:
@@ -376,13 +381,13 @@ class DecisionBuilder:
         if found.kind in (Cue.IF, Cue.UNLESS):
             self._guarded(row, scope, found)
             return
-        if found.kind is Cue.WHILE and (match := ACTS.under_way.match(found.text)) is not None:
-            self.put_together(row, found.text[match.end() :].strip(), scope)
+        if found.kind is Cue.WHILE and (match := CHECKS.under_way.match(found.text)) is not None:
+            self.put_together(row, found.text[match.end :].strip(), scope)
             return
         if found.kind is Cue.EVERY:
-            rounds = self.limit_rounds(seconds_of_cue(found.cue), found.text, row.state)
+            rounds = self.limit_rounds(amount_of_cue(found, parse_seconds, "time"), found.text, row.state)
         elif found.kind is Cue.TIMES:
-            rounds = None if found.text else Rounds(Loop(times=times_of_cue(found.cue)), row.state)
+            rounds = None if found.text else self._how_often(row, found, ())[0]
         else:
             rounds = self._rounds_behind(row, scope, found)
         if rounds is None:
@@ -402,7 +407,7 @@ class DecisionBuilder:
     def _scope(self, row: StepRow, clause: Clause, found: Clause) -> list[Clause]:
         """Clauses that a trailing cue applies to. Raises RefusalError when these are ambiguous."""
         main = replace(clause, text=found.before)
-        alone = clause.begins or (clause.then and not ACTS.comes_back.fullmatch(found.before))
+        alone = clause.begins or (clause.then and not CHECKS.comes_back.fullmatch(found.before))
         earlier = [] if alone else list(row.plain)
         start = max((n for n, one in enumerate(earlier) if one.begins or (one.then and n)), default=0)
         earlier = earlier[start:]

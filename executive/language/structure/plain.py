@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.language.actions import Action
-from executive.language.amounts import parse_seconds, parse_times
-from executive.language.clauses import ACTS, CLAUSES, Clause, Cue
+from executive.language.clauses import CHECKS, CLAUSES, Clause, Cue
 from executive.language.items import Adverb, Being, Chunk, Item, Whether, verb
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
@@ -18,6 +17,7 @@ from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import HERE, Location
+from executive.language.templates import page
 from executive.language.tokens import Token
 from executive.words.command import START, Command, Task
 from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
@@ -28,6 +28,7 @@ from executive.words.steps import Loop, Repeat, Steps
 from skills.api import ObjectKind
 
 _LEFT_OUT: Final = frozenset({"not", "n't", "but", "except", "instead", "rather", "neither", "nor"})
+_DENIALS: Final = page("denials")
 SEES: Final = "I can see whether something or somebody is somewhere"
 
 
@@ -98,6 +99,12 @@ def phrase_of_name(name: str, kind: NounKind) -> Phrase:
     return Phrase((Token(0, 0, name, name.lower(), pos, tag, 0, "obl", entity, kind, known=True),))
 
 
+def names_of_world(knowledge: Knowledge) -> dict[str, tuple[str, ...]]:
+    """Names of people and places, which templates leave open; the longest first."""
+    names = {"names": knowledge.people, "around": knowledge.place_names()}
+    return {key: tuple(sorted(knowledge.spellings(each), key=len, reverse=True)) for key, each in names.items()}
+
+
 def with_preposition(items: Sequence[Item], preposition: str) -> tuple[Item, ...]:
     """Adds a preposition to the first noun phrase of some items; "there" needs none."""
     at = next((n for n, item in enumerate(items) if isinstance(item, Chunk | Adverb)), None)
@@ -163,13 +170,13 @@ class PlainReader:
 
     def check(self, text: str, state: State, lead: Sequence[Item] = (), *, said: str | None = None) -> SpokenCondition:
         """Condition that the statement in a text holds; `said` is the full text."""
-        read = self._run(Trace(text, lead=(verb("check"), Whether(), *lead), asked=True), upto="reading")
-        assert read.affirmed is not None
-        words = [token.word for token in read.tokens if token.index not in read.affirmed.silent]
-        if (left_out := next((word for word in words if word in _LEFT_OUT), None)) is not None:
+        denied = (_DENIALS.existing if lead else _DENIALS.statement).fullmatch(text)
+        affirmed = text if denied is None else denied.instead
+        read = self._run(Trace(affirmed, lead=(verb("check"), Whether(), *lead)), upto="reading")
+        if (left_out := next((token.word for token in read.tokens if token.word in _LEFT_OUT), None)) is not None:
             raise RefusalError(f"I cannot see whether '{said or text}'; say it without '{left_out}'", [said or text])
         found = self.look_by_items(read.items, said or text, state, read.tokens)
-        return found.negate(said or text) if read.affirmed.denied else found
+        return found.negate(said or text) if denied is not None else found
 
     def exists(self, what: str, text: str, state: State) -> SpokenCondition:
         """Condition that an object exists, or does not exist ("no beer in the hall"); `text` is the full text."""
@@ -205,20 +212,12 @@ class PlainReader:
         he = isinstance(item, Chunk) and item.role is None and item.phrase.head.word in ("he", "she")
         return replace(item, phrase=person.phrase) if isinstance(item, Chunk) and he else item
 
-    def room(self, place: Location | str, state: State) -> str:
-        """Room that contains a place, which is given as a location or in words."""
-        text = place if isinstance(place, str) else place.text
-        if isinstance(place, str):
-            reading = self.go_to(place, state)
-        else:
-            assert place.phrase is not None
-            to = Chunk(place.phrase, "to", PrepositionRole.GOAL)
-            reading = self.commands_from_items((verb("go"), to), state)
-        first, *more = reading.commands
-        goal = first.goal
-        if more or first.item or first.task or goal is None or self.knowledge.place(goal) is None:
-            raise RefusalError(f"'{text}' is no room", [text])
-        return self.knowledge.room(goal)
+    def room(self, place: str, state: State) -> str:
+        """Room that contains a place."""
+        first, *more = self.go_to(place, state).commands
+        if more or first.item or first.task or first.goal is None or self.knowledge.place(first.goal) is None:
+            raise RefusalError(f"'{place}' is no room", [place])
+        return self.knowledge.room(first.goal)
 
     def is_somebody(self, who: str, state: State) -> bool:
         """Returns whether the words mean a known person, an earlier person, or anybody."""
@@ -326,7 +325,7 @@ def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, ro
         after_all = n > at and ((one.outer and not first) or one.anyway)
         then = n > at and branch and one.then
         if rounds:
-            goes_on = one.kind in ATTACHED or (one.kind is Cue.IF and ACTS.pronoun.match(one.text) is not None)
+            goes_on = one.kind in ATTACHED or (one.kind is Cue.IF and CHECKS.pronoun.match(one.text) is not None)
             if after_all or (one.begins and n > at and not goes_on):
                 return n
         elif one.kind in (*ATTACHED, Cue.IF, Cue.UNLESS, Cue.SOON) or one.begins or after_all or then:
@@ -395,11 +394,11 @@ def condition_at_source(supposed: SpokenCondition, steps: Steps, text: str) -> S
 
 def statement_of_check(text: str) -> str | None:
     """Turns a check into a statement: "is the door open" becomes "the door is open"."""
-    match = ACTS.checked.fullmatch(text)
-    if match is None or match["what"] is not None:
-        return None if match is None else match["what"]
-    found = next((found for form in ACTS.each("asked") if (found := form.fullmatch(match["asked"]))), None)
-    return None if found is None else f"{found[1]} {'are' if found[1].lower() == 'you' else 'is'} {found[2]}"
+    if (checked := CHECKS.checked.fullmatch(text)) is not None:
+        return checked["what"]
+    if (asked := CHECKS.asked.fullmatch(text)) is None:
+        return None
+    return f"{asked['subject']} {'are' if asked['subject'].lower() == 'you' else 'is'} {asked['state']}"
 
 
 def ambiguous_cue(found: Clause) -> RefusalError:
@@ -413,22 +412,11 @@ def missing_action(cue: str, text: str = "") -> RefusalError:
     return RefusalError(f"what am I to do {f'{cue.lower()} {text}'.strip()}?", [f"{cue} {text}".strip()])
 
 
-def seconds_of_cue(cue: str) -> float:
-    """Parses the interval in "every ten minutes", in seconds. Raises RefusalError for another text."""
-    words = re.sub(r"^(?:once )?(?:every|each|per) |^once (?=an? )|^once per ", "", cue, flags=re.IGNORECASE)
-    seconds = parse_seconds(words if words not in ("hour", "minute") else f"a {words}")
-    if seconds is None:
-        raise RefusalError(f"'{cue}' is no time that I understand", [cue])
-    return seconds
-
-
-def times_of_cue(cue: str) -> int:
-    """Parses the number of rounds in "do this three times". Raises RefusalError for another text."""
-    words = re.sub(r"^(?:do|repeat) (?:this |that |the following |it )?|^for ", "", cue, flags=re.IGNORECASE)
-    count = parse_times(words)
-    if count is None:
-        raise RefusalError(f"'{cue}' is no number of times that I understand", [cue])
-    return count
+def amount_of_cue(cue: Clause, parse: Callable[[str], float | None], what: str) -> float:
+    """Interval or number of rounds in a cue."""
+    if (found := parse(cue.amount)) is None:
+        raise RefusalError(f"'{cue.cue}' is no {what} that I understand", [cue.cue])
+    return found
 
 
 def merge_repeats(block: Repeat) -> Repeat:

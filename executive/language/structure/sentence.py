@@ -3,11 +3,12 @@
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.clauses import ACTS, Clause, Cue, cut, split, trailing_cue
+from executive.language.clauses import CHECKS, Clause, Cue, cut, split, trailing_cue, without_whatever
 from executive.language.coverage import TOLD, note_adverbs
 from executive.language.items import Adverb, Chunk, verb, without_objects
 from executive.language.lexicon import PrepositionRole
@@ -16,9 +17,9 @@ from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.structure.conditions import parse_condition, parse_opening
+from executive.language.structure.conditions import RequestParser, parse_condition, parse_opening
 from executive.language.structure.decisions import DecisionBuilder
-from executive.language.structure.people import commands_on_people, parse_people, refers_to_somebody
+from executive.language.structure.people import PEOPLE, commands_on_people, parse_people
 from executive.language.structure.plain import (
     ATTACHED,
     LastCheck,
@@ -34,11 +35,11 @@ from executive.language.structure.plain import (
     with_preposition,
 )
 from executive.language.structure.requests import (
-    Listener,
+    ROOMS,
+    SPEECH,
     QuestionRequest,
     escape_braces,
     is_clause,
-    make_speech,
     parse_charging,
     parse_pictures,
     parse_question,
@@ -47,11 +48,12 @@ from executive.language.structure.requests import (
     search_for,
     steps_for_everyone,
 )
-from executive.words.command import PEOPLE_TASKS, SPEAKER, START, Command, Task
+from executive.language.templates import Match
+from executive.words.command import PEOPLE_TASKS, SPEAKER, START, Task
 from executive.words.condition import Look
 from executive.words.leaf_steps import Awaited, Check, Do, Speak, Wait, steps_of_commands
 from executive.words.step import Step
-from executive.words.steps import Ask, Choose, Repeat, Steps, Together, Try
+from executive.words.steps import Ask, Choose, Group, Repeat, Steps, Together, Try
 from skills.inputs.schema import first_error
 
 
@@ -73,57 +75,72 @@ class SentenceBuilder(DecisionBuilder):
     def _next(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
         """Builds the clause at `at` and the clauses that depend on it; returns the index after these."""
         clause = clauses[at]
-        if clause.anyway or clause.ends_anyway:
-            return self.put_always(row, clauses, at)
+        if clause.anyway:
+            return self._put_always(row, clauses, at)
         if clause.kind in (Cue.IF, Cue.UNLESS):
             return self.decide(row, clauses, at)
         if clause.kind in ATTACHED:
             return self.attach(row, clauses, at)
         if clause.kind is not None:
             return (self.wait_for if clause.kind is Cue.SOON else self.repeat)(row, clauses, at)
-        stated = bool(row.plain) and all(ACTS.told_first.match(one.text) for one in row.plain)
+        stated = bool(row.plain) and all(
+            CHECKS.told_first.match(one.text) or CHECKS.pronoun.match(one.text) for one in row.plain
+        )
         if clause.begins and not stated:  # unless it goes on with "there is a hammer on the bench. bring it"
             self.flush(row)
             row.begun = len(row.steps)
-        if self.given is not None and at == 0 and ACTS.no_verb.match(clause.text):
+        if self.given is not None and at == 0 and CHECKS.no_verb.fullmatch(clause.text):
             clause = replace(clause, lead=without_objects(self.reader.read_items(self.given)))
             clauses = [clause, *clauses[1:]]
         return self._act(row, clause, clauses, at)
 
+    def _put_always(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
+        """Adds steps that run at the end, whatever happens."""
+        self.flush(row)
+        first = clauses[at]
+        if not row.steps:
+            raise RefusalError("say what I am to do first, before what I am to do in any case", [first.text])
+        ended = re.sub(r"[, ]+(?:at the end|in the end)$", "", without_whatever(first.text), flags=re.IGNORECASE)
+        rest = [replace(first, text=ended), *clauses[at + 1 :]]
+        always, state = self.nest(rest, replace(row.state, goal=None, at=None))
+        row.steps = [Group(steps=tuple(row.steps), always=always)]
+        row.state, row.asked = state, None
+        return len(clauses)
+
     def _act(self, row: StepRow, clause: Clause, clauses: Sequence[Clause], at: int) -> int:
         """Builds the clause at `at`, which contains an action; returns the index after it."""
         text = clause.text
-        if ACTS.giving.match(text) is not None:
+        if CHECKS.brings.match(text) is not None or CHECKS.giving.match(text) is not None:
             self.given = text if (behind := trailing_cue(text)) is None else behind.before
-        if ACTS.answered.fullmatch(text) is not None and self._answered(row):
+        if CHECKS.answered.fullmatch(text) is not None and self._answered(row):
             return at + 1
-        if ACTS.idle.fullmatch(text) is not None:
+        if CHECKS.idle.fullmatch(text) is not None:
             self.flush(row)
             return at + 1
-        for act in (self._opens, self._people, self._waits, self._asks, self._says, self._checks):
+        first, then = (partial(self._request, parsers) for parsers in (_FIRST, _THEN))
+        for act in (first, self._people, then, self._asks, self._says, self._checks):
             if (end := act(row, clauses, at)) is not None:
                 return end
         found = trailing_cue(text)
-        if found is not None and (found.kind is Cue.EVERY or not ACTS.every_room.search(text)):
+        if found is not None and (found.kind is Cue.EVERY or not ROOMS.every_room.search(text)):
             self.modify(row, clause, found)
             return at + 1
-        for act in (self._everyone, self._rooms):
+        for act in (partial(self._request, (steps_for_everyone,)), self._rooms):
             if (end := act(row, clauses, at)) is not None:
                 return end
         row.plain.append(clause)
         return at + 1
 
-    def _opens(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
-        """Adds the opening of a door, or pictures, if the clause asks for them."""
-        text = clauses[at].text
-        pictures = ACTS.pictures.match(text) and not trailing_cue(text)
-        parse = parse_opening if ACTS.opens.match(text) else parse_pictures if pictures else None
-        done = parse and parse(text, self._known(row), self.reader)
-        if done is None:
-            return None
-        self.flush(row)
-        self.put_done(row, done)
-        return at + 1
+    def _request(
+        self, parsers: Sequence[RequestParser], row: StepRow, clauses: Sequence[Clause], at: int
+    ) -> int | None:
+        """Adds the steps of a request that one of the parsers understands."""
+        for parse in parsers:
+            if (done := parse(clauses[at].text, partial(self.known, row), self.reader)) is not None:
+                self.put_done(row, done)
+                self.special = True
+                return at + 1
+        return None
 
     def _people(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         """Adds following, guiding, meeting or greeting people, if the clause asks for it."""
@@ -142,9 +159,9 @@ class SentenceBuilder(DecisionBuilder):
         if request is None:
             return None
         then = clauses[at + 1].text if at + 1 < len(clauses) and clauses[at + 1].kind is None else ""
-        if request.form == "find" and not (refers_to_somebody(then) or (self.special and request.refers)):
+        if request.form == "find" and not (PEOPLE.refers.search(then) or (self.special and request.refers)):
             return None
-        if request.form == "stated" and not (refers_to_somebody(then) and parse_people(then, self.reader.knowledge)):
+        if request.form == "stated" and not (PEOPLE.refers.search(then) and parse_people(then, self.reader.knowledge)):
             return None
         if found is not None and decides:
             self.modify(row, clauses[at], found)
@@ -179,31 +196,15 @@ class SentenceBuilder(DecisionBuilder):
         self.special = self.special or looked
         return looked
 
-    def _known(self, row: StepRow) -> State:
-        """State after the pending clauses."""
-        return self.read_together(row.plain, row.state).state if row.plain else row.state
-
-    def _waits(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
-        text = clauses[at].text
-        if not ACTS.waits.match(text) or (row.plain and not ACTS.waits_for.search(text)):
-            return None
-        state = self._known(row)
-        done = parse_charging(text, state) or parse_wait(text, state, self.reader)
-        if done is None:
-            return None
-        self.flush(row)
-        self.put_done(row, done)
-        return at + 1
-
     def _says(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         clause = clauses[at]
-        if (match := ACTS.tells_when.fullmatch(clause.text)) is not None:
+        if (match := SPEECH.tells_when.fullmatch(clause.text)) is not None:
             self._tells_when(row, match)
             return at + 1
-        if not ACTS.speaks.match(clause.text) or ACTS.asks_back.match(clause.text):
+        if not SPEECH.speaks.match(clause.text) or SPEECH.asks_back.match(clause.text):
             return None
-        if (everywhere_said := ACTS.says_everywhere.fullmatch(clause.text)) is not None:
-            self._in_each(row, replace(clause, joint="", text=everywhere_said[1]))
+        if (everywhere_said := ROOMS.says_everywhere.fullmatch(clause.text)) is not None:
+            self._in_each(row, replace(clause, joint="", text=everywhere_said["said"]))
             return at + 1
         found = trailing_cue(clause.text)
         if found is not None:  # unless it is a part of what is said
@@ -214,41 +215,39 @@ class SentenceBuilder(DecisionBuilder):
         said = parse_speech(clause.text, self.reader)
         if said is None:
             return None
-        text = said.text if said.text is not None else self.statement
+        text, to = said[0] or self.statement, said[1]
         if text is None:
             raise RefusalError(f"what am I to say in '{clause.text}'?", [clause.text])
         self.flush(row)
-        self._to(row, said.to)
+        self._to(row, to)
         self.put(row, Speak(speak=escape_braces(text)), row.state)
         return at + 1
 
-    def _tells_when(self, row: StepRow, match: re.Match[str]) -> None:
+    def _tells_when(self, row: StepRow, match: Match) -> None:
         """Builds a wait and a speech for "tell me when Robin comes"."""
         self.flush(row)
         supposed = parse_condition(match["what"], row.state, self.reader)
         statement = statement_of(supposed)
         if statement is None:
-            raise RefusalError(f"what am I to say in '{match[0]}'?", [match[0]])
+            raise RefusalError(f"what am I to say in '{match.text}'?", [match.text])
         self.put(row, Wait(awaited=Awaited(condition=supposed.condition)), supposed.holds)
-        said = make_speech(match["who"], statement, self.reader.knowledge)
-        self._to(row, said.to)
-        self.put(row, Speak(speak=escape_braces(said.text or statement)), row.state)
+        said = parse_speech(f"tell {match['who']} that {statement}", self.reader)
+        if said is None:
+            raise RefusalError(f"I do not know to whom to say it: '{match['who']}'", [match["who"]])
+        self._to(row, said[1])
+        self.put(row, Speak(speak=escape_braces(said[0])), row.state)
 
-    def _to(self, row: StepRow, to: Listener | None) -> None:
+    def _to(self, row: StepRow, to: Match) -> None:
         """Adds the drive to the listener."""
-        if to is None or not (to.who or to.where):
+        said, place = to["name"] or to["pronoun"], to["where"]
+        if not (said or place or to["speaker"]):
             return
-        who = with_preposition(self.reader.read_items(to.who), "to") if to.who and not to.speaker else ()
-        where = with_preposition(self.reader.read_items(to.where), "in" if who else "to") if to.where else ()
-        going = (verb("come"), Adverb(here=True)) if to.speaker else (verb("go"), *who, *where)
+        who = with_preposition(self.reader.read_items(said), "to") if said else ()
+        where = with_preposition(self.reader.read_items(place), "in" if who else "to") if place else ()
+        going = (verb("come"), Adverb(here=True)) if to["speaker"] else (verb("go"), *who, *where)
         reading = self.reader.commands_from_items(going, row.state)
-        last = row.steps[-1].commands if row.steps else ()
-        if (
-            last
-            and last[-1].task in PEOPLE_TASKS
-            and str(last[-1].object) == reading.commands[-1].goal
-            and not to.where
-        ):
+        last = row.steps[-1].commands[-1:] if row.steps and not place else ()
+        if any(one.task in PEOPLE_TASKS and str(one.object) == reading.commands[-1].goal for one in last):
             return  # the robot has just followed or guided that person
         if reading.commands[-1].goal != row.state.goal or reading.commands[-1].goal_at is not None:
             self.add(row, reading)
@@ -274,12 +273,13 @@ class SentenceBuilder(DecisionBuilder):
         found: dict[str, Steps] = {"yes": (), "no": ()}
         while at < len(clauses):
             clause, rest = clauses[at], clauses[at].text
-            match = ACTS.answers.match(rest) if clause.kind is Cue.IF else None
+            denied = CHECKS.declines.match(rest) if clause.kind is Cue.IF else None
+            match = denied or (CHECKS.agrees.match(rest) if clause.kind is Cue.IF else None)
             answer = "yes" if clause.kind is Cue.SO else "no" if clause.kind in (Cue.NOT, Cue.OTHERWISE) else None
             if match is not None:
-                answer = "no" if match["no"] else "yes"
-                rest = rest[match.end() :].strip(" ,")
-            chosen = clause.kind is None and not any(found.values()) and ACTS.brings_it.match(rest)
+                answer = "yes" if denied is None else "no"
+                rest = rest[match.end :].strip(" ,")
+            chosen = clause.kind is None and not any(found.values()) and CHECKS.brings_it.match(rest)
             answer = "yes" if chosen else answer
             if answer is None or found[answer]:
                 break
@@ -289,7 +289,7 @@ class SentenceBuilder(DecisionBuilder):
                 raise missing_action(clause.cue, clause.text)
             found[answer], _ = self.nest(body, self._choosing(asked, 0, state))
             at = end
-        if at < len(clauses) and not found["yes"] and ACTS.brings.match(clauses[at].text):
+        if at < len(clauses) and not found["yes"] and CHECKS.brings.match(clauses[at].text):
             raise RefusalError("say 'if yes' before the action for that answer", [clauses[at].text])
         return found, at
 
@@ -299,7 +299,7 @@ class SentenceBuilder(DecisionBuilder):
         """Steps that follow each of the choices: the robot brings the chosen object if the sentence says so."""
         article = r"^(?:a|an|some|the|any|another) "
         names = [re.sub(article, "", choice, flags=re.IGNORECASE) for choice in asked.choices]
-        if at >= len(clauses) or clauses[at].kind is not None or not ACTS.brings.match(clauses[at].text):
+        if at >= len(clauses) or clauses[at].kind is not None or not CHECKS.brings.match(clauses[at].text):
             return dict.fromkeys(names, ()), at
         chosen = (self._choosing(asked, n, state) for n in range(len(names)))
         return {name: self.nest([clauses[at]], each)[0] for name, each in zip(names, chosen, strict=True)}, at + 1
@@ -309,7 +309,7 @@ class SentenceBuilder(DecisionBuilder):
         objects = tuple(
             item.phrase for item in self.reader.read_items(asked.choices[number]) if isinstance(item, Chunk)
         )
-        person = Location(phrase_of_name(asked.of.name or "", NounKind.PERSON), "to")
+        person = Location(phrase_of_name(asked.of["name"], NounKind.PERSON), "to")
         memory = replace(state.memory, objects=objects, gathered=objects, where=None, person=person)
         return replace(state, memory=memory, recipient=person)
 
@@ -318,7 +318,7 @@ class SentenceBuilder(DecisionBuilder):
         text = statement_of_check(clauses[at].text)
         if text is None:
             return None
-        state = self._known(row)
+        state = self.known(row)
         try:
             self.reader.read_commands(clauses[at].text, state)
         except RefusalError as refusal:
@@ -339,31 +339,19 @@ class SentenceBuilder(DecisionBuilder):
         row.asked = LastCheck(supposed, looked=True)
         return at + 1
 
-    def _everyone(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
-        text = clauses[at].text
-        if ACTS.gives.match(text) is None or ACTS.everyone.search(text) is None:
-            return None
-        done = steps_for_everyone(text, self._known(row), self.reader)
-        if done is None:
-            return None
-        self.flush(row)
-        self.put_done(row, (*done, ()))
-        self.special = True
-        return at + 1
-
     def _rooms(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         text = clauses[at].text
-        if not ACTS.every_room.search(text):
+        if not ROOMS.every_room.search(text):
             return None
-        state, end = self._known(row), at + 1
-        looks = next((found for form in ACTS.each("looks") if (found := form.fullmatch(text))), None)
+        state, end = self.known(row), at + 1
+        looks = ROOMS.search.fullmatch(text)
         reading = None if looks is None else search_for(looks["what"], state, self.reader)
         follow = clauses[at + 1].text if at + 1 < len(clauses) and clauses[at + 1].kind is None else ""
-        if reading is None and ACTS.goes_everywhere.fullmatch(text) is not None:
-            if (match := ACTS.what_there.fullmatch(follow)) is not None:
-                what = next(filter(None, match.groups()))
-                reading, end = search_for(what, state, self.reader), at + 2
-            elif ACTS.speaks.match(follow) and trailing_cue(follow) is None:
+        if reading is None and ROOMS.goes_everywhere.fullmatch(text) is not None:
+            there = ROOMS.what_there.fullmatch(follow) or ROOMS.search.fullmatch(follow)
+            if there is not None:
+                reading, end = search_for(there["what"], state, self.reader), at + 2
+            elif SPEECH.speaks.match(follow) and trailing_cue(follow) is None:
                 self._in_each(row, replace(clauses[at + 1], joint=""))
                 return at + 2
         if reading is None:
@@ -381,6 +369,11 @@ class SentenceBuilder(DecisionBuilder):
             reading = self.reader.commands_from_items((verb("go"), there), replace(row.state, goal=None))
             said, state = self.sequence([says], reading.state)
             self.put_done(row, ((*steps_of_commands(reading.commands), *said), state, ()))
+
+
+_FIRST: Final[Sequence[RequestParser]] = (parse_opening, parse_pictures)
+_THEN: Final[Sequence[RequestParser]] = (parse_charging, parse_wait)
+"""Parsers before and after the one of requests about people."""
 
 
 MOST_NESTED: Final = 2
@@ -420,19 +413,16 @@ def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, mem
     parts = tuple(" | ".join(filter(None, (each.joint.strip(" ,;."), each.cue, each.text))) for each in clauses)
     commands = tuple(command for step in steps for each in step.walk() for command in each.commands)
     found = Trace(plain.text, state.memory, opened=plain.opened, tokens=plain.tokens, commands=commands)
+    moved = next((n for n, one in enumerate(commands) if str(one.object) == SPEAKER), len(commands))
+    back = any(one.item is not None and one.goal == START for one in commands[moved:])
     spoken = [each.speak for step in steps for each in step.walk() if isinstance(each, Speak)]
     adverbs = note_adverbs(plain.text, [*spoken, *re.findall("'([^']+)'", " ".join(builder.notes))])
-    notes = [*builder.notes, *filter(None, [adverbs]), *([_BACK] if _returns_to_speaker(commands) else [])]
+    notes = [*builder.notes, *filter(None, [adverbs]), *([_BACK] if back else [])]
     return replace(found, notes=tuple(dict.fromkeys(notes)), parts=parts, steps=steps)
 
 
 _BACK: Final = "I bring it to the place where you have spoken to me, not to where you are then"
-
-
-def _returns_to_speaker(commands: Sequence[Command]) -> bool:
-    """Returns whether the robot brings an object to the speaker after going elsewhere with the speaker."""
-    moved = next((n for n, one in enumerate(commands) if str(one.object) == SPEAKER), len(commands))
-    return any(one.item is not None and one.goal == START for one in commands[moved:])
+"""Note when the robot brings an object to the speaker after going elsewhere with the speaker."""
 
 
 def _depth(step: Step) -> int:

@@ -9,14 +9,15 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skills.quantities import Angle, Coordinate, Delay, Height, Margin, Share, Speed, TagNumber, TagSize
-from skills.robot import FloatArray, Robot, Scan
+from skills.relations import Relation
+from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform
@@ -36,22 +37,35 @@ class PlanningError(Exception):
 
 @dataclass(frozen=True)
 class ObjectKind:
-    """Kind of object, optionally with attributes: "red wrench" is ObjectKind("wrench", ("red",))."""
+    """Kind of object, optionally with attributes: "red wrench" is ObjectKind("wrench", ("red",)).
+
+    The `relations` say which object of the kind is meant: "red wrench next to the hammer".
+    """
 
     name: str
     attributes: tuple[str, ...] = ()
+    relations: tuple[Relation, ...] = ()
 
     def __str__(self) -> str:
-        return " ".join((*self.attributes, self.name))
+        return " ".join((*self.attributes, self.name, *map(str, self.relations)))
+
+    @property
+    def plain(self) -> ObjectKind:
+        """Kind without its relations, which no longer hold once the robot has taken the object."""
+        return replace(self, relations=()) if self.relations else self
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Flat top on which objects lie: outline in the world frame as (x, y) corners, height above the floor."""
+    """Flat top on which objects lie: outline in the world frame as (x, y) corners, height above the floor.
+
+    Left and right on it are as seen from the pose `viewer` (None: from the robot).
+    """
 
     name: str
     polygon_W: tuple[tuple[Coordinate, Coordinate], ...]
     height_m: Height
+    viewer: Pose2D | None = None
 
 
 @dataclass(frozen=True)

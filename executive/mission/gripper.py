@@ -84,4 +84,5 @@ def _fits(held: InGripper, item: ObjectKind | None, knowledge: Knowledge) -> boo
     if held.kind is None or item is None:
         return True
     of_held, asked = (set(knowledge.classes(knowledge.object_name(one.name) or one.name)) for one in (held.kind, item))
-    return of_held <= asked and set(item.attributes) <= set(held.kind.attributes)
+    said, asked_for = ({*each.attributes, *each.relations} for each in (held.kind, item))
+    return of_held <= asked and asked_for <= said

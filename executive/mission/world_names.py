@@ -1,11 +1,13 @@
 """Compares the names in a command with a world's: finds unknown names, and replaces aliases."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from executive.words.command import PEOPLE_TASKS, SPEAKER, START, TIME_UNITS_S, Command, Task
 from executive.words.knowledge import ANYBODY, Knowledge
 from skills.api import ObjectKind
-from skills.inputs.errors import suggestion
+from skills.inputs.errors import listing, suggestion
+from skills.relations import DOOR, ROBOT, Landmark, Relation, RelationKind
 
 
 def unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
@@ -27,6 +29,17 @@ def unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str,
         yield "to", *unknown("place or person", command.goal, goals)
     if command.goal_at is not None and knowledge.place(command.goal_at) is None:
         yield "to", *unknown("place", command.goal_at, knowledge.place_names())
+    of_item, of_object = (() if each is None else each.relations for each in (command.item, command.object))
+    if command.goal_relations and knowledge.place(str(command.goal)) not in knowledge.surfaces:
+        hint = f"name one of {listing(knowledge.surfaces, last='or')}" if knowledge.surfaces else "this world has none"
+        yield "to", f"'{command.goal}' is no surface, and the spot is {command.goal_relations[0]}", hint
+    for key, relations in (("take", of_item), ("object", of_object), ("to", command.goal_relations)):
+        for relation in relations:
+            by_person = relation.kind is RelationKind.SEEN_FROM
+            known = tuple(knowledge.people) if by_person else (*knowledge.object_names(), *goals, ROBOT, DOOR)
+            for name in (each.name for each in relation.landmarks):
+                if _landmark(name, knowledge) not in known:
+                    yield key, *unknown("person" if by_person else "landmark", name, known)
 
 
 def _wrong_with_people(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
@@ -50,7 +63,11 @@ def in_world_names(command: Command, knowledge: Knowledge) -> Command:
 
     def named(item: ObjectKind | None) -> ObjectKind | None:
         known = item and (knowledge.object_name(item.name) or knowledge.somebody(item.name))
-        return item and ObjectKind(known or item.name, item.attributes)
+        return item and ObjectKind(known or item.name, item.attributes, related(item.relations))
+
+    def related(relations: tuple[Relation, ...]) -> tuple[Relation, ...]:
+        names = ([replace(one, name=_landmark(one.name, knowledge)) for one in each.landmarks] for each in relations)
+        return tuple(replace(each, landmarks=tuple(own)) for each, own in zip(relations, names, strict=True))
 
     return Command(
         item=named(command.item),
@@ -60,8 +77,42 @@ def in_world_names(command: Command, knowledge: Knowledge) -> Command:
         object=named(command.object),
         item_count=command.item_count,
         object_count=command.object_count,
+        goal_relations=related(command.goal_relations),
     )
 
 
 def _goal(name: str, knowledge: Knowledge) -> str | None:
     return START if name == START else knowledge.place(name) or knowledge.person(name)
+
+
+def _landmark(name: str, knowledge: Knowledge) -> str:
+    """World's own name of a landmark: an object, a place or a person; the same name when it is unknown."""
+    return knowledge.object_name(name) or knowledge.place(name) or knowledge.person(name) or name
+
+
+def in_world(relations: Sequence[Relation], knowledge: Knowledge, place: str | None) -> tuple[Relation, ...]:
+    """Adds the classes of their objects, and the outlines of furniture, places and people, to relations at a place.
+
+    Raises ValueError for a door of a room that does not have exactly one.
+    """
+
+    def grounded(landmark: Landmark) -> Landmark:
+        name = _landmark(landmark.name, knowledge)
+        if name == ROBOT:
+            return landmark
+        if classes := knowledge.classes(name):
+            return replace(landmark, classes=classes)
+        if name == DOOR:
+            known = knowledge.place(place or "")
+            room = None if known is None else knowledge.room(known)
+            doors = [door.at for door in knowledge.doors if room in door.between]
+            if len(doors) != 1:
+                raise ValueError(f"it cannot be told which door is meant, since {room or 'no room'} has {len(doors)}")
+            return replace(landmark, outline_W=tuple(doors))
+        if name in knowledge.surfaces:
+            return replace(landmark, outline_W=knowledge.surfaces[name].polygon)
+        facts = knowledge.people.get(name)
+        pose = (facts and facts.pose) or knowledge.place_pose(facts.at if facts else name)
+        return replace(landmark, outline_W=((pose.x, pose.y),))
+
+    return tuple(replace(each, landmarks=tuple(map(grounded, each.landmarks))) for each in relations)

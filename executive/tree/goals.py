@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Final
 
+from executive.mission.world_names import in_world
 from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.goal import GoalCondition, GoalKind, Region, When
 from executive.words.knowledge import ANYBODY, Knowledge, Pose
@@ -59,7 +60,8 @@ def surfaces_to_search(knowledge: Knowledge, item: str, place: str | None) -> tu
 def surface_region(knowledge: Knowledge, surface: str) -> Region:
     """Region above a surface that contains the origin of each object at rest on the surface."""
     facts = knowledge.surfaces[surface]
-    return Region(surface, facts.polygon, facts.height - BELOW_TOP_M, facts.height + ABOVE_TOP_M)
+    heights_m = facts.height - BELOW_TOP_M, facts.height + ABOVE_TOP_M
+    return Region(surface, facts.polygon, *heights_m, facts.viewpoints[0].pose_2d())
 
 
 def _classes(item: ObjectKind | None, knowledge: Knowledge) -> tuple[str, ...]:
@@ -76,7 +78,9 @@ def _regions(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...])
 
 def _grasped(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
     classes, regions = _classes(command.object, knowledge), _regions(command, knowledge, elsewhere)
-    return GoalCondition(GoalKind.GRASPED, classes, command.object_count, regions, wanted=str(command.object))
+    meant = in_world(() if command.object is None else command.object.relations, knowledge, command.goal)
+    count, wanted = command.object_count, str(command.object)
+    return GoalCondition(GoalKind.GRASPED, classes, count, regions, wanted=wanted, relations=meant)
 
 
 def _answered(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
@@ -93,8 +97,9 @@ def _answered(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]
     place = None if command.goal is None else knowledge.place(command.goal)
     around = [name for name in knowledge.rooms if place in (None, name)]
     floors = tuple(Region(f"the floor of the {name}", knowledge.rooms[name], *FLOOR_M) for name in around)
-    asked = str(command.object)
-    return GoalCondition(GoalKind.ANSWERED, classes, command.object_count, regions, wanted=asked, maybe=floors)
+    asked, meant = str(command.object), in_world(command.object.relations, knowledge, command.goal)
+    count, floors = command.object_count, () if meant else floors
+    return GoalCondition(GoalKind.ANSWERED, classes, count, regions, wanted=asked, maybe=floors, relations=meant)
 
 
 def _carried(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> GoalCondition:
@@ -107,7 +112,8 @@ def _carried(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> Goal
     place = knowledge.place(goal)
     assert place is not None
     goals = tuple(surface_region(knowledge, name) for name in knowledge.surfaces_in(place))
-    return GoalCondition(GoalKind.PLACED, classes, command.item_count, goal=goals, wanted=str(item))
+    where = in_world(command.goal_relations, knowledge, goal)
+    return GoalCondition(GoalKind.PLACED, classes, command.item_count, goal=goals, wanted=str(item), relations=where)
 
 
 def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from executive.mission.gripper import InGripper
+from executive.mission.world_names import in_world
 from executive.tree.board import Constant, FromBoard, LastKnown
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import Condition
@@ -25,6 +26,7 @@ from executive.words.slug import slug
 from skills.api import Cause, ObjectKind, Part, Skill, Surface
 from skills.inputs.errors import InputError, SourceLine, suggestion
 from skills.perception.class_forms import ANY_OBJECT
+from skills.relations import Relation
 from skills.robot import Pose2D
 
 Registry = Mapping[str, type[Skill[Any]]]
@@ -297,8 +299,19 @@ class PlanBuilder:
 
     def surface(self, name: str) -> Surface:
         """Converts a surface from the knowledge file to the surface type of the skills."""
-        facts = self.knowledge.surfaces[name]
-        return Surface(name=name, polygon_W=facts.polygon, height_m=facts.height)
+        return self.knowledge.surfaces[name].surface(name)
+
+    def relations(self, relations: tuple[Relation, ...]) -> dict[str, object]:
+        """Returns the port for the relations of an object or a spot; none without relations.
+
+        Raises InputError when a landmark cannot be told.
+        """
+        if not relations:
+            return {}
+        try:
+            return {"relations": in_world(relations, self.knowledge, self.command.goal)}
+        except ValueError as error:
+            raise self.error(str(error), "name a surface, an object or a person") from error
 
     def place(self, name: str) -> str:
         """Returns the known place that `name` means. Raises InputError when there is no such place."""

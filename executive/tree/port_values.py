@@ -263,8 +263,7 @@ def _surface(value: Any, knowledge: Knowledge, path: Path) -> Surface:
     known = knowledge.place(name)
     if known is None or known not in knowledge.surfaces:
         raise _unknown("surface", name, tuple(knowledge.surfaces), knowledge, path)
-    facts = knowledge.surfaces[known]
-    return Surface(name=known, polygon_W=facts.polygon, height_m=facts.height)
+    return knowledge.surfaces[known].surface(known)
 
 
 def _surfaces(name: str, knowledge: Knowledge, path: Path) -> tuple[Surface, ...]:

@@ -1,7 +1,8 @@
 """Commands of the form *Take [item] to [goal] and do [task] to [object]*, and their text form.
 
 A name with several words needs no quotes ("[orange juice]"). If its words could be read as attributes, a number or
-Nothing, the text form puts the name in quotes ('["red wine"]'), so that every command parses back to itself.
+Nothing, the text form puts the name in quotes ('["red wine"]'), so that every command parses back to itself. Relations
+follow the name: "[hammer next to the wrench, 2nd from the left]".
 """
 
 from __future__ import annotations
@@ -9,10 +10,11 @@ from __future__ import annotations
 import enum
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from skills.api import ObjectKind
+from skills.relations import ORDERS, PARTS, Landmark, Relation, RelationKind
 
 _ATTRIBUTE: Final = re.compile(
     r"red|green|blue|yellow|orange|white|black|gr[ae]y|brown|pink|purple|violet|silver|golden|dark|bright|light"
@@ -33,6 +35,9 @@ _NO_ATTRIBUTE: Final = re.compile(rf"\d+|{_PLURAL}|.*\s.*")
 _FORM: Final = re.compile(r"\s*Take \[(.+?)\] to \[(.+?)\] and do \[(.+?)\] to \[(.+?)\]\s*")
 _GOAL: Final = re.compile(r'("[^"]+"|.+?)(?: at ("[^"]+"|.+))?')
 _COUNTED: Final = re.compile(r'(?:(\d+|some) )?(?:([^"]*) )?(?:"([^"]+)"|([^"]+))')
+_RELATION: Final = re.compile(
+    rf'"[^"]*"|,? (?:(\d+)(?:st|nd|rd|th) )?({"|".join(kind.value for kind in RelationKind)})(?=[ ,]|$)'
+)
 
 
 class Task(enum.Enum):
@@ -57,10 +62,10 @@ class Command:
     """Command to one robot. None stands for Nothing; a count of 0 is a plural without a number, 1 a singular.
 
     `goal` is a place or a person ("start": the pose where the robot stood when the speaker addressed it), `goal_at` the
-    place where that person is, `verb` the spoken verb.
+    place where that person is, `verb` the spoken verb. `goal_relations` say where on a surface to put an object.
 
-    Raises ValueError when a name contains brackets, quotes or stray blanks, a count is negative, Nothing is counted, or
-    `goal_at` is given without a goal.
+    Raises ValueError when a name contains brackets, quotes or stray blanks, a count is negative, Nothing is counted,
+    `goal_at` is given without a goal, or two relations of an object or a goal are of one kind.
     """
 
     item: ObjectKind | None = None
@@ -71,9 +76,10 @@ class Command:
     item_count: int = 1
     object_count: int = 1
     verb: str = ""
+    goal_relations: tuple[Relation, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in (self.goal, self.goal_at, *_words(self.item), *_words(self.object)):
+        for name in (self.goal, self.goal_at, *_words(self.item), *_words(self.object), *_names(self.goal_relations)):
             if name is not None and _RESERVED.search(name):
                 raise ValueError(f"{name!r} cannot be a name in a command")
         for kind, count in ((self.item, self.item_count), (self.object, self.object_count)):
@@ -81,21 +87,27 @@ class Command:
                 raise ValueError(f"{count} cannot be the count of {kind or _NOTHING}")
             if not all(map(may_be_attribute, _words(kind)[1:])):
                 raise ValueError(f"{kind} has an attribute that is no single word, or a number")
-        if self.goal_at is not None and self.goal is None:
-            raise ValueError(f"a goal is missing at {self.goal_at!r}")
+        if (self.goal_at is not None or self.goal_relations) and self.goal is None:
+            raise ValueError(f"a goal is missing at {self.goal_at or self.goal_relations[0]!s}")
+        if self.goal_relations and (self.goal_at is not None or self.goal == _NOTHING):
+            raise ValueError(f"'{self.goal_relations[0]}' goes with a surface")
+        for relations in (self.goal_relations, *(each.relations for each in (self.item, self.object) if each)):
+            kinds = [next((group for group in (PARTS, ORDERS) if one.kind in group), one.kind) for one in relations]
+            if len({*kinds}) < len(kinds):
+                raise ValueError(f"two relations are of one kind in '{', '.join(map(str, relations))}'")
 
     def __str__(self) -> str:
         """Text form, for instance "Take [Nothing] to [kitchen] and do [grasp] to [drink]"."""
         item = _counted_text(self.item, self.item_count)
         task = _NOTHING if self.task is None else self.task.value
         target = _counted_text(self.object, self.object_count)
-        return f"Take [{item}] to [{_goal_text(self.goal, self.goal_at)}] and do [{task}] to [{target}]"
+        return f"Take [{item}] to [{_goal_text(self)}] and do [{task}] to [{target}]"
 
     def to_json(self) -> dict[str, Any]:
         """Returns the command as JSON values: names as text, and null for Nothing, with count 0."""
         return {
             "item": None if self.item is None else str(self.item),
-            "goal": self.goal,
+            "goal": self.goal and " ".join((self.goal, *map(str, self.goal_relations))),
             "goal_at": self.goal_at,
             "task": None if self.task is None else self.task.value,
             "object": None if self.object is None else str(self.object),
@@ -133,15 +145,17 @@ def parse_command(text: str) -> Command:
     item, goal, task, target = match.groups()
     item_kind, item_count = _parse_counted(item)
     target_kind, target_count = _parse_counted(target)
-    goal_name, goal_at = _parse_goal(goal)
-    return Command(item_kind, goal_name, goal_at, _parse_task(task), target_kind, item_count, target_count)
+    place, relations = split_relations(goal)
+    goal_name, goal_at = _parse_goal(place)
+    tasks = _parse_task(task), target_kind, item_count, target_count
+    return Command(item_kind, goal_name, goal_at, *tasks, goal_relations=relations)
 
 
 def parts_of_command(command: Command) -> dict[str, str]:
     """Splits a command's text form into its parts by the keys of mission files; omits parts that are Nothing."""
     parts = {
         "take": _counted_text(command.item, command.item_count),
-        "to": _goal_text(command.goal, command.goal_at),
+        "to": _goal_text(command),
         "do": _NOTHING if command.task is None else command.task.value,
         "object": _counted_text(command.object, command.object_count),
     }
@@ -155,7 +169,47 @@ def command_of_parts(parts: Mapping[str, str | None]) -> Command:
 
 
 def _words(kind: ObjectKind | None) -> tuple[str, ...]:
-    return () if kind is None else (kind.name, *kind.attributes)
+    return () if kind is None else (kind.name, *kind.attributes, *_names(kind.relations))
+
+
+def _names(relations: tuple[Relation, ...]) -> tuple[str, ...]:
+    return tuple(word for each in relations for one in each.landmarks for word in (one.name, *one.attributes))
+
+
+def related(text: str, relations: tuple[Relation, ...]) -> str:
+    """Appends relations to the text of an object or a place."""
+    for number, relation in enumerate(relations):
+        landmarks = " and ".join(map(landmark_text, relation.landmarks))
+        text += f"{',' if number else ''} {relation.phrase} {landmarks}".rstrip()
+    return text
+
+
+def landmark_text(landmark: Landmark) -> str:
+    """Text of a landmark; in quotes if it would not parse back to the same landmark."""
+    plain = str(landmark)
+    parses = " and " not in plain and split_relations(plain)[1] == () and parse_landmark(plain) == landmark
+    return plain if parses else " ".join((*landmark.attributes, f'"{landmark.name}"'))
+
+
+def parse_landmark(text: str) -> Landmark:
+    """Parses a landmark. Raises ValueError when the text is no single object or place."""
+    kind, count = _parse_counted(text.removeprefix("the "))
+    if kind is None or count != 1:
+        raise ValueError(f"'{text}' is no single object or place")
+    return Landmark(kind.name, kind.attributes)
+
+
+def split_relations(text: str) -> tuple[str, tuple[Relation, ...]]:
+    """Splits the text of an object or a place from its relations. Raises ValueError for wrong landmarks."""
+    found = [match for match in _RELATION.finditer(text) if match.group(2)]
+    ends = [*(match.start() for match in found), len(text)]
+    relations = []
+    for match, end in zip(found, ends[1:], strict=True):
+        kind, said = RelationKind(match.group(2)), text[match.end() : end].strip()
+        parts = re.split(r' and (?=(?:[^"]*"[^"]*")*[^"]*$)', said) if kind is RelationKind.BETWEEN else [said]
+        landmarks = tuple(map(parse_landmark, parts)) if said else ()
+        relations.append(Relation(kind, landmarks, int(match.group(1) or 1)))
+    return text[: ends[0]], tuple(relations)
 
 
 def _counted_text(of: ObjectKind | None, count: int) -> str:
@@ -163,32 +217,35 @@ def _counted_text(of: ObjectKind | None, count: int) -> str:
     if of is None:
         return _NOTHING
     number = {0: f"{_PLURAL} ", 1: ""}.get(count, f"{count} ")
-    plain = f"{number}{of}"
-    return plain if _parse_counted(plain) == (of, count) else f'{number}{" ".join((*of.attributes, ""))}"{of.name}"'
+    plain = f"{number}{of.plain}"
+    parses = not split_relations(plain)[1] and _parse_counted(plain) == (of.plain, count)
+    return related(plain if parses else f'{number}{" ".join((*of.attributes, ""))}"{of.name}"', of.relations)
 
 
 def _parse_counted(text: str) -> tuple[ObjectKind | None, int]:
     if text == _NOTHING:
         return None, 1
-    match = _COUNTED.fullmatch(text)
+    words, relations = split_relations(text)
+    match = _COUNTED.fullmatch(words)
     if match is None:
         raise ValueError(f"[{text}] is no object")
     number, attributes, quoted, plain = match.groups()
     count = 1 if number is None else 0 if number == _PLURAL else int(number)
     if quoted is not None:
-        return ObjectKind(quoted, tuple((attributes or "").split())), count
-    return parse_object(" ".join(filter(None, (attributes, plain)))), count
+        return ObjectKind(quoted, tuple((attributes or "").split()), relations), count
+    return replace(parse_object(" ".join(filter(None, (attributes, plain)))), relations=relations), count
 
 
-def _goal_text(goal: str | None, goal_at: str | None) -> str:
-    if goal is None:
+def _goal_text(command: Command) -> str:
+    if command.goal is None:
         return _NOTHING
-    name = _quoted_place(goal)
-    return name if goal_at is None else f"{name} at {_quoted_place(goal_at)}"
+    name, at = _quoted_place(command.goal), command.goal_at
+    return related(name, command.goal_relations) if at is None else f"{name} at {_quoted_place(at)}"
 
 
 def _quoted_place(name: str) -> str:
-    return f'"{name}"' if name == _NOTHING or " at " in f" {name} " else name
+    is_plain = name != _NOTHING and " at " not in f" {name} " and _RELATION.search(f" at {name}") is None
+    return name if is_plain else f'"{name}"'
 
 
 def _parse_goal(text: str) -> tuple[str | None, str | None]:

@@ -13,6 +13,7 @@ from typing_extensions import TypeAliasType
 from executive.words.command import Command, Task, command_of_parts, parts_of_command
 from executive.words.expression import Expression, Kind
 from executive.words.forms import Forms
+from executive.words.phrase import ObjectWords, written
 from skills.inputs.errors import listing
 from skills.inputs.schema import Name, Strict, Text
 from skills.quantities import Delay, Quantity, Share
@@ -84,19 +85,19 @@ class Question(_Looking):
 class Look(_Looking):
     """Condition that an object is seen; the robot goes there and looks each time the condition is checked."""
 
-    object: Text = Field(description="The object to look for; `at` says where.")
+    object: ObjectWords = Field(description="The object to look for; `at` says where.")
     at: Text | None = Field(default=None, description="The place of the object; by default anywhere.")
 
     @classmethod
     def from_command(cls, command: Command, max_age_s: float = 0.0) -> Look:
         """Builds the condition from a command to find an object."""
-        parts = parts_of_command(command)
+        parts = written(parts_of_command(command))
         return cls(object=parts["object"], at=parts.get("to"), max_age_s=max_age_s)
 
     @cached_property
     def command(self) -> Command:
         """Command to find the object. Raises ValueError when a name cannot be parsed."""
-        return command_of_parts({"do": Task.FIND.value, "object": self.object, "to": self.at})
+        return command_of_parts({"do": Task.FIND.value, "object": str(self.object), "to": self.at})
 
     def __str__(self) -> str:
         at = "" if self.command.goal is None else f" at {self.command.goal}"

@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from executive.words.outlines import inside
+from skills.relations import Relation
+from skills.robot import Pose2D
 
 
 class GoalKind(enum.Enum):
@@ -39,13 +41,14 @@ class Region:
     """Part of the world: an outline seen from above, (x, y) corners in order, and a range of heights (m).
 
     An object or a robot is in a region when the origin of its body frame is: for a table 0.75 m high, on which origins
-    are up to 0.25 m above an object's base, the range is 0.70 to 1.00.
+    are up to 0.25 m above an object's base, the range is 0.70 to 1.00. `viewer` sees left and right.
     """
 
     name: str
     polygon_W: tuple[tuple[float, float], ...]
     z_min_m: float = -0.1
     z_max_m: float = 3.0
+    viewer: Pose2D | None = None
 
     def __post_init__(self) -> None:
         if len(self.polygon_W) < 3 or not self.z_min_m < self.z_max_m:
@@ -67,7 +70,8 @@ class GoalCondition:
     of the objects or of the robot (any of the regions). `person` receives the object or, if the class is "person", is
     searched for (None: anyone). To follow, guide, meet or greet a person, `person` (None: anyone) must stand in `goal`
     (empty: anywhere). `answer` is the answer that the robot gave at `answered_s` (None: now), `spoken_s` has the times
-    at which it spoke. `robot` must act (None: any).
+    at which it spoke. `robot` must act (None: any). `relations` say which objects of the source are meant, or for
+    PLACED where in the goal.
 
     `when` says at which times the condition must hold. The step ran from `began_s` (None: since `since_s`) to `ended_s`
     (None: it ends now). A later step of the same mission may lift the objects again within the intervals `taken_s`.
@@ -91,6 +95,7 @@ class GoalCondition:
     ended_s: float | None = None
     taken_s: tuple[tuple[float, float], ...] = ()
     since_s: float = 0.0
+    relations: tuple[Relation, ...] = ()
 
     @property
     def from_s(self) -> float:

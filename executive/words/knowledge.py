@@ -12,7 +12,7 @@ from executive.words.command import Task
 from executive.words.outlines import Corner, Polygon, distance_m
 from executive.words.robot_config import RobotsFile
 from executive.words.zone import ZoneFacts, with_files
-from skills.api import Tag, Zone
+from skills.api import Surface, Tag, Zone
 from skills.inputs.errors import InputError, suggestion
 from skills.inputs.schema import Name, Strict, validate
 from skills.inputs.yaml_source import YamlSource, read_yaml
@@ -102,6 +102,10 @@ class SurfaceFacts(Strict):
     viewpoints: Annotated[tuple[Pose, ...], Field(min_length=1, description="poses from which it is seen whole")]
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
     bin: bool = Field(default=False, description="whether what is thrown away goes there")
+
+    def surface(self, name: str) -> Surface:
+        """Surface as the skills' own data type; left and right are as seen from the first viewpoint."""
+        return Surface(name, self.polygon, self.height, self.viewpoints[0].pose_2d())
 
 
 class ObjectFacts(Strict):

@@ -19,22 +19,12 @@ from pydantic import (
 from executive.words.command import Command, Task, command_of_parts, parts_of_command
 from executive.words.condition import Condition, DoorOpen
 from executive.words.expression import Expression, Template, literal
+from executive.words.phrase import Goal, ObjectWords, written
 from executive.words.step import Fault, Scalar, Step, unreadable
 from skills.inputs.schema import Name, Strict, Text
-from skills.quantities import Duration, QuantityError, Share, clock_text
+from skills.quantities import Duration, Share, clock_text
 
 COMMAND_KEYS: Final = ("take", "to", "do", "object")
-
-
-def _named_goal(value: object) -> object:
-    """Accepts the name of a goal. Raises QuantityError for a pose, with the skill that takes one as a hint."""
-    if isinstance(value, list | dict):
-        hint = "for a pose write 'skill: navigate' with 'with: {x: 1.0, y: 2.0, yaw: 1.57}', in metres and radians"
-        raise QuantityError("should be the name of a place or person", hint)
-    return value
-
-
-Goal = Annotated[Text, BeforeValidator(_named_goal)]
 _ELSEWHERE: Final = "Whether the robot also searches elsewhere for an object that is not in its place; by default, yes."
 _GIVES: Final = (
     "Names for the skill's output ports, or for the answer; later steps read them with {from: NAME} and in expressions."
@@ -64,10 +54,12 @@ class Say(Step):
 class Do(Step):
     """Step with one command, written as its parts."""
 
-    take: Text | None = Field(default=None, description="The object to carry; a number may stand before it.")
-    to: Goal | None = Field(default=None, description='The place or person, or "start", or "Robin at hall".')
+    take: ObjectWords | None = Field(default=None, description="The object to carry; a number may stand before it.")
+    to: Goal | None = Field(
+        default=None, description='The place or person, or "start", or "Robin at hall"; or a spot on a surface.'
+    )
     do: Task | None = Field(default=None, description="The task there, on the object.")
-    object: Text | None = Field(
+    object: ObjectWords | None = Field(
         default=None, description='The object of the task, or a person: a name, "person" for anybody, or "speaker".'
     )
     elsewhere: StrictBool | None = Field(default=None, description=_ELSEWHERE)
@@ -84,14 +76,14 @@ class Do(Step):
     @classmethod
     def from_command(cls, command: Command) -> Do:
         """Builds the step for a command, and keeps the command's verb."""
-        step = cls.model_validate(parts_of_command(command))
+        step = cls.model_validate(written(parts_of_command(command)))
         step.__dict__["command"] = command
         return step
 
     def with_command(self, command: Command) -> Do:
         """Copies the step with another command."""
-        parts: Mapping[str, Any] = {**dict.fromkeys(COMMAND_KEYS), **parts_of_command(command), "do": command.task}
-        copy = self.model_copy(update=parts)
+        parts = written(parts_of_command(command))
+        copy = self.model_copy(update={**dict.fromkeys(COMMAND_KEYS), **parts, "do": command.task})
         copy.__dict__["command"] = command
         return copy
 
@@ -99,7 +91,8 @@ class Do(Step):
     def command(self) -> Command:
         """Command of the step. Raises ValueError when a part cannot be parsed."""
         do = None if self.do is None else self.do.value
-        return command_of_parts({"take": self.take, "to": self.to, "do": do, "object": self.object})
+        parts = {"take": self.take, "to": self.to, "do": do, "object": self.object}
+        return command_of_parts({key: None if each is None else str(each) for key, each in parts.items()})
 
     @property
     def commands(self) -> tuple[Command, ...]:

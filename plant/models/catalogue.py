@@ -31,6 +31,11 @@ class ModelForm(Strict):
     rest_height_m: float
     round: bool = False
 
+    @property
+    def sides_m(self) -> tuple[float, float, float]:
+        """Length, width and height of the object at rest."""
+        return 2.0 * self.half_extents_m[0], 2.0 * self.half_extents_m[1], 2.0 * self.rest_height_m
+
     def path(self) -> Path:
         """Path of the SDF file."""
         return MODELS_FOLDER / self.file

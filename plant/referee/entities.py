@@ -68,6 +68,7 @@ class Entities:
     of_geometry: Mapping[GeometryId, int]
     objects: Mapping[str, RigidBody]
     classes: Mapping[str, str]
+    sides_m: Mapping[str, tuple[float, float, float]]
     persons: Mapping[str, RigidBody]
     bases: Mapping[str, RigidBody]
     hands: Mapping[str, RigidBody]
@@ -112,6 +113,7 @@ class Entities:
             | {each: pieces[name] for each, name in scenery.items()},
             objects=objects,
             classes={placed.name: placed.class_name for placed in loose},
+            sides_m={placed.name: placed.form.sides_m for placed in loose},
             persons={name: _bodies(plant, name)[0] for name in persons},
             bases=bases,
             hands=_links(plant, {name: kind.hand_link for name, kind in robots.items()}),

@@ -9,8 +9,9 @@ from typing import Final
 import numpy as np
 
 from executive.words.goal import GoalCondition, GoalKind, Region, When
-from plant.referee.object_history import HIDES_M, TakenPicture, TimedPath, Truth
+from plant.referee.object_history import HIDES_M, ObjectHistory, TakenPicture, TimedPath, Truth
 from skills.inputs.errors import count_text, definite
+from skills.relations import Scene, Standing, choose
 from skills.robot import FloatArray
 
 NAMED_REGIONS = 3
@@ -21,6 +22,8 @@ NEAR_M: Final[Mapping[GoalKind, float]] = MappingProxyType(
 LOST_M: Final = 5.0
 LONGEST_LOSS_S: Final = 10.0
 """A robot that was farther than this from the person, for longer than this, has lost the person."""
+SLACK_M: Final = 0.05
+"""Distance by which the relations of an object may be missed."""
 _SAMPLE_S: Final = 0.1
 
 
@@ -45,6 +48,30 @@ def is_past(condition: GoalCondition) -> bool:
 def region_at(regions: Sequence[Region], p_W: FloatArray) -> str | None:
     """Name, with its article, of the first region that contains a point; None when none does."""
     return next((the(region.name) for region in regions if region.contains(p_W)), None)
+
+
+def has_relations(
+    history: ObjectHistory, at_W: FloatArray, time_s: float, condition: GoalCondition, truth: Truth
+) -> bool:
+    """Returns whether an object at a position is one that the condition's relations mean, among those at rest then."""
+    regions = condition.goal if condition.kind is GoalKind.PLACED else condition.source
+    region = next((each for each in regions if each.contains(at_W)), None)
+    if not condition.relations or region is None or region.viewer is None:
+        return not condition.relations
+    places = {one: one.place_at(time_s) for one in truth.histories} | {history: at_W}
+    here = {
+        one: Standing((float(p_W[0]), float(p_W[1])), one.sides_m)
+        for one, p_W in places.items()
+        if p_W is not None and region.contains(p_W)
+    }
+    landmarks = {landmark for relation in condition.relations for landmark in relation.landmarks}
+    objects = {each: [at for one, at in here.items() if one.class_name in each.classes] for each in landmarks}
+    scene = Scene(region.polygon_W, region.viewer, objects)
+    is_place = condition.kind is GoalKind.PLACED
+    same = [one for one in here if one.class_name in condition.classes or not condition.classes]
+    same = [history] if is_place else same
+    meant = choose(condition.relations, [here[one] for one in same], scene, SLACK_M)
+    return history in [same[k] for k in meant]
 
 
 def the(name: str) -> str:

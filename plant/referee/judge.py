@@ -7,6 +7,7 @@ from plant.referee.entities import Collision
 from plant.referee.findings import (
     Finding,
     distance_m,
+    has_relations,
     is_past,
     judge_company,
     judge_greeted,
@@ -59,7 +60,11 @@ def _judge_grasped(condition: GoalCondition, truth: Truth) -> Finding:
     until_s = step_end_s(condition, truth)
     from_s = condition.from_s if condition.when is When.SOME_TIME else condition.since_s
     candidates = ((one, _lift(one, condition, from_s, until_s)) for one in _of_class(condition, truth))
-    lifted = {history: lift for history, lift in candidates if lift is not None}
+    lifted = {
+        one: lift
+        for one, lift in candidates
+        if lift is not None and has_relations(one, lift.from_W, lift.time_s, condition, truth)
+    }
     done = {one: lift for one, lift in lifted.items() if _is_held(one, condition, until_s)}
     if len(done) >= condition.needed:
         froms = (f"{definite(history.name)} was lifted{_from(condition, lift)}" for history, lift in done.items())
@@ -228,11 +233,13 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
         who = condition.person or "nobody"
         nothing = f"{who} {verb} {'not ' if condition.person else ''}in {where(condition.source)}"
     else:
+        when_s = truth.now_s if then_s is None else then_s
         rest = [
             (each.name, p_W)
             for each in _of_class(condition, truth)
             if (p_W := each.place_at(then_s) if then_s is not None else each.last.p_WO if each.resting else None)
             is not None
+            and has_relations(each, p_W, when_s, condition, truth)
         ]
         verb = "is" if then_s is None else "was"
         there = [f"{definite(name)} {verb} on {on}" for name, p_W in rest if (on := region_at(condition.source, p_W))]

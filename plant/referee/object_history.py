@@ -61,11 +61,12 @@ class ObjectHistory(Stateful):
     """History of one object; `add` is called with every sample.
 
     `rests_W` are its resting places, `rested_s` the times at which it came to rest there, `dropped_s` the times of its
-    drops.
+    drops. `sides_m` are its length, width and height.
     """
 
     name: str
     class_name: str
+    sides_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     lifts: list[Lift] = field(default_factory=list)
     rests_W: list[FloatArray] = field(default_factory=list)
     rested_s: list[float] = field(default_factory=list)

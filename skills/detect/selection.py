@@ -6,12 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from skills.api import FLOOR, ObjectObservation, Surface
+from skills.detect.descriptions import count_of, surface_names
+from skills.inputs.errors import listing
 from skills.perception.class_forms import ANY_OBJECT, class_form
 from skills.perception.detection_3d import Detection3D, has_attribute
 from skills.perception.surface_segmentation import Cluster
 from skills.perception.tracker import CONFIRMED_BELIEF, Track
 from skills.quantities import Angle, Coordinate, Duration, Height, Length, Tries
-from skills.robot import FloatArray
+from skills.relations import Landmark, Relation, Scene, Standing, choose
+from skills.robot import FloatArray, Pose2D
 
 _NAMED_WITHIN_M = 0.06
 _SAME_PLACE_M = 0.05
@@ -40,7 +43,8 @@ class DetectInputs:
     The class "thing" matches any object, whether or not the detector knows its class. `avoid`: objects at these
     positions are the last choice. `count`: the search ends with so many objects; 0 searches all surfaces and counts all
     objects. `expected_W`: the search views only this position, and only objects within 0.35 m of it count. `floor`:
-    visible objects on the floor beside the surfaces count too.
+    visible objects on the floor beside the surfaces count too. With `relations`, only the objects that they mean count:
+    the search views the whole surface and also looks for the landmarks. With a count of 1, exactly one must be meant.
     """
 
     classes: tuple[str, ...]
@@ -51,6 +55,17 @@ class DetectInputs:
     floor: bool = False
     avoid: tuple[ObjectObservation, ...] = ()
     seen_before: ObjectObservation | None = None
+    relations: tuple[Relation, ...] = ()
+
+    @property
+    def landmarks(self) -> tuple[Landmark, ...]:
+        """Landmarks of the relations that are objects."""
+        return tuple(one for each in self.relations for one in each.landmarks if one.classes)
+
+    @property
+    def sought(self) -> tuple[str, ...]:
+        """Classes of the wanted objects and of the landmarks."""
+        return tuple(dict.fromkeys((*self.classes, *(name for each in self.landmarks for name in each.classes))))
 
 
 @dataclass(frozen=True)
@@ -81,7 +96,7 @@ def matching_tracks(
     Where any object is wanted, the nearest and most accessible ones come first, and those to avoid last.
     """
     tracks = [t for t in tracks if is_wanted(t, inputs) and _in_place(t, inputs, options, p_WB)]
-    fitting = [t for t in tracks if all(has_attribute(t.best, word) for word in inputs.attributes)]
+    fitting = [t for t in tracks if is_of_kind(t, inputs) or any(_is_landmark(t, one) for one in inputs.landmarks)]
     if inputs.expected_W is not None:
         off = {t.number: level_distance(t.position_W, inputs.expected_W) for t in fitting}
         near = (t for t in fitting if off[t.number] < options.expected_within_m)
@@ -103,8 +118,53 @@ def sure_tracks(matching: Sequence[Track], inputs: DetectInputs, views: int) -> 
 
 
 def is_wanted(track: Track, inputs: DetectInputs) -> bool:
-    """Returns whether the class of a track is wanted."""
-    return ANY_OBJECT in inputs.classes or track.class_name in inputs.classes
+    """Returns whether the class of a track is wanted, or that of a landmark."""
+    return ANY_OBJECT in inputs.classes or track.class_name in inputs.sought
+
+
+def is_of_kind(track: Track, inputs: DetectInputs) -> bool:
+    """Returns whether a track has a wanted class and all attributes."""
+    is_class = ANY_OBJECT in inputs.classes or track.class_name in inputs.classes
+    return is_class and all(has_attribute(track.best, word) for word in inputs.attributes)
+
+
+def _is_landmark(track: Track, landmark: Landmark) -> bool:
+    return track.class_name in landmark.classes and all(has_attribute(track.best, w) for w in landmark.attributes)
+
+
+def meant_tracks(tracks: Sequence[Track], inputs: DetectInputs, robot: Pose2D) -> list[Track]:
+    """Tracks that the relations mean among the reliable `tracks`, on each surface by itself."""
+    meant = list[Track]()
+    for surface in inputs.surfaces:
+        here = {track.number: standing(track) for track in tracks if track.latest.surface == surface.name}
+        wanted = [track for track in tracks if track.number in here and is_of_kind(track, inputs)]
+        objects = {
+            each: [here[track.number] for track in tracks if track.number in here and _is_landmark(track, each)]
+            for each in inputs.landmarks
+        }
+        scene = Scene(surface.polygon_W, surface.viewer or robot, objects)
+        meant += [wanted[k] for k in choose(inputs.relations, [here[track.number] for track in wanted], scene)]
+    return meant
+
+
+def standing(track: Track) -> Standing:
+    """Position and sides of a track's object, for its relations."""
+    x, y, _ = track.position_W
+    return Standing((float(x), float(y)), track.latest.size_m)
+
+
+def why_not_meant(tracks: Sequence[Track], inputs: DetectInputs) -> str | None:
+    """Reason why the relations mean none of the reliable `tracks`; None when no object of the kind is among them."""
+    wanted = [str(track.class_name) for track in tracks if is_of_kind(track, inputs)]
+    if not wanted:
+        return None
+    relations = " and ".join(map(str, inputs.relations))
+    missing = [str(each) for each in inputs.landmarks if not any(_is_landmark(track, each) for track in tracks)]
+    seen = f"{listing(count_of(wanted.count(name), name) for name in dict.fromkeys(wanted))} seen"
+    on = surface_names(inputs.surfaces)
+    if missing:
+        return f"{seen} on {on}, but not {listing(missing, last='or')}, so it cannot be told which is {relations}"
+    return f"{seen} on {on}, but none {relations}"
 
 
 def is_sure(track: Track, inputs: DetectInputs, views: int) -> bool:

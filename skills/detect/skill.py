@@ -8,7 +8,16 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, Detection, LocalisationEstimate, ObjectKind, ObjectObservation, Running, Succeeded
+from skills.api import (
+    Cause,
+    Detection,
+    LocalisationEstimate,
+    ObjectKind,
+    ObjectObservation,
+    Question,
+    Running,
+    Succeeded,
+)
 from skills.detect.descriptions import count_sentence, describe, surface_names, wanted_names
 from skills.detect.messages import (
     coverage_message,
@@ -23,9 +32,11 @@ from skills.detect.selection import (
     is_sure,
     level_distance,
     matching_tracks,
+    meant_tracks,
     seen_again,
     sure_tracks,
     unlabelled_clusters,
+    why_not_meant,
 )
 from skills.detect.viewpoints import look_targets, surface_boxes
 from skills.geometry import wrap
@@ -38,6 +49,7 @@ from skills.perception.model_matching import identified
 from skills.perception.point_cloud import Coverage, in_plain_view
 from skills.perception.surface_segmentation import Cluster, loose_clusters, segment_3d, segment_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
+from skills.relations import ordinal
 from skills.robot import FloatArray, Image, Mount
 from skills.routine import PlanningAttempt, Routine, SkillFailure
 
@@ -47,6 +59,10 @@ _LEAST_IN_VIEW = 0.5
 _FITS_NEAR_M = 0.4
 _LOOKED_AT_M = 0.08
 _BELOW_TOP_M = 0.01
+_RELATED = 8
+"""Number of candidates for the landmarks, and for the objects that are compared with one another."""
+_ANSWER_S = 30.0
+"""Time limit for the answer which of several objects is meant."""
 _RAISED_M = 0.15
 """Height by which the body rises for one more view by a camera on a head."""
 
@@ -102,6 +118,7 @@ class Detect(LookingSkill[DetectInputs]):
         self._tracker, self._coverage = Tracker(tuple(dict.fromkeys(names))), Coverage(inputs.surfaces)
         self._tried: dict[int, int] = {}
         self._clusters: list[Cluster] = []
+        self._is_covered = False
         blocked: list[SkillFailure] = []
         targets_W = [X_WB @ p_BT for p_BT in targets]
         for k, p_WT in enumerate(targets_W):
@@ -110,6 +127,7 @@ class Detect(LookingSkill[DetectInputs]):
             if self._has_enough(inputs):
                 break
             yield Running(f"looking for {wanted_names(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
+        self._is_covered = True
         yield from self._look_closer(inputs)
         yield from self._look_around(inputs)
         yield from self._look_from_above(inputs, targets_W)
@@ -120,8 +138,9 @@ class Detect(LookingSkill[DetectInputs]):
     def _check(self, inputs: DetectInputs) -> None:
         """Raises SkillFailure with cause PRECONDITION for an unknown class or attribute, and without surfaces."""
         knows = {*self.context.detector.class_names, ANY_OBJECT, *self._own}
-        unknown = [name for name in inputs.classes if name not in knows]
-        unknown += [word for word in inputs.attributes if word.lower() not in known_attributes()]
+        unknown = [name for name in inputs.sought if name not in knows]
+        words = (*inputs.attributes, *(word for each in inputs.landmarks for word in each.attributes))
+        unknown += [word for word in words if word.lower() not in known_attributes()]
         if unknown:
             raise SkillFailure(Cause.PRECONDITION, f"I do not know what {', '.join(unknown)} looks like")
         if not inputs.surfaces:
@@ -139,6 +158,8 @@ class Detect(LookingSkill[DetectInputs]):
         return [target for surface in nearest_first for target in look_targets(surface, X_WB, self.p_BS)]
 
     def _has_enough(self, inputs: DetectInputs) -> bool:
+        if inputs.relations:
+            return self._is_covered and 0 < inputs.count == len(self._meant(inputs))
         return 0 < inputs.count <= len(self._sure(inputs))
 
     def _look_closer(self, inputs: DetectInputs) -> Routine[None]:
@@ -154,7 +175,7 @@ class Detect(LookingSkill[DetectInputs]):
         if ANY_OBJECT in inputs.classes:
             return
         for _ in range(self.options.closer_looks):
-            left = unlabelled_clusters(self._clusters, self._tracker.snapshot(), inputs.classes)
+            left = unlabelled_clusters(self._clusters, self._tracker.snapshot(), inputs.sought)
             if self._has_enough(inputs) or not left:
                 return
             shape, base_m = left[0].shape, left[0].base_m
@@ -202,7 +223,7 @@ class Detect(LookingSkill[DetectInputs]):
 
     def _old_result(self, inputs: DetectInputs) -> Track | None:
         """The track seen last, if it is reliable and its picture is old."""
-        newest = next(iter(self._sure(inputs)), None)
+        newest = next(iter(self._meant(inputs)), None)
         return newest if newest is not None and self._is_old(newest) else None
 
     def _is_old(self, track: Track) -> bool:
@@ -257,7 +278,8 @@ class Detect(LookingSkill[DetectInputs]):
 
     def _candidate(self, inputs: DetectInputs) -> Track | None:
         """The most likely track that needs another view, or None; one more when neither side showed its position."""
-        if self._has_enough(inputs) or len(self._tried) > self.options.candidates + inputs.count:
+        related = _RELATED if inputs.relations else 0
+        if self._has_enough(inputs) or len(self._tried) > self.options.candidates + inputs.count + related:
             return None
         shifts = len(self.options.confirm_shifts_rad)
         for track in self._matching(inputs):
@@ -271,6 +293,11 @@ class Detect(LookingSkill[DetectInputs]):
 
     def _sure(self, inputs: DetectInputs) -> list[Track]:
         return sure_tracks(self._matching(inputs), inputs, self._views(inputs))
+
+    def _meant(self, inputs: DetectInputs) -> list[Track]:
+        """Reliable tracks that the relations mean; all of them when there are no relations."""
+        sure = self._sure(inputs)
+        return meant_tracks(sure, inputs, self.context.pose()) if inputs.relations else sure
 
     def _views(self, inputs: DetectInputs) -> int:
         """Number of viewpoints that a reliable track needs: one where the camera cannot change its position."""
@@ -330,6 +357,8 @@ class Detect(LookingSkill[DetectInputs]):
     def _ended(self, inputs: DetectInputs, blocked: Sequence[SkillFailure]) -> Routine[Succeeded]:
         """Returns the result. Raises SkillFailure when too few objects were found."""
         found = [_observed(track, inputs.attributes) for track in self._results(inputs)]
+        if inputs.relations and inputs.count == 1 and len(found) > 1:
+            found = [(yield from self._which(inputs, found))]
         if found and len(found) >= inputs.count:
             look = self._last
             for seen in found:
@@ -344,10 +373,29 @@ class Detect(LookingSkill[DetectInputs]):
 
     def _results(self, inputs: DetectInputs) -> list[Track]:
         """Reliable tracks in the order of the result; when any object is wanted, those with a fresh picture first."""
-        found = self._sure(inputs)
+        found = self._meant(inputs)
         if inputs.expected_W is not None or ANY_OBJECT not in inputs.classes:
             return found
         return sorted(found, key=self._is_old)
+
+    def _which(self, inputs: DetectInputs, found: Sequence[ObjectObservation]) -> Routine[ObjectObservation]:
+        """Asks which of several objects is meant. Raises SkillFailure, which is final, when nobody says it."""
+        origin = self.X_WB().inverse()
+        row = sorted(found, key=lambda seen: -_bearing(origin @ np.array(seen.position_W)))
+        names = {f"{ordinal(number)} from the left": seen for number, seen in enumerate(row, start=1)}
+        relations = " and ".join(map(str, inputs.relations))
+        several = f"{count_sentence(found, inputs.surfaces)} {relations}"
+        question = Question(f"which of {self.context.robot.name}", f"{several}: which one?", (*names,), "", _ANSWER_S)
+        asked = self.context.ask(question)
+        try:
+            while not asked.done():
+                yield Running(f"asking which one is meant: {several}")
+        finally:
+            asked.withdraw()
+        if asked.result() not in names:
+            yield from self.try_stow()
+            raise SkillFailure(Cause.PRECONDITION, f"{several}, and it is not said which one", final=True)
+        return names[asked.result()]
 
     def _too_few(self, inputs: DetectInputs, found: Sequence[ObjectObservation]) -> SkillFailure:
         """Failure that says how much of each surface was seen."""
@@ -361,6 +409,9 @@ class Detect(LookingSkill[DetectInputs]):
         if self.object_camera.mount is Mount.BODY and shown < _LEAST_IN_VIEW:
             why = f"most of it is out of the camera's view ({seen})"
             return SkillFailure(Cause.EXECUTION, f"{names} could not be looked at from here: {why}")
+        unmeant = why_not_meant(self._sure(inputs), inputs) if inputs.relations and not found else None
+        if unmeant is not None:
+            return SkillFailure(Cause.POSTCONDITION, f"{unmeant} ({seen})")
         if found:
             few = f"{count_sentence(found, inputs.surfaces)}, fewer than {inputs.count} ({seen})"
             return SkillFailure(Cause.POSTCONDITION, few)

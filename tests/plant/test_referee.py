@@ -13,6 +13,7 @@ from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
 from executive.words.goal import GoalCondition, GoalKind, Region, When
+from plant.models.catalogue import ModelForm
 from plant.referee import Referee
 from plant.referee.entities import Kind
 from plant.referee.judge import judge
@@ -35,12 +36,14 @@ def square(name, x, y, half=0.5, **heights):
 
 TABLE = square("the table", 1.5, 0.0, z_min_m=0.7, z_max_m=1.0)
 SHELF = square("the shelf", -1.5, 0.0, z_min_m=0.7, z_max_m=1.0)
+CUBE = ModelForm(file="", half_extents_m=(HALF, HALF), rest_height_m=HALF)
 
 
 @dataclass(frozen=True)
 class Placement:
     name: str
     class_name: str
+    form: ModelForm = CUBE
 
 
 class Stage:

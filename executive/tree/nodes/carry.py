@@ -37,7 +37,7 @@ from skills.robot import Pose2D
 def carry_plan(builder: PlanBuilder) -> NodeSpec:
     """Carries the item to a person, to the start, or to a surface of a place."""
     command = builder.command
-    item = builder.required_object(command.item or command.object)
+    item = builder.required_object(command.item or command.object).plain
     goal = command.goal
     if goal is None:
         raise builder.error(f"it is not said where to take the {item}", "name a place or a person")

@@ -62,7 +62,7 @@ def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembl
         builder,
         avoided=frozenset() if goal_of_next is None else frozenset(knowledge.surfaces_in(goal_of_next)),
         in_gripper=is_same(held, command.object, knowledge),
-        carried=None if held is None else held.kind,
+        carried=None if held is None or held.kind is None else held.kind.plain,
         met=flow.met,
     )
     refuse_several(builder)
@@ -180,7 +180,8 @@ def are_trips(get: Command, bring: Command | None) -> bool:
     if bring is None or get.task is not Task.GRASP or get.object is None or get.object_count < 2:
         return False
     carried, count = (bring.item, bring.item_count) if bring.task is None else (bring.object, bring.object_count)
-    return bring.task in (None, Task.PLACE) and carried == get.object and count == get.object_count
+    same = carried is not None and carried.plain == get.object.plain and count == get.object_count
+    return bring.task in (None, Task.PLACE) and same
 
 
 def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:

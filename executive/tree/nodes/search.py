@@ -219,9 +219,15 @@ def detect_plan(
         where_to_look = surfaces
     else:
         where_to_look = tuple(each if isinstance(each, Surface) else builder.surface(each) for each in surfaces)
-    ports = {"classes": builder.search_classes(item.name), "attributes": item.attributes, "surfaces": where_to_look}
+    ports: Ports = {
+        "classes": builder.search_classes(item.name),
+        "attributes": item.attributes,
+        "surfaces": where_to_look,
+    }
     tally = {_TALLY: builder.key("all")} if tallied else {}
-    return builder.skill("detect", {**ports, **extra}, {"observation": key, **tally})
+    return builder.skill(
+        "detect", {**ports, **builder.relations(item.relations), **extra}, {"observation": key, **tally}
+    )
 
 
 def find_again_plan(builder: PlanBuilder, item: ObjectKind, surfaces: tuple[str, ...], key: str) -> NodeSpec:
@@ -261,7 +267,8 @@ def search_plan(
         *_looks_from_aside(builder, item, surfaces, key),
         *(look for _, look in further),
         exhausted_cause=Cause.PRECONDITION,
-        exhausted_message=f"found no {item} {looked}",
+        exhausted_message=f"found {'not the one' if item.relations else 'no'} {item} {looked}",
+        one_goal=bool(item.relations),
     )
 
 
@@ -342,7 +349,7 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         what, asked = str(item), _asked_for(str(item), command.object_count)
         absent = str(item) if command.object_count == 1 else asked
         whole_room = place is None or place in knowledge.rooms
-        extra = {"floor": whole_room, "count": 0 if counting else 1}
+        extra = {"floor": whole_room, "count": 0 if counting or item.relations else 1}
         surfaces = required_surfaces(builder, item, place)
         looks = look_plans(builder.at("search"), item, surfaces, key, extra, tallied=counting)
     below = builder.at("search")

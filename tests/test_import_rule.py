@@ -23,13 +23,13 @@ from make_api import public_names
 Check = Callable[[str, str], list[str]]
 Graph = Mapping[str, frozenset[str]]
 WORDS_MAY = (
-    *("executive.words", "skills.api", "skills.inputs", "skills.quantities", "skills.quantities", "skills.robot"),
+    *("executive.words", "skills.api", "skills.inputs", "skills.quantities", "skills.relations", "skills.robot"),
     *("skills.world_model", "skills.perception.class_forms"),
 )
 """All that the words import: what things are, how files are read, and which numbers a quantity may have."""
 PLANT_MAY = (
     *("executive.words", "skills.command_table", "skills.robot", "skills.robot_wrapper", "skills.inputs"),
-    "skills.map_drawing",
+    *("skills.map_drawing", "skills.relations"),
 )
 """All that the plant imports of others."""
 HOMES = (

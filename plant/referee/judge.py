@@ -148,7 +148,8 @@ def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether the objects rest in the goal, released by the gripper."""
     until_s = step_end_s(condition, truth)
     objects = [one for one in _of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
-    done = {one: p_W for one in objects if (p_W := _put_in(one, condition, truth)) is not None}
+    put = {one: p_W for one in objects if (p_W := _put_in(one, condition, truth)) is not None}
+    done = {one: p_W for one, p_W in put.items() if has_relations(one, p_W, until_s, condition, truth)}
     if len(done) >= condition.needed:
         verb = "was put" if is_past(condition) else "rests"
         ons = (f"{definite(history.name)} {verb} on {region_at(condition.goal, p)}" for history, p in done.items())
@@ -159,6 +160,9 @@ def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
     if not elsewhere:
         return Finding(False, f"{_tally(done, condition)} put on {where(condition.goal)}.")
     missed = _where_it_is(elsewhere[0], condition, truth)
+    if elsewhere[0] in put:
+        meant = " and ".join(map(str, condition.relations))
+        missed = f"{definite(elsewhere[0].name)} was put on {where(condition.goal)}, but not {meant}"
     return Finding(False, f"{_tally(done, condition)} put there; {missed}." if done else f"{missed}.")
 
 

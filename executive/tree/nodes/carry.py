@@ -84,7 +84,8 @@ def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[N
 def _put_on_plan(builder: PlanBuilder, item: ObjectKind, surface: str, to: str) -> NodeSpec:
     """Carries the item to a surface and puts it down, with guards around both."""
     view, carry = builder.knowledge.surfaces[surface].viewpoints[0].pose_2d(), builder.at("carry")
-    place = builder.skill("place", {"surface": builder.surface(surface)}, _released(builder, "place"))
+    inputs = {"surface": builder.surface(surface), **builder.relations(builder.command.goal_relations)}
+    place = builder.skill("place", inputs, _released(builder, "place"))
     return builder.sequence(
         f"put it on the {surface}",
         _holding(carry, item, to, go_near_plan(carry, view, f"the {surface}")),

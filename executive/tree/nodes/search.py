@@ -258,7 +258,8 @@ def search_plan(
     floor = builder.optional_ports("detect", {"floor": True})
     looks = (*look_plans(builder, item, first, key, floor), *look_plans(builder, item, surfaces[len(first) :], key))
     further = look_plans(builder.at("elsewhere"), item, elsewhere, key)
-    looked = place_phrase(builder.knowledge, place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
+    looked = place_phrase(builder.knowledge, place)
+    looked += f", nor on the {listing(elsewhere)}" if elsewhere and not item.relations else ""
     return builder.first_of(
         f"find the {item}",
         find_again_plan(builder.at("again"), item, (*surfaces, *elsewhere), key),
@@ -267,7 +268,7 @@ def search_plan(
         *_looks_from_aside(builder, item, surfaces, key),
         *(look for _, look in further),
         exhausted_cause=Cause.PRECONDITION,
-        exhausted_message=f"found {'not the one' if item.relations else 'no'} {item} {looked}",
+        exhausted_message=f"{'did not find the one' if item.relations else 'found no'} {item} {looked}",
         one_goal=bool(item.relations),
     )
 

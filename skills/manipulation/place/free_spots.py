@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -12,15 +13,18 @@ from pydrake.math import RigidTransform
 
 from skills.api import PlanningError, Surface
 from skills.geometry import grid_inside, inside_polygon
+from skills.inputs.errors import listing
 from skills.manipulation.arm.arm_skill import Goal
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.held_object import LEAST_ABOVE_M, OFF_SURFACE_M, HeldObject
 from skills.manipulation.arm.kinematics import ArmModel
 from skills.manipulation.arm.motion import ArmPlanner
+from skills.perception.detection_3d import Detection3D, has_attribute
 from skills.perception.fitting import LevelPlane
 from skills.perception.point_cloud import PointCloud
 from skills.perception.surface_segmentation import SurfaceView
-from skills.robot import FloatArray
+from skills.relations import Landmark, Relation, Scene, Standing, choose
+from skills.robot import FloatArray, Pose2D
 
 if TYPE_CHECKING:
     import shapely
@@ -191,23 +195,49 @@ class SpotSearch:
     """Searches a surface for a free spot for an object, outside all circles `clear_of` (x, y, radius).
 
     Spots with much clearance come first, then those that no picture shows yet, and at the end `tight` ones, on which
-    the object only just fits.
+    the object only just fits. With `relations`, no spot is free before all landmarks are seen, and then only where the
+    relations hold as the `robot` sees the surface, or the surface's own viewer.
     """
 
     surface: Surface
     held: HeldObject
     clear_of: Sequence[tuple[float, float, float]] = ()
     tight: bool = False
+    relations: tuple[Relation, ...] = ()
+    robot: Pose2D = field(default_factory=lambda: Pose2D(0.0, 0.0, 0.0))
+    _seen: dict[Landmark, list[Standing]] = field(default_factory=dict)
     _views: list[SurfaceView] = field(default_factory=list)
     _tried: list[FloatArray] = field(default_factory=list)
 
     def spots(self) -> FloatArray:
         """Spots (N, 2) on the surface, free or not."""
         edge_m = min(EDGE_M, self.held.half_width_m + BESIDE_M) if self.tight else EDGE_M
-        return clear_spots(spots(self.surface, edge_m), self.clear_of)
+        found = clear_spots(spots(self.surface, edge_m), self.clear_of)
+        if not self.relations or self.missing():
+            return found
+        scene = Scene(self.surface.polygon_W, self.surface.viewer or self.robot, self._seen)
+        sides_m = (2.0 * self.held.half_width_m, 2.0 * self.held.half_width_m, 0.0)
+        return found[[bool(choose(self.relations, [Standing((x, y), sides_m)], scene)) for x, y in found]]
+
+    def missing(self) -> tuple[Landmark, ...]:
+        """Landmarks of which too few objects are seen yet."""
+        wanted = [one for each in self.relations for one in each.landmarks if one.classes]
+        return tuple(each for each in wanted if len(self._seen.get(each, ())) < wanted.count(each))
+
+    def see(self, found: Sequence[Detection3D]) -> None:
+        """Adds the landmarks among detections in 3D of objects on the surface."""
+        for landmark, one in itertools.product(self.missing(), found):
+            is_landmark = one.class_name in landmark.classes and one.surface == self.surface.name
+            if is_landmark and all(has_attribute(one, word) for word in landmark.attributes):
+                at = Standing((float(one.position_W[0]), float(one.position_W[1])), one.size_m)
+                known = self._seen.setdefault(landmark, [])
+                if all(math.dist(each.p_W, at.p_W) > _SAME_OBJECT_M for each in known):
+                    known.append(at)
 
     def free(self, view: SurfaceView) -> FloatArray:
         """Spots (N, 2) that a view shows to be free."""
+        if self.missing():
+            return np.empty((0, 2))
         clearance_m = min(CLEARANCE_M, self.held.half_width_m + BESIDE_M) if self.tight else CLEARANCE_M
         return free_spots(view, self.spots(), clearance_m)
 
@@ -253,10 +283,14 @@ class SpotSearch:
     def why_none(self) -> str:
         """Reason why the search found no spot, according to all views."""
         seen, name = merged(self._views), self.surface.name
+        if self.missing():
+            return f"no {listing((each.name for each in self.missing()), last='or')} is seen on the {name}"
         middles = np.array([cluster.shape.centre for cluster in seen.clusters]).reshape(-1, 2)
         count = len(spaced_spots(middles, _SAME_OBJECT_M))
         if not count or len(self.free(seen)):
             return f"no free spot of the {name} is within the arm's reach"
+        if self.relations:
+            return f"no free spot of the {name} is {' and '.join(map(str, self.relations))}"
         inside = grid_inside(self.surface.polygon_W, _CELL_M)
         room_m = np.minimum(clearances_m(seen, inside), _from_edge_m(self.surface, inside))
         objects = "1 object" if count == 1 else f"{count} objects"

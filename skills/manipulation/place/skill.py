@@ -40,6 +40,7 @@ from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.surroundings import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
 from skills.quantities import Coordinate, Length, Tries, TurnRate
+from skills.relations import Relation
 from skills.robot import FloatArray, Pose2D
 from skills.routine import PlanningAttempt, Routine, SkillFailure
 
@@ -83,11 +84,13 @@ _OVER_SPOT_M = 0.45
 class PlaceInputs:
     """Surface to put the object on.
 
-    The object's centre must come to rest outside all circles `clear_of` (x, y, radius) in the world.
+    The object's centre must come to rest outside all circles `clear_of` (x, y, radius) in the world, and where all
+    `relations` hold.
     """
 
     surface: Surface
     clear_of: tuple[tuple[Coordinate, Coordinate, Length], ...] = ()
+    relations: tuple[Relation, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -131,7 +134,8 @@ class Place(PlaceVerification[PlaceInputs]):
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
         carried = self._carried()
-        search = SpotSearch(surface, held_object(self.context.payload, self.gripper, carried), inputs.clear_of)
+        held, pose = held_object(self.context.payload, self.gripper, carried), self.context.pose()
+        search = SpotSearch(surface, held, inputs.clear_of, relations=inputs.relations, robot=pose)
         if len(search.spots()) == 0:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} has no spot out of the way")
         yield from self._go_near(search)
@@ -232,6 +236,8 @@ class Place(PlaceVerification[PlaceInputs]):
         else:
             image, view = yield from self.seen_on(surface, spot_W)
             hidden = self.is_hidden(image)
+            if search.missing():
+                search.see((yield from self.detected_on(image, surface, f"looking at what is on the {surface.name}")))
         if view is None or (hidden and len(search.free(view)) == 0):
             return unseen_view(surface, standing_W)
         return view

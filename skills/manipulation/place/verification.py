@@ -11,7 +11,7 @@ from skills.manipulation.arm.collision import Box
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints
 from skills.manipulation.arm.releasing_skill import ReleasingSkill
 from skills.manipulation.place.free_spots import distances_m, objects_W
-from skills.perception.detection_3d import detections_3d
+from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
 from skills.perception.point_cloud import Mask
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
@@ -109,17 +109,20 @@ class PlaceVerification(ReleasingSkill[InputsT]):
 
     def _is_detected(self, image: Image, surface: Surface, new: Callable[[FloatArray], Mask]) -> Routine[bool]:
         """Returns whether the detector finds a `new` object of the class, which depth may miss when it is flat."""
-        context, kind = self.context, self.checkpoint.get("kind")
-        if kind not in context.detector.class_names:
+        kind = self.checkpoint.get("kind")
+        if kind not in self.context.detector.class_names:
             return False
-        place = context.localiser.estimate()
+        found = yield from self.detected_on(image, surface, f"looking for the {kind} on the {surface.name}")
+        own_W = np.array([one.position_W for one in found if one.class_name == kind]).reshape(-1, 3)
+        return bool(np.any(new(own_W[:, :2]) & (np.abs(own_W[:, 2] - surface.height_m) < _ON_SURFACE_M)))
 
-        def detected() -> bool:
-            found = detections_3d(image, place, detect_in_image(context.detector, image), ())
-            own_W = np.array([one.position_W for one in found if one.class_name == kind]).reshape(-1, 3)
-            return bool(np.any(new(own_W[:, :2]) & (np.abs(own_W[:, 2] - surface.height_m) < _ON_SURFACE_M)))
+    def detected_on(self, image: Image, surface: Surface, message: str) -> Routine[tuple[Detection3D, ...]]:
+        """Returns the detections in 3D in a picture of a surface."""
+        place, detector = self.context.localiser.estimate(), self.context.detector
 
-        message = f"looking for the {kind} on the {surface.name}"
+        def detected() -> tuple[Detection3D, ...]:
+            return detections_3d(image, place, detect_in_image(detector, image), [surface])
+
         return (yield from self.compute(detected, latency_s=DETECTION_LATENCY_S, name="look again", message=message))
 
     def seen_on(

@@ -11,7 +11,7 @@ from pydrake.math import RollPitchYaw
 from skills.api import FLOOR, Detection, LocalisationEstimate, ObjectKind, ObjectObservation, Surface
 from skills.geometry import inside_polygon
 from skills.perception.class_forms import MEANS_BIG, class_form, class_forms, colour_words
-from skills.perception.point_cloud import Mask, camera_pose_W, closed_mask
+from skills.perception.point_cloud import Mask, camera_pose_W, closed_mask, project
 from skills.perception.position import Position, locate
 from skills.robot import FloatArray, Image
 
@@ -20,6 +20,8 @@ _SURFACE_HEIGHT_M = 0.10
 _FLOOR_HEIGHT_M = 0.08
 _FAR_TOO_LARGE = 1.5
 _LEAST_COLOUR_SHARE = 0.3
+_DEEP_M = 0.1
+"""Extent in depth of the points that belong to one object."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,29 @@ def _detection_3d(
         colours=np.empty((0, 3), np.uint8) if image.colour is None else image.colour[pixels[:, 1], pixels[:, 0]],
         surface=surface_below(p_W, p_W[2] - 0.5 * extents.height_m, surfaces),
     )
+
+
+def at_points(
+    detection: Detection, image: Image, localisation: LocalisationEstimate, points_W: FloatArray, surface: str
+) -> Detection3D | None:
+    """Locates a detection without depth by the nearest of the points (N, 3) on a surface that lie in its box, or below
+    it where the gripper hides the object's lower part.
+
+    Returns None when no points do, or the box is far too large. The sizes are those that are usual in its class.
+    """
+    X_WC, (u0, v0, u1, v1) = camera_pose_W(image, localisation.X_WO), detection.box
+    points_C = (points_W - X_WC.translation()) @ X_WC.rotation().matrix()
+    (u, v), range_m, form = project(points_C, image.intrinsics), points_C[:, 2], class_form(detection.class_name)
+    whole = np.maximum(v1, v0 + form.length_m[1] * image.intrinsics.fy / np.maximum(range_m, _DEEP_M))
+    inside = (u > u0) & (u < u1) & (v > v0) & (v < whole) & (range_m > 0.0)
+    nearest_m = float(np.min(range_m[inside], initial=np.inf))
+    if (u1 - u0) * nearest_m / image.intrinsics.fx > _FAR_TOO_LARGE * form.length_m[1]:
+        return None
+    p_W = np.median(points_W[inside & (range_m < nearest_m + _DEEP_M)], axis=0)
+    covariance, empty = np.diag([_DEEP_M**2] * 3), np.empty((0, 2), np.int64)
+    size_m = (form.width_m[1], form.width_m[1], form.usual_m)
+    at = (p_W, covariance, covariance, size_m, 0.0, X_WC.translation(), empty, np.empty((0, 3), np.uint8), surface)
+    return Detection3D(image.stamp_s, detection, *at)
 
 
 def place_covariance(p_W: FloatArray, p_WB: FloatArray, covariance: FloatArray) -> FloatArray:

@@ -237,7 +237,9 @@ class Place(PlaceVerification[PlaceInputs]):
             image, view = yield from self.seen_on(surface, spot_W)
             hidden = self.is_hidden(image)
             if search.missing():
-                search.see((yield from self.detected_on(image, surface, f"looking at what is on the {surface.name}")))
+                message = f"looking at what stands on the {surface.name}"
+                found = yield from self.detected_on(image, surface, message, self._standing_W(surface))
+                search.see(found)
         if view is None or (hidden and len(search.free(view)) == 0):
             return unseen_view(surface, standing_W)
         return view

@@ -11,7 +11,7 @@ from skills.manipulation.arm.collision import Box
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints
 from skills.manipulation.arm.releasing_skill import ReleasingSkill
 from skills.manipulation.place.free_spots import distances_m, objects_W
-from skills.perception.detection_3d import Detection3D, detections_3d
+from skills.perception.detection_3d import Detection3D, at_points, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
 from skills.perception.point_cloud import Mask
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
@@ -116,12 +116,22 @@ class PlaceVerification(ReleasingSkill[InputsT]):
         own_W = np.array([one.position_W for one in found if one.class_name == kind]).reshape(-1, 3)
         return bool(np.any(new(own_W[:, :2]) & (np.abs(own_W[:, 2] - surface.height_m) < _ON_SURFACE_M)))
 
-    def detected_on(self, image: Image, surface: Surface, message: str) -> Routine[tuple[Detection3D, ...]]:
-        """Returns the detections in 3D in a picture of a surface."""
+    def detected_on(
+        self, image: Image, surface: Surface, message: str, standing_W: FloatArray | None = None
+    ) -> Routine[list[Detection3D]]:
+        """Returns the detections in 3D in a picture of a surface.
+
+        The points `standing_W` (N, 3) on the surface give the position of a detection without depth.
+        """
         place, detector = self.context.localiser.estimate(), self.context.detector
 
-        def detected() -> tuple[Detection3D, ...]:
-            return detections_3d(image, place, detect_in_image(detector, image), [surface])
+        def detected() -> list[Detection3D]:
+            seen = detect_in_image(detector, image)
+            found = list(detections_3d(image, place, seen, [surface]))
+            if standing_W is not None:
+                lacking = [one for one in seen if all(one is not each.detection for each in found)]
+                found += filter(None, (at_points(one, image, place, standing_W, surface.name) for one in lacking))
+            return found
 
         return (yield from self.compute(detected, latency_s=DETECTION_LATENCY_S, name="look again", message=message))
 

@@ -47,6 +47,8 @@ class RelationKind(enum.Enum):
 _K = RelationKind
 PARTS: Final = frozenset({_K.MIDDLE, _K.EDGE, _K.LEFT_HALF, _K.RIGHT_HALF, _K.FRONT_HALF, _K.BACK_HALF})
 """Kinds that name a part of the surface."""
+SIDES: Final = frozenset({_K.NEXT_TO, _K.LEFT_OF, _K.RIGHT_OF, _K.BEHIND, _K.IN_FRONT_OF})
+"""Kinds that mean an object beside a landmark."""
 ROWS: Final = frozenset({_K.LEFT, _K.RIGHT, _K.BIGGEST, _K.SMALLEST})
 """Kinds that put the objects in a row, of which the `nth` is meant."""
 ORDERS: Final = ROWS | {_K.NEAREST_TO}
@@ -66,7 +68,8 @@ BESIDE_M: Final = 1.0
 EDGE_M: Final = 0.15
 """Largest distance from the edge of a surface to the middle of an object at the edge."""
 MIDDLE_M: Final = 0.1
-"""Least distance from the centre of a surface up to which its middle extends; on large surfaces, a sixth of a side."""
+"""Least distance from its centre up to which the middle of a surface extends; on large ones, half way to the edge."""
+TWICE: Final = 2.0
 EQUAL_M: Final = 0.03
 EQUAL_SIZE_M: Final = 0.01
 """Differences in place and in size up to which two objects are equal."""
@@ -146,6 +149,10 @@ class Scene:
             return [Standing((self.viewer.x_m, self.viewer.y_m))]
         return [each for each in self.objects.get(landmark, ()) if each != one]
 
+    def apart_m(self, landmark: Landmark, one: Standing) -> float:
+        """Distance between an object and a landmark; infinite when no landmark is there."""
+        return min((math.dist(one.p_W, each.p_W) for each in self.places(landmark, one)), default=math.inf)
+
     def offset_m(self, at_W: tuple[float, float], p_W: tuple[float, float]) -> complex:
         """Offset of a point from another as the viewer sees it: behind it (real part) and left of it (imaginary)."""
         return (complex(*p_W) - complex(*at_W)) * cmath.rect(1.0, -self.viewer.yaw_rad)
@@ -157,10 +164,16 @@ class Scene:
 
 
 def choose(
-    relations: Sequence[Relation], candidates: Sequence[Standing], scene: Scene, slack_m: float = 0.0
+    relations: Sequence[Relation],
+    candidates: Sequence[Standing],
+    scene: Scene,
+    slack_m: float = 0.0,
+    *,
+    several: bool = False,
 ) -> list[int]:
     """Indices of the candidates that the relations mean; several when they fit equally, none when nothing fits.
 
+    One candidate beside a landmark fits better than another that is `TWICE` as far away, unless `several` are wanted.
     With slack, relations may be missed by so many metres.
     """
     for outline_W in (each.landmarks[0].outline_W for each in relations if each.kind is _K.SEEN_FROM):
@@ -169,6 +182,9 @@ def choose(
         scene = replace(scene, viewer=Pose2D(float(x), float(y), yaw_rad))
     others = [each for each in relations if each.kind not in ORDERS]
     chosen = [k for k, one in enumerate(candidates) if all(margin_m(each, one, scene) >= -slack_m for each in others)]
+    for relation in (each for each in others if each.kind in SIDES and not several):
+        apart_m = {k: scene.apart_m(relation.landmarks[0], candidates[k]) for k in chosen}
+        chosen = [k for k in chosen if apart_m[k] <= TWICE * min(apart_m.values()) + slack_m]
     for relation in (each for each in relations if each.kind in ORDERS):
         keys_m = {k: key for k in chosen if (key := _key_m(relation, candidates[k], scene)) < math.inf}
         if relation.nth > len(keys_m):
@@ -212,15 +228,12 @@ def _between_m(p_W: tuple[float, float], a_W: tuple[float, float], b_W: tuple[fl
 
 def _part_margin_m(kind: RelationKind, one: Standing, scene: Scene) -> float:
     """Margin of an object in a part of the surface."""
-    corners, middle_W = np.array(scene.polygon_W, dtype=float), scene.middle_W()
+    middle_W = scene.middle_W()
     if kind is _K.EDGE:
         return EDGE_M - math.dist(_nearest_point(scene.polygon_W, one.p_W), one.p_W)
     if kind is _K.MIDDLE:
-        edges = np.roll(corners, -1, axis=0) - corners
-        along = edges[int(np.argmax(np.linalg.norm(edges, axis=1)))]
-        axes = np.array([along, [-along[1], along[0]]]) / np.linalg.norm(along)
-        reach_m = np.maximum(np.ptp(corners @ axes.T, axis=0) / 6.0, MIDDLE_M)
-        return float(np.min(reach_m - np.abs(axes @ (np.array(one.p_W) - middle_W))))
+        reach_m = max(MIDDLE_M, 0.5 * math.dist(_nearest_point(scene.polygon_W, middle_W), middle_W))
+        return reach_m - math.dist(one.p_W, middle_W)
     return (_TURNS[kind] * scene.offset_m(middle_W, one.p_W)).real
 
 
@@ -229,8 +242,7 @@ def _key_m(relation: Relation, one: Standing, scene: Scene) -> float:
     if relation.kind in (_K.BIGGEST, _K.SMALLEST):
         return max(one.sides_m) if relation.kind is _K.SMALLEST else -max(one.sides_m)
     if relation.kind is _K.NEAREST_TO:
-        places = scene.places(relation.landmarks[0], one)
-        return min((math.dist(one.p_W, place.p_W) for place in places), default=math.inf)
+        return scene.apart_m(relation.landmarks[0], one)
     left_m = scene.offset_m(scene.middle_W(), one.p_W).imag
     return -left_m if relation.kind is _K.LEFT else left_m
 

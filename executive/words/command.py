@@ -85,7 +85,9 @@ class Command:
         for kind, count in ((self.item, self.item_count), (self.object, self.object_count)):
             if count < 0 or (kind is None and count != 1):
                 raise ValueError(f"{count} cannot be the count of {kind or _NOTHING}")
-            if not all(map(may_be_attribute, _words(kind)[1:])):
+            landmarks = () if kind is None else tuple(one for each in kind.relations for one in each.landmarks)
+            described = () if kind is None else (kind.attributes, *(one.attributes for one in landmarks))
+            if not all(may_be_attribute(word) for words in described for word in words):
                 raise ValueError(f"{kind} has an attribute that is no single word, or a number")
         if (self.goal_at is not None or self.goal_relations) and self.goal is None:
             raise ValueError(f"a goal is missing at {self.goal_at or self.goal_relations[0]!s}")
@@ -186,9 +188,11 @@ def related(text: str, relations: tuple[Relation, ...]) -> str:
 
 def landmark_text(landmark: Landmark) -> str:
     """Text of a landmark; in quotes if it would not parse back to the same landmark."""
-    plain = str(landmark)
-    parses = " and " not in plain and split_relations(plain)[1] == () and parse_landmark(plain) == landmark
-    return plain if parses else " ".join((*landmark.attributes, f'"{landmark.name}"'))
+    plain, kind = str(landmark), ObjectKind(landmark.name, landmark.attributes)
+    is_plain = " and " not in plain and not _has_relation(plain)
+    if is_plain and _parse_counted(plain.removeprefix("the ")) == (kind, 1):
+        return plain
+    return " ".join((*landmark.attributes, f'"{landmark.name}"'))
 
 
 def parse_landmark(text: str) -> Landmark:
@@ -197,6 +201,10 @@ def parse_landmark(text: str) -> Landmark:
     if kind is None or count != 1:
         raise ValueError(f"'{text}' is no single object or place")
     return Landmark(kind.name, kind.attributes)
+
+
+def _has_relation(text: str) -> bool:
+    return any(match.group(2) for match in _RELATION.finditer(f" {text}"))
 
 
 def split_relations(text: str) -> tuple[str, tuple[Relation, ...]]:
@@ -218,7 +226,7 @@ def _counted_text(of: ObjectKind | None, count: int) -> str:
         return _NOTHING
     number = {0: f"{_PLURAL} ", 1: ""}.get(count, f"{count} ")
     plain = f"{number}{of.plain}"
-    parses = not split_relations(plain)[1] and _parse_counted(plain) == (of.plain, count)
+    parses = not _has_relation(plain) and _parse_counted(plain) == (of.plain, count)
     return related(plain if parses else f'{number}{" ".join((*of.attributes, ""))}"{of.name}"', of.relations)
 
 
@@ -244,7 +252,7 @@ def _goal_text(command: Command) -> str:
 
 
 def _quoted_place(name: str) -> str:
-    is_plain = name != _NOTHING and " at " not in f" {name} " and _RELATION.search(f" at {name}") is None
+    is_plain = name != _NOTHING and " at " not in f" {name} " and not _has_relation(f"at {name}")
     return name if is_plain else f'"{name}"'
 
 

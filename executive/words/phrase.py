@@ -46,7 +46,8 @@ class _Related(Strict):
         subject, relations = split_relations(text)
         values: dict[str, Any] = {cls.subject: subject}
         for each in relations:
-            name, landmarks = each.kind.name.lower(), tuple(map(landmark_text, each.landmarks))
+            name = each.kind.name.lower()
+            landmarks = tuple(landmark_text(one).removeprefix("the ") for one in each.landmarks)
             if landmarks:
                 values[name] = landmarks if len(landmarks) > 1 else landmarks[0]
             elif each.kind in PARTS:

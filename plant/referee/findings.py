@@ -67,11 +67,10 @@ def has_relations(
     landmarks = {landmark for relation in condition.relations for landmark in relation.landmarks}
     objects = {each: [at for one, at in here.items() if one.class_name in each.classes] for each in landmarks}
     scene = Scene(region.polygon_W, region.viewer, objects)
-    is_place = condition.kind is GoalKind.PLACED
-    same = [one for one in here if one.class_name in condition.classes or not condition.classes]
-    same = [history] if is_place else same
-    meant = choose(condition.relations, [here[one] for one in same], scene, SLACK_M)
-    return history in [same[k] for k in meant]
+    of_class = [one for one in here if one.class_name in condition.classes or not condition.classes]
+    same = [history] if condition.kind is GoalKind.PLACED else of_class
+    candidates, several = [here[one] for one in same], condition.kind is GoalKind.ANSWERED
+    return history in [same[k] for k in choose(condition.relations, candidates, scene, SLACK_M, several=several)]
 
 
 def the(name: str) -> str:

@@ -143,7 +143,8 @@ def meant_tracks(tracks: Sequence[Track], inputs: DetectInputs, robot: Pose2D) -
             for each in inputs.landmarks
         }
         scene = Scene(surface.polygon_W, surface.viewer or robot, objects)
-        meant += [wanted[k] for k in choose(inputs.relations, [here[track.number] for track in wanted], scene)]
+        candidates = [here[track.number] for track in wanted]
+        meant += [wanted[k] for k in choose(inputs.relations, candidates, scene, several=inputs.count != 1)]
     return meant
 
 

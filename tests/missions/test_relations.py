@@ -51,7 +51,7 @@ def test_the_robot_takes_the_coke_that_is_meant(relation, taken, monkeypatch):
 
 
 def test_the_robot_asks_which_of_two_fits_and_fails_without_an_answer(monkeypatch):
-    put(monkeypatch, coke=7.35, coke_2=7.75, beer=7.55)
+    put(monkeypatch, coke=7.35, coke_2=7.75, beer=7.56)
     result, verdict = FlatMission([GRASP.format(" next to the beer")]).run()
     assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.PRECONDITION)
     assert "there are two cokes on the kitchen counter next to the beer, and it is not said which one" in result.message

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from executive.words.command import SPEAKER, Command, Task, parse_command, parse_object
 from skills.api import ObjectKind
+from skills.relations import ORDERS, PARTS, ROWS, Landmark, Relation, RelationKind
 from tests.tables import table
 
 KINDS = {"item", "object"}
@@ -27,21 +28,61 @@ def test_text_form_parses_back(command, text):
     assert (str(command), parse_command(text)) == (text, dataclasses.replace(command, verb=""))
 
 
+@pytest.mark.parametrize(*table(__file__, "related"))
+def test_relations_parse_back(text):
+    assert str(parse_command(text)) == text
+
+
+@pytest.mark.parametrize(*table(__file__, "wrong_relations"))
+def test_wrong_relations_are_refused(text, says):
+    with pytest.raises(ValueError, match=says):
+        parse_command(text)
+
+
+def test_a_spot_belongs_to_a_goal_that_is_no_person_at_a_place():
+    edge = (Relation(RelationKind.EDGE),)
+    with pytest.raises(ValueError, match="a goal is missing at at the edge"):
+        Command(goal_relations=edge)
+    with pytest.raises(ValueError, match="goes with a surface"):
+        Command(goal="Robin", goal_at="hall", goal_relations=edge)
+
+
 WORDS = st.lists(
     st.sampled_from(["red", "cup", "some", "2", "Nothing", "at", "juice", "biggest", "of", "Zoë"]), min_size=1
 )
 NAMES = st.one_of(WORDS.map(" ".join), st.from_regex(r"[^\[\]\"\s]+( [^\[\]\"\s]+){0,3}", fullmatch=True))
 ATTRIBUTES = st.from_regex(r"[^\[\]\"\s\d]+", fullmatch=True).filter(lambda word: word != "some")
-THINGS = st.builds(ObjectKind, NAMES, st.lists(ATTRIBUTES, max_size=2).map(tuple))
+LANDMARKS = st.builds(Landmark, NAMES, st.lists(ATTRIBUTES, max_size=1).map(tuple))
+
+
+def related(kind, landmarks, nth):
+    count = 0 if kind in PARTS | ROWS else 2 if kind is RelationKind.BETWEEN else 1
+    return Relation(kind, tuple(landmarks[:count]), nth if kind in ROWS else 1)
+
+
+RELATIONS = st.builds(
+    related, st.sampled_from(RelationKind), st.lists(LANDMARKS, min_size=2, max_size=2), st.integers(1, 30)
+)
+
+
+def group(relation):
+    """Relations of which a command has one at most."""
+    return "part" if relation.kind in PARTS else "order" if relation.kind in ORDERS else relation.kind
+
+
+RELATED = st.lists(RELATIONS, max_size=2, unique_by=group).map(tuple)
+THINGS = st.builds(ObjectKind, NAMES, st.lists(ATTRIBUTES, max_size=2).map(tuple), st.just(()) | RELATED)
 
 
 @st.composite
 def commands(draw):
     item, target, goal = (draw(st.none() | kind) for kind in (THINGS, THINGS, NAMES))
+    spot = () if goal in (None, "Nothing") else draw(st.just(()) | RELATED)
     return Command(
         item=item,
         goal=goal,
-        goal_at=None if goal is None else draw(st.none() | NAMES),
+        goal_at=None if goal is None or spot else draw(st.none() | NAMES),
+        goal_relations=spot,
         task=draw(st.none() | st.sampled_from(Task)),
         object=target,
         item_count=1 if item is None else draw(st.integers(0, 99)),
@@ -57,7 +98,8 @@ def test_every_command_parses_back_from_its_text(command):
 @given(commands())
 def test_json_keeps_the_text_form_of_plain_names(command):
     values = command.to_json()
-    assert (values["goal"], values["goal_at"]) == (command.goal, command.goal_at)
+    goal = None if command.goal is None else " ".join((command.goal, *map(str, command.goal_relations)))
+    assert (values["goal"], values["goal_at"]) == (goal, command.goal_at)
     assert (values["item"] is None) == (command.item is None)
 
 

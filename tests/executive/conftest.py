@@ -42,6 +42,7 @@ from skills.api import (
     Surface,
 )
 from skills.api import Step as SkillStep
+from skills.relations import Relation
 from skills.robot import CommandState, CommandStatus, Lease
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
@@ -229,6 +230,7 @@ class DetectInputs:
     floor: bool = False
     count: int = 1
     avoid: tuple[ObjectObservation, ...] = ()
+    relations: tuple[Relation, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """The referee records the true events and judges goal conditions by them."""
 
+import math
 import time
 from dataclasses import dataclass, replace
 
@@ -19,6 +20,8 @@ from plant.referee.entities import Kind
 from plant.referee.judge import judge
 from plant.referee.object_history import TimedPath, Truth
 from plant.robots.spot.kind import SPOT
+from skills.relations import Landmark, Relation, RelationKind
+from skills.robot import Pose2D
 
 FRICTION = CoulombFriction(0.8, 0.8)
 HALF = 0.03  # half a side of the objects, which are cubes
@@ -649,3 +652,57 @@ def test_the_start_of_a_mission_counts_as_a_passed_place():
 def test_bumps_and_drops_before_a_mission_are_not_its_own():
     stage = given().watch(0.1).fall("coke", ON_TRAY, (0.6, 2.4, HALF - TOUCH))
     assert [stage.referee.judge(each).drops for each in ([GRASPED], since_now(stage, GRASPED))] == [1, 0]
+
+
+HAMMER = Landmark("hammer", classes=("hammer",))
+SEEN_TABLE, SEEN_SHELF = (
+    replace(region, viewer=Pose2D(0.0, 0.0, yaw)) for region, yaw in ((TABLE, 0.0), (SHELF, math.pi))
+)
+
+
+def stage_with_two_cokes():
+    """A coke right of the hammer and one left of it on the table, as seen from the origin."""
+    stage = Stage().put("hammer", np.add(ON_TABLE, (0, 0.2, 0))).put("coke_2", np.add(ON_TABLE, (0, 0.4, 0)))
+    return stage.watch()
+
+
+@pytest.mark.parametrize(
+    ("relation", "holds"),
+    [
+        (Relation(RelationKind.RIGHT_OF, (HAMMER,)), True),
+        (Relation(RelationKind.LEFT_OF, (HAMMER,)), False),
+        (Relation(RelationKind.RIGHT), True),
+        (Relation(RelationKind.LEFT, nth=2), True),
+        (Relation(RelationKind.LEFT), False),
+    ],
+    ids=str,
+)
+def test_the_lifted_object_is_judged_by_its_relations_before_the_lift(relation, holds):
+    stage = stage_with_two_cokes().lift()
+    meant = replace(GRASPED, source=(SEEN_TABLE,), relations=(relation,))
+    assert stage.results(GRASPED, meant) == [True, holds]
+
+
+@pytest.mark.parametrize(
+    ("y_m", "kind", "holds"),
+    [
+        (0.2, RelationKind.NEXT_TO, True),
+        (0.2, RelationKind.RIGHT_OF, True),
+        (0.2, RelationKind.LEFT_OF, False),
+        (0.29, RelationKind.NEXT_TO, True),  # within the tolerance
+        (0.4, RelationKind.NEXT_TO, False),
+    ],
+)
+def test_a_placed_object_is_judged_by_where_it_rests(y_m, kind, holds):
+    at = (-1.5, y_m, TABLE_Z + HALF - TOUCH)
+    stage = Stage().lift().carry("coke", OVER_TABLE, at).let_go().watch()
+    success, why = stage.verdict(replace(PLACED, goal=(SEEN_SHELF,), relations=(Relation(kind, (HAMMER,)),)))
+    assert success is holds, why
+    assert holds or f"the coke was put on the shelf, but not {kind.value} the hammer" in why.lower()
+
+
+@pytest.mark.parametrize(("kind", "count", "right"), [("LEFT_OF", 1, True), ("BEHIND", 1, False), ("NEXT_TO", 2, True)])
+def test_an_answer_is_judged_by_the_objects_that_are_meant(kind, count, right):
+    meant = (Relation(RelationKind[kind], (HAMMER,)),)
+    asked = GoalCondition(GoalKind.ANSWERED, ("coke",), count, (SEEN_TABLE,), answer=True, relations=meant)
+    assert stage_with_two_cokes().holds(asked) is right

@@ -1,13 +1,14 @@
 """Free spots on a seen surface, and hand poses that put an object down there."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
 from plant.robots.spot.kind import spot_capabilities
-from skills.api import Surface
+from skills.api import Detection, Surface
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.held_object import HeldObject
 from skills.manipulation.arm.kinematics import arm_model
@@ -28,9 +29,11 @@ from skills.manipulation.place.free_spots import (
     spots,
     unseen_view,
 )
+from skills.perception.detection_3d import Detection3D
 from skills.perception.fitting import LevelPlane, SeenShape
 from skills.perception.point_cloud import PointCloud
 from skills.perception.surface_segmentation import Cluster, SurfaceView
+from skills.relations import Landmark, Relation, RelationKind
 
 TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)
 DOWN = RotationMatrix.MakeYRotation(np.pi / 2)
@@ -237,3 +240,68 @@ def test_a_far_spot_is_reached_from_lower_and_then_tilted(ahead_m, way):
 def test_the_body_is_not_lowered_until_the_held_object_presses_on_the_surface(x_m, low_m, tried_m):
     corners_W = np.array([[x_m, y, z] for y in (-0.03, 0.03) for z in (low_m, low_m + 0.1)])
     assert tuple(clear_heights((0.76, 0.6, 0.5, 0.4), 0.76, corners_W, KITCHEN_TABLE)) == tried_m
+
+
+def _seen(name, x, y, surface="table", colours=()):
+    """A detection in 3D of an object on a surface."""
+    detection = Detection(name, 0.9, (0.0, 0.0, 10.0, 10.0))
+    covariance, colours = np.eye(3), np.array(colours, dtype=np.uint8).reshape(-1, 3)
+    pixels = np.zeros((len(colours), 2), np.int64)
+    at = (
+        np.array([x, y, 0.76]),
+        covariance,
+        covariance,
+        (0.07, 0.07, 0.12),
+        0.0,
+        np.zeros(3),
+        pixels,
+        colours,
+        surface,
+    )
+    return Detection3D(0.0, detection, *at)
+
+
+BEER = Landmark("beer", classes=("beer",))
+RELATED = SpotSearch(TABLE, SCREWDRIVER, relations=(Relation(RelationKind.LEFT_OF, (BEER,)),))
+
+
+def test_no_spot_is_free_before_the_landmark_is_seen():
+    search = replace(RELATED, _seen={})
+    search.add(_view(), np.array([1.2, 0.0]))
+    assert len(search.spots()) > 0 and len(search.free(_view())) == 0
+    search.see([_seen("coke", 1.3, 0.0), _seen("beer", 1.3, 0.0, "shelf")])
+    assert search.missing() == (BEER,)
+    assert search.why_none() == "no beer is seen on the table"
+
+
+def test_spots_have_the_relations_once_the_landmark_is_seen():
+    search = replace(RELATED, _seen={})
+    search.see([_seen("beer", 1.3, -0.1)])
+    free = search.free(_view(things=[(1.3, -0.1)]))
+    assert len(free) > 0
+    assert np.all(free[:, 1] + 0.1 > np.abs(free[:, 0] - 1.3))
+
+
+def test_a_part_of_the_surface_needs_no_landmark():
+    search = SpotSearch(TABLE, SCREWDRIVER, relations=(Relation(RelationKind.RIGHT_HALF),))
+    assert np.max(search.free(_view())[:, 1]) < 0.0
+    things = [(x, y) for x in np.arange(1.05, 1.6, 0.1) for y in np.arange(-0.45, 0.1, 0.1)]
+    search.add(_view(things=things), np.array([1.2, -0.4]))
+    assert search.why_none() == "no free spot of the table is on the right half"
+
+
+def test_a_landmark_has_its_colour():
+    red = Landmark("beer", ("red",), ("beer",))
+    search = SpotSearch(TABLE, SCREWDRIVER, relations=(Relation(RelationKind.NEXT_TO, (red,)),))
+    search.see([_seen("beer", 1.3, 0.0, colours=[(20, 200, 20)] * 9)])
+    assert search.missing() == (red,)
+    search.see([_seen("beer", 1.3, 0.0, colours=[(200, 20, 20)] * 9)])
+    assert search.missing() == ()
+
+
+def test_between_two_of_a_kind_needs_two_objects():
+    search = SpotSearch(TABLE, SCREWDRIVER, relations=(Relation(RelationKind.BETWEEN, (BEER, BEER)),))
+    search.see([_seen("beer", 1.3, 0.3), _seen("beer", 1.31, 0.32)])
+    assert search.missing() == (BEER, BEER)
+    search.see([_seen("beer", 1.3, -0.3)])
+    assert 0 < len(search.spots()) < len(spots(TABLE))

@@ -239,6 +239,11 @@ SMALL = (
 CONDITIONS = (
     ("an expression", "`battery > 0.3 and not holding`", "at once"),
     ("`object`, perhaps `at`", "`{object: beer, at: kitchen}`", "goes there and looks; no only after all views"),
+    (
+        "`object` with relations",
+        "`{object: {name: beer, left_of: coke}, at: kitchen}`",
+        "the same; [which one](../language.md#which-one-and-where-to-put-it) has all relations",
+    ),
     ("`person`, perhaps `at`", "`{person: anybody, at: office}`", "goes there and looks around"),
     ("`look`", "`{look: is there a hammer in the workshop}`", "looks for the answer to a question in English"),
     (

@@ -164,29 +164,24 @@ class Scene:
 
 
 def choose(
-    relations: Sequence[Relation],
-    candidates: Sequence[Standing],
-    scene: Scene,
-    slack_m: float = 0.0,
-    *,
-    several: bool = False,
+    relations: Sequence[Relation], among: Sequence[Standing], scene: Scene, slack_m: float = 0.0, *, every: bool = False
 ) -> list[int]:
     """Indices of the candidates that the relations mean; several when they fit equally, none when nothing fits.
 
-    One candidate beside a landmark fits better than another that is `TWICE` as far away, unless `several` are wanted.
-    With slack, relations may be missed by so many metres.
+    Beside a landmark, one candidate fits better than another that is `TWICE` as far away, unless `every` one that fits
+    is wanted. With slack, relations may be missed by so many metres.
     """
     for outline_W in (each.landmarks[0].outline_W for each in relations if each.kind is _K.SEEN_FROM):
         (x, y), middle_W = np.mean(outline_W, axis=0), scene.middle_W()
         yaw_rad = math.atan2(middle_W[1] - y, middle_W[0] - x)
         scene = replace(scene, viewer=Pose2D(float(x), float(y), yaw_rad))
     others = [each for each in relations if each.kind not in ORDERS]
-    chosen = [k for k, one in enumerate(candidates) if all(margin_m(each, one, scene) >= -slack_m for each in others)]
-    for relation in (each for each in others if each.kind in SIDES and not several):
-        apart_m = {k: scene.apart_m(relation.landmarks[0], candidates[k]) for k in chosen}
+    chosen = [k for k, one in enumerate(among) if all(margin_m(each, one, scene) >= -slack_m for each in others)]
+    for relation in (each for each in others if each.kind in SIDES and not every):
+        apart_m = {k: scene.apart_m(relation.landmarks[0], among[k]) for k in chosen}
         chosen = [k for k in chosen if apart_m[k] <= TWICE * min(apart_m.values()) + slack_m]
     for relation in (each for each in relations if each.kind in ORDERS):
-        keys_m = {k: key for k in chosen if (key := _key_m(relation, candidates[k], scene)) < math.inf}
+        keys_m = {k: key for k in chosen if (key := _key_m(relation, among[k], scene)) < math.inf}
         if relation.nth > len(keys_m):
             return []
         wanted_m = sorted(keys_m.values())[relation.nth - 1]
@@ -197,11 +192,16 @@ def choose(
 
 def margin_m(relation: Relation, one: Standing, scene: Scene) -> float:
     """Distance (m) by which an object has a relation, negative when it has not; -inf without a landmark."""
-    kind = relation.kind
-    if kind is _K.SEEN_FROM:
-        return math.inf
+    kind, middle_W = relation.kind, scene.middle_W()
+    if kind is _K.SEEN_FROM or (kind in PARTS and not len(scene.polygon_W)):
+        return math.inf if kind is _K.SEEN_FROM else -math.inf
+    if kind is _K.EDGE:
+        return EDGE_M - math.dist(_nearest_point(scene.polygon_W, one.p_W), one.p_W)
+    if kind is _K.MIDDLE:
+        half_m = 0.5 * math.dist(_nearest_point(scene.polygon_W, middle_W), middle_W)
+        return max(MIDDLE_M, half_m) - math.dist(one.p_W, middle_W)
     if kind in PARTS:
-        return _part_margin_m(kind, one, scene) if len(scene.polygon_W) else -math.inf
+        return (_TURNS[kind] * scene.offset_m(middle_W, one.p_W)).real
     places = [scene.places(landmark, one) for landmark in relation.landmarks]
     if kind is _K.BETWEEN:
         pairs = ((a.p_W, b.p_W) for a in places[0] for b in places[1] if a != b)
@@ -224,17 +224,6 @@ def _between_m(p_W: tuple[float, float], a_W: tuple[float, float], b_W: tuple[fl
     apart_m = abs(along)
     offset_m = (complex(*p_W) - complex(*a_W)) * along.conjugate() / (apart_m or 1.0)
     return min(offset_m.real, apart_m - offset_m.real, 0.25 * apart_m - abs(offset_m.imag))
-
-
-def _part_margin_m(kind: RelationKind, one: Standing, scene: Scene) -> float:
-    """Margin of an object in a part of the surface."""
-    middle_W = scene.middle_W()
-    if kind is _K.EDGE:
-        return EDGE_M - math.dist(_nearest_point(scene.polygon_W, one.p_W), one.p_W)
-    if kind is _K.MIDDLE:
-        reach_m = max(MIDDLE_M, 0.5 * math.dist(_nearest_point(scene.polygon_W, middle_W), middle_W))
-        return reach_m - math.dist(one.p_W, middle_W)
-    return (_TURNS[kind] * scene.offset_m(middle_W, one.p_W)).real
 
 
 def _key_m(relation: Relation, one: Standing, scene: Scene) -> float:

@@ -69,8 +69,8 @@ def has_relations(
     scene = Scene(region.polygon_W, region.viewer, objects)
     of_class = [one for one in here if one.class_name in condition.classes or not condition.classes]
     same = [history] if condition.kind is GoalKind.PLACED else of_class
-    candidates, several = [here[one] for one in same], condition.kind is GoalKind.ANSWERED
-    return history in [same[k] for k in choose(condition.relations, candidates, scene, SLACK_M, several=several)]
+    candidates, every = [here[one] for one in same], condition.kind is GoalKind.ANSWERED
+    return history in [same[k] for k in choose(condition.relations, candidates, scene, SLACK_M, every=every)]
 
 
 def the(name: str) -> str:

@@ -144,7 +144,7 @@ def meant_tracks(tracks: Sequence[Track], inputs: DetectInputs, robot: Pose2D) -
         }
         scene = Scene(surface.polygon_W, surface.viewer or robot, objects)
         candidates = [here[track.number] for track in wanted]
-        meant += [wanted[k] for k in choose(inputs.relations, candidates, scene, several=inputs.count != 1)]
+        meant += [wanted[k] for k in choose(inputs.relations, candidates, scene, every=inputs.count != 1)]
     return meant
 
 

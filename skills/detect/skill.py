@@ -8,16 +8,7 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import (
-    Cause,
-    Detection,
-    LocalisationEstimate,
-    ObjectKind,
-    ObjectObservation,
-    Question,
-    Running,
-    Succeeded,
-)
+from skills.api import Cause, Detection, LocalisationEstimate, Question, Running, Succeeded
 from skills.detect.descriptions import count_sentence, describe, surface_names, wanted_names
 from skills.detect.messages import (
     coverage_message,
@@ -52,6 +43,7 @@ from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
 from skills.relations import ordinal
 from skills.robot import FloatArray, Image, Mount
 from skills.routine import PlanningAttempt, Routine, SkillFailure
+from skills.world_model import ObjectKind, ObjectObservation
 
 _LEAST_SEEN = 0.02
 _LEAST_IN_VIEW = 0.5

@@ -55,7 +55,7 @@ def test_relations_choose_among_candidates(relations, candidates, meant):
 def test_all_that_fit_are_chosen_where_several_are_wanted():
     candidates = [Standing((2.0, 0.2)), Standing((2.0, 0.7))]
     assert choose(grounded("left of the beer"), candidates, SCENE) == [0]
-    assert choose(grounded("left of the beer"), candidates, SCENE, several=True) == [0, 1]
+    assert choose(grounded("left of the beer"), candidates, SCENE, every=True) == [0, 1]
 
 
 def test_slack_accepts_relations_that_are_missed_by_less():

@@ -219,15 +219,10 @@ def detect_plan(
         where_to_look = surfaces
     else:
         where_to_look = tuple(each if isinstance(each, Surface) else builder.surface(each) for each in surfaces)
-    ports: Ports = {
-        "classes": builder.search_classes(item.name),
-        "attributes": item.attributes,
-        "surfaces": where_to_look,
-    }
+    relations, classes = builder.relations(item.relations), builder.search_classes(item.name)
+    ports = {"classes": classes, "attributes": item.attributes, "surfaces": where_to_look, **relations, **extra}
     tally = {_TALLY: builder.key("all")} if tallied else {}
-    return builder.skill(
-        "detect", {**ports, **builder.relations(item.relations), **extra}, {"observation": key, **tally}
-    )
+    return builder.skill("detect", ports, {"observation": key, **tally})
 
 
 def find_again_plan(builder: PlanBuilder, item: ObjectKind, surfaces: tuple[str, ...], key: str) -> NodeSpec:

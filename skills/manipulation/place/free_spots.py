@@ -63,6 +63,8 @@ _LEAST_BACK_M = 0.08
 """The open hand must be able to draw back from a spot by this distance."""
 _MARGIN_RAD = 0.05
 """Distance of the joints from their limits."""
+_SURE_M = 0.02
+"""Margin of a spot's relations, for the way the object takes when it is put down."""
 _OVER_M = 0.1
 """Distance beyond a surface's edge within which an object counts as over the surface."""
 
@@ -217,7 +219,7 @@ class SpotSearch:
             return found
         scene = Scene(self.surface.polygon_W, self.surface.viewer or self.robot, self._seen)
         sides_m = (2.0 * self.held.half_width_m, 2.0 * self.held.half_width_m, 0.0)
-        return found[[bool(choose(self.relations, [Standing((x, y), sides_m)], scene)) for x, y in found]]
+        return found[[bool(choose(self.relations, [Standing((x, y), sides_m)], scene, -_SURE_M)) for x, y in found]]
 
     def missing(self) -> tuple[Landmark, ...]:
         """Landmarks of which too few objects are seen yet."""

@@ -4,7 +4,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from table_scene import BLUE, CAMERA, COKE, LENS, RED, TABLE, Can, scene, seen_as
 
 from skills.api import Detection, LocalisationEstimate, Surface
-from skills.perception.detection_3d import detections_3d, observation, place_covariance, surface_below
+from skills.perception.detection_3d import at_points, detections_3d, observation, place_covariance, surface_below
 from skills.perception.point_cloud import depth_at_points, in_plain_view
 
 SURE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
@@ -27,6 +27,44 @@ def test_a_detection_without_depth_is_left_out():
     image = scene([COKE])
     image.depth_m[:] = 0.0
     assert detections_3d(image, SURE, [seen_as("coke", image)], [TABLE]) == ()
+
+
+def ring(can, z):
+    """Points of a scan around an upright cylinder."""
+    turns = np.linspace(0.0, 2.0 * np.pi, 12)
+    return np.column_stack([can.x + can.radius * np.cos(turns), can.y + can.radius * np.sin(turns), np.full(12, z)])
+
+
+BEHIND = Can(1.3, -0.17, 0.033, 0.115, BLUE)
+
+
+def test_the_nearest_scan_points_in_its_box_locate_a_detection_without_depth():
+    image = scene([COKE])
+    points_W = np.concatenate([ring(BEHIND, 0.83), ring(COKE, 0.8)])
+    found = at_points(seen_as("coke", image), image, SURE, points_W, "table")
+    assert found.position_W[:2] == pytest.approx(COKE_W[:2], abs=0.01)
+    assert (found.surface, found.class_name, len(found.colours)) == ("table", "coke", 0)
+
+
+def test_scan_points_below_a_half_hidden_detection_locate_it():
+    image = scene([COKE])
+    whole = seen_as("coke", image)
+    u0, v0, u1, v1 = whole.box
+    upper = Detection("coke", 0.9, (u0, v0, u1, v0 + 0.3 * (v1 - v0)))
+    found = at_points(upper, image, SURE, ring(COKE, 0.76), "table")
+    assert found.position_W[:2] == pytest.approx(COKE_W[:2], abs=0.01)
+
+
+# no points at all, points beside the box, and a box far too large for a coke at that distance
+@pytest.mark.parametrize(
+    ("points_W", "grow_px"),
+    [(np.empty((0, 3)), 0.0), (ring(Can(1.0, 0.4, 0.03, 0.1, RED), 0.8), 0.0), (ring(COKE, 0.8), 250.0)],
+)
+def test_a_detection_without_fitting_scan_points_has_no_position(points_W, grow_px):
+    image = scene([COKE])
+    u0, v0, u1, v1 = seen_as("coke", image).box
+    seen = Detection("coke", 0.9, (u0 - grow_px, v0, u1 + grow_px, v1))
+    assert at_points(seen, image, SURE, points_W, "table") is None
 
 
 def test_an_observation_has_the_data_of_its_detection():

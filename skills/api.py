@@ -22,6 +22,9 @@ from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
 from skills.doorway import DoorMemory, Doorway
+from skills.relations import Landmark as Landmark
+from skills.relations import Relation as Relation
+from skills.relations import RelationKind as RelationKind
 from skills.robot import Clock, Image, Lease, Picture, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 from skills.world_model import FLOOR as FLOOR

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from executive.words.command import PEOPLE_TASKS, SPEAKER, START, TIME_UNITS_S, Command, Task
-from executive.words.knowledge import ANYBODY, Knowledge
+from executive.words.knowledge import ANYBODY, EVERYTHING, Knowledge
 from skills.api import ObjectKind
 from skills.inputs.errors import listing, suggestion
 from skills.relations import DOOR, ROBOT, Landmark, Relation, RelationKind
@@ -29,17 +29,29 @@ def unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str,
         yield "to", *unknown("place or person", command.goal, goals)
     if command.goal_at is not None and knowledge.place(command.goal_at) is None:
         yield "to", *unknown("place", command.goal_at, knowledge.place_names())
-    of_item, of_object = (() if each is None else each.relations for each in (command.item, command.object))
+    yield from _wrong_relations(command, knowledge)
+
+
+def _wrong_relations(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
+    """Yields the faults in a command's relations: the command's key, a sentence and a hint."""
+    objects = {"take": command.item, "object": command.object}
+    for key, item in objects.items():
+        if item and item.relations and (knowledge.somebody(item.name) or item.name == EVERYTHING):
+            yield key, f"it cannot tell who or what is {item.relations[0]}", "name one kind of object"
+    if command.goal_relations and command.item is None and command.task is not Task.PLACE:
+        yield "to", f"nothing is put down {command.goal_relations[0]}", "say what to put there under 'take'"
     if command.goal_relations and knowledge.place(str(command.goal)) not in knowledge.surfaces:
         hint = f"name one of {listing(knowledge.surfaces, last='or')}" if knowledge.surfaces else "this world has none"
         yield "to", f"'{command.goal}' is no surface, and the spot is {command.goal_relations[0]}", hint
-    for key, relations in (("take", of_item), ("object", of_object), ("to", command.goal_relations)):
+    landmarks = (*knowledge.object_names(), *knowledge.place_names(), *knowledge.people, ROBOT, DOOR)
+    related = {key: () if item is None else item.relations for key, item in objects.items()}
+    for key, relations in {**related, "to": command.goal_relations}.items():
         for relation in relations:
             by_person = relation.kind is RelationKind.SEEN_FROM
-            known = tuple(knowledge.people) if by_person else (*knowledge.object_names(), *goals, ROBOT, DOOR)
-            for name in (each.name for each in relation.landmarks):
-                if _landmark(name, knowledge) not in known:
-                    yield key, *unknown("person" if by_person else "landmark", name, known)
+            known = tuple(knowledge.people) if by_person else landmarks
+            for name in (each.name for each in relation.landmarks if _landmark(each.name, knowledge) not in known):
+                hint = suggestion(name, knowledge.spellings(known), shown=known)
+                yield key, f"unknown {'person' if by_person else 'landmark'} {name!r}", hint
 
 
 def _wrong_with_people(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:

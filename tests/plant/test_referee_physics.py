@@ -52,7 +52,8 @@ class Press:
         self.context = plant.GetMyContextFromRoot(self.simulator.get_mutable_context())
         self.desired = plant.get_desired_state_input_port(alice)
         plant.SetPositions(self.context, alice, [0.0, 0.12])
-        placement = SimpleNamespace(name="coke", class_name="coke")
+        form = SimpleNamespace(sides_m=(0.06, 0.06, 0.06))
+        placement = SimpleNamespace(name="coke", class_name="coke", form=form)
         self.referee = Referee(plant, [placement], robots={"alice": SPOT})
 
     def run(self, lift_m, jaw_m, seconds):

@@ -47,8 +47,6 @@ class RelationKind(enum.Enum):
 _K = RelationKind
 PARTS: Final = frozenset({_K.MIDDLE, _K.EDGE, _K.LEFT_HALF, _K.RIGHT_HALF, _K.FRONT_HALF, _K.BACK_HALF})
 """Kinds that name a part of the surface."""
-SIDES: Final = frozenset({_K.NEXT_TO, _K.LEFT_OF, _K.RIGHT_OF, _K.BEHIND, _K.IN_FRONT_OF})
-"""Kinds that mean an object beside a landmark."""
 ROWS: Final = frozenset({_K.LEFT, _K.RIGHT, _K.BIGGEST, _K.SMALLEST})
 """Kinds that put the objects in a row, of which the `nth` is meant."""
 ORDERS: Final = ROWS | {_K.NEAREST_TO}
@@ -177,7 +175,8 @@ def choose(
         scene = replace(scene, viewer=Pose2D(float(x), float(y), yaw_rad))
     others = [each for each in relations if each.kind not in ORDERS]
     chosen = [k for k, one in enumerate(among) if all(margin_m(each, one, scene) >= -slack_m for each in others)]
-    for relation in (each for each in others if each.kind in SIDES and not every):
+    beside = [each for each in others if each.kind is not _K.SEEN_FROM and len(each.landmarks) == 1]
+    for relation in () if every else beside:
         apart_m = {k: scene.apart_m(relation.landmarks[0], among[k]) for k in chosen}
         chosen = [k for k in chosen if apart_m[k] <= TWICE * min(apart_m.values()) + slack_m]
     for relation in (each for each in relations if each.kind in ORDERS):

@@ -96,7 +96,7 @@ def matching_tracks(
     Where any object is wanted, the nearest and most accessible ones come first, and those to avoid last.
     """
     tracks = [t for t in tracks if is_wanted(t, inputs) and _in_place(t, inputs, options, p_WB)]
-    fitting = [t for t in tracks if is_of_kind(t, inputs) or any(_is_landmark(t, one) for one in inputs.landmarks)]
+    fitting = [t for t in tracks if is_of_kind(t, inputs) or any(is_of_kind(t, one) for one in inputs.landmarks)]
     if inputs.expected_W is not None:
         off = {t.number: level_distance(t.position_W, inputs.expected_W) for t in fitting}
         near = (t for t in fitting if off[t.number] < options.expected_within_m)
@@ -122,36 +122,26 @@ def is_wanted(track: Track, inputs: DetectInputs) -> bool:
     return ANY_OBJECT in inputs.classes or track.class_name in inputs.sought
 
 
-def is_of_kind(track: Track, inputs: DetectInputs) -> bool:
-    """Returns whether a track has a wanted class and all attributes."""
-    is_class = ANY_OBJECT in inputs.classes or track.class_name in inputs.classes
-    return is_class and all(has_attribute(track.best, word) for word in inputs.attributes)
-
-
-def _is_landmark(track: Track, landmark: Landmark) -> bool:
-    return track.class_name in landmark.classes and all(has_attribute(track.best, w) for w in landmark.attributes)
+def is_of_kind(track: Track, kind: DetectInputs | Landmark) -> bool:
+    """Returns whether a track has one of the classes, and all attributes, of wanted objects or of a landmark."""
+    is_class = ANY_OBJECT in kind.classes or track.class_name in kind.classes
+    return is_class and all(has_attribute(track.best, word) for word in kind.attributes)
 
 
 def meant_tracks(tracks: Sequence[Track], inputs: DetectInputs, robot: Pose2D) -> list[Track]:
     """Tracks that the relations mean among the reliable `tracks`, on each surface by itself."""
     meant = list[Track]()
     for surface in inputs.surfaces:
-        here = {track.number: standing(track) for track in tracks if track.latest.surface == surface.name}
-        wanted = [track for track in tracks if track.number in here and is_of_kind(track, inputs)]
-        objects = {
-            each: [here[track.number] for track in tracks if track.number in here and _is_landmark(track, each)]
-            for each in inputs.landmarks
-        }
-        scene = Scene(surface.polygon_W, surface.viewer or robot, objects)
-        candidates = [here[track.number] for track in wanted]
-        meant += [wanted[k] for k in choose(inputs.relations, candidates, scene, every=inputs.count != 1)]
+        here = [
+            (track, Standing((float(track.position_W[0]), float(track.position_W[1])), track.latest.size_m))
+            for track in tracks
+            if track.latest.surface == surface.name
+        ]
+        wanted = [each for each in here if is_of_kind(each[0], inputs)]
+        objects = {one: [at for track, at in here if is_of_kind(track, one)] for one in inputs.landmarks}
+        scene, candidates = Scene(surface.polygon_W, surface.viewer or robot, objects), [at for _, at in wanted]
+        meant += [wanted[k][0] for k in choose(inputs.relations, candidates, scene, every=inputs.count != 1)]
     return meant
-
-
-def standing(track: Track) -> Standing:
-    """Position and sides of a track's object, for its relations."""
-    x, y, _ = track.position_W
-    return Standing((float(x), float(y)), track.latest.size_m)
 
 
 def why_not_meant(tracks: Sequence[Track], inputs: DetectInputs) -> str | None:
@@ -160,7 +150,7 @@ def why_not_meant(tracks: Sequence[Track], inputs: DetectInputs) -> str | None:
     if not wanted:
         return None
     relations = " and ".join(map(str, inputs.relations))
-    missing = [str(each) for each in inputs.landmarks if not any(_is_landmark(track, each) for track in tracks)]
+    missing = [str(each) for each in inputs.landmarks if not any(is_of_kind(track, each) for track in tracks)]
     seen = f"{listing(count_of(wanted.count(name), name) for name in dict.fromkeys(wanted))} seen"
     on = surface_names(inputs.surfaces)
     if missing:

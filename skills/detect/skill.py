@@ -51,8 +51,6 @@ _LEAST_IN_VIEW = 0.5
 _FITS_NEAR_M = 0.4
 _LOOKED_AT_M = 0.08
 _BELOW_TOP_M = 0.01
-_RELATED = 8
-"""Number of candidates for the landmarks, and for the objects that are compared with one another."""
 _ANSWER_S = 30.0
 """Time limit for the answer which of several objects is meant."""
 _RAISED_M = 0.15
@@ -270,8 +268,8 @@ class Detect(LookingSkill[DetectInputs]):
 
     def _candidate(self, inputs: DetectInputs) -> Track | None:
         """The most likely track that needs another view, or None; one more when neither side showed its position."""
-        related = _RELATED if inputs.relations else 0
-        if self._has_enough(inputs) or len(self._tried) > self.options.candidates + inputs.count + related:
+        many = len(self._tried) > self.options.candidates + inputs.count and not inputs.relations
+        if many or self._has_enough(inputs):
             return None
         shifts = len(self.options.confirm_shifts_rad)
         for track in self._matching(inputs):

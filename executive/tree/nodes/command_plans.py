@@ -212,7 +212,7 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
         get_one = replace(trip.at("get"), command=replace(get, object_count=1))
         bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))
         trips.append(trip.sequence(f"trip {number}", grasp_plan(get_one, anywhere=False), carry_plan(bring_one)))
-    return builder.sequence(f"bring {count_of(count, str(item))} to the {goal}, one at a time", *trips)
+    return builder.sequence(f"bring {count_of(count, str(item and item.plain))} to the {goal}, one at a time", *trips)
 
 
 _BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {

@@ -342,7 +342,8 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         looks = people_looks(builder.at("search"), person, place, key, tallied=counting)
     else:
         item = builder.required_object(command.object)
-        what, asked = str(item), _asked_for(str(item), command.object_count)
+        related = "".join(f" {relation}" for relation in item.relations)
+        what, asked = str(item), _asked_for(str(item.plain), command.object_count) + related
         absent = str(item) if command.object_count == 1 else asked
         whole_room = place is None or place in knowledge.rooms
         extra = {"floor": whole_room, "count": 0 if counting or item.relations else 1}

@@ -71,3 +71,9 @@ def test_a_search_that_cannot_tell_which_ends_at_once(compiled, run_tree, script
     result = run_tree(compiled(GRASP)).worst
     assert result.cause is Cause.PRECONDITION and said in result.message
     assert (script.begun.count("detect") == 1) is final
+
+
+def test_a_question_about_several_is_in_the_plural(compiled):
+    tree = compiled(FIND.replace("[coke", "[2 coke"))
+    names = {node.name for node in tree.root.walk() if node.kind == "answer"}
+    assert names == {"are there two cokes left of the beer in the kitchen?"}

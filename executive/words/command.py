@@ -36,7 +36,7 @@ _FORM: Final = re.compile(r"\s*Take \[(.+?)\] to \[(.+?)\] and do \[(.+?)\] to \
 _GOAL: Final = re.compile(r'("[^"]+"|.+?)(?: at ("[^"]+"|.+))?')
 _COUNTED: Final = re.compile(r'(?:(\d+|some) )?(?:([^"]*) )?(?:"([^"]+)"|([^"]+))')
 _RELATION: Final = re.compile(
-    rf'"[^"]*"|,? (?:(\d+)(?:st|nd|rd|th) )?({"|".join(kind.value for kind in RelationKind)})(?=[ ,]|$)'
+    rf'"[^"]*"|,? (?:(\d+)(?:st|nd|rd|th) )?({"|".join(kind.value for kind in RelationKind)})(?=,|$| the | [A-Z])'
 )
 
 
@@ -190,9 +190,10 @@ def landmark_text(landmark: Landmark) -> str:
     """Text of a landmark; in quotes if it would not parse back to the same landmark."""
     plain, kind = str(landmark), ObjectKind(landmark.name, landmark.attributes)
     is_plain = " and " not in plain and not _has_relation(plain)
+    is_plain = is_plain and re.match(r"the |[A-Z]", plain) is not None
     if is_plain and _parse_counted(plain.removeprefix("the ")) == (kind, 1):
         return plain
-    return " ".join((*landmark.attributes, f'"{landmark.name}"'))
+    return " ".join(("the", *landmark.attributes, f'"{landmark.name}"'))
 
 
 def parse_landmark(text: str) -> Landmark:

@@ -11,11 +11,11 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3460,
-    "executive/language": 8263,
+    "executive/words": 3652,
+    "executive/language": 8443,
     "executive/speech": 1663,
-    "executive/mission": 1660,
-    "executive/tree": 8850,
+    "executive/mission": 1724,
+    "executive/tree": 8874,
     "executive/run": 3295,
     "executive/record": 1099,
     "executive/store": 1604,
@@ -23,11 +23,11 @@ LINES = {
     "executive/view": 1922,
     "executive/testing": 860,
     "executive/app": 8254,
-    "executive/cli": 3921,
-    "skills": 28107,
-    "plant": 11378,
+    "executive/cli": 3925,
+    "skills": 28543,
+    "plant": 11424,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 421, 61, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 425, 58, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

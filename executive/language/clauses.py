@@ -2,7 +2,7 @@
 
 import enum
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import pairwise
@@ -11,6 +11,7 @@ from typing import Final
 from executive.language.addressees import AddressedText, Addressee, addressees
 from executive.language.items import Item
 from executive.language.lexicon import lexicon
+from executive.language.questions import RefusalError
 from executive.language.templates import Match, Words, page, words_of
 from executive.language.tokens import smooth
 
@@ -73,6 +74,23 @@ class Clause:
     def then(self) -> bool:
         """Returns whether "then" stands before the clause."""
         return re.search(r"\bthen\b", self.joint, re.IGNORECASE) is not None
+
+    @property
+    def ambiguous(self) -> RefusalError:
+        """Refusal of a cue that several actions could belong to."""
+        said = f"{self.cue} {self.text}".strip()
+        return RefusalError(f"it is not clear which action '{said}' belongs to; say it first", [said])
+
+    def missing_action(self, text: str = "") -> RefusalError:
+        """Refusal of a condition to which no action belongs."""
+        said = f"{self.cue} {text}".strip()
+        return RefusalError(f"what am I to do {f'{self.cue.lower()} {text}'.strip()}?", [said])
+
+    def parse_amount(self, parse: Callable[[str], float | None], what: str) -> float:
+        """Interval or number of rounds in the cue."""
+        if (found := parse(self.amount)) is None:
+            raise RefusalError(f"'{self.cue}' is no {what} that I understand", [self.cue])
+        return found
 
 
 @dataclass(frozen=True)

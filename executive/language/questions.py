@@ -156,15 +156,17 @@ class RefusalKind(Enum):
     NOTHING_TO_DO = "nothing_to_do"  # it asks for no action
     NO_SUCH_DOOR = "no_such_door"
     UNSEEN = "unseen"  # it asks for what no sensor shows
-    ABOUT_PEOPLE = "about_people"  # whom to follow, guide or greet, or where to
     OTHER = "other"
 
 
 class RefusalError(Exception):
     """Refusal of a sentence: the reason in one line, and the unknown words.
 
-    `question` is True if an answer from the speaker would help, or is the question itself.
+    `question` is True if an answer from the speaker would help, or is the question itself. `plain` marks the refusal of
+    plain words in a sentence with structure.
     """
+
+    plain = False
 
     def __init__(
         self,

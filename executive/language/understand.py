@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
@@ -174,14 +173,10 @@ def under_rules(rules: RoomRules, meant: Understanding) -> Understanding:
 def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = None) -> Understanding:
     """Understands a text for one robot; takes an empty trace with the inputs, and optionally the text's clauses."""
     trace = pipeline.run(said)
-    mentioned = _MENTIONED.search(said.text) is not None
-    refused = trace.refusal is not None and trace.refused_at != "cleaning"
-    if pipeline.knowledge is not None and (mentioned or refused):
-        from executive.language.structure.sentence import read_structure
+    if pipeline.knowledge is not None and (trace.refusal is not None or trace.taken_back):
+        from executive.language.structure.sentence import read_structure  # plain commands do not need it
 
-        found = read_structure(trace, clauses, pipeline, said.memory)
-        of_people = found.refusal is None or found.refusal.kind is RefusalKind.ABOUT_PEOPLE
-        trace = found if mentioned or of_people else trace
+        trace = read_structure(trace, clauses, pipeline, said.memory)
     refusal = trace.refusal
     if refusal is None:
         ok = Understanding(said.text, Status.OK, trace.commands, notes=trace.notes, memory=trace.memory, trace=trace)
@@ -207,11 +202,3 @@ def ask_until_clear(sentence: str, meant: Callable[[str], Understanding], answer
 
 
 _MOST_QUESTIONS: Final = 3
-_MENTIONED: Final = re.compile(
-    r"\b(?:pictures?|photo\w*|snapshots?|look a?(?:round|bout)|is it|are you|house|whole|everywhere|all over|move|if"
-    r"|unless|in case|otherwise|else|every|each|all|everyone|everybody|twice|times|once|while|as long as|until|till"
-    r"|soon|when|wait|stay|say|tell|announce|ask|greet|know|inform|remind|whatever|matter|regardless|failing|fails?"
-    r"|should|whether|door|battery|charge|percent|repeat|holding|report|provided)\b",
-    re.IGNORECASE,
-)
-"""Words of structured sentences; other sentences have only plain commands, and do not load the rest."""

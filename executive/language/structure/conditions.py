@@ -86,8 +86,9 @@ def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | No
     if match is None or (match["it"] and state.door is None):
         return None
     if (how := match["how"].lower()).endswith("locked"):
-        reason = f"I cannot see whether a door is {how}; ask whether it is closed"
-        raise RefusalError(reason, [how], kind=RefusalKind.UNSEEN)
+        raise RefusalError(
+            f"I cannot see whether a door is {how}; ask whether it is closed", [how], kind=RefusalKind.UNSEEN
+        )
     door = state.door if match["it"] and state.door is not None else DoorOpen(door=_between(match, reader.knowledge))
     opens = how in ("open", "opened", "opens", "to open", "is opening", "has opened")
     known = replace(state, door=door, goal=None, at=None)

@@ -25,19 +25,9 @@ from executive.language.structure.plain import (
     SpokenCondition,
     State,
     StepRow,
-    ambiguous_cue,
-    amount_of_cue,
-    condition_at_source,
     end_of_scope,
-    find_last_check,
     merge_repeats,
-    missing_action,
     negate,
-    negate_supposed,
-    one_errand,
-    rounds_by,
-    state_behind_both,
-    statement_of,
     statement_of_check,
 )
 from executive.language.structure.requests import escape_braces, parse_speech, wait_steps
@@ -88,16 +78,19 @@ class DecisionBuilder:
 
     def read_together(self, clauses: Sequence[Clause], state: State) -> PlainReading:
         """Understands several plain clauses together."""
-        return self.reader.read_commands(
-            join_clauses([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead
-        )
+        text = join_clauses([replace(clauses[0], joint=""), *clauses[1:]])
+        try:
+            return self.reader.read_commands(text, state, clauses[0].lead)
+        except RefusalError as refusal:
+            refusal.plain = not self.special
+            raise
 
     def add(self, row: StepRow, reading: PlainReading) -> None:
         """Adds the commands of a plain part of the sentence."""
         self.notes += reading.trace.notes
         row.steps += steps_of_commands(reading.commands)
         before, row.state = row.state, reading.state
-        row.asked = find_last_check(reading, before, self.reader)
+        row.asked = self.reader.last_check(reading, before)
 
     def put(self, row: StepRow, block: Step, state: State) -> None:
         """Adds a block of steps; `state` is the state after the block."""
@@ -128,18 +121,16 @@ class DecisionBuilder:
         asked = row.asked if row.asked is not None and row.asked.looked else None
         supposed, rest = self.split(clause.text, row.state, follows)
         if not rest and not follows:
-            raise missing_action(clause.cue, clause.text)
+            raise clause.missing_action(clause.text)
         if asked is not None and supposed.condition in (asked.supposed.condition, negate(asked.supposed.condition)):
             row.steps[-asked.steps :] = []
         body = [*cut(rest), *follows]
         if row.asked is not None and not (asked or row.asked.decided) and clause.kind is Cue.IF:
-            there = condition_at_source(supposed, tuple(row.steps[-row.asked.steps :]), clause.text).condition
+            there = supposed.at_source(tuple(row.steps[-row.asked.steps :]), clause.text).condition
             if there == negate(row.asked.supposed.condition):  # get a coke; if there is no coke, get a beer
                 self._replace_missing(row, row.asked, supposed.said, body)
                 return end
-        return self.choose(
-            row, negate_supposed(supposed) if clause.kind is Cue.UNLESS else supposed, body, clauses, end
-        )
+        return self.choose(row, supposed.opposite if clause.kind is Cue.UNLESS else supposed, body, clauses, end)
 
     def known(self, row: StepRow) -> State:
         """State after the pending clauses."""
@@ -165,7 +156,7 @@ class DecisionBuilder:
             try:
                 supposed = parse_condition(condition, state, self.reader)
                 if rest:
-                    inner = type(self)(self.reader, statement_of(supposed), self.given)
+                    inner = type(self)(self.reader, supposed.statement, self.given)
                     inner.sequence([*cut(rest), *follows], supposed.holds)
             except RefusalError as error:
                 asks = error.question is not None or supposed is not None
@@ -193,24 +184,24 @@ class DecisionBuilder:
                 stop = len(clauses)
                 rest = [rest[0], *rest[1 : len(cut(first.text))], *clauses[end + 1 : stop]]
             if not rest:
-                raise missing_action(first.cue)
+                raise first.missing_action()
             begun = supposed.fails
             if begun.memory.objects == () or begun.memory.objects[-1].person:
                 begun = replace(begun, memory=replace(begun.memory, objects=after.memory.objects))
-            otherwise, other_state = self.branch(rest, negate_supposed(supposed), begun)
+            otherwise, other_state = self.branch(rest, supposed.opposite, begun)
             end = stop
         if not (then or otherwise):
             raise RefusalError("no action is said for either case; name one", [supposed.said])
         condition = supposed.condition if then else negate(supposed.condition)
         block = Choose(condition=condition, then=then or otherwise, otherwise=otherwise if then else ())
-        self.put(row, block, state_behind_both(after, other_state))
+        self.put(row, block, after.common(other_state))
         return end
 
     def branch(self, clauses: Sequence[Clause], supposed: SpokenCondition, state: State) -> tuple[Steps, State]:
         """Builds the steps of a branch, in which "tell Robin" refers to the condition."""
         if not clauses:
-            raise missing_action("if", supposed.said)
-        inner = type(self)(self.reader, statement_of(supposed), self.given)
+            raise Clause("", "", cue="if").missing_action(supposed.said)
+        inner = type(self)(self.reader, supposed.statement, self.given)
         found = inner.nest(clauses, state)
         self.notes += inner.notes
         self.given = inner.given
@@ -229,19 +220,19 @@ class DecisionBuilder:
             raise RefusalError(f"'{clause.cue}' refers to nothing that was said before", words)
         if asked is not None and asked.looked and cue is not Cue.FAILED:
             row.steps[-asked.steps :] = []
-            supposed = asked.supposed if cue is Cue.SO else negate_supposed(asked.supposed)
+            supposed = asked.supposed if cue is Cue.SO else asked.supposed.opposite
             return self.choose(row, supposed, [*cut(clause.text), *clauses[at + 1 : both]], clauses, both)
         body = [*cut(clause.text), *clauses[at + 1 : end]]
         if asked is not None and asked.decided and isinstance(last, Choose) and cue is not Cue.SO:
-            otherwise, state = self.branch(body, negate_supposed(asked.supposed), asked.supposed.fails)
+            otherwise, state = self.branch(body, asked.supposed.opposite, asked.supposed.fails)
             row.steps[-1:] = []
-            self.put(row, last.model_copy(update={"otherwise": otherwise}), state_behind_both(row.state, state))
+            self.put(row, last.model_copy(update={"otherwise": otherwise}), row.state.common(state))
             return end
         if isinstance(last, Choose | Repeat) and cue is not Cue.FAILED:
             raise RefusalError(f"I do not understand what '{clause.cue}' refers to; say the whole condition", words)
         missing = cue is Cue.NOT and clause.cue.lower() not in ("if not", "if no")
         if cue is not Cue.SO and not body:
-            raise missing_action(clause.cue)
+            raise clause.missing_action()
         if cue is Cue.SO or (missing and asked is None):
             raise RefusalError(f"'{clause.cue}' refers to no earlier look", words)
         if missing and asked is not None:
@@ -252,7 +243,7 @@ class DecisionBuilder:
         row.steps[row.begun :] = []
         skipped = Group(steps=tried, on_failure=OnFailure.SKIP)
         attempt = Try(steps=tried, otherwise=otherwise) if otherwise else skipped
-        self.put(row, attempt, state_behind_both(row.state, state))
+        self.put(row, attempt, row.state.common(state))
         return end
 
     def _replace_missing(self, row: StepRow, asked: LastCheck, said: str, body: Sequence[Clause]) -> None:
@@ -263,11 +254,11 @@ class DecisionBuilder:
         puts = any(command.task is Task.PLACE for step in row.steps[-asked.steps :] for command in step.commands)
         if puts and re.search(r"\bthere$", said, re.IGNORECASE):
             raise RefusalError(f"'{said}' could mean two places; name the place", [said])
-        otherwise, state = self.branch(body, negate_supposed(asked.supposed), asked.supposed.fails)
+        otherwise, state = self.branch(body, asked.supposed.opposite, asked.supposed.fails)
         done = tuple(row.steps[-asked.steps :])
         row.steps[-asked.steps :] = []
         block = Choose(condition=asked.supposed.condition, then=done, otherwise=otherwise)
-        self.put(row, block, state_behind_both(row.state, state))
+        self.put(row, block, row.state.common(state))
 
     def wait_for(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
         """Builds a wait for "as soon as Robin comes, ..."."""
@@ -275,7 +266,7 @@ class DecisionBuilder:
         end = end_of_scope(clauses, at + 1)
         supposed, rest = self.split(clauses[at].text, row.state, clauses[at + 1 : end])
         if not rest and end == at + 1:
-            raise missing_action(clauses[at].cue, supposed.said)
+            raise clauses[at].missing_action(supposed.said)
         self.put(row, Wait(awaited=Awaited(condition=supposed.condition)), supposed.holds)
         more, row.state = self.sequence([*cut(rest), *clauses[at + 1 :]], supposed.holds)
         row.steps += more
@@ -295,7 +286,7 @@ class DecisionBuilder:
             self.put_done(row, wait_steps(where, clause.kind.value, said, row.state, self.reader))
             return end
         if not body:
-            raise missing_action(clause.cue)
+            raise clause.missing_action()
         self.put_rounds(row, rounds, body)
         return end
 
@@ -313,9 +304,9 @@ class DecisionBuilder:
         """Splits the number or interval of rounds from the action that follows."""
         text, state = clause.text, row.state
         if clause.kind is Cue.TIMES:
-            return Rounds(Loop(times=int(amount_of_cue(clause, parse_times, "number of times"))), state), text
+            return Rounds(Loop(times=int(clause.parse_amount(parse_times, "number of times"))), state), text
         if clause.kind is Cue.EVERY:  # "for an hour" and "until three" may stand behind
-            every_s = amount_of_cue(clause, parse_seconds, "time")
+            every_s = clause.parse_amount(parse_seconds, "time")
             if not re.match(r"(?:for|until|till|as long as|while)\b", text, re.IGNORECASE):
                 return Rounds(Loop(every_s=every_s), state), text
             for cut_at in (*([len(text)] if follows else []), *verb_positions(text)):
@@ -326,7 +317,7 @@ class DecisionBuilder:
             if parse_time(said := text[:cut_at].strip(" ,")) is not None:
                 return self._rounds_behind(row, (), replace(clause, text=said)), text[cut_at:]
         supposed, rest = self.split(text, state, follows)
-        return rounds_by(clause.kind, supposed), rest
+        return supposed.rounds(clause.kind), rest
 
     def limit_rounds(self, every_s: float, text: str, state: State) -> Rounds | None:
         """Parses the end of rounds in "for an hour", "until three o'clock" or "five times"; None for other texts."""
@@ -349,7 +340,7 @@ class DecisionBuilder:
             supposed = parse_condition(cue.text, state, self.reader)
         except RefusalError:
             return None
-        rounds = rounds_by(cue.kind, supposed)
+        rounds = supposed.rounds(cue.kind)
         return replace(rounds, loop=rounds.loop.model_copy(update={"every_s": every_s}))
 
     def _on_the_way(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> bool:
@@ -385,7 +376,7 @@ class DecisionBuilder:
             self.put_together(row, found.text[match.end :].strip(), scope)
             return
         if found.kind is Cue.EVERY:
-            rounds = self.limit_rounds(amount_of_cue(found, parse_seconds, "time"), found.text, row.state)
+            rounds = self.limit_rounds(found.parse_amount(parse_seconds, "time"), found.text, row.state)
         elif found.kind is Cue.TIMES:
             rounds = None if found.text else self._how_often(row, found, ())[0]
         else:
@@ -402,7 +393,7 @@ class DecisionBuilder:
             self.notes += time.notes(found.text)
             return Rounds(Loop(until_clock=time.text), row.state)
         _, state = type(self)(self.reader).sequence(scope, row.state)
-        return replace(rounds_by(found.kind, parse_condition(found.text, state, self.reader)), state=row.state)
+        return replace(parse_condition(found.text, state, self.reader).rounds(found.kind), state=row.state)
 
     def _scope(self, row: StepRow, clause: Clause, found: Clause) -> list[Clause]:
         """Clauses that a trailing cue applies to. Raises RefusalError when these are ambiguous."""
@@ -413,14 +404,14 @@ class DecisionBuilder:
         earlier = earlier[start:]
         if not earlier:
             if row.steps[row.begun :] and not (clause.begins or clause.then) and not row.plain:
-                raise ambiguous_cue(found)
+                raise found.ambiguous
             self.flush(row)
             return [replace(main, joint="")]
         row.plain = row.plain[: len(row.plain) - len(earlier)]
         self.flush(row)
         scope = [replace(earlier[0], joint=""), *earlier[1:], main]
-        if not one_errand(self.read_together(scope, row.state)):
-            raise ambiguous_cue(found)
+        if not self.read_together(scope, row.state).one_errand:
+            raise found.ambiguous
         return scope
 
     def _guarded(self, row: StepRow, scope: Sequence[Clause], found: Clause) -> None:
@@ -429,16 +420,16 @@ class DecisionBuilder:
             raise RefusalError(f"'{found.cue}' what?", [found.cue])
         steps, state = type(self)(self.reader, self.statement).sequence(scope, row.state)
         supposed = parse_condition(found.text, replace(state, goal=row.state.goal, at=row.state.at), self.reader)
-        supposed = condition_at_source(supposed, steps, found.text)
+        supposed = supposed.at_source(steps, found.text)
         begun = replace(row.state, goal=supposed.holds.goal)
         if found.kind is Cue.IF:
             begun = replace(begun, memory=replace(begun.memory, locations=supposed.holds.memory.locations))
-        again = type(self)(self.reader, statement_of(supposed))
+        again = type(self)(self.reader, supposed.statement)
         steps, state = again.sequence(scope, begun)
         self.notes += [*again.notes, *supposed.notes]
         both = supposed.negate(supposed.said) if found.kind is Cue.UNLESS else replace(supposed, quotable=True)
         block = Choose(condition=both.condition, then=_done(steps, join_clauses(scope)))
-        self.put(row, block, state_behind_both(state, row.state))
+        self.put(row, block, state.common(row.state))
         row.asked = LastCheck(both, looked=False, decided=True)
 
 

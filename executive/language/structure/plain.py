@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -49,6 +49,22 @@ class State:
     recipient: Location | None = None
     somebody: bool = False
 
+    @classmethod
+    def initial(cls, knowledge: Knowledge, memory: Memory) -> State:
+        """State where a sentence begins."""
+        start = (knowledge.start.x, knowledge.start.y)
+        room = next((name for name, outline in knowledge.rooms.items() if inside(outline, start)), None)
+        return cls(memory=memory, at=room)
+
+    def common(self, other: State) -> State:
+        """State after two branches: what both branches have in common."""
+        return replace(
+            self,
+            held=self.held if self.held == other.held else None,
+            goal=self.goal if self.goal == other.goal else None,
+            at=self.at if self.at == other.at else None,
+        )
+
 
 @dataclass(frozen=True)
 class SpokenCondition:
@@ -70,6 +86,33 @@ class SpokenCondition:
         """Negated condition, with its words."""
         return SpokenCondition(negate(self.condition), said, self.fails, self.holds, self.notes, items=self.items)
 
+    @property
+    def opposite(self) -> SpokenCondition:
+        """Negated condition, whose words may not be repeated."""
+        return replace(self.negate(f"not {self.said}"), quotable=False)
+
+    @property
+    def statement(self) -> str | None:
+        """Words of the condition as a statement; None if they cannot be repeated."""
+        plain = self.quotable and not CLAUSES.deictic.search(self.said)
+        return self.said if plain and self.said and not re.match(r"it\b|there is one", self.said) else None
+
+    def at_source(self, steps: Steps, text: str) -> SpokenCondition:
+        """Adds to a condition without a place ("if there is one") the place from which the object is taken."""
+        taken = next((c for step in steps for c in step.commands if c.task is Task.GRASP), None)
+        look = self.condition.part if isinstance(self.condition, Not) else self.condition
+        placed = re.search(r"\b(?:in|on|at|inside|near)\b", text, re.IGNORECASE)
+        if taken is None or placed or not isinstance(look, Look) or look.command.object != taken.object:
+            return self
+        there = Look.from_command(replace(look.command, goal=taken.goal))
+        return replace(self, condition=Not(part=there) if isinstance(self.condition, Not) else there)
+
+    def rounds(self, kind: Cue | None) -> Rounds:
+        """Rounds that run until or while the condition holds."""
+        if kind is Cue.UNTIL:
+            return Rounds(Loop(until=self.condition), self.fails)
+        return Rounds(Loop(while_=self.condition), self.holds)
+
 
 @dataclass(frozen=True)
 class PlainReading:
@@ -79,17 +122,18 @@ class PlainReading:
     state: State
     trace: Trace
 
+    @property
+    def one_errand(self) -> bool:
+        """Returns whether all commands are about one object, or only go to a place and back."""
+        objects = {str(thing) for command in self.commands for thing in (command.item, command.object) if thing}
+        going = [action for action in self.trace.resolved if action.kind is VerbKind.GO]
+        bare = sum(command.item is None and command.task is None for command in self.commands)
+        return len(objects) == 1 if not bare else not objects and bare <= 2 and bool(going) and going[-1].goal == HERE
+
 
 def negate(condition: Condition) -> Condition:
     """Negation of a condition."""
     return condition.part if isinstance(condition, Not) else Not(part=condition)
-
-
-def initial_state(knowledge: Knowledge, memory: Memory) -> State:
-    """State where a sentence begins."""
-    start = (knowledge.start.x, knowledge.start.y)
-    room = next((name for name, outline in knowledge.rooms.items() if inside(outline, start)), None)
-    return State(memory=memory, at=room)
 
 
 def phrase_of_name(name: str, kind: NounKind) -> Phrase:
@@ -235,6 +279,23 @@ class PlainReader:
         condition = looks[0] if len(looks) == 1 else AllOf(parts=looks)
         return SpokenCondition(condition, text, known, fails, reading.trace.notes)
 
+    def last_check(self, reading: PlainReading, before: State) -> LastCheck | None:
+        """Look or fetch that the last command of a reading stands for."""
+        commands = reading.commands
+        if commands and commands[-1].task is Task.FIND:
+            looks = sum(command.task is Task.FIND for command in commands)
+            return LastCheck(self.condition_of_looks(reading, reading.state, before, ""), looked=True, steps=looks)
+        taken = next((command for command in reversed(commands) if command.task is Task.GRASP), None)
+        if taken is None:
+            return None
+        found = Command(
+            goal=taken.goal, task=Task.FIND, object=taken.object, object_count=taken.object_count, verb="find"
+        )
+        memory = replace(reading.state.memory, where=None, locations=before.memory.locations)
+        fails = replace(reading.state, memory=memory, held=None, goal=None, at=None)
+        supposed = SpokenCondition(Look.from_command(found), "", reading.state, fails)
+        return LastCheck(supposed, looked=False, steps=len(commands))
+
     def _state_if_seen(self, reading: PlainReading, state: State) -> State:
         """State if the look succeeds."""
         action = reading.trace.resolved[-1]
@@ -269,7 +330,7 @@ class PlainReader:
     def _room_of(self, command: Command, state: State) -> str | None:
         place = command.goal_at or command.goal
         if place == START:
-            return initial_state(self.knowledge, state.memory).at
+            return State.initial(self.knowledge, state.memory).at
         if place is not None and place in self.knowledge.people and command.goal_at is None:
             return self.knowledge.room(self.knowledge.people[place].at)
         return None if place is None or self.knowledge.place(place) is None else self.knowledge.room(place)
@@ -333,65 +394,6 @@ def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, ro
     return len(clauses)
 
 
-def negate_supposed(supposed: SpokenCondition) -> SpokenCondition:
-    """Negation of a condition, with the state after it."""
-    return replace(supposed.negate(f"not {supposed.said}"), quotable=False)
-
-
-def statement_of(supposed: SpokenCondition) -> str | None:
-    """Words of a condition, rephrased as a statement; None if they cannot be repeated."""
-    said = supposed.said
-    plain = supposed.quotable and not CLAUSES.deictic.search(said) and not re.match(r"it\b|there is one", said)
-    return said if said and plain else None
-
-
-def state_behind_both(one: State, other: State) -> State:
-    """State after two branches: what both branches have in common."""
-    return replace(
-        one,
-        held=one.held if one.held == other.held else None,
-        goal=one.goal if one.goal == other.goal else None,
-        at=one.at if one.at == other.at else None,
-    )
-
-
-def one_errand(reading: PlainReading) -> bool:
-    """Returns whether all commands are about one object, or only go to a place and back."""
-    objects = {str(thing) for command in reading.commands for thing in (command.item, command.object) if thing}
-    going = [action for action in reading.trace.resolved if action.kind is VerbKind.GO]
-    bare = sum(command.item is None and command.task is None for command in reading.commands)
-    return len(objects) == 1 if not bare else not objects and bare <= 2 and bool(going) and going[-1].goal == HERE
-
-
-def find_last_check(reading: PlainReading, before: State, reader: PlainReader) -> LastCheck | None:
-    """Look or fetch that the last command stands for."""
-    commands = reading.commands
-    if commands and commands[-1].task is Task.FIND:
-        looks = sum(command.task is Task.FIND for command in commands)
-        return LastCheck(reader.condition_of_looks(reading, reading.state, before, ""), looked=True, steps=looks)
-    taken = next((command for command in reversed(commands) if command.task is Task.GRASP), None)
-    if taken is None:
-        return None
-    found = Command(goal=taken.goal, task=Task.FIND, object=taken.object, object_count=taken.object_count, verb="find")
-    memory = replace(reading.state.memory, where=None, locations=before.memory.locations)
-    fails = replace(reading.state, memory=memory, held=None, goal=None, at=None)
-    return LastCheck(
-        SpokenCondition(Look.from_command(found), "", reading.state, fails), looked=False, steps=len(commands)
-    )
-
-
-def condition_at_source(supposed: SpokenCondition, steps: Steps, text: str) -> SpokenCondition:
-    """Adds to a condition without a place ("if there is one") the place from which the object is taken."""
-    taken = next((c for step in steps for c in step.commands if c.task is Task.GRASP), None)
-    condition = supposed.condition
-    look = condition.part if isinstance(condition, Not) else condition
-    placed = re.search(r"\b(?:in|on|at|inside|near)\b", text, re.IGNORECASE)
-    if taken is None or placed or not isinstance(look, Look) or look.command.object != taken.object:
-        return supposed
-    there = Look.from_command(replace(look.command, goal=taken.goal))
-    return replace(supposed, condition=Not(part=there) if isinstance(condition, Not) else there)
-
-
 def statement_of_check(text: str) -> str | None:
     """Turns a check into a statement: "is the door open" becomes "the door is open"."""
     if (checked := CHECKS.checked.fullmatch(text)) is not None:
@@ -399,24 +401,6 @@ def statement_of_check(text: str) -> str | None:
     if (asked := CHECKS.asked.fullmatch(text)) is None:
         return None
     return f"{asked['subject']} {'are' if asked['subject'].lower() == 'you' else 'is'} {asked['state']}"
-
-
-def ambiguous_cue(found: Clause) -> RefusalError:
-    """Refusal of a cue that several actions could belong to."""
-    said = f"{found.cue} {found.text}".strip()
-    return RefusalError(f"it is not clear which action '{said}' belongs to; say it first", [said])
-
-
-def missing_action(cue: str, text: str = "") -> RefusalError:
-    """Refusal of a condition to which no action belongs."""
-    return RefusalError(f"what am I to do {f'{cue.lower()} {text}'.strip()}?", [f"{cue} {text}".strip()])
-
-
-def amount_of_cue(cue: Clause, parse: Callable[[str], float | None], what: str) -> float:
-    """Interval or number of rounds in a cue."""
-    if (found := parse(cue.amount)) is None:
-        raise RefusalError(f"'{cue.cue}' is no {what} that I understand", [cue.cue])
-    return found
 
 
 def merge_repeats(block: Repeat) -> Repeat:
@@ -428,10 +412,3 @@ def merge_repeats(block: Repeat) -> Repeat:
         raise RefusalError("an endless repetition cannot be repeated again; say how often", [])
     ends = {"until": outer.until, "while_": outer.while_, "until_clock": outer.until_clock}
     return inner.model_copy(update={"loop": inner.loop.model_copy(update=ends)})
-
-
-def rounds_by(kind: Cue | None, supposed: SpokenCondition) -> Rounds:
-    """Builds rounds that run until or while a condition holds."""
-    if kind is Cue.UNTIL:
-        return Rounds(Loop(until=supposed.condition), supposed.fails)
-    return Rounds(Loop(while_=supposed.condition), supposed.holds)

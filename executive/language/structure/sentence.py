@@ -27,10 +27,7 @@ from executive.language.structure.plain import (
     State,
     StepRow,
     end_of_scope,
-    initial_state,
-    missing_action,
     phrase_of_name,
-    statement_of,
     statement_of_check,
     with_preposition,
 )
@@ -147,7 +144,7 @@ class SentenceBuilder(DecisionBuilder):
         try:
             return self._people_at(row, clauses, at)
         except RefusalError as refusal:
-            refusal.kind = RefusalKind.ABOUT_PEOPLE
+            refusal.plain = False
             raise
 
     def _people_at(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
@@ -227,7 +224,7 @@ class SentenceBuilder(DecisionBuilder):
         """Builds a wait and a speech for "tell me when Robin comes"."""
         self.flush(row)
         supposed = parse_condition(match["what"], row.state, self.reader)
-        statement = statement_of(supposed)
+        statement = supposed.statement
         if statement is None:
             raise RefusalError(f"what am I to say in '{match.text}'?", [match.text])
         self.put(row, Wait(awaited=Awaited(condition=supposed.condition)), supposed.holds)
@@ -286,7 +283,7 @@ class SentenceBuilder(DecisionBuilder):
             end = end_of_scope(clauses, at + 1, branch=True)
             body = [*cut(rest), *clauses[at + 1 : end]]
             if not body:
-                raise missing_action(clause.cue, clause.text)
+                raise clause.missing_action(clause.text)
             found[answer], _ = self.nest(body, self._choosing(asked, 0, state))
             at = end
         if at < len(clauses) and not found["yes"] and CHECKS.brings.match(clauses[at].text):
@@ -384,13 +381,18 @@ MOST_CLAUSES: Final = 24
 def read_structure(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pipeline, memory: Memory) -> Trace:
     """Reads a sentence with conditions, loops, waits or speech, given the trace of its plain reading.
 
-    Returns the plain trace if the sentence is a list of plain commands; if it could be one, only unambiguous decisions
-    and rounds count. `clauses` are the sentence's clauses, if known; `memory` has the referents from earlier sentences.
+    Returns the plain trace for a list of plain commands, and for plain words that are refused. `clauses` are the
+    sentence's clauses, if known; `memory` has the referents from earlier sentences.
     """
+    decides = True
     try:
-        return _structured(plain, split(plain.text).clauses if clauses is None else clauses, pipeline, memory)
+        clauses = split(plain.text).clauses if clauses is None else clauses
+        decides = any(one.kind is not None or trailing_cue(one.text) is not None for one in clauses)
+        if not decides and (plain.refusal is None or plain.refused_at == "cleaning"):
+            return plain
+        return _structured(plain, clauses, pipeline, memory)
     except RefusalError as refusal:
-        return replace(plain, refusal=refusal, refused_at="structure")
+        return plain if refusal.plain and not decides else replace(plain, refusal=refusal, refused_at="structure")
     except ValidationError as error:
         _, wrong, _ = first_error(error.errors())
         return replace(plain, refusal=RefusalError(f"a number in it {wrong}"), refused_at="structure")
@@ -398,14 +400,11 @@ def read_structure(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pip
 
 def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, memory: Memory) -> Trace:
     """Reads the structured sentence. Raises RefusalError with the words if any part is uncertain."""
-    decides = any(one.kind is not None or trailing_cue(one.text) is not None for one in clauses)
-    if plain.refusal is None and not decides:
-        return plain
     if len(clauses) > MOST_CLAUSES:
         raise RefusalError(f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most")
     assert pipeline.knowledge is not None
     builder = SentenceBuilder(PlainReader(pipeline, pipeline.knowledge))
-    steps, state = builder.sequence(clauses, initial_state(pipeline.knowledge, memory))
+    steps, state = builder.sequence(clauses, State.initial(pipeline.knowledge, memory))
     if all(isinstance(step, Do) for step in steps) and not builder.special:
         return plain
     if max(map(_depth, steps), default=0) > MOST_NESTED:

@@ -43,14 +43,14 @@ def parse_number(text: str) -> float | None:
 
 def parse_times(text: str) -> int | None:
     """Parses "three times" or "twice"; None for any text but whole numbers from 1 to 100."""
-    match = _AMOUNTS.times.fullmatch(text)
+    match = _AMOUNTS["times"].fullmatch(text)
     number = None if match is None else parse_number(match["count"])
     return int(number) if number is not None and number == int(number) and 1 <= number <= 100 else None
 
 
 def parse_seconds(text: str) -> float | None:
     """Parses a duration (s); None for any other text."""
-    match = _AMOUNTS.seconds.fullmatch(text)
+    match = _AMOUNTS["seconds"].fullmatch(text)
     count = None if match is None else parse_number(match["count"])
     if match is None or count is None:
         return None
@@ -59,14 +59,14 @@ def parse_seconds(text: str) -> float | None:
 
 def parse_share(text: str) -> float | None:
     """Parses a fraction from 0 to 1, such as "thirty percent" or "half"."""
-    match = _AMOUNTS.share.fullmatch(text)
+    match = _AMOUNTS["share"].fullmatch(text)
     number = None if match is None else parse_number(match["count"])
     return number / 100 if number is not None and 0 < number <= 100 else None
 
 
 def parse_time(text: str) -> TimeOfDay | None:
     """Parses a time of day; "one" to "six" without more words are in the afternoon."""
-    match = _AMOUNTS.time.fullmatch(text.replace("o' clock", "o'clock"))
+    match = _AMOUNTS["time"].fullmatch(text.replace("o' clock", "o'clock"))
     if match is None:
         return None
     said, _, minutes = match["hour"].replace(".", ":").partition(":")

@@ -62,13 +62,13 @@ class Clause:
     @property
     def outer(self) -> bool:
         """Returns whether the words before the clause say that it follows all earlier clauses, not only the last."""
-        return CLAUSES.outer.search(self.joint) is not None
+        return CLAUSES["outer"].search(self.joint) is not None
 
     @property
     def anyway(self) -> bool:
         """Returns whether the clause runs at the end, whatever happens before."""
         said = self.kind is None and self.text != without_whatever(self.text)
-        return said or CLAUSES.whatever.search(self.joint) is not None
+        return said or CLAUSES["whatever"].search(self.joint) is not None
 
     @property
     def then(self) -> bool:
@@ -109,7 +109,7 @@ def split(text: str, robots: tuple[str, ...] = ()) -> Split:
     listener, parts = addressees(robots).parts(text) if len(robots) > 1 else (None, (AddressedText(None, text),))
     found: list[Clause] = []
     for part in parts:
-        said = _REWORDING.whole.reword(_REWORDING.parts.reword(smooth(part.text)), whole=True)
+        said = _REWORDING["whole"].reword(_REWORDING["parts"].reword(smooth(part.text)), whole=True)
         found += (replace(clause, part=part) for clause in cut(said))
     return Split(tuple(found), listener)
 
@@ -131,7 +131,7 @@ def _cuts(text: str) -> Iterator[tuple[int, int]]:
         start, begin = words.spans[at - 1][1] if at else 0, words.start(behind)
         joint, before = text[start:begin], words.word(at - 1)
         bare = at > 0 and behind == at  # no words join, but "otherwise" may follow
-        cue = None if bare and not CLAUSES.otherwise.match(text, at) else leading_cue(text[begin:])
+        cue = None if bare and not CLAUSES["otherwise"].match(text, at) else leading_cue(text[begin:])
         alone = before.endswith(_SOME) if bare else before in _ONE_VERB and joint.strip().lower() in ("and", "please")
         begins = cue is not None or (not bare and begins_action(text[begin:])) or re.search(r"[.!?;](?:\s|$)", joint)
         if not at or (begins and not alone):
@@ -142,7 +142,7 @@ def _cuts(text: str) -> Iterator[tuple[int, int]]:
 def _behind_joint(words: Words, at: int) -> int:
     """Index of the word behind the joining words that begin at a word."""
     while words.word(at):
-        joints = (CLAUSES.joint, CLAUSES.outer, CLAUSES.whatever)
+        joints = (CLAUSES["joint"], CLAUSES["outer"], CLAUSES["whatever"])
         found = next((found.after for form in joints if (found := form.match(words.text, at)) is not None), at)
         found += words.word(at) in _MARKS
         if found == at:
@@ -155,7 +155,7 @@ def leading_cue(text: str) -> Clause | None:
     """Clause by the cue at its beginning; None if there is none. Behind a complete cue ("if not") an action begins."""
     words = words_of(text)
     for kind in Cue:
-        for found in getattr(CLAUSES, kind.value).matches(text, 0):
+        for found in CLAUSES[kind.value].matches(text, 0):
             behind, last = words.word(found.after), words.word(found.after - 1)
             begins = {"", "then", "please", "just", *_MARKS, *(_ARTICLES if last in CLAUSES.table["objects"] else ())}
             rest = text[found.end :].strip(" ,;:")
@@ -168,8 +168,8 @@ def trailing_cue(text: str) -> Clause | None:
     """First cue after an action in a clause, which makes the action conditional or repeated; None if there is none."""
     for at in range(1, len(words_of(text).words)):
         for kind in _BEHIND:
-            found = getattr(CLAUSES, kind.value).match(text, at)
-            if found is not None and not (kind is Cue.IF and CLAUSES.asks_before.fullmatch(text[: found.start])):
+            found = CLAUSES[kind.value].match(text, at)
+            if found is not None and not (kind is Cue.IF and CLAUSES["asks_before"].fullmatch(text[: found.start])):
                 before = text[: found.start].strip(" ,")
                 return replace(_clause(kind, found, text[found.end :].strip(" ,")), before=before)
     return None
@@ -181,7 +181,7 @@ def _clause(kind: Cue, cue: Match, text: str) -> Clause:
 
 def without_whatever(text: str) -> str:
     """Text without "whatever happens" at its end."""
-    found = CLAUSES.whatever_last.fullmatch(text)
+    found = CLAUSES["whatever_last"].fullmatch(text)
     return text if found is None else found["before"].rstrip(" ,")
 
 

@@ -58,10 +58,10 @@ class Amendment:
 def parse_follow_up(text: str) -> FollowUp | None:
     """Parses a follow-up; None for a sentence that is complete without the earlier request."""
     plain = " ".join(text.replace("’", "'").split()).strip(" .!,")
-    if _FORMS.again.fullmatch(plain):
+    if _FORMS["again"].fullmatch(plain):
         return FollowUp(FollowUpKind.AGAIN)
     for kind in (FollowUpKind.CORRECTION, FollowUpKind.ADDITION):
-        if (match := getattr(_FORMS, kind.value).fullmatch(plain)) is not None:
+        if (match := _FORMS[kind.value].fullmatch(plain)) is not None:
             return FollowUp(kind, match["said"], match["preposition"].lower(), match["old"])
     return None
 
@@ -161,7 +161,7 @@ class Remark(enum.Enum):
 def parse_remark(text: str) -> Remark | None:
     """Parses a whole sentence as a remark; None for any other sentence, such as a request."""
     words = " ".join(re.sub(r"[^\w\s']", " ", text[:_MOST_LETTERS].lower().replace("’", "'")).split())
-    plain = page("remarks").remark.fullmatch(words)
+    plain = page("remarks")["remark"].fullmatch(words)
     return _remarks().get(words) or (None if plain is None else _remarks().get(plain["remark"]))
 
 

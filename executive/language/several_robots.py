@@ -58,29 +58,23 @@ def understand_for_robots(
         return replace(alone, parts=(part,)) if alone.status is Status.OK else alone
     assert knowledge is not None
     said = correct_spelling(text, knowledge, parser) if correct else CorrectedText(text)
-    forms = addressees(names).forms
+    forms, addressed = addressees(names).forms, True
     stranger = forms.stranger.match(text)
-    addressed = True
-
-    def read(text: str, known: Knowledge | None) -> Understanding:
-        """Understands a sentence that contains no rules for rooms."""
-        nonlocal addressed
-        assert known is not None
-        cut = split(text, names)
-        addressed = cut.listener is not None
-        if not addressed and stranger is not None and forms.called.fullmatch(stranger["name"]) is None:
-            what = f"there is no robot called {stranger['name']}; there are {listing(names)}"
-            return Understanding(sentence, Status.NOT_ADDRESSED, reason=what, unknown_words=(stranger["name"],))
-        if require_wake and not addressed:
-            called = listing((f'"Hey {name}"' for name in names), last="or")
-            reason = f"no robot's name was said; begin with {called}"
-            return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
-        return _Reader(tuple(robots), Pipeline(parser, known), known).addressed(sentence, cut, memory)
-
     try:
         rules = read_rules(said.text, knowledge)
-        found = read(rules.rest, rules.knowledge)
-        found = under_rules(rules, found) if rules.zones else found
+        assert rules.knowledge is not None
+        cut = split(rules.rest, names)
+        addressed = cut.listener is not None
+        found = Understanding(sentence, Status.NOT_ADDRESSED)
+        if not addressed and stranger is not None and forms.called.fullmatch(stranger["name"]) is None:
+            what = f"there is no robot called {stranger['name']}; there are {listing(names)}"
+            found = replace(found, reason=what, unknown_words=(stranger["name"],))
+        elif require_wake and not addressed:
+            called = listing((f'"Hey {name}"' for name in names), last="or")
+            found = replace(found, reason=f"no robot's name was said; begin with {called}")
+        else:
+            reader = _Reader(tuple(robots), Pipeline(parser, rules.knowledge), rules.knowledge)
+            found = under_rules(rules, reader.addressed(sentence, cut, memory))
     except RefusalError as refusal:
         found = Understanding(sentence, Status.REFUSED, reason=refusal.reason, unknown_words=refusal.unknown)
         return replace(found, addressed=addressed)

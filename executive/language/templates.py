@@ -11,17 +11,16 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from itertools import product
-from typing import Any, Final, NamedTuple
+from functools import cache, cached_property, lru_cache
+from typing import Any, Final
 
-from executive.language.lexicon import lexicon, read_table
+from executive.language.lexicon import any_of, lexicon, read_table
 
 
 class Words:
-    """Words of a text in lower case, and their positions there; "n't" is "not"."""
+    """Words of a text in lower case, and their positions there; "n't" is "not"; `spaced` has a blank before each."""
 
     def __init__(self, text: str) -> None:
         self.text, self.words, self.spans = text, list[str](), list[tuple[int, int]]()
@@ -30,6 +29,8 @@ class Words:
                 if piece is not None:
                     self.words.append(_FULL.get(piece.lower(), piece.lower()))
                     self.spans.append(match.span(n))
+        self.spaced = "".join(f" {word}" for word in self.words)
+        self.starts = [*(n for n, letter in enumerate(self.spaced) if letter == " "), len(self.spaced)]
 
     def word(self, at: int) -> str:
         """Word at an index; empty outside the text."""
@@ -38,6 +39,11 @@ class Words:
     def start(self, at: int) -> int:
         """Position of a word in the text, or the text's end."""
         return self.spans[at][0] if at < len(self.spans) else len(self.text)
+
+    def span(self, begin: int, end: int) -> tuple[int, int]:
+        """Positions in the text of the words between two positions in `spaced`."""
+        first, last = self.starts.index(begin), self.starts.index(end)
+        return (self.spans[first][0], self.spans[last - 1][1]) if last > first else (0, 0)
 
 
 @lru_cache(maxsize=4096)
@@ -74,35 +80,27 @@ class Match:
 
 
 class Page:
-    """Templates of a page, by intent as its attributes; `lists` has the values of slots that the page leaves open."""
+    """Templates of a page by intent; `lists` has the values of slots that the page leaves open."""
 
     def __init__(self, name: str, **lists: tuple[str, ...]) -> None:
-        self._name, self._given, self._parts = name, lists, dict[str, _Part]()
+        self._given, self._templates, self._forms = lists, dict[str, Template](), dict[str, _Form]()
+        self.table: Mapping[str, Any] = read_table(f"intents/{name}.yaml")
 
-    @cached_property
-    def table(self) -> Mapping[str, Any]:
-        """Contents of the page."""
-        found: Mapping[str, Any] = read_table(f"intents/{self._name}.yaml")
-        return found
-
-    def __getattr__(self, intent: str) -> Template:
-        if intent.startswith("__"):
-            raise AttributeError(intent)
-        found = Template(self, self.table["intents"][intent])
-        setattr(self, intent, found)
-        return found
+    def __getitem__(self, intent: str) -> Template:
+        if intent not in self._templates:
+            self._templates[intent] = Template(self, self.table["intents"][intent])
+        return self._templates[intent]
 
     def entry(self, kind: str, name: str) -> Any:
         """Rule or list of the page, or else the common one; an unknown list takes any words."""
         tables = ({"lists": self._given}, self.table, read_table("intents/common.yaml"))
         return next((table[kind][name] for table in tables if name in table.get(kind, ())), {})
 
-    def part(self, values: str | Iterable[str]) -> _Part:
-        """Part for a template, or for one of several; each is parsed once."""
-        text = values if isinstance(values, str) else "|".join(values)
-        if text not in self._parts:
-            self._parts[text] = _alternatives(_PARTS.findall(text)[::-1], self)
-        return self._parts[text]
+    def form(self, template: str) -> _Form:
+        """Form of a template, which is translated once."""
+        if template not in self._forms:
+            self._forms[template] = _Form(self, template)
+        return self._forms[template]
 
 
 page = lru_cache(maxsize=64)(Page)
@@ -144,139 +142,104 @@ class Template:
         return text
 
     def _match(self, row: Mapping[str, Any], words: Words, at: int, whole: bool) -> Match | None:
-        ends, size = self._page.part(row["template"]).ends_at(words, at), len(words.words)
-        end, slots = next(((end, slots) for end, slots in ends if (end == size if whole else end > at)), (-1, ()))
-        if end < 0 or words.word(end) not in row.get("before", [words.word(end)]):
+        form = self._page.form(row["template"])
+        if at > len(words.words) or (found := form.match(words, at, whole)) is None:
             return None
-        if whole and any(getattr(self._page, one).fullmatch(words.text) for one in row.get("unless", ())):
+        after = words.starts.index(found.end())
+        if words.word(after) not in row.get("before", [words.word(after)]):
             return None
-        start, stop = (words.spans[at][0], words.spans[end - 1][1]) if end > at else (0, 0)
-        filled = {**row.get("slots", {}), **dict(slots)}
-        instead = " ".join(row.get("instead", "").format_map(defaultdict(str, filled)).split())
-        return Match(words.text[start:stop], start, stop, end, filled, instead)
+        if whole and any(self._page[one].fullmatch(words.text) for one in row.get("unless", ())):
+            return None
+        slots = {**row.get("slots", {}), **form.slots_of(found, words)}
+        instead = " ".join(row.get("instead", "").format_map(defaultdict(str, slots)).split())
+        start, end = words.span(found.start(), found.end())
+        return Match(words.text[start:end], start, end, after, slots, instead)
 
 
-_Ends = Iterator[tuple[int, tuple[tuple[str, str], ...]]]
+class _Form:
+    """Template as a regular expression over spaced words; its groups are the slots, each with other texts for some."""
+
+    def __init__(self, page: Page, template: str) -> None:
+        self._page, self._slots, self._first = page, list[tuple[str, Mapping[str, str]]](), ""
+        self._text = self._expression(template)
+
+    def match(self, words: Words, at: int, whole: bool) -> re.Match[str] | None:
+        """Matches words from an index on, up to the end if `whole`; the first word is tried alone, which is quick."""
+        start = words.starts[at]
+        if self._begins.match(words.spaced, start) is None:
+            return None
+        found = (self._form.fullmatch if whole else self._form.match)(words.spaced, start)
+        return None if found is None or (found.end() == start and not whole) else found
+
+    def slots_of(self, found: re.Match[str], words: Words) -> dict[str, str]:
+        """Texts of the slots; of two slots with one name, the last counts."""
+        slots = {}
+        for n, (name, instead) in enumerate(self._slots, 1):
+            if found.start(n) >= 0:
+                start, end = words.span(*found.span(n))
+                slots[name] = instead.get(words.text[start:end].lower(), words.text[start:end])
+        return slots
+
+    @cached_property
+    def _begins(self) -> re.Pattern[str]:
+        return re.compile(self._first)
+
+    @cached_property
+    def _form(self) -> re.Pattern[str]:
+        return re.compile(rf"(?:{self._text})(?![^ ])")
+
+    def _expression(self, template: str) -> str:
+        """Expression for a template, a rule or a list; a word has a blank before it unless it continues another."""
+        pieces, found, opened, joined = _PARTS.findall(template), "", list[tuple[str, bool]](), False
+        firsts, begin, blank = list[str](), 0, None
+        for piece, behind in zip(pieces, [*pieces[1:], ""], strict=True):
+            joined = joined and not (piece.isspace() or piece in _MARKS or (piece == "[" and behind in _MARKS))
+            if piece.isspace():
+                blank = len(found) if blank is None and not opened else blank
+            elif piece in "([":
+                opened.append((piece, joined))
+                found += "(?:"
+            elif piece in ")]":
+                found += ")" if opened.pop()[0] == "(" else "|)"
+                joined = True
+            elif piece == "|" and opened:
+                found, joined = f"{found}|", opened[-1][1]
+            elif piece == "|":
+                firsts.append(found[begin:blank])
+                found, joined, begin, blank = f"{found}|", False, len(found) + 1, None
+            else:
+                found, joined = found + self._piece(piece, joined), piece not in _MARKS
+        self._first = "|".join([*firsts, found[begin:blank]])
+        return found
+
+    def _piece(self, piece: str, joined: bool) -> str:
+        """Expression for a word, a rule or a slot."""
+        if piece[0] == "<":
+            rule = self._page.entry("rules", piece[1:-1]) or self._page.table["rules"][piece[1:-1]]
+            return f"(?:{self._expression(_text(rule))})"
+        if piece[0] != "{":
+            return re.escape("".join(f" {word}" for word in words_of(piece).words)[joined:])
+        name, _, slot = piece[1:-1].partition(":")
+        values: Any = {} if name == "number" else self._page.entry("lists", name)
+        self._slots.append((slot or name, {}))
+        if isinstance(values, Mapping) and values.keys() <= {"most", "without"}:
+            most = f"{{1,{values['most']}}}" if "most" in values else "+"
+            without = f"(?! (?:{any_of(values['without'])})(?![^ ]))" if "without" in values else ""
+            return f"({_number() if name == 'number' else f'(?:{without} [^ ]++){most}?'})"
+        if isinstance(values, Mapping):
+            self._slots[-1] = (slot or name, values)
+        return f"({self._expression(_text(values)) if values else '(?!)'})"
 
 
-class _Part(NamedTuple):
-    """Part of a template: the words with which it can begin (None: any), and whether it may be without words.
-
-    `ends` yields the indices behind the part when it begins at a word, the preferred ones first, with its slots.
-    """
-
-    ends: Callable[[Words, int], _Ends]
-    first: frozenset[str] | None = None
-    empty: bool = False
-
-    def ends_at(self, words: Words, at: int) -> _Ends:
-        begins = self.empty or self.first is None or words.word(at) in self.first
-        return self.ends(words, at) if begins else iter(())
+def _text(values: str | Iterable[str]) -> str:
+    return values if isinstance(values, str) else "|".join(values)
 
 
-def _word(spellings: Iterable[str]) -> _Part:
-    """One of some words."""
-    return _Part(lambda words, at: iter([(at + 1, ())]), frozenset(spellings))
-
-
-def _sequence(parts: Sequence[_Part]) -> _Part:
-    def ends(words: Words, at: int, n: int = 0) -> _Ends:
-        if n == len(parts):
-            yield at, ()
-            return
-        for middle, slots in parts[n].ends_at(words, at):
-            for end, more in ends(words, middle, n + 1):
-                yield end, (*slots, *more)
-
-    begin = next((n for n, part in enumerate(parts) if not part.empty), len(parts))
-    return _Part(ends, _firsts(parts[: begin + 1]), begin == len(parts))
-
-
-def _choice(parts: Sequence[_Part]) -> _Part:
-    def ends(words: Words, at: int) -> _Ends:
-        for part in parts:
-            yield from part.ends_at(words, at)
-
-    return _Part(ends, _firsts(parts), any(part.empty for part in parts))
-
-
-def _firsts(parts: Sequence[_Part]) -> frozenset[str] | None:
-    firsts = [part.first for part in parts]
-    return None if None in firsts else frozenset(word for first in firsts for word in first or ())
-
-
-def _slot(name: str, part: _Part, instead: Mapping[str, str]) -> _Part:
-    """Part whose text is kept, or another text for it."""
-
-    def ends(words: Words, at: int) -> _Ends:
-        for end, slots in part.ends_at(words, at):
-            text = words.text[words.start(at) : words.spans[end - 1][1]]
-            yield end, ((name, instead.get(text.lower(), text)), *slots)
-
-    return part._replace(ends=ends)
-
-
-def _any(facts: Mapping[str, Any]) -> _Part:
-    """One or more words, as few as possible, or `most` of them; `without` some words."""
-
-    def ends(words: Words, at: int) -> _Ends:
-        for end in range(at + 1, min(len(words.words), at + int(facts.get("most", len(words.words)))) + 1):
-            if words.words[end - 1] in facts.get("without", ()):
-                break
-            yield end, ()
-
-    return _Part(ends)
-
-
-def _number(words: Words, at: int) -> _Ends:
-    """Number in digits, or in one or two words."""
-    first, known = words.word(at), lexicon().numbers.keys() - {"couple", "dozen"}
-    if first in known and words.word(at + 1) in known:
-        yield at + 2, ()
-    if first.replace(".", "", 1).isdigit() or known >= {*first.split("-")}:
-        yield at + 1, ()
-
-
-def _alternatives(parts: list[str], page: Page) -> _Part:
-    """Alternatives up to the closing bracket, which it removes from the reversed parts."""
-    choices, pieces, joined = list[_Part](), list[_Part](), False
-    while True:
-        part = parts.pop() if parts else ""
-        if part in ("|", ")", "]", ""):
-            choices.append(pieces[0] if len(pieces) == 1 else _sequence(pieces))
-            pieces, joined = [], False
-            if part != "|":
-                break
-            continue
-        mark = part.isspace() or part in _MARKS or (part == "[" and parts[-1] in _MARKS)
-        glued = joined and not mark
-        if not part.isspace():
-            found = _part(part, parts, page)
-            pieces[len(pieces) - glued :] = [_glued(pieces[-1], found) if glued else found]
-        joined = not mark
-    return choices[0] if len(choices) == 1 else _choice(choices)
-
-
-def _glued(one: _Part, other: _Part) -> _Part:
-    """Words that two parts spell, of which the other may be left out."""
-    return _word(map("".join, product(one.first or (), {*(other.first or ()), *([""] if other.empty else [])})))
-
-
-def _part(part: str, parts: list[str], page: Page) -> _Part:
-    if part in "([":
-        found = _alternatives(parts, page)
-        return found if part == "(" else _choice([found, _sequence(())])
-    if part[0] == "<":
-        return page.part(page.entry("rules", part[1:-1]) or page.table["rules"][part[1:-1]])
-    if part[0] != "{":
-        words = words_of(part).words
-        return _word(words) if len(words) == 1 else _sequence([_word([word]) for word in words])
-    name, _, slot = part[1:-1].partition(":")
-    values: Any = {} if name == "number" else page.entry("lists", name)
-    if isinstance(values, Mapping) and values.keys() <= {"most", "without"}:
-        return _slot(slot or name, _Part(_number) if name == "number" else _any(values), {})
-    inner = page.part(values) if values else _word(())
-    return _slot(slot or name, inner, values if isinstance(values, Mapping) else {})
+@cache
+def _number() -> str:
+    """Expression for a number in digits, or in one or two words."""
+    word = f"(?:{any_of(lexicon().numbers.keys() - {'couple', 'dozen'})})"
+    return rf" (?:{word} {word}|\d+(?:\.\d+)?|{word}(?:-{word})*)(?![^ ])"
 
 
 _PARTS: Final = re.compile(r"\s+|[()\[\]|]|<[^>]*>|\{[^}]*\}|[,;:.!?]|[^\s()\[\]|<>{},;:.!?]+")

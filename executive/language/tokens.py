@@ -64,16 +64,16 @@ def repair_parse(tokens: Iterable[Token]) -> tuple[Token, ...]:
 class _Repair:
     """Conditions on the words around a word, by relative position, and the word's new values."""
 
-    where: Mapping[int, Mapping[str, re.Pattern[str]]]
+    where: Mapping[int, Mapping[str, tuple[bool, re.Pattern[str]]]]
     then: Mapping[int, Mapping[str, str]]
     joins: tuple[int, ...]
     only: re.Pattern[str]
 
     def fits(self, tokens: Sequence[Token], at: int) -> bool:
         return all(
-            form.fullmatch(_fact(tokens, at + place, name)) is not None
+            (form.fullmatch(_fact(tokens, at + place, name)) is not None) == wanted
             for place, facts in self.where.items()
-            for name, form in facts.items()
+            for name, (wanted, form) in facts.items()
         )
 
     def apply(self, tokens: list[Token], at: int) -> None:
@@ -91,13 +91,19 @@ class _Repair:
 def _repairs() -> tuple[_Repair, ...]:
     return tuple(
         _Repair(
-            {int(at): {name: re.compile(form) for name, form in facts.items()} for at, facts in rule["where"].items()},
+            {int(at): {name: _form(text) for name, text in facts.items()} for at, facts in rule["where"].items()},
             {int(at): become for at, become in rule["then"].items()},
             tuple(map(int, rule.get("joins", ()))),
             re.compile(rule.get("only", ".*")),
         )
         for rule in read_table("repairs.yaml")
     )
+
+
+def _form(text: str) -> tuple[bool, re.Pattern[str]]:
+    """Expression for a field, and whether the field must match it."""
+    wanted = not text.startswith("not ")
+    return wanted, re.compile(text if wanted else text.removeprefix("not "))
 
 
 def _fact(tokens: Sequence[Token], at: int, name: str) -> str:

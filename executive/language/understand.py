@@ -142,27 +142,24 @@ def understand(
         return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
     if (blank := placeholder(sentence)) is not None:
         odd = RefusalError(f"{blank!r} is no word; say it in words", [blank])
-        trace = Trace(sentence, refusal=odd, refused_at="cleaning")
-        return Understanding(sentence, Status.REFUSED, (), odd.reason, odd.unknown, trace=trace, addressed=addressed)
+        return replace(_of_trace(Trace(sentence, refusal=odd, refused_at="cleaning")), addressed=addressed)
     said = CorrectedText(called.text)
     if correct and knowledge is not None:
         said = correct_spelling(called.text, knowledge, parser)
     try:
         rules = read_rules(said.text, knowledge)
-        meant = meaning(Trace(rules.rest, memory or Memory()), Pipeline(parser, rules.knowledge))
-        found = under_rules(rules, meant) if rules.zones else meant
+        found = under_rules(rules, meaning(Trace(rules.rest, memory or Memory()), Pipeline(parser, rules.knowledge)))
     except RefusalError as refusal:
-        trace = Trace(said.text, refusal=refusal, refused_at="rules")
-        found = Understanding(said.text, Status.REFUSED, (), refusal.reason, refusal.unknown, trace=trace)
+        found = _of_trace(Trace(said.text, refusal=refusal, refused_at="rules"))
     return replace(found, text=sentence, notes=(*said.notes, *found.notes), addressed=addressed)
 
 
 def under_rules(rules: RoomRules, meant: Understanding) -> Understanding:
-    """Puts the steps, or the steps of each part, into a group that has the rules for rooms.
+    """Puts the steps, or the steps of each part, into a group that has the rules for rooms, if there are any.
 
     Raises RefusalError for work in a forbidden room.
     """
-    if meant.status is not Status.OK:
+    if meant.status is not Status.OK or not rules.zones:
         return meant
     if meant.parts:
         parts = tuple(replace(part, meaning=under_rules(rules, part.meaning)) for part in meant.parts)
@@ -177,13 +174,17 @@ def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = 
         from executive.language.structure.sentence import read_structure  # plain commands do not need it
 
         trace = read_structure(trace, clauses, pipeline, said.memory)
+    return _of_trace(trace)
+
+
+def _of_trace(trace: Trace) -> Understanding:
     refusal = trace.refusal
+    found = Understanding(trace.text, Status.OK, notes=trace.notes, trace=trace)
     if refusal is None:
-        ok = Understanding(said.text, Status.OK, trace.commands, notes=trace.notes, memory=trace.memory, trace=trace)
-        return replace(ok, steps=trace.steps)
+        return replace(found, commands=trace.commands, memory=trace.memory, steps=trace.steps)
     status = Status.QUESTION if refusal.question else Status.REFUSED
-    reason = foreign_reason(said.text) or refusal.reason
-    return Understanding(said.text, status, (), reason, refusal.unknown, refusal.question, trace.notes, trace=trace)
+    reason = foreign_reason(trace.text) or refusal.reason
+    return replace(found, status=status, reason=reason, unknown_words=refusal.unknown, question=refusal.question)
 
 
 def ask_until_clear(sentence: str, meant: Callable[[str], Understanding], answer: Answerer) -> Understanding:

@@ -34,10 +34,10 @@ FULL: Final = 0.99
 def parse_condition(text: str, state: State, reader: PlainReader) -> SpokenCondition:
     """Parses a condition. Raises RefusalError when the robot can neither see nor measure it."""
     words = " ".join(text.replace(" o' clock", " o'clock").split()).strip(" ,.")
-    words = words if (tail := _P.tail.fullmatch(words)) is None else tail["condition"]
+    words = words if (tail := _P["tail"].fullmatch(words)) is None else tail["condition"]
     if (found := usual_condition(words, state, reader)) is not None:
         return found
-    if (unreal := CLAUSES.unreal.search(words)) is not None:
+    if (unreal := CLAUSES["unreal"].search(words)) is not None:
         raise RefusalError(f"I can only decide by what I see now, not by '{words}'", [unreal.text])
     joined, left_open = _joined(words, state, reader)
     if joined is not None:
@@ -55,7 +55,7 @@ def usual_condition(words: str, state: State, reader: PlainReader) -> SpokenCond
 
 def _measured(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
     """Condition on a value that the robot measures: battery, gripper, place or time."""
-    if (match := _P.measured.fullmatch(words)) is None:
+    if (match := _P["measured"].fullmatch(words)) is None:
         return None
     share, seconds, time = parse_share(match["share"]), parse_seconds(match["span"]), parse_time(match["time"])
     if match["share"] and share is None:
@@ -71,7 +71,8 @@ def _measured(words: str, state: State, reader: PlainReader) -> SpokenCondition 
 
 
 def _pressed(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
-    return None if (match := _P.pressed.fullmatch(words)) is None else button_condition(match["button"], words, state)
+    match = _P["pressed"].fullmatch(words)
+    return None if match is None else button_condition(match["button"], words, state)
 
 
 def button_condition(button: str, words: str, state: State) -> SpokenCondition:
@@ -82,7 +83,7 @@ def button_condition(button: str, words: str, state: State) -> SpokenCondition:
 
 def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
     """Condition that a door is open or closed; "it" refers to the last door. Raises RefusalError like `_between`."""
-    match = _DOORS.stands.fullmatch(words)
+    match = _DOORS["stands"].fullmatch(words)
     if match is None or (match["it"] and state.door is None):
         return None
     if (how := match["how"].lower()).endswith("locked"):
@@ -101,7 +102,7 @@ def parse_opening(text: str, known: Callable[[], State], reader: PlainReader) ->
 
     Raises RefusalError like `_between`, and if the robot would have to open a door that has no plug-in.
     """
-    match = _DOORS.opening.fullmatch(re.sub(r" for (?:me|us|you|him|her|them)$", "", text, flags=re.IGNORECASE))
+    match = _DOORS["opening"].fullmatch(re.sub(r" for (?:me|us|you|him|her|them)$", "", text, flags=re.IGNORECASE))
     if match is None or ((state := known()).door is None and match["it"]):
         return None
     own, doors = match["own"], [door for door in reader.knowledge.doors if door.opens is not None]
@@ -146,13 +147,13 @@ def _room(name: str, knowledge: Knowledge) -> str:
 
 def _meeting(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
     """Condition that somebody arrives at the robot's place, or leaves it."""
-    gone = _P.goes.fullmatch(words)
-    match = gone or _P.comes.fullmatch(words)
-    if match is None or CLAUSES.unreal.search(words):
+    gone = _P["goes"].fullmatch(words)
+    match = gone or _P["comes"].fullmatch(words)
+    if match is None or CLAUSES["unreal"].search(words):
         return None
     who, where = re.sub(r"\b(?:if|until)\b", "", match["who"]).strip(), match["place"] or None
     where = "there" if where is None and re.search(r"\bthere(?: any more)?$", words, re.IGNORECASE) else where
-    if not (_P.nobody.fullmatch(who) or reader.is_somebody(who, state)) or re.search(r"\b(?:or|and)\b", where or ""):
+    if not (_P["nobody"].fullmatch(who) or reader.is_somebody(who, state)) or re.search(r"\b(?:or|and)\b", where or ""):
         return None
     return presence_condition(who, where, words, state, reader, gone=gone is not None)
 
@@ -171,16 +172,16 @@ def presence_condition(
         room = reader.room(place if place == "there" else where or "", state)
     if room is None:
         raise RefusalError(f"in which room can I see whether '{words}'? Name it", [words])
-    nobody = _P.nobody.fullmatch(who) is not None
-    look = reader.look("anybody" if nobody or _P.anybody.fullmatch(who) else who, room, words, state)
+    nobody = _P["nobody"].fullmatch(who) is not None
+    look = reader.look("anybody" if nobody or _P["anybody"].fullmatch(who) else who, room, words, state)
     return replace(look, condition=Not(part=look.condition) if gone != nobody else look.condition)
 
 
 def _look(words: str, state: State, reader: PlainReader) -> SpokenCondition:
     """Condition that something is visible, or not visible. Raises RefusalError."""
-    if (match := _P.sees.fullmatch(words)) is not None:
+    if (match := _P["sees"].fullmatch(words)) is not None:
         return _seen(match, words, state, reader)
-    if (match := _P.fullness.fullmatch(words)) is None:
+    if (match := _P["fullness"].fullmatch(words)) is None:
         return reader.check(words, state)
     some = match["some"] != ""
     place = with_preposition(reader.read_items(match["place"]), "on" if some else "at")
@@ -240,14 +241,14 @@ def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[S
     """Parses two joined conditions; the second may omit words of the first, and the first the place of both."""
     first = parse_condition(before, state, reader)
     denied = isinstance(first.condition, Not)
-    if _JOINED.there.match(before) and _JOINED.bare.match(after):
+    if _JOINED["there"].match(before) and _JOINED["bare"].match(after):
         items = reader.read_items(after)
         place = next((item for item in items if isinstance(item, Chunk) and item.role is not None), None)
-        if place is not None and not _JOINED.placed.search(before):
+        if place is not None and not _JOINED["placed"].search(before):
             first = reader.look_by_items((*first.items, place), before, state)
             first = first.negate(before) if denied else first
         return first, reader.exists(after, after, first.holds)
-    if _JOINED.at.fullmatch(before) and re.match(r"(?:in|on|at|the) ", after, re.IGNORECASE) and " is " not in after:
+    if _JOINED["at"].fullmatch(before) and re.match(r"(?:in|on|at|the) ", after, re.IGNORECASE) and " is " not in after:
         old = next((item for item in first.items if isinstance(item, Chunk) and item.role is not None), None)
         moved = with_preposition(reader.read_items(after), "in" if old is None else old.preposition)
         second = reader.look_by_items((*(one for one in first.items if one is not old), *moved), after, first.holds)

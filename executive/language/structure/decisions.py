@@ -16,7 +16,7 @@ from executive.language.clauses import (
 )
 from executive.language.items import verb
 from executive.language.questions import RefusalError
-from executive.language.structure.conditions import Done, parse_condition
+from executive.language.structure.conditions import parse_condition
 from executive.language.structure.plain import (
     LastCheck,
     PlainReader,
@@ -34,7 +34,7 @@ from executive.language.structure.requests import escape_braces, parse_speech, w
 from executive.language.templates import words_of
 from executive.words.command import Task
 from executive.words.leaf_steps import Awaited, Do, Speak, Wait, steps_of_commands
-from executive.words.step import OnFailure, Step
+from executive.words.step import OnFailure
 from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, Try
 
 
@@ -92,16 +92,11 @@ class DecisionBuilder:
         before, row.state = row.state, reading.state
         row.asked = self.reader.last_check(reading, before)
 
-    def put(self, row: StepRow, block: Step, state: State) -> None:
-        """Adds a block of steps; `state` is the state after the block."""
-        self.put_done(row, ((block,), state, ()))
-
-    def put_done(self, row: StepRow, done: Done) -> None:
-        """Adds steps, behind those of the pending clauses, the state after them, and notes."""
+    def put(self, row: StepRow, steps: Steps, state: State, notes: Sequence[str] = ()) -> None:
+        """Adds steps behind those of the pending clauses, with the state after them, and notes."""
         self.flush(row)
-        steps, row.state, notes = done
         row.steps += steps
-        row.asked = None
+        row.state, row.asked = state, None
         self.notes += notes
 
     def decide(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
@@ -148,7 +143,7 @@ class DecisionBuilder:
         """Splits a condition from an action that follows without a comma."""
         refusal: RefusalError | None = None
         begins = [start for start, _ in words_of(text).spans[1:]] if self.given is not None else []
-        objects = [start for start in begins if CHECKS.no_verb.fullmatch(text[start:])]
+        objects = [start for start in begins if CHECKS["no_verb"].fullmatch(text[start:])]
         for cut_at in (*([len(text)] if follows else []), *verb_positions(text), *objects, len(text)):
             rest = re.sub(r"^(?:then|please)\s+", "", text[cut_at:], flags=re.IGNORECASE)
             condition = re.sub(r"\s+(?:then|please|and)$", "", text[:cut_at].rstrip(" ,"), flags=re.IGNORECASE)
@@ -194,7 +189,7 @@ class DecisionBuilder:
             raise RefusalError("no action is said for either case; name one", [supposed.said])
         condition = supposed.condition if then else negate(supposed.condition)
         block = Choose(condition=condition, then=then or otherwise, otherwise=otherwise if then else ())
-        self.put(row, block, after.common(other_state))
+        self.put(row, (block,), after.common(other_state))
         return end
 
     def branch(self, clauses: Sequence[Clause], supposed: SpokenCondition, state: State) -> tuple[Steps, State]:
@@ -213,7 +208,7 @@ class DecisionBuilder:
         cue, words = clause.kind, [clause.cue]
         self.flush(row)
         asked, last = row.asked, row.steps[-1] if row.steps else None
-        if cue in (Cue.SO, Cue.NOT) and asked is None and CHECKS.somebody.search(clause.cue):
+        if cue in (Cue.SO, Cue.NOT) and asked is None and CHECKS["somebody"].search(clause.cue):
             supposed = parse_condition(re.sub(r"^if ", "", clause.cue, flags=re.IGNORECASE), row.state, self.reader)
             return self.choose(row, supposed, [*cut(clause.text), *clauses[at + 1 : both]], clauses, both)
         if not row.steps[row.begun :] and not (asked and row.steps):
@@ -226,7 +221,7 @@ class DecisionBuilder:
         if asked is not None and asked.decided and isinstance(last, Choose) and cue is not Cue.SO:
             otherwise, state = self.branch(body, asked.supposed.opposite, asked.supposed.fails)
             row.steps[-1:] = []
-            self.put(row, last.model_copy(update={"otherwise": otherwise}), row.state.common(state))
+            self.put(row, (last.model_copy(update={"otherwise": otherwise}),), row.state.common(state))
             return end
         if isinstance(last, Choose | Repeat) and cue is not Cue.FAILED:
             raise RefusalError(f"I do not understand what '{clause.cue}' refers to; say the whole condition", words)
@@ -243,7 +238,7 @@ class DecisionBuilder:
         row.steps[row.begun :] = []
         skipped = Group(steps=tried, on_failure=OnFailure.SKIP)
         attempt = Try(steps=tried, otherwise=otherwise) if otherwise else skipped
-        self.put(row, attempt, row.state.common(state))
+        self.put(row, (attempt,), row.state.common(state))
         return end
 
     def _replace_missing(self, row: StepRow, asked: LastCheck, said: str, body: Sequence[Clause]) -> None:
@@ -258,7 +253,7 @@ class DecisionBuilder:
         done = tuple(row.steps[-asked.steps :])
         row.steps[-asked.steps :] = []
         block = Choose(condition=asked.supposed.condition, then=done, otherwise=otherwise)
-        self.put(row, block, row.state.common(state))
+        self.put(row, (block,), row.state.common(state))
 
     def wait_for(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
         """Builds a wait for "as soon as Robin comes, ..."."""
@@ -267,7 +262,7 @@ class DecisionBuilder:
         supposed, rest = self.split(clauses[at].text, row.state, clauses[at + 1 : end])
         if not rest and end == at + 1:
             raise clauses[at].missing_action(supposed.said)
-        self.put(row, Wait(awaited=Awaited(condition=supposed.condition)), supposed.holds)
+        self.put(row, (Wait(awaited=Awaited(condition=supposed.condition)),), supposed.holds)
         more, row.state = self.sequence([*cut(rest), *clauses[at + 1 :]], supposed.holds)
         row.steps += more
         return len(clauses)
@@ -280,10 +275,10 @@ class DecisionBuilder:
             return end
         rounds, rest = self._how_often(row, clause, clauses[at + 1 : end])
         body = [*cut(rest), *clauses[at + 1 : end]]
-        if clause.kind in (Cue.WHILE, Cue.UNTIL) and len(body) == 1 and CHECKS.stays.fullmatch(body[0].text):
+        if clause.kind in (Cue.WHILE, Cue.UNTIL) and len(body) == 1 and CHECKS["stays"].fullmatch(body[0].text):
             said = clause.text[: len(clause.text) - len(rest)].strip(" ,")
             where = body[0].text.partition(" ")[2]
-            self.put_done(row, wait_steps(where, clause.kind.value, said, row.state, self.reader))
+            self.put(row, *wait_steps(where, clause.kind.value, said, row.state, self.reader))
             return end
         if not body:
             raise clause.missing_action()
@@ -298,7 +293,7 @@ class DecisionBuilder:
         idle = stays and all(isinstance(step, Do) for step in steps)  # only goes to one place, or charges
         if rounds.loop.times is None and rounds.loop.every_s is None and idle:
             raise RefusalError("I see no action to repeat; say 'wait there until ...'", [join_clauses(body)])
-        self.put(row, merge_repeats(Repeat(loop=rounds.loop, steps=_done(steps, join_clauses(body)))), state)
+        self.put(row, (merge_repeats(Repeat(loop=rounds.loop, steps=_done(steps, join_clauses(body)))),), state)
 
     def _how_often(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> tuple[Rounds, str]:
         """Splits the number or interval of rounds from the action that follows."""
@@ -315,7 +310,7 @@ class DecisionBuilder:
             raise RefusalError(f"I do not understand for how long: '{text}'", [text])
         for cut_at in (len(text), *verb_positions(text)) if clause.kind is Cue.UNTIL else ():
             if parse_time(said := text[:cut_at].strip(" ,")) is not None:
-                return self._rounds_behind(row, (), replace(clause, text=said)), text[cut_at:]
+                return self._rounds_up_to(replace(clause, text=said), state), text[cut_at:]
         supposed, rest = self.split(text, state, follows)
         return supposed.rounds(clause.kind), rest
 
@@ -323,7 +318,7 @@ class DecisionBuilder:
         """Parses the end of rounds in "for an hour", "until three o'clock" or "five times"; None for other texts."""
         if not text:
             return Rounds(Loop(every_s=every_s), state)
-        if (match := CHECKS.for_span.fullmatch(text)) is not None:
+        if (match := CHECKS["for_span"].fullmatch(text)) is not None:
             seconds = parse_seconds(match["span"])
             if seconds is None or seconds < every_s:
                 raise RefusalError(f"'{text}' is shorter than one round", [text])
@@ -333,20 +328,23 @@ class DecisionBuilder:
         cue = leading_cue(text)
         if cue is None or cue.kind not in (Cue.UNTIL, Cue.WHILE):
             return None
-        if (time := parse_time(cue.text)) is not None:
-            self.notes += time.notes(cue.text)
-            return Rounds(Loop(until_clock=time.text, every_s=every_s), state)
         try:
-            supposed = parse_condition(cue.text, state, self.reader)
+            return self._rounds_up_to(cue, state, every_s)
         except RefusalError:
             return None
-        rounds = supposed.rounds(cue.kind)
+
+    def _rounds_up_to(self, cue: Clause, state: State, every_s: float | None = None) -> Rounds:
+        """Rounds that a time of day or a condition ends."""
+        if cue.kind is Cue.UNTIL and (time := parse_time(cue.text)) is not None:
+            self.notes += time.notes(cue.text)
+            return Rounds(Loop(until_clock=time.text, every_s=every_s), state)
+        rounds = parse_condition(cue.text, state, self.reader).rounds(cue.kind)
         return replace(rounds, loop=rounds.loop.model_copy(update={"every_s": every_s}))
 
     def _on_the_way(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> bool:
         """Builds parallel steps for a simple "while driving to the kitchen, say ..."."""
         text = clause.text
-        match = CHECKS.under_way.match(text) if clause.kind is Cue.WHILE else None
+        match = CHECKS["under_way"].match(text) if clause.kind is Cue.WHILE else None
         if match is None:
             return False
         for cut_at in (*([len(text)] if follows else []), *verb_positions(text)):
@@ -363,7 +361,7 @@ class DecisionBuilder:
         if said is None or not said[0] or said[1].slots.keys() - {"text", "says"} or len(reading.commands) != 1:
             raise RefusalError("while I go somewhere I can only say something", [join_clauses(body)])
         both = (Do.from_command(reading.commands[0]), Speak(speak=escape_braces(said[0])))
-        self.put(row, Together(steps=both), reading.state)
+        self.put(row, (Together(steps=both),), reading.state)
 
     def modify(self, row: StepRow, clause: Clause, found: Clause) -> None:
         """Adds an action that a trailing condition or number of rounds modifies."""
@@ -372,7 +370,7 @@ class DecisionBuilder:
         if found.kind in (Cue.IF, Cue.UNLESS):
             self._guarded(row, scope, found)
             return
-        if found.kind is Cue.WHILE and (match := CHECKS.under_way.match(found.text)) is not None:
+        if found.kind is Cue.WHILE and (match := CHECKS["under_way"].match(found.text)) is not None:
             self.put_together(row, found.text[match.end :].strip(), scope)
             return
         if found.kind is Cue.EVERY:
@@ -389,16 +387,13 @@ class DecisionBuilder:
         """Builds rounds for "... until there are none left" or "... until three o'clock"."""
         if not found.text:
             raise RefusalError(f"{found.cue.lower()} what?", [found.cue])
-        if found.kind is Cue.UNTIL and (time := parse_time(found.text)) is not None:
-            self.notes += time.notes(found.text)
-            return Rounds(Loop(until_clock=time.text), row.state)
         _, state = type(self)(self.reader).sequence(scope, row.state)
-        return replace(parse_condition(found.text, state, self.reader).rounds(found.kind), state=row.state)
+        return replace(self._rounds_up_to(found, state), state=row.state)
 
     def _scope(self, row: StepRow, clause: Clause, found: Clause) -> list[Clause]:
         """Clauses that a trailing cue applies to. Raises RefusalError when these are ambiguous."""
         main = replace(clause, text=found.before)
-        alone = clause.begins or (clause.then and not CHECKS.comes_back.fullmatch(found.before))
+        alone = clause.begins or (clause.then and not CHECKS["comes_back"].fullmatch(found.before))
         earlier = [] if alone else list(row.plain)
         start = max((n for n, one in enumerate(earlier) if one.begins or (one.then and n)), default=0)
         earlier = earlier[start:]
@@ -429,7 +424,7 @@ class DecisionBuilder:
         self.notes += [*again.notes, *supposed.notes]
         both = supposed.negate(supposed.said) if found.kind is Cue.UNLESS else replace(supposed, quotable=True)
         block = Choose(condition=both.condition, then=_done(steps, join_clauses(scope)))
-        self.put(row, block, state.common(row.state))
+        self.put(row, (block,), state.common(row.state))
         row.asked = LastCheck(both, looked=False, decided=True)
 
 

@@ -38,19 +38,19 @@ def parse_people(text: str, knowledge: Knowledge) -> PeopleRequest | None:
     Raises RefusalError when such a clause does not say clearly whom it means.
     """
     forms = page("people", **names_of_world(knowledge))
-    text = text if (around := forms.around.fullmatch(text)) is None else around["clause"]
+    text = text if (around := forms["around"].fullmatch(text)) is None else around["clause"]
     for name in (*_TASKS, "meet", "find", "stated"):
-        if (match := getattr(forms, name).fullmatch(text)) is not None:
+        if (match := forms[name].fullmatch(text)) is not None:
             return PeopleRequest(name, match)
-    if forms.certain.match(text) is None or forms.greets_known.match(text) is not None:
+    if forms["certain"].match(text) is None or forms["greets_known"].match(text) is not None:
         return None
     known = f"; known are {listing(knowledge.people)}" if knowledge.people else ""
     hint = f"name one person, or say 'the person in the kitchen'{known}"
     if (cue := trailing_cue(text)) is not None and parse_people(cue.before, knowledge) is not None:
         what, hint = f"I cannot do '{cue.before}' {cue.cue} {cue.text}", "I do it up to a place, or until you say stop"
-    elif (unseen := forms.unseen.search(text)) is not None:
+    elif (unseen := forms["unseen"].search(text)) is not None:
         what = f"I cannot tell people apart by {unseen['by']}, such as '{unseen.text}'"
-    elif (crowd := forms.crowd.search(text)) is not None:
+    elif (crowd := forms["crowd"].search(text)) is not None:
         what = f"I follow and guide one person at a time, not '{crowd.text}'"
     else:
         what = f"I do not understand whom and where '{text}' means"

@@ -94,7 +94,7 @@ class SpokenCondition:
     @property
     def statement(self) -> str | None:
         """Words of the condition as a statement; None if they cannot be repeated."""
-        plain = self.quotable and not CLAUSES.deictic.search(self.said)
+        plain = self.quotable and not CLAUSES["deictic"].search(self.said)
         return self.said if plain and self.said and not re.match(r"it\b|there is one", self.said) else None
 
     def at_source(self, steps: Steps, text: str) -> SpokenCondition:
@@ -214,7 +214,7 @@ class PlainReader:
 
     def check(self, text: str, state: State, lead: Sequence[Item] = (), *, said: str | None = None) -> SpokenCondition:
         """Condition that the statement in a text holds; `said` is the full text."""
-        denied = (_DENIALS.existing if lead else _DENIALS.statement).fullmatch(text)
+        denied = (_DENIALS["existing"] if lead else _DENIALS["statement"]).fullmatch(text)
         affirmed = text if denied is None else denied.instead
         read = self._run(Trace(affirmed, lead=(verb("check"), Whether(), *lead)), upto="reading")
         if (left_out := next((token.word for token in read.tokens if token.word in _LEFT_OUT), None)) is not None:
@@ -386,7 +386,7 @@ def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, ro
         after_all = n > at and ((one.outer and not first) or one.anyway)
         then = n > at and branch and one.then
         if rounds:
-            goes_on = one.kind in ATTACHED or (one.kind is Cue.IF and CHECKS.pronoun.match(one.text) is not None)
+            goes_on = one.kind in ATTACHED or (one.kind is Cue.IF and CHECKS["pronoun"].match(one.text) is not None)
             if after_all or (one.begins and n > at and not goes_on):
                 return n
         elif one.kind in (*ATTACHED, Cue.IF, Cue.UNLESS, Cue.SOON) or one.begins or after_all or then:
@@ -396,9 +396,9 @@ def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, ro
 
 def statement_of_check(text: str) -> str | None:
     """Turns a check into a statement: "is the door open" becomes "the door is open"."""
-    if (checked := CHECKS.checked.fullmatch(text)) is not None:
+    if (checked := CHECKS["checked"].fullmatch(text)) is not None:
         return checked["what"]
-    if (asked := CHECKS.asked.fullmatch(text)) is None:
+    if (asked := CHECKS["asked"].fullmatch(text)) is None:
         return None
     return f"{asked['subject']} {'are' if asked['subject'].lower() == 'you' else 'is'} {asked['state']}"
 

@@ -18,6 +18,7 @@ from executive.language.structure.conditions import (
     Done,
     button_condition,
     parse_condition,
+    parse_opening,
     presence_condition,
     usual_condition,
 )
@@ -42,8 +43,8 @@ _ADVERBIAL: Final = re.compile(
 
 def parse_wait(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
     """Parses a wait for a condition; None for other texts, and for a wait of a given duration. Raises RefusalError."""
-    match = _WAITING.wait.fullmatch(text)
-    if match is None or _WAITING.only_span.fullmatch(match["what"]):
+    match = _WAITING["wait"].fullmatch(text)
+    if match is None or _WAITING["only_span"].fullmatch(match["what"]):
         return None
     return wait_steps(match["where"], match["how"].lower(), match["what"], known(), reader)
 
@@ -55,7 +56,7 @@ def wait_steps(where: str, how: str, what: str, state: State, reader: PlainReade
     """
     steps, there = _gone(where, state, reader)
     if how in ("until", "till"):
-        passed, clock = _WAITING.passed.fullmatch(what), _WAITING.time.fullmatch(what)
+        passed, clock = _WAITING["passed"].fullmatch(what), _WAITING["time"].fullmatch(what)
         if passed is not None and (span := parse_seconds(passed["span"])) is not None:
             return (*steps, Wait(awaited=Awaited(seconds=span))), there, ()
         if (time := parse_time(what if clock is None else clock["time"])) is not None:
@@ -63,11 +64,11 @@ def wait_steps(where: str, how: str, what: str, state: State, reader: PlainReade
         found = parse_condition(what, there, reader)
     elif how != "for":
         found = parse_condition(what, there, reader).negate(what)
-    elif (match := _WAITING.button.fullmatch(what)) is not None:
+    elif (match := _WAITING["button"].fullmatch(what)) is not None:
         found = button_condition(match["button"], what, there)
     elif " to " in what and (usual := usual_condition(what, there, reader)) is not None:
         found = usual
-    elif (match := _WAITING.person_at.fullmatch(what)) is not None and reader.is_somebody(match["who"], there):
+    elif (match := _WAITING["person_at"].fullmatch(what)) is not None and reader.is_somebody(match["who"], there):
         reading = reader.go_to(match["where"], there)
         steps, there = (*steps, *steps_of_commands(reading.commands)), reading.state
         found = presence_condition(match["who"], None, what, there, reader)
@@ -81,9 +82,9 @@ def wait_steps(where: str, how: str, what: str, state: State, reader: PlainReade
 
 def _gone(where: str, state: State, reader: PlainReader) -> tuple[Steps, State]:
     """Adds the drive to the place of a wait; returns the state there."""
-    if _WAITING.here.fullmatch(where):
+    if _WAITING["here"].fullmatch(where):
         return (), state
-    match = _WAITING.place.fullmatch(where)
+    match = _WAITING["place"].fullmatch(where)
     if match is None:
         raise RefusalError(f"I do not understand where to wait: '{where}'", [where])
     if match["there"] and state.goal is not None and state.at is not None:
@@ -94,7 +95,7 @@ def _gone(where: str, state: State, reader: PlainReader) -> tuple[Steps, State]:
 
 def parse_charging(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
     """Parses charging up to a level; None if the text states no level."""
-    match = _WAITING.charge.fullmatch(text)
+    match = _WAITING["charge"].fullmatch(text)
     if match is None:
         return None
     level = FULL if match["level"].lower().startswith("full") else parse_share(match["level"])
@@ -105,7 +106,7 @@ def parse_charging(text: str, known: Callable[[], State], reader: PlainReader) -
 
 def parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
     """Parses a request for pictures; None for other texts. Raises RefusalError for an unknown name."""
-    if (match := page("pictures").picture.fullmatch(text)) is None or trailing_cue(text) is not None:
+    if (match := page("pictures")["picture"].fullmatch(text)) is None or trailing_cue(text) is not None:
         return None
     state = known()
     at = (match["at"] or None) and reader.go_to(match["at"], state).commands[0].goal
@@ -116,6 +117,8 @@ def parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) -
         steps.append(Picture(subject=Subject(of=of, at=at, camera=match["camera"] or None)))
     return tuple(steps), replace(state, goal=None, at=None), ()
 
+
+REQUESTS: Final = (parse_opening, parse_pictures, parse_charging, parse_wait)
 
 Speech = tuple[str, Match]
 """Text, empty if the sentence does not say it ("tell Robin"), and its listener.
@@ -141,15 +144,15 @@ def parse_speech(text: str, reader: PlainReader) -> Speech | None:
     Raises RefusalError when the robot cannot say it in the speaker's place, or does not know the listener.
     """
     forms, parser = page("speech", **names_of_world(reader.knowledge)), reader.pipeline.parser
-    if forms.say_within.fullmatch(text) is not None:
+    if forms["say_within"].fullmatch(text) is not None:
         raise RefusalError(f"I do not understand to whom to say '{text}'; name one person at the end", [text])
-    if (match := forms.says_to.fullmatch(text) or forms.says.fullmatch(text)) is not None:
+    if (match := forms["says_to"].fullmatch(text) or forms["says"].fullmatch(text)) is not None:
         return _words(match["text"], parser), match
-    if (match := forms.formula.fullmatch(text)) is not None:
+    if (match := forms["formula"].fullmatch(text)) is not None:
         return match["says"], match
-    if (match := forms.tells.fullmatch(text)) is not None:
+    if (match := forms["tells"].fullmatch(text)) is not None:
         return _told(f"{match['polite']}{match['text']}"), match
-    if (match := forms.relays.fullmatch(text)) is None:
+    if (match := forms["relays"].fullmatch(text)) is None:
         _refuse_stranger(text, reader.knowledge)
         return None
     return _relayed(match["text"], text, match, parser)
@@ -174,8 +177,8 @@ def _relayed(said: str, text: str, to: Match, parser: DependencyParser) -> Speec
     adverbial = _ADVERBIAL.match(said)
     if adverbial is not None and is_clause(said[adverbial.end() :], parser):
         raise RefusalError(f"I tell it as soon as I am there, not {adverbial[1] or adverbial[2]!r}", [adverbial[0]])
-    states = not (to["speaker"] or SPEECH.question.match(said)) and is_clause(said, parser)
-    if SPEECH.greetings.fullmatch(said) or states:
+    states = not (to["speaker"] or SPEECH["question"].match(said)) and is_clause(said, parser)
+    if SPEECH["greetings"].fullmatch(said) or states:
         return _told(said), to
     raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
 
@@ -194,21 +197,21 @@ def _words(text: str, parser: DependencyParser) -> str:
     whom = re.search(r" to (?:the|a|an|my|our|all|every|each|some|any|somebody|someone)\b.*$", text, re.IGNORECASE)
     if whom is not None and (not clause or re.search(r"\b(?:person|guest|visitor)\b", whom[0], re.IGNORECASE)):
         raise RefusalError(f"I do not know to whom to say it: '{whom[0].strip()}'", [whom[0].strip()])
-    if SPEECH.named.match(text) and not clause:
+    if SPEECH["named"].match(text) and not clause:
         raise RefusalError(f"what are the words of '{text}'?", [text])
     return _literal(text)
 
 
 def _literal(text: str) -> str:
     """Words to say literally. Raises RefusalError when they only describe a text."""
-    if SPEECH.nothing.fullmatch(text) or SPEECH.question.match(text) or re.match(r"to\b", text, re.IGNORECASE):
+    if SPEECH["nothing"].fullmatch(text) or SPEECH["question"].match(text) or re.match(r"to\b", text, re.IGNORECASE):
         raise RefusalError(f"what am I to say? '{text}' says nothing", [text])
     return text.strip(" ,.'\"")
 
 
 def _told(text: str) -> str:
     """Statement as the robot says it for the speaker. Raises RefusalError when this would change the meaning."""
-    word = CLAUSES.deictic.search(text) or SPEECH.inner.search(text)
+    word = CLAUSES["deictic"].search(text) or SPEECH["inner"].search(text)
     if word is not None:
         meant = "would mean somebody or something else"
         raise RefusalError(f"I cannot say '{text}' for you: '{word.text}' {meant}", [text])
@@ -226,17 +229,17 @@ def parse_question(text: str, knowledge: Knowledge) -> QuestionRequest | None:
     Raises RefusalError for a question that the robot cannot put.
     """
     forms = page("speech", **names_of_world(knowledge))
-    if not re.match(r"ask\b", text, re.IGNORECASE) or forms.tells.fullmatch(text):
+    if not re.match(r"ask\b", text, re.IGNORECASE) or forms["tells"].fullmatch(text):
         return None
     text = re.sub(r" or not$", "", text, flags=re.IGNORECASE)
-    match = forms.wants_one.fullmatch(text) or forms.wants_what.fullmatch(text)
+    match = forms["wants_one"].fullmatch(text) or forms["wants_what"].fullmatch(text)
     if match is None or not match["name"]:
         _refuse_stranger(text, knowledge)
         able = "I can ask somebody by name whether they want this or that"
         raise RefusalError(f"I do not understand the question in '{text}'; {able}", [text])
     if not match["what"]:
         return _what(match, text, knowledge)
-    if (word := CLAUSES.deictic.search(match["what"])) is not None:
+    if (word := CLAUSES["deictic"].search(match["what"])) is not None:
         raise RefusalError(f"I cannot ask that for you: '{word.text}' would mean somebody else", [text])
     choices = tuple(re.split(r",? or |, ", match["what"], flags=re.IGNORECASE))
     return QuestionRequest(f"Do you want {match['what']}?", match, choices, yes_or_no=len(choices) == 1)
@@ -257,11 +260,11 @@ def steps_for_everyone(text: str, known: Callable[[], State], reader: PlainReade
 
     Raises RefusalError when no room is named, no known person is there, or there is only one such object.
     """
-    if ROOMS.gives.match(text) is None or ROOMS.everyone.search(text) is None:
+    if ROOMS["gives"].match(text) is None or ROOMS["everyone"].search(text) is None:
         return None
     trace = reader.read_actions(text, state := known())
     goals = [one.goal for one in trace.actions if one.goal is not None and one.goal.phrase is not None]
-    to = next((goal for goal in goals if goal.phrase and ROOMS.everyone.fullmatch(goal.phrase.spoken)), None)
+    to = next((goal for goal in goals if goal.phrase and ROOMS["everyone"].fullmatch(goal.phrase.spoken)), None)
     if to is None or to.phrase is None:
         return None
     who = to.phrase.spoken

@@ -17,7 +17,7 @@ from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.structure.conditions import RequestParser, parse_condition, parse_opening
+from executive.language.structure.conditions import RequestParser, parse_condition
 from executive.language.structure.decisions import DecisionBuilder
 from executive.language.structure.people import PEOPLE, commands_on_people, parse_people
 from executive.language.structure.plain import (
@@ -32,16 +32,14 @@ from executive.language.structure.plain import (
     with_preposition,
 )
 from executive.language.structure.requests import (
+    REQUESTS,
     ROOMS,
     SPEECH,
     QuestionRequest,
     escape_braces,
     is_clause,
-    parse_charging,
-    parse_pictures,
     parse_question,
     parse_speech,
-    parse_wait,
     search_for,
     steps_for_everyone,
 )
@@ -81,12 +79,12 @@ class SentenceBuilder(DecisionBuilder):
         if clause.kind is not None:
             return (self.wait_for if clause.kind is Cue.SOON else self.repeat)(row, clauses, at)
         stated = bool(row.plain) and all(
-            CHECKS.told_first.match(one.text) or CHECKS.pronoun.match(one.text) for one in row.plain
+            CHECKS["told_first"].match(one.text) or CHECKS["pronoun"].match(one.text) for one in row.plain
         )
         if clause.begins and not stated:  # unless it goes on with "there is a hammer on the bench. bring it"
             self.flush(row)
             row.begun = len(row.steps)
-        if self.given is not None and at == 0 and CHECKS.no_verb.fullmatch(clause.text):
+        if self.given is not None and at == 0 and CHECKS["no_verb"].fullmatch(clause.text):
             clause = replace(clause, lead=without_objects(self.reader.read_items(self.given)))
             clauses = [clause, *clauses[1:]]
         return self._act(row, clause, clauses, at)
@@ -107,34 +105,33 @@ class SentenceBuilder(DecisionBuilder):
     def _act(self, row: StepRow, clause: Clause, clauses: Sequence[Clause], at: int) -> int:
         """Builds the clause at `at`, which contains an action; returns the index after it."""
         text = clause.text
-        if CHECKS.brings.match(text) is not None or CHECKS.giving.match(text) is not None:
+        if CHECKS["brings"].match(text) is not None or CHECKS["giving"].match(text) is not None:
             self.given = text if (behind := trailing_cue(text)) is None else behind.before
-        if CHECKS.answered.fullmatch(text) is not None and self._answered(row):
+        if CHECKS["answered"].fullmatch(text) is not None and self._answered(row):
             return at + 1
-        if CHECKS.idle.fullmatch(text) is not None:
+        if CHECKS["idle"].fullmatch(text) is not None:
             self.flush(row)
             return at + 1
-        first, then = (partial(self._request, parsers) for parsers in (_FIRST, _THEN))
-        for act in (first, self._people, then, self._asks, self._says, self._checks):
+        for act in (self._request, self._people, self._asks, self._says, self._checks):
             if (end := act(row, clauses, at)) is not None:
                 return end
         found = trailing_cue(text)
-        if found is not None and (found.kind is Cue.EVERY or not ROOMS.every_room.search(text)):
+        if found is not None and (found.kind is Cue.EVERY or not ROOMS["every_room"].search(text)):
             self.modify(row, clause, found)
             return at + 1
-        for act in (partial(self._request, (steps_for_everyone,)), self._rooms):
+        for act in (partial(self._request, parsers=(steps_for_everyone,)), self._rooms):
             if (end := act(row, clauses, at)) is not None:
                 return end
         row.plain.append(clause)
         return at + 1
 
     def _request(
-        self, parsers: Sequence[RequestParser], row: StepRow, clauses: Sequence[Clause], at: int
+        self, row: StepRow, clauses: Sequence[Clause], at: int, parsers: Sequence[RequestParser] = REQUESTS
     ) -> int | None:
         """Adds the steps of a request that one of the parsers understands."""
         for parse in parsers:
             if (done := parse(clauses[at].text, partial(self.known, row), self.reader)) is not None:
-                self.put_done(row, done)
+                self.put(row, *done)
                 self.special = True
                 return at + 1
         return None
@@ -156,16 +153,17 @@ class SentenceBuilder(DecisionBuilder):
         if request is None:
             return None
         then = clauses[at + 1].text if at + 1 < len(clauses) and clauses[at + 1].kind is None else ""
-        if request.form == "find" and not (PEOPLE.refers.search(then) or (self.special and request.refers)):
+        refers = PEOPLE["refers"].search(then) is not None
+        if request.form == "find" and not (refers or (self.special and request.refers)):
             return None
-        if request.form == "stated" and not (PEOPLE.refers.search(then) and parse_people(then, self.reader.knowledge)):
+        if request.form == "stated" and not (refers and parse_people(then, self.reader.knowledge)):
             return None
         if found is not None and decides:
             self.modify(row, clauses[at], found)
             return at + 1
         self._flush_reasons(row)
         commands, state, notes = commands_on_people(request, row.state, self.reader)
-        self.put_done(row, (steps_of_commands(commands), state, notes))
+        self.put(row, steps_of_commands(commands), state, notes)
         self.special = True
         return at + 1
 
@@ -195,12 +193,12 @@ class SentenceBuilder(DecisionBuilder):
 
     def _says(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         clause = clauses[at]
-        if (match := SPEECH.tells_when.fullmatch(clause.text)) is not None:
+        if (match := SPEECH["tells_when"].fullmatch(clause.text)) is not None:
             self._tells_when(row, match)
             return at + 1
-        if not SPEECH.speaks.match(clause.text) or SPEECH.asks_back.match(clause.text):
+        if not SPEECH["speaks"].match(clause.text) or SPEECH["asks_back"].match(clause.text):
             return None
-        if (everywhere_said := ROOMS.says_everywhere.fullmatch(clause.text)) is not None:
+        if (everywhere_said := ROOMS["says_everywhere"].fullmatch(clause.text)) is not None:
             self._in_each(row, replace(clause, joint="", text=everywhere_said["said"]))
             return at + 1
         found = trailing_cue(clause.text)
@@ -217,7 +215,7 @@ class SentenceBuilder(DecisionBuilder):
             raise RefusalError(f"what am I to say in '{clause.text}'?", [clause.text])
         self.flush(row)
         self._to(row, to)
-        self.put(row, Speak(speak=escape_braces(text)), row.state)
+        self.put(row, (Speak(speak=escape_braces(text)),), row.state)
         return at + 1
 
     def _tells_when(self, row: StepRow, match: Match) -> None:
@@ -227,12 +225,12 @@ class SentenceBuilder(DecisionBuilder):
         statement = supposed.statement
         if statement is None:
             raise RefusalError(f"what am I to say in '{match.text}'?", [match.text])
-        self.put(row, Wait(awaited=Awaited(condition=supposed.condition)), supposed.holds)
+        self.put(row, (Wait(awaited=Awaited(condition=supposed.condition)),), supposed.holds)
         said = parse_speech(f"tell {match['who']} that {statement}", self.reader)
         if said is None:
             raise RefusalError(f"I do not know to whom to say it: '{match['who']}'", [match["who"]])
         self._to(row, said[1])
-        self.put(row, Speak(speak=escape_braces(said[0])), row.state)
+        self.put(row, (Speak(speak=escape_braces(said[0])),), row.state)
 
     def _to(self, row: StepRow, to: Match) -> None:
         """Adds the drive to the listener."""
@@ -260,7 +258,7 @@ class SentenceBuilder(DecisionBuilder):
         self._to(row, asked.of)
         answers = self._agreed if asked.yes_or_no else self._chosen
         choices, end = answers(asked, row.state, clauses, at + 1)
-        self.put(row, Ask(ask=escape_braces(asked.text), choices=choices), replace(row.state, goal=None, at=None))
+        self.put(row, (Ask(ask=escape_braces(asked.text), choices=choices),), replace(row.state, goal=None, at=None))
         return end
 
     def _agreed(
@@ -270,13 +268,13 @@ class SentenceBuilder(DecisionBuilder):
         found: dict[str, Steps] = {"yes": (), "no": ()}
         while at < len(clauses):
             clause, rest = clauses[at], clauses[at].text
-            denied = CHECKS.declines.match(rest) if clause.kind is Cue.IF else None
-            match = denied or (CHECKS.agrees.match(rest) if clause.kind is Cue.IF else None)
+            denied = CHECKS["declines"].match(rest) if clause.kind is Cue.IF else None
+            match = denied or (CHECKS["agrees"].match(rest) if clause.kind is Cue.IF else None)
             answer = "yes" if clause.kind is Cue.SO else "no" if clause.kind in (Cue.NOT, Cue.OTHERWISE) else None
             if match is not None:
                 answer = "yes" if denied is None else "no"
                 rest = rest[match.end :].strip(" ,")
-            chosen = clause.kind is None and not any(found.values()) and CHECKS.brings_it.match(rest)
+            chosen = clause.kind is None and not any(found.values()) and CHECKS["brings_it"].match(rest)
             answer = "yes" if chosen else answer
             if answer is None or found[answer]:
                 break
@@ -286,7 +284,7 @@ class SentenceBuilder(DecisionBuilder):
                 raise clause.missing_action(clause.text)
             found[answer], _ = self.nest(body, self._choosing(asked, 0, state))
             at = end
-        if at < len(clauses) and not found["yes"] and CHECKS.brings.match(clauses[at].text):
+        if at < len(clauses) and not found["yes"] and CHECKS["brings"].match(clauses[at].text):
             raise RefusalError("say 'if yes' before the action for that answer", [clauses[at].text])
         return found, at
 
@@ -296,7 +294,7 @@ class SentenceBuilder(DecisionBuilder):
         """Steps that follow each of the choices: the robot brings the chosen object if the sentence says so."""
         article = r"^(?:a|an|some|the|any|another) "
         names = [re.sub(article, "", choice, flags=re.IGNORECASE) for choice in asked.choices]
-        if at >= len(clauses) or clauses[at].kind is not None or not CHECKS.brings.match(clauses[at].text):
+        if at >= len(clauses) or clauses[at].kind is not None or not CHECKS["brings"].match(clauses[at].text):
             return dict.fromkeys(names, ()), at
         chosen = (self._choosing(asked, n, state) for n in range(len(names)))
         return {name: self.nest([clauses[at]], each)[0] for name, each in zip(names, chosen, strict=True)}, at + 1
@@ -332,23 +330,23 @@ class SentenceBuilder(DecisionBuilder):
         self.flush(row)
         found = supposed.condition
         step = Do.from_command(found.command) if isinstance(found, Look) else Check(condition=found)
-        self.put_done(row, ((step,), supposed.holds, supposed.notes))
+        self.put(row, (step,), supposed.holds, supposed.notes)
         row.asked = LastCheck(supposed, looked=True)
         return at + 1
 
     def _rooms(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         text = clauses[at].text
-        if not ROOMS.every_room.search(text):
+        if not ROOMS["every_room"].search(text):
             return None
         state, end = self.known(row), at + 1
-        looks = ROOMS.search.fullmatch(text)
+        looks = ROOMS["search"].fullmatch(text)
         reading = None if looks is None else search_for(looks["what"], state, self.reader)
         follow = clauses[at + 1].text if at + 1 < len(clauses) and clauses[at + 1].kind is None else ""
-        if reading is None and ROOMS.goes_everywhere.fullmatch(text) is not None:
-            there = ROOMS.what_there.fullmatch(follow) or ROOMS.search.fullmatch(follow)
+        if reading is None and ROOMS["goes_everywhere"].fullmatch(text) is not None:
+            there = ROOMS["what_there"].fullmatch(follow) or ROOMS["search"].fullmatch(follow)
             if there is not None:
                 reading, end = search_for(there["what"], state, self.reader), at + 2
-            elif SPEECH.speaks.match(follow) and trailing_cue(follow) is None:
+            elif SPEECH["speaks"].match(follow) and trailing_cue(follow) is None:
                 self._in_each(row, replace(clauses[at + 1], joint=""))
                 return at + 2
         if reading is None:
@@ -365,12 +363,7 @@ class SentenceBuilder(DecisionBuilder):
             there = Chunk(phrase_of_name(room, NounKind.PLACE), "to", PrepositionRole.GOAL)
             reading = self.reader.commands_from_items((verb("go"), there), replace(row.state, goal=None))
             said, state = self.sequence([says], reading.state)
-            self.put_done(row, ((*steps_of_commands(reading.commands), *said), state, ()))
-
-
-_FIRST: Final[Sequence[RequestParser]] = (parse_opening, parse_pictures)
-_THEN: Final[Sequence[RequestParser]] = (parse_charging, parse_wait)
-"""Parsers before and after the one of requests about people."""
+            self.put(row, (*steps_of_commands(reading.commands), *said), state)
 
 
 MOST_NESTED: Final = 2

@@ -209,17 +209,14 @@ class _Reader:
     def _parts(self, read: Sequence[_Read], cut: Split) -> Iterator[Part]:
         """Yields a part for each robot that each part of the text addresses."""
         by = find_robot(cut.listener[0], self.robots) if isinstance(cut.listener, tuple) else None
-        numbers: list[tuple[int, ...]] = []
-        count = 0
+        numbers: list[range] = []
         for one in read:
-            who: tuple[str | RobotChoice, ...] = (
-                (one.part.who or RobotChoice.ANY,) if not isinstance(one.part.who, tuple) else ()
-            )
-            if isinstance(one.part.who, tuple):
-                who = tuple(find_robot(name, self.robots) or name for name in one.part.who)
+            named = one.part.who if isinstance(one.part.who, tuple) else ()
+            robots = [find_robot(name, self.robots) or name for name in named]
+            who: list[str | RobotChoice] = [*robots] or [RobotChoice(one.part.who or RobotChoice.ANY)]
             after = tuple(sorted({at for number in one.after for at in numbers[number]}))
-            numbers.append(tuple(range(count, count + len(who))))
-            count += len(who)
+            begin = numbers[-1].stop if numbers else 0
+            numbers.append(range(begin, begin + len(who)))
             yield from (Part(robot, one.meaning, after, by) for robot in who)
 
     def _named(self, who: Addressee | None) -> str:

@@ -50,7 +50,8 @@ def parse_condition(text: str, state: State, reader: PlainReader) -> SpokenCondi
 
 def usual_condition(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
     """Parses a condition in a usual form: battery, gripper, place, clock, button, door, or people who come or go."""
-    return next((found for read in _READERS if (found := read(words, state, reader)) is not None), None)
+    readers = (_measured, _pressed, _door, _meeting)
+    return next((found for read in readers if (found := read(words, state, reader)) is not None), None)
 
 
 def _measured(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
@@ -254,7 +255,3 @@ def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[S
         second = reader.look_by_items((*(one for one in first.items if one is not old), *moved), after, first.holds)
         return first, second.negate(after) if denied else second
     return first, parse_condition(after, first.holds, reader)
-
-
-_Reader = Callable[[str, State, PlainReader], SpokenCondition | None]
-_READERS: Final[tuple[_Reader, ...]] = (_measured, _pressed, _door, _meeting)

@@ -256,12 +256,16 @@ class PlainReader:
         he = isinstance(item, Chunk) and item.role is None and item.phrase.head.word in ("he", "she")
         return replace(item, phrase=person.phrase) if isinstance(item, Chunk) and he else item
 
+    def place(self, said: str, state: State, kind: str = "place") -> str:
+        """World's name for a place that words name."""
+        first, *more = self.go_to(said, state).commands
+        if more or first.item or first.task or first.goal is None or self.knowledge.place(first.goal) is None:
+            raise RefusalError(f"'{said}' is no {kind}", [said])
+        return first.goal
+
     def room(self, place: str, state: State) -> str:
         """Room that contains a place."""
-        first, *more = self.go_to(place, state).commands
-        if more or first.item or first.task or first.goal is None or self.knowledge.place(first.goal) is None:
-            raise RefusalError(f"'{place}' is no room", [place])
-        return self.knowledge.room(first.goal)
+        return self.knowledge.room(self.place(place, state, "room"))
 
     def is_somebody(self, who: str, state: State) -> bool:
         """Returns whether the words mean a known person, an earlier person, or anybody."""

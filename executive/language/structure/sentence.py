@@ -19,7 +19,6 @@ from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.structure.conditions import RequestParser, parse_condition
 from executive.language.structure.decisions import DecisionBuilder
-from executive.language.structure.people import PEOPLE, commands_on_people, parse_people
 from executive.language.structure.plain import (
     ATTACHED,
     LastCheck,
@@ -32,16 +31,19 @@ from executive.language.structure.plain import (
     with_preposition,
 )
 from executive.language.structure.requests import (
+    PEOPLE,
     REQUESTS,
     ROOMS,
     SPEECH,
     QuestionRequest,
     escape_braces,
     is_clause,
+    parse_people,
     parse_question,
     parse_speech,
     search_for,
     steps_for_everyone,
+    steps_on_people,
 )
 from executive.language.templates import Match
 from executive.words.command import PEOPLE_TASKS, SPEAKER, START, Task
@@ -112,7 +114,7 @@ class SentenceBuilder(DecisionBuilder):
         if CHECKS["idle"].fullmatch(text) is not None:
             self.flush(row)
             return at + 1
-        for act in (self._request, self._people, self._asks, self._says, self._checks):
+        for act in (self._people, self._request, self._asks, self._says, self._checks):
             if (end := act(row, clauses, at)) is not None:
                 return end
         found = trailing_cue(text)
@@ -137,14 +139,6 @@ class SentenceBuilder(DecisionBuilder):
         return None
 
     def _people(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
-        """Adds following, guiding, meeting or greeting people, if the clause asks for it."""
-        try:
-            return self._people_at(row, clauses, at)
-        except RefusalError as refusal:
-            refusal.plain = False
-            raise
-
-    def _people_at(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         """Builds a request about people; finding somebody counts only before another request about the same person."""
         text = clauses[at].text
         found = trailing_cue(text)
@@ -162,8 +156,7 @@ class SentenceBuilder(DecisionBuilder):
             self.modify(row, clauses[at], found)
             return at + 1
         self._flush_reasons(row)
-        commands, state, notes = commands_on_people(request, row.state, self.reader)
-        self.put(row, steps_of_commands(commands), state, notes)
+        self.put(row, *steps_on_people(request, row.state, self.reader))
         self.special = True
         return at + 1
 
@@ -174,6 +167,7 @@ class SentenceBuilder(DecisionBuilder):
             self.flush(row)
         except RefusalError as refusal:
             if refusal.kind is not RefusalKind.NOTHING_TO_DO or not is_clause(reasons, self.reader.pipeline.parser):
+                refusal.plain = False
                 raise
             row.plain = []
             self.notes.append(TOLD.format(repr(reasons)))

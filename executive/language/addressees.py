@@ -58,7 +58,7 @@ class AddressedText:
 def _verbs() -> Mapping[str, str]:
     """Returns verbs by their forms: "bring" and "brings" map to "bring"."""
     table = read_table("robots.yaml")
-    bases = {verb[0] for verb in lexicon().verbs} | set(table["verbs_too"].split("|"))
+    bases = {verb[0] for verb in lexicon().verbs} | set(table["verbs_too"])
     forms = {f"{base}{'es' if re.search('(?:s|x|z|ch|sh)$', base) else 's'}": base for base in bases}
     return {**forms, **table["third_persons"], **{base: base for base in bases}}
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Set
 from functools import cache
 from importlib import resources
-from typing import Any
+from typing import Any, Final
 
 import yaml
 
@@ -94,6 +94,20 @@ def any_of(phrases: Iterable[str]) -> str:
     return "|".join(map(re.escape, sorted(phrases, key=len, reverse=True)))
 
 
+_AROUND: Final = {
+    **{"before": "(?<={})", "not_before": "(?<!{})", "not": "(?!{})"},
+    **{"say": "{}", "behind": "(?={})", "not_behind": "(?!{})"},
+}
+
+
+def expression(entry: Any) -> str:
+    """Text of a regular expression in a table: a text, pieces of it, or what is said with what stands around it."""
+    if isinstance(entry, str | list):
+        return "".join(entry)
+    texts = {name: each if name == "not_before" else [expression(each)] for name, each in entry.items()}
+    return "".join(form.format(text) for name, form in _AROUND.items() for text in texts.get(name, ()))
+
+
 class Patterns:
     """Regular expressions from a table, case-insensitive; each is compiled at first use.
 
@@ -116,11 +130,13 @@ class Patterns:
 
     def mapping(self, name: str) -> tuple[tuple[str, re.Pattern[str]], ...]:
         """Expressions in a mapping, each with its name."""
-        return tuple((key, self.compiled(text)) for key, text in read_table(self._table)[name].items())
+        return tuple((key, self.compiled(expression(each))) for key, each in read_table(self._table)[name].items())
 
     def text(self, name: str) -> str:
         """Text of an expression, with the named expressions inserted."""
-        return self._words[name] if name in self._words else self.compiled(read_table(self._table)[name]).pattern
+        if name in self._words:
+            return self._words[name]
+        return self.compiled(expression(read_table(self._table)[name])).pattern
 
     def with_words(self, **words: str) -> Patterns:
         """Copies the patterns with more words that expressions may insert."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Final
 
-from executive.language.lexicon import any_of, lexicon, read_table
+from executive.language.lexicon import any_of, expression, lexicon, read_table
 from executive.language.nouns import NounKind
 from executive.words.command import is_attribute, may_be_attribute
 from executive.words.knowledge import Knowledge
@@ -209,19 +209,20 @@ def smooth(text: str) -> str:
 
 @cache
 def _rules(families: tuple[str, ...] | None = None) -> tuple[_Rule, ...]:
-    tables = {f"<{name}>": getattr(lexicon(), name) for name in _TABLES}
-    tables["<verbs>"] = [first for first, *rest in lexicon().verbs if not rest]
-    phrases = {mark: any_of(table) for mark, table in tables.items()}
-    filled = re.compile("|".join(phrases))
+    phrases = {f"<{name}>": any_of(getattr(lexicon(), name)) for name in _TABLES}
+    phrases["<verbs>"] = any_of(first for first, *rest in lexicon().verbs if not rest)
+    table = read_table("rephrasing.yaml")
+    phrases |= {f"<{name}>": _filled(expression(part), phrases) for name, part in table["parts"].items()}
+    rules = (rule for name in families or [*table][1:] for rule in table[name])
+    pairs = ((expression(rule), rule["instead"]) if isinstance(rule, dict) else rule for rule in rules)
     return tuple(
-        (
-            re.compile(filled.sub(lambda mark: phrases[mark[0]], pattern), re.IGNORECASE),
-            _FUNCTIONS.get(instead, instead),
-        )
-        for name, rules in read_table("rephrasing.yaml").items()
-        if families is None or name in families
-        for pattern, instead in rules
+        (re.compile(_filled(pattern, phrases), re.IGNORECASE), _FUNCTIONS.get(instead, instead))
+        for pattern, instead in pairs
     )
+
+
+def _filled(pattern: str, phrases: Mapping[str, str]) -> str:
+    return re.sub("|".join(phrases), lambda mark: phrases[mark[0]], pattern)
 
 
 def _break(match: re.Match[str]) -> str:

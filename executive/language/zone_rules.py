@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from executive.language.amounts import parse_number
 from executive.language.clauses import begins_action
-from executive.language.lexicon import Patterns, any_of, read_table
+from executive.language.lexicon import Patterns, any_of, expression, read_table
 from executive.language.questions import RefusalError
 from executive.language.spelling import synonyms_for
 from executive.language.templates import page
@@ -97,7 +97,7 @@ def take_rules(text: str, knowledge: Knowledge) -> tuple[str, Zones]:
     room = rf"(?:(?:the|my|our|your) )?{names}"
     rooms = rf"(?P<rooms>{room}(?:(?:,? (?:and|or|nor)|,)(?: {_FORMS.text('into')})? {room})*)"
     patterns, rules = _FORMS.with_words(rooms=rooms), read_table("zones.yaml")["rules"] if own else {}
-    forms = {kind: [*map(patterns.compiled, rows)] for kind, rows in rules.items()}
+    forms = {kind: [*map(patterns.compiled, map(expression, rows))] for kind, rows in rules.items()}
     for kind, form in ((kind, form) for kind, rows in forms.items() for form in rows if kind != "other"):
         for match in [*form.finditer(text)][::-1]:
             if (end := _end(text, match)) is not None:

@@ -7,22 +7,12 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from typing import Final
 
 from executive.language.cleaning import find_address
 from executive.language.lexicon import Patterns, any_of, lexicon, read_table
 from executive.language.questions import RefusalError
 from executive.words.robot_config import display_name, find_robot
 from skills.inputs.errors import listing
-
-_NUMBERS: Final = {"two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "both": 2}
-_YOU: Final = frozenset({"you", "yourself"})
-_SOMEBODY: Final = frozenset({"he", "she", "it", "they", "that", "this", "you"})
-_LEADS: Final[Mapping[str, str]] = {"check": "check ", "send": "go "}
-_REFUSED: Final[Mapping[str, str]] = {
-    "not": "say only what a robot is to do",
-    "or": "say which of the robots is meant",
-}
 
 
 class RobotChoice(enum.Enum):
@@ -98,8 +88,8 @@ class Addressees:
                 raise RefusalError(f"which robot is '{said}'? say its name", [said])
             return others
         if self.forms.everybody.fullmatch(words):
-            number = next((_NUMBERS[word] for word in words.split() if word in _NUMBERS), None)
-            if number is not None and number != len(self.names):
+            numbers = (int(read_table("robots.yaml")["numbers"].get(word, 0)) for word in words.split())
+            if next(filter(None, numbers), len(self.names)) != len(self.names):
                 known = listing(map(display_name, self.names))
                 raise RefusalError(f"there are {len(self.names)} robots, {known}: which are '{said}'?", [said])
             return RobotChoice.ALL
@@ -110,10 +100,6 @@ class Addressees:
         """Splits off the robots that a text calls at its beginning. Raises RefusalError like `find_robots`."""
         match = self.forms.talk.match(text)
         return None if match is None else (self.find_robots(match["who"]), text[match.end() :])
-
-    def narrates(self, text: str) -> bool:
-        """Returns whether a text only describes the state of robots: "Bob can't reach the shelf"."""
-        return re.search(rf"\b{self.forms.one.pattern}", self.forms.narrated.sub("", text), re.IGNORECASE) is None
 
     def parts(self, text: str) -> tuple[Addressee | None, tuple[AddressedText, ...]]:
         """Splits a sentence into its addressee and its parts; joins adjacent parts that are for the same robots.
@@ -200,14 +186,14 @@ class _Parting:
 
     def _begins(self, start: int, at: int) -> _Found | None:
         """Part for another robot that begins here; None if none begins. Raises RefusalError if it forbids an action."""
-        current = self.found[-1]
+        current, table = self.found[-1], read_table("robots.yaml")
         for kind, form in self.calls.begins:
             match = form.match(self.text, start)
-            if match is None or (_who(match).lower() in _YOU and (current.who is None or not start)):
+            if match is None or (_who(match).lower() in table["you"] and (current.who is None or not start)):
                 continue
-            if kind in _REFUSED:
-                raise RefusalError(f"{_REFUSED[kind]}: '{match[0].strip()}'", [match[0].strip()])
-            return _Found(_who(match), match.end(), kind, _LEADS.get(kind, ""))
+            if kind in table["refused"]:
+                raise RefusalError(f"{table['refused'][kind]}: '{match[0].strip()}'", [match[0].strip()])
+            return _Found(_who(match), match.end(), kind, table["leads"].get(kind, ""))
         match = self.calls.forms.gap.match(self.text, start)
         if match is None or current.who is None or not self.text[:start].strip():
             return None
@@ -224,7 +210,11 @@ class _Parting:
             self._add(said)
             now = self.found[-1].who
             who = now if found.kind == "wait" or self.address is None else self.address
-            behind = None if found.who.lower() in _SOMEBODY else self.calls.find_robots(found.who)
+            behind = (
+                None
+                if found.who.lower() in read_table("robots.yaml")["somebody"]
+                else self.calls.find_robots(found.who)
+            )
             behind = behind or next((one.who for one in reversed(self.found) if one.who is not None), None)
             if behind is None:
                 raise RefusalError(f"who is '{found.who}'? say the robot's name", [found.who])
@@ -257,7 +247,7 @@ class _Parting:
     def _who(self, found: _Found) -> Addressee:
         """Robots that a name, "you" or "the other robot" stands for."""
         named = [name for one in self.found if isinstance(one.who, tuple) for name in one.who]
-        if found.who.lower() in _YOU:
+        if found.who.lower() in read_table("robots.yaml")["you"]:
             return self.calls.find_robots("the other robot", named) if self.address is None else self.address
         return self.calls.find_robots(found.who, self.address if isinstance(self.address, tuple) else named[-1:])
 

@@ -33,12 +33,12 @@ def cover(
         chunks = [one for one in (clause.subject, *clause.items) if isinstance(one, Chunk)]
         named = (one for one in chunks if not (one.phrase.speaker or (one.phrase.addressed and one.role is None)))
         unused = [one for one in named if not used & _indices(one) and one.phrase.text not in described]
-        words = _spoken(clause)
+        words, states = _spoken(clause), any(isinstance(item, Unknown) for item in clause.items)
         if _asks(clause, actions):
             favours = [chunk for chunk in unused if chunk.role is PrepositionRole.FOR and chunk.phrase.person]
             asides += [chunk.spoken for chunk in favours]
             lost += [(chunk.spoken, words) for chunk in unused if chunk not in favours]
-        elif unused or (" " in words and _tells(clause)):
+        elif unused or (" " in words and isinstance(verb := clause.verb, Being) and (verb.narrated or states)):
             told.append(words)
     targets = [one.target for one in actions if one.target is not None]
     owned = [one.spoken for one in targets if any(token.word in lexicon().owners for token in one.tokens[:-1])]
@@ -81,12 +81,6 @@ def _spoken(clause: Predicate) -> str:
     items = [Chunk(topic)] if topic is not None else []
     words = spoken_words(one for one in (*items, clause.subject, verb, *clause.items) if one is not None)
     return re.sub(r" (?='|n't)", "", words)
-
-
-def _tells(clause: Predicate) -> bool:
-    """Returns whether a statement tells an event or a state, and no place."""
-    states = any(isinstance(item, Unknown) for item in clause.items)
-    return isinstance(clause.verb, Being) and (clause.verb.narrated or states)
 
 
 def _asks(clause: Predicate, actions: Sequence[Action]) -> bool:

@@ -198,7 +198,8 @@ class _Reader:
         named = [name for name in self.robots if re.search(rf"\b{re.escape(name)}\b", text, re.IGNORECASE)]
         named = [name for name in named if self.knowledge.person(name) is None]
         quotes = re.match(r"(?:say|announce|shout)\b(?!.* to \w+\W*$)", text, re.IGNORECASE)
-        if named and not quotes and not addressees(self.robots).narrates(text):
+        forms = addressees(self.robots).forms
+        if named and not quotes and re.search(rf"\b{forms.one.pattern}", forms.narrated.sub("", text), re.IGNORECASE):
             name = display_name(named[0])
             reason = (
                 f"{name} is a robot, and not somebody to go to or to hand objects to; "

@@ -236,8 +236,14 @@ def look_alikes(word: str, known: Mapping[str, str], facts: DependencyParser) ->
     if len(wanted) > _MOST_LETTERS:
         return ()
     sounds = {one.phrase: one.distance for one in _alikes(tuple(known)).similarities(wanted)}
-    slips = ((_slip(wanted, spelling, sounds.get(spelling, 1.0)), name) for spelling, name in known.items())
-    near = [name for slip, name in sorted(slips) if slip < 1.0]
+    scores: list[tuple[float, str]] = []  # the lower, the likelier
+    for spelling, name in known.items():
+        slips, sound = _slips(wanted, spelling), sounds.get(spelling, 1.0)
+        if len(wanted) >= _FEWEST_LETTERS - 1 and slips <= _slips_allowed(spelling) // 2 + (len(spelling) > 3):
+            scores.append((slips / len(spelling), name))
+        elif sound <= ALIKE_SOUND:
+            scores.append((sound, name))
+    near = [name for score, name in sorted(scores) if score < 1.0]
     if not near:
         head = wanted.split()[-1] if wanted else ""
         scored = [(facts.similarity(head, spelling.split()[-1]), name) for spelling, name in known.items()]
@@ -318,14 +324,6 @@ def _slips(word: str, name: str) -> int:
 
 def _slips_allowed(name: str) -> int:
     return 1 if len(name) < _LONG_NAME else 2
-
-
-def _slip(word: str, name: str, sound: float) -> float:
-    """Score of a word as a misspelling of a name: below 1 if they look or sound alike; lower is likelier."""
-    slips = _slips(word, name)
-    if len(word) >= _FEWEST_LETTERS - 1 and slips <= _slips_allowed(name) // 2 + (len(name) > 3):
-        return slips / len(name)
-    return sound if sound <= ALIKE_SOUND else 1.0
 
 
 @lru_cache(maxsize=16)

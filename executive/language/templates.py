@@ -83,8 +83,14 @@ class Page:
     """Templates of a page by intent; `lists` has the values of slots that the page leaves open."""
 
     def __init__(self, name: str, **lists: tuple[str, ...]) -> None:
-        self._given, self._templates, self._forms = lists, dict[str, Template](), dict[str, _Form]()
-        self.table: Mapping[str, Any] = read_table(f"intents/{name}.yaml")
+        self._name, self._given = name, lists
+        self._templates, self._forms = dict[str, Template](), dict[str, _Form]()
+
+    @cached_property
+    def table(self) -> Mapping[str, Any]:
+        """Contents of the page."""
+        found: Mapping[str, Any] = read_table(f"intents/{self._name}.yaml")
+        return found
 
     def __getitem__(self, intent: str) -> Template:
         if intent not in self._templates:

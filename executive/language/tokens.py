@@ -182,10 +182,6 @@ def parse_with_names(
 
 _Rule = tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]
 _SMOOTHED: Final = ("smoothed", "asked")
-_TABLES: Final = (
-    *("short_forms", "asides", "hesitations", "praises", "refusals", "searches", "requests"),
-    *("telling", "wondering", "kinds_of_place", "openers"),
-)
 
 
 def rephrase(text: str) -> str:
@@ -209,20 +205,27 @@ def smooth(text: str) -> str:
 
 @cache
 def _rules(families: tuple[str, ...] | None = None) -> tuple[_Rule, ...]:
-    phrases = {f"<{name}>": any_of(getattr(lexicon(), name)) for name in _TABLES}
-    phrases["<verbs>"] = any_of(first for first, *rest in lexicon().verbs if not rest)
     table = read_table("rephrasing.yaml")
-    phrases |= {f"<{name}>": _filled(expression(part), phrases) for name, part in table["parts"].items()}
     rules = (rule for name in families or [*table][1:] for rule in table[name])
     pairs = ((expression(rule), rule["instead"]) if isinstance(rule, dict) else rule for rule in rules)
     return tuple(
-        (re.compile(_filled(pattern, phrases), re.IGNORECASE), _FUNCTIONS.get(instead, instead))
-        for pattern, instead in pairs
+        (re.compile(_filled(pattern), re.IGNORECASE), _FUNCTIONS.get(instead, instead)) for pattern, instead in pairs
     )
 
 
-def _filled(pattern: str, phrases: Mapping[str, str]) -> str:
-    return re.sub("|".join(phrases), lambda mark: phrases[mark[0]], pattern)
+def _filled(pattern: str) -> str:
+    """Expression with the phrases of the tables and the parts that its marks stand for."""
+    return re.sub(r"(?<!P)<(\w+)>", lambda mark: _phrases(mark[1]), pattern)
+
+
+@cache
+def _phrases(name: str) -> str:
+    parts = read_table("rephrasing.yaml")["parts"]
+    if name in parts:
+        return _filled(expression(parts[name]))
+    return any_of(
+        (first for first, *rest in lexicon().verbs if not rest) if name == "verbs" else getattr(lexicon(), name)
+    )
 
 
 def _break(match: re.Match[str]) -> str:

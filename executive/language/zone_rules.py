@@ -24,7 +24,7 @@ from skills.api import ZoneKind
 SLOWLY_M_S: Final = 0.3
 """Speed limit of "slowly"."""
 _FORMS: Final = Patterns("zones.yaml")
-_SPEAKS: Final = page("zones")["speaks"]
+_PAGE: Final = page("zones")
 _PARTS: Final = {"half": 0.5, "quarter": 0.25, "three quarters": 0.75}
 _UNITS_M_S: Final = {"m": 1.0, "c": 0.01, "k": 1.0 / 3.6}
 _SPEEDS: Final = ("slowly", "at_most")
@@ -108,7 +108,7 @@ def take_rules(text: str, knowledge: Knowledge) -> tuple[str, Zones]:
                 text = _joined(text[: match.start()], text[end:])
     for left in filter(None, (form.search(text) for rows in forms.values() for form in rows)):
         begin = text[: left.start()]
-        is_said, other = _SPEAKS.search(begin) is not None, left.re not in forms["keep_out"]
+        is_said, other = _PAGE["speaks"].search(begin) is not None, left.re not in forms["keep_out"]
         if re.search(r"\bbut\W*$", begin, re.IGNORECASE) if is_said else other:
             raise RefusalError(f"I do not understand '{left[0]}' here; say it in a sentence of its own", [left[0]])
     return text, zones
@@ -119,7 +119,7 @@ def _end(text: str, match: re.Match[str]) -> int | None:
     begin, tail = text[: match.start()], _FORMS.tail.match(text, match.end())
     end = match.end() if tail is None else tail.end()
     sentence = re.split(r"[.;!?]", begin)[-1]
-    if _FORMS.depends.search(sentence) or _SPEAKS.search(sentence):
+    if _FORMS.depends.search(sentence) or _PAGE["speaks"].search(sentence):
         return None
     if not match[0].lower().startswith("without") and _FORMS.before.search(begin) is None:
         return None

@@ -50,7 +50,9 @@ def parse_condition(text: str, state: State, reader: PlainReader) -> SpokenCondi
 
 def usual_condition(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
     """Parses a condition in a usual form: battery, gripper, place, clock, button, door, or people who come or go."""
-    readers = (_measured, _pressed, _door, _meeting)
+    if (pressed := _P["pressed"].fullmatch(words)) is not None:
+        return button_condition(pressed["button"], words, state)
+    readers = (_measured, _door, _meeting)
     return next((found for read in readers if (found := read(words, state, reader)) is not None), None)
 
 
@@ -69,11 +71,6 @@ def _measured(words: str, state: State, reader: PlainReader) -> SpokenCondition 
     notes = () if time is None else time.notes(match["time"])
     found = SpokenCondition(ValueIs(text=text), words, state, state, notes)
     return found.negate(words) if match["not"] else found
-
-
-def _pressed(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
-    match = _P["pressed"].fullmatch(words)
-    return None if match is None else button_condition(match["button"], words, state)
 
 
 def button_condition(button: str, words: str, state: State) -> SpokenCondition:

@@ -329,15 +329,14 @@ class PlainReader:
             goal = command.goal if command.goal is not None else goal
         if not commands:
             return replace(state, memory=memory)
-        return replace(state, memory=memory, held=held, goal=goal, at=self._room_of(commands[-1], state))
-
-    def _room_of(self, command: Command, state: State) -> str | None:
-        place = command.goal_at or command.goal
+        place = commands[-1].goal_at or commands[-1].goal
         if place == START:
-            return State.initial(self.knowledge, state.memory).at
-        if place is not None and place in self.knowledge.people and command.goal_at is None:
-            return self.knowledge.room(self.knowledge.people[place].at)
-        return None if place is None or self.knowledge.place(place) is None else self.knowledge.room(place)
+            at = State.initial(self.knowledge, state.memory).at
+        elif place in self.knowledge.people and commands[-1].goal_at is None:
+            at = self.knowledge.room(self.knowledge.people[place].at)
+        else:
+            at = None if place is None or self.knowledge.place(place) is None else self.knowledge.room(place)
+        return replace(state, memory=memory, held=held, goal=goal, at=at)
 
 
 ATTACHED = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)

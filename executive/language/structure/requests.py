@@ -238,22 +238,17 @@ def parse_question(text: str, knowledge: Knowledge) -> QuestionRequest | None:
         _refuse_stranger(text, knowledge)
         able = "I can ask somebody by name whether they want this or that"
         raise RefusalError(f"I do not understand the question in '{text}'; {able}", [text])
-    if not match["what"]:
-        return _what(match, text, knowledge)
+    if not match["what"]:  # what he wants to drink: a choice among all known objects of that kind
+        kind = (match["kind"] or ("drink" if "drink" in text.lower() else "")).lower()
+        names = knowledge.classes(kind.removesuffix("s")) if kind else ()
+        if not names:
+            raise RefusalError(f"I do not know what there is to choose from in '{text}'; name it", [text])
+        spoken = "What do you want to drink?" if not match["kind"] else f"Which {kind} do you want?"
+        return QuestionRequest(spoken, match, tuple(map(with_article, names)))
     if (word := CLAUSES["deictic"].search(match["what"])) is not None:
         raise RefusalError(f"I cannot ask that for you: '{word.text}' would mean somebody else", [text])
     choices = tuple(re.split(r",? or |, ", match["what"], flags=re.IGNORECASE))
     return QuestionRequest(f"Do you want {match['what']}?", match, choices, yes_or_no=len(choices) == 1)
-
-
-def _what(match: Match, text: str, knowledge: Knowledge) -> QuestionRequest:
-    """Builds the question for "what he wants to drink": a choice among all known objects of that kind."""
-    kind = (match["kind"] or ("drink" if "drink" in text.lower() else "")).lower()
-    names = knowledge.classes(kind.removesuffix("s")) if kind else ()
-    if not names:
-        raise RefusalError(f"I do not know what there is to choose from in '{text}'; name it", [text])
-    spoken = "What do you want to drink?" if not match["kind"] else f"Which {kind} do you want?"
-    return QuestionRequest(spoken, match, tuple(map(with_article, names)))
 
 
 def steps_for_everyone(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:

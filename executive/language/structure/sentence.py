@@ -204,27 +204,28 @@ class SentenceBuilder(DecisionBuilder):
         said = parse_speech(clause.text, self.reader)
         if said is None:
             return None
-        text, to = said[0] or self.statement, said[1]
-        if text is None:
+        if (text := said[0] or self.statement) is None:
             raise RefusalError(f"what am I to say in '{clause.text}'?", [clause.text])
-        self.flush(row)
-        self._to(row, to)
-        self.put(row, (Speak(speak=escape_braces(text)),), row.state)
+        self._speak(row, text, said[1])
         return at + 1
 
     def _tells_when(self, row: StepRow, match: Match) -> None:
         """Builds a wait and a speech for "tell me when Robin comes"."""
         self.flush(row)
         supposed = parse_condition(match["what"], row.state, self.reader)
-        statement = supposed.statement
-        if statement is None:
+        if supposed.statement is None:
             raise RefusalError(f"what am I to say in '{match.text}'?", [match.text])
         self.put(row, (Wait(awaited=Awaited(condition=supposed.condition)),), supposed.holds)
-        said = parse_speech(f"tell {match['who']} that {statement}", self.reader)
+        said = parse_speech(f"tell {match['who']} that {supposed.statement}", self.reader)
         if said is None:
             raise RefusalError(f"I do not know to whom to say it: '{match['who']}'", [match["who"]])
-        self._to(row, said[1])
-        self.put(row, (Speak(speak=escape_braces(said[0])),), row.state)
+        self._speak(row, *said)
+
+    def _speak(self, row: StepRow, text: str, to: Match) -> None:
+        """Adds speech to a listener, behind the pending clauses."""
+        self.flush(row)
+        self._to(row, to)
+        self.put(row, (Speak(speak=escape_braces(text)),), row.state)
 
     def _to(self, row: StepRow, to: Match) -> None:
         """Adds the drive to the listener."""

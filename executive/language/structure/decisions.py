@@ -42,13 +42,14 @@ class DecisionBuilder:
     """Builder of steps that decide and repeat. Its methods raise RefusalError for a clause that they cannot build.
 
     `statement` is what "tell Robin" refers to, `given` is the last clause with an object, `notes` list words that were
-    interpreted as others; `special` marks a mission without blocks that is more than a list of commands.
+    interpreted as others; `special` marks a mission without blocks that is more than a list of commands, `built` that
+    steps were built of more than plain words.
     """
 
     def __init__(self, reader: PlainReader, statement: str | None = None, given: str | None = None) -> None:
         self.reader, self.statement, self.given = reader, statement, given
         self.notes: list[str] = []
-        self.special = False
+        self.special = self.built = False
 
     def sequence(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
         """Builds the steps of clauses, in order."""
@@ -82,7 +83,7 @@ class DecisionBuilder:
         try:
             return self.reader.read_commands(text, state, clauses[0].lead)
         except RefusalError as refusal:
-            refusal.plain = not self.special
+            refusal.plain = not (self.special or self.built)
             raise
 
     def add(self, row: StepRow, reading: PlainReading) -> None:
@@ -96,7 +97,7 @@ class DecisionBuilder:
         """Adds steps behind those of the pending clauses, with the state after them, and notes."""
         self.flush(row)
         row.steps += steps
-        row.state, row.asked = state, None
+        row.state, row.asked, self.built = state, None, True
         self.notes += notes
 
     def decide(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:

@@ -14,6 +14,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
+from itertools import accumulate, pairwise
 from typing import Any, Final
 
 from executive.language.lexicon import any_of, lexicon, read_table
@@ -163,17 +164,24 @@ class Template:
 
 
 class _Form:
-    """Template as a regular expression over spaced words; its groups are the slots, each with other texts for some."""
+    """Template as a regular expression over spaced words; its groups are the slots, each with other texts for some.
+
+    The expression is only made for a text that begins with a word of `first` (empty: any).
+    """
 
     def __init__(self, page: Page, template: str) -> None:
-        self._page, self._slots, self._first = page, list[tuple[str, Mapping[str, str]]](), ""
-        self._text = self._expression(template)
+        self._page, self._template, self._slots = page, template, list[tuple[str, Mapping[str, str]]]()
+        listed = page.entry("lists", template[1:-1]) if _SLOT.fullmatch(template) else ()
+        opened = _RULE.sub(lambda rule: _text(self._rule(rule[1])), template)
+        heads = list(map(_HEAD.match, listed if isinstance(listed, tuple) and listed else _split(opened)))
+        words = {one.split()[0].lower() for head in heads if head for one in (head[1] or head[2]).split("|")}
+        self._first = words if all(heads) else set()
 
     def match(self, words: Words, at: int, whole: bool) -> re.Match[str] | None:
-        """Matches words from an index on, up to the end if `whole`; the first word is tried alone, which is quick."""
-        start = words.starts[at]
-        if self._begins.match(words.spaced, start) is None:
+        """Matches words from an index on, up to the end if `whole`."""
+        if self._first and words.word(at) not in self._first:
             return None
+        start = words.starts[at]
         found = (self._form.fullmatch if whole else self._form.match)(words.spaced, start)
         return None if found is None or (found.end() == start and not whole) else found
 
@@ -187,42 +195,34 @@ class _Form:
         return slots
 
     @cached_property
-    def _begins(self) -> re.Pattern[str]:
-        return re.compile(self._first)
-
-    @cached_property
     def _form(self) -> re.Pattern[str]:
-        return re.compile(rf"(?:{self._text})(?![^ ])")
+        return re.compile(rf"(?:{self._expression(self._template)})(?![^ ])")
 
     def _expression(self, template: str) -> str:
         """Expression for a template, a rule or a list; a word has a blank before it unless it continues another."""
         pieces, found, opened, joined = _PARTS.findall(template), "", list[tuple[str, bool]](), False
-        firsts, begin, blank = list[str](), 0, None
         for piece, behind in zip(pieces, [*pieces[1:], ""], strict=True):
             joined = joined and not (piece.isspace() or piece in _MARKS or (piece == "[" and behind in _MARKS))
-            if piece.isspace():
-                blank = len(found) if blank is None and not opened else blank
-            elif piece in "([":
+            if piece in "([":
                 opened.append((piece, joined))
                 found += "(?:"
             elif piece in ")]":
                 found += ")" if opened.pop()[0] == "(" else "|)"
                 joined = True
-            elif piece == "|" and opened:
-                found, joined = f"{found}|", opened[-1][1]
             elif piece == "|":
-                firsts.append(found[begin:blank])
-                found, joined, begin, blank = f"{found}|", False, len(found) + 1, None
-            else:
+                found, joined = f"{found}|", bool(opened) and opened[-1][1]
+            elif not piece.isspace():
                 found, joined = found + self._piece(piece, joined), piece not in _MARKS
-        self._first = "|".join([*firsts, found[begin:blank]])
+        return found
+
+    def _rule(self, name: str) -> str | Iterable[str]:
+        found: str | Iterable[str] = self._page.entry("rules", name) or self._page.table["rules"][name]
         return found
 
     def _piece(self, piece: str, joined: bool) -> str:
         """Expression for a word, a rule or a slot."""
         if piece[0] == "<":
-            rule = self._page.entry("rules", piece[1:-1]) or self._page.table["rules"][piece[1:-1]]
-            return f"(?:{self._expression(_text(rule))})"
+            return f"(?:{self._expression(_text(self._rule(piece[1:-1])))})"
         if piece[0] != "{":
             return re.escape("".join(f" {word}" for word in words_of(piece).words)[joined:])
         name, _, slot = piece[1:-1].partition(":")
@@ -237,6 +237,13 @@ class _Form:
         return f"({self._expression(_text(values)) if values else '(?!)'})"
 
 
+def _split(template: str) -> list[str]:
+    """Splits a template at the bars outside of its brackets."""
+    depths = list(accumulate((letter in "([") - (letter in ")]") for letter in template))
+    bars = [n for n, letter in enumerate(template) if letter == "|" and depths[n] == 0]
+    return [template[begin + 1 : end] for begin, end in pairwise([-1, *bars, len(template)])]
+
+
 def _text(values: str | Iterable[str]) -> str:
     return values if isinstance(values, str) else "|".join(values)
 
@@ -245,8 +252,11 @@ def _text(values: str | Iterable[str]) -> str:
 def _number() -> str:
     """Expression for a number in digits, or in one or two words."""
     word = f"(?:{any_of(lexicon().numbers.keys() - {'couple', 'dozen'})})"
-    return rf" (?:{word} {word}|\d+(?:\.\d+)?|{word}(?:-{word})*)(?![^ ])"
+    return rf" (?:\d+(?:\.\d+)?|{word}(?: {word}|(?:-{word})*))(?![^ ])"
 
 
+_SLOT: Final = re.compile(r"\{\w+\}")
+_RULE: Final = re.compile(r"^<(\w+)>")
+_HEAD: Final = re.compile(r"(?:\((\w[\w| ]*)\)|(\w+))(?: |$)")
 _PARTS: Final = re.compile(r"\s+|[()\[\]|]|<[^>]*>|\{[^}]*\}|[,;:.!?]|[^\s()\[\]|<>{},;:.!?]+")
 _MARKS: Final = tuple(",;:.!?")

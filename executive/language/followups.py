@@ -12,7 +12,7 @@ from typing import Final
 
 from executive.language.lexicon import read_table
 from executive.language.templates import page
-from executive.words.command import Command, Task
+from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectKind
 
@@ -134,11 +134,10 @@ def _place_of(commands: Sequence[Command], by: Amendment) -> int:
     goals = [n for n, command in enumerate(commands) if n not in sources]
     if by.source:
         return next(iter([*named, *sources, *goals]))
-    said = [n for n in goals if commands[n].goal != _START]
+    said = [n for n in goals if commands[n].goal != START]
     return next(iter([*named, *said[-1:], *goals[-1:], *sources]))
 
 
-_START: Final = "start"
 _FORMS: Final = page("followups")
 
 

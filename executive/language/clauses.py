@@ -93,25 +93,15 @@ class Clause:
         return found
 
 
-@dataclass(frozen=True)
-class Split:
-    """Clauses of a sentence, and the sentence's addressee."""
-
-    clauses: tuple[Clause, ...]
-    listener: Addressee | None = None
-
-
-def split(text: str, robots: tuple[str, ...] = ()) -> Split:
-    """Splits sentences into clauses, each with the part of the text for its addressee among `robots`.
+def split(text: str, robots: tuple[str, ...] = ()) -> tuple[Addressee | None, tuple[Clause, ...]]:
+    """Splits sentences into their addressee among `robots`, and clauses, each with the text for its own addressee.
 
     Raises RefusalError when it is not clear which robots a sentence names, or when it forbids an action.
     """
     listener, parts = addressees(robots).parts(text) if len(robots) > 1 else (None, (AddressedText(None, text),))
-    found: list[Clause] = []
-    for part in parts:
-        said = _REWORDING["whole"].reword(_REWORDING["parts"].reword(smooth(part.text)), whole=True)
-        found += (replace(clause, part=part) for clause in cut(said))
-    return Split(tuple(found), listener)
+    said = ((part, _REWORDING["parts"].reword(smooth(part.text))) for part in parts)
+    cuts = ((part, cut(_REWORDING["whole"].reword(text, whole=True))) for part, text in said)
+    return listener, tuple(replace(clause, part=part) for part, clauses in cuts for clause in clauses)
 
 
 def cut(text: str) -> tuple[Clause, ...]:

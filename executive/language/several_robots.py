@@ -7,7 +7,7 @@ from itertools import groupby
 from typing import Final
 
 from executive.language.addressees import AddressedText, Addressee, RobotChoice, addressees
-from executive.language.clauses import Clause, Split, split
+from executive.language.clauses import Clause, split
 from executive.language.cleaning import clean
 from executive.language.parser import DependencyParser
 from executive.language.pipeline import Pipeline, Trace
@@ -63,8 +63,8 @@ def understand_for_robots(
     try:
         rules = read_rules(said.text, knowledge)
         assert rules.knowledge is not None
-        cut = split(rules.rest, names)
-        addressed = cut.listener is not None
+        listener, clauses = split(rules.rest, names)
+        addressed = listener is not None
         found = Understanding(sentence, Status.NOT_ADDRESSED)
         if not addressed and stranger is not None and forms.called.fullmatch(stranger["name"]) is None:
             what = f"there is no robot called {stranger['name']}; there are {listing(names)}"
@@ -74,7 +74,7 @@ def understand_for_robots(
             found = replace(found, reason=f"no robot's name was said; begin with {called}")
         else:
             reader = _Reader(tuple(robots), Pipeline(parser, rules.knowledge), rules.knowledge)
-            found = under_rules(rules, reader.addressed(sentence, cut, memory))
+            found = under_rules(rules, reader.addressed(sentence, listener, clauses, memory))
     except RefusalError as refusal:
         found = Understanding(sentence, Status.REFUSED, reason=refusal.reason, unknown_words=refusal.unknown)
         return replace(found, addressed=addressed)
@@ -96,11 +96,13 @@ class _Reader:
     pipeline: Pipeline
     knowledge: Knowledge
 
-    def addressed(self, sentence: str, cut: Split, memory: Memory | None) -> Understanding:
+    def addressed(
+        self, sentence: str, listener: Addressee | None, said: Sequence[Clause], memory: Memory | None
+    ) -> Understanding:
         """Understands the parts into which a sentence was split."""
         read: list[_Read] = []
         pending: tuple[Clause, ...] = ()
-        parts = [tuple(clauses) for _, clauses in groupby(cut.clauses, key=lambda clause: id(clause.part))]
+        parts = [tuple(clauses) for _, clauses in groupby(said, key=lambda clause: id(clause.part))]
         for number, clauses in enumerate(parts):
             part = clauses[0].part
             assert part is not None
@@ -119,7 +121,7 @@ class _Reader:
         if not read:
             raise RefusalError(f"there is nothing to do for {self._named(self.robots)} in the sentence")
         notes = tuple(dict.fromkeys(note for one in read for note in one.meaning.notes))
-        return Understanding(sentence, Status.OK, notes=notes, memory=memory, parts=tuple(self._parts(read, cut)))
+        return Understanding(sentence, Status.OK, notes=notes, memory=memory, parts=tuple(self._parts(read, listener)))
 
     def _read(
         self, part: AddressedText, clauses: Sequence[Clause], before: Sequence[_Read], memory: Memory | None
@@ -207,9 +209,9 @@ class _Reader:
             )
             raise RefusalError(reason, [name])
 
-    def _parts(self, read: Sequence[_Read], cut: Split) -> Iterator[Part]:
+    def _parts(self, read: Sequence[_Read], listener: Addressee | None) -> Iterator[Part]:
         """Yields a part for each robot that each part of the text addresses."""
-        by = find_robot(cut.listener[0], self.robots) if isinstance(cut.listener, tuple) else None
+        by = find_robot(listener[0], self.robots) if isinstance(listener, tuple) else None
         numbers: list[range] = []
         for one in read:
             named = one.part.who if isinstance(one.part.who, tuple) else ()

@@ -31,6 +31,7 @@ class Words:
                     self.words.append(_FULL.get(piece.lower(), piece.lower()))
                     self.spans.append(match.span(n))
         self.spaced = "".join(f" {word}" for word in self.words)
+        self.known = frozenset(self.words)
         self.starts = [*(n for n, letter in enumerate(self.spaced) if letter == " "), len(self.spaced)]
 
     def word(self, at: int) -> str:
@@ -166,7 +167,7 @@ class Template:
 class _Form:
     """Template as a regular expression over spaced words; its groups are the slots, each with other texts for some.
 
-    The expression is only made for a text that begins with a word of `first` (empty: any).
+    The expression is only made for a text that begins with a word of `first` (empty: any) and has the words `needs`.
     """
 
     def __init__(self, page: Page, template: str) -> None:
@@ -176,10 +177,14 @@ class _Form:
         heads = list(map(_HEAD.match, listed if isinstance(listed, tuple) and listed else _split(opened)))
         words = {one.split()[0].lower() for head in heads if head for one in (head[1] or head[2]).split("|")}
         self._first = words if all(heads) else set()
+        bare, before = template, ""
+        while bare != before:
+            bare, before = re.sub(r"[(\[][^()\[\]]*[)\]]|<[^>]*>|\{[^}]*\}", "§", bare), bare
+        self._needs = set() if "|" in bare else set(words_of(re.sub(r"\S*§\S*", " ", bare)).words)
 
     def match(self, words: Words, at: int, whole: bool) -> re.Match[str] | None:
         """Matches words from an index on, up to the end if `whole`."""
-        if self._first and words.word(at) not in self._first:
+        if (self._first and words.word(at) not in self._first) or not self._needs <= words.known:
             return None
         start = words.starts[at]
         found = (self._form.fullmatch if whole else self._form.match)(words.spaced, start)
@@ -224,7 +229,7 @@ class _Form:
         if piece[0] == "<":
             return f"(?:{self._expression(_text(self._rule(piece[1:-1])))})"
         if piece[0] != "{":
-            return re.escape("".join(f" {word}" for word in words_of(piece).words)[joined:])
+            return "".join(f" {re.escape(word)}" for word in words_of(piece).words)[joined:]
         name, _, slot = piece[1:-1].partition(":")
         values: Any = {} if name == "number" else self._page.entry("lists", name)
         self._slots.append((slot or name, {}))

@@ -374,7 +374,7 @@ def read_structure(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pip
     """
     decides = True
     try:
-        clauses = split(plain.text).clauses if clauses is None else clauses
+        clauses = split(plain.text)[1] if clauses is None else clauses
         decides = any(one.kind is not None or trailing_cue(one.text) is not None for one in clauses)
         if not decides and (plain.refusal is None or plain.refused_at == "cleaning"):
             return plain

@@ -11,17 +11,17 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
-from itertools import accumulate, pairwise
-from typing import Any, Final
+from functools import cached_property, lru_cache
+from itertools import product
+from typing import Any, Final, NamedTuple
 
-from executive.language.lexicon import any_of, lexicon, read_table
+from executive.language.lexicon import lexicon, read_table
 
 
 class Words:
-    """Words of a text in lower case, and their positions there; "n't" is "not"; `spaced` has a blank before each."""
+    """Words of a text in lower case, and their positions there; "n't" is "not"."""
 
     def __init__(self, text: str) -> None:
         self.text, self.words, self.spans = text, list[str](), list[tuple[int, int]]()
@@ -30,9 +30,6 @@ class Words:
                 if piece is not None:
                     self.words.append(_FULL.get(piece.lower(), piece.lower()))
                     self.spans.append(match.span(n))
-        self.spaced = "".join(f" {word}" for word in self.words)
-        self.known = frozenset(self.words)
-        self.starts = [*(n for n, letter in enumerate(self.spaced) if letter == " "), len(self.spaced)]
 
     def word(self, at: int) -> str:
         """Word at an index; empty outside the text."""
@@ -41,11 +38,6 @@ class Words:
     def start(self, at: int) -> int:
         """Position of a word in the text, or the text's end."""
         return self.spans[at][0] if at < len(self.spans) else len(self.text)
-
-    def span(self, begin: int, end: int) -> tuple[int, int]:
-        """Positions in the text of the words between two positions in `spaced`."""
-        first, last = self.starts.index(begin), self.starts.index(end)
-        return (self.spans[first][0], self.spans[last - 1][1]) if last > first else (0, 0)
 
 
 @lru_cache(maxsize=4096)
@@ -86,7 +78,7 @@ class Page:
 
     def __init__(self, name: str, **lists: tuple[str, ...]) -> None:
         self._name, self._given = name, lists
-        self._templates, self._forms = dict[str, Template](), dict[str, _Form]()
+        self._templates, self._parts = dict[str, Template](), dict[str, _Part]()
 
     @cached_property
     def table(self) -> Mapping[str, Any]:
@@ -104,11 +96,12 @@ class Page:
         tables = ({"lists": self._given}, self.table, read_table("intents/common.yaml"))
         return next((table[kind][name] for table in tables if name in table.get(kind, ())), {})
 
-    def form(self, template: str) -> _Form:
-        """Form of a template, which is translated once."""
-        if template not in self._forms:
-            self._forms[template] = _Form(self, template)
-        return self._forms[template]
+    def part(self, values: str | Iterable[str]) -> _Part:
+        """Part for a template, or for one of several; each is parsed once."""
+        text = values if isinstance(values, str) else "|".join(values)
+        if text not in self._parts:
+            self._parts[text] = _alternatives(_PARTS.findall(text)[::-1], self)
+        return self._parts[text]
 
 
 page = lru_cache(maxsize=64)(Page)
@@ -150,118 +143,140 @@ class Template:
         return text
 
     def _match(self, row: Mapping[str, Any], words: Words, at: int, whole: bool) -> Match | None:
-        form = self._page.form(row["template"])
-        if at > len(words.words) or (found := form.match(words, at, whole)) is None:
-            return None
-        after = words.starts.index(found.end())
-        if words.word(after) not in row.get("before", [words.word(after)]):
+        ends, size = self._page.part(row["template"]).ends_at(words, at), len(words.words)
+        end, slots = next(((end, slots) for end, slots in ends if (end == size if whole else end > at)), (-1, ()))
+        if end < 0 or words.word(end) not in row.get("before", [words.word(end)]):
             return None
         if whole and any(self._page[one].fullmatch(words.text) for one in row.get("unless", ())):
             return None
-        slots = {**row.get("slots", {}), **form.slots_of(found, words)}
-        instead = " ".join(row.get("instead", "").format_map(defaultdict(str, slots)).split())
-        start, end = words.span(found.start(), found.end())
-        return Match(words.text[start:end], start, end, after, slots, instead)
+        start, stop = (words.spans[at][0], words.spans[end - 1][1]) if end > at else (0, 0)
+        filled = {**row.get("slots", {}), **dict(slots)}
+        instead = " ".join(row.get("instead", "").format_map(defaultdict(str, filled)).split())
+        return Match(words.text[start:stop], start, stop, end, filled, instead)
 
 
-class _Form:
-    """Template as a regular expression over spaced words; its groups are the slots, each with other texts for some.
+_Ends = Iterator[tuple[int, tuple[tuple[str, str], ...]]]
 
-    The expression is only made for a text that begins with a word of `first` (empty: any) and has the words `needs`.
+
+class _Part(NamedTuple):
+    """Part of a template: the words with which it can begin (None: any), and whether it may be without words.
+
+    `ends` yields the indices behind the part when it begins at a word, the preferred ones first, with its slots.
     """
 
-    def __init__(self, page: Page, template: str) -> None:
-        self._page, self._template, self._slots = page, template, list[tuple[str, Mapping[str, str]]]()
-        listed = page.entry("lists", template[1:-1]) if _SLOT.fullmatch(template) else ()
-        opened = _RULE.sub(lambda rule: _text(self._rule(rule[1])), template)
-        heads = list(map(_HEAD.match, listed if isinstance(listed, tuple) and listed else _split(opened)))
-        words = {one.split()[0].lower() for head in heads if head for one in (head[1] or head[2]).split("|")}
-        self._first = words if all(heads) else set()
-        bare, before = template, ""
-        while bare != before:
-            bare, before = re.sub(r"[(\[][^()\[\]]*[)\]]|<[^>]*>|\{[^}]*\}", "§", bare), bare
-        self._needs = set() if "|" in bare else set(words_of(re.sub(r"\S*§\S*", " ", bare)).words)
+    ends: Callable[[Words, int], _Ends]
+    first: frozenset[str] | None = None
+    empty: bool = False
 
-    def match(self, words: Words, at: int, whole: bool) -> re.Match[str] | None:
-        """Matches words from an index on, up to the end if `whole`."""
-        if (self._first and words.word(at) not in self._first) or not self._needs <= words.known:
-            return None
-        start = words.starts[at]
-        found = (self._form.fullmatch if whole else self._form.match)(words.spaced, start)
-        return None if found is None or (found.end() == start and not whole) else found
-
-    def slots_of(self, found: re.Match[str], words: Words) -> dict[str, str]:
-        """Texts of the slots; of two slots with one name, the last counts."""
-        slots = {}
-        for n, (name, instead) in enumerate(self._slots, 1):
-            if found.start(n) >= 0:
-                start, end = words.span(*found.span(n))
-                slots[name] = instead.get(words.text[start:end].lower(), words.text[start:end])
-        return slots
-
-    @cached_property
-    def _form(self) -> re.Pattern[str]:
-        return re.compile(rf"(?:{self._expression(self._template)})(?![^ ])")
-
-    def _expression(self, template: str) -> str:
-        """Expression for a template, a rule or a list; a word has a blank before it unless it continues another."""
-        pieces, found, opened, joined = _PARTS.findall(template), "", list[tuple[str, bool]](), False
-        for piece, behind in zip(pieces, [*pieces[1:], ""], strict=True):
-            joined = joined and not (piece.isspace() or piece in _MARKS or (piece == "[" and behind in _MARKS))
-            if piece in "([":
-                opened.append((piece, joined))
-                found += "(?:"
-            elif piece in ")]":
-                found += ")" if opened.pop()[0] == "(" else "|)"
-                joined = True
-            elif piece == "|":
-                found, joined = f"{found}|", bool(opened) and opened[-1][1]
-            elif not piece.isspace():
-                found, joined = found + self._piece(piece, joined), piece not in _MARKS
-        return found
-
-    def _rule(self, name: str) -> str | Iterable[str]:
-        found: str | Iterable[str] = self._page.entry("rules", name) or self._page.table["rules"][name]
-        return found
-
-    def _piece(self, piece: str, joined: bool) -> str:
-        """Expression for a word, a rule or a slot."""
-        if piece[0] == "<":
-            return f"(?:{self._expression(_text(self._rule(piece[1:-1])))})"
-        if piece[0] != "{":
-            return "".join(f" {re.escape(word)}" for word in words_of(piece).words)[joined:]
-        name, _, slot = piece[1:-1].partition(":")
-        values: Any = {} if name == "number" else self._page.entry("lists", name)
-        self._slots.append((slot or name, {}))
-        if isinstance(values, Mapping) and values.keys() <= {"most", "without"}:
-            most = f"{{1,{values['most']}}}" if "most" in values else "+"
-            without = f"(?! (?:{any_of(values['without'])})(?![^ ]))" if "without" in values else ""
-            return f"({_number() if name == 'number' else f'(?:{without} [^ ]++){most}?'})"
-        if isinstance(values, Mapping):
-            self._slots[-1] = (slot or name, values)
-        return f"({self._expression(_text(values)) if values else '(?!)'})"
+    def ends_at(self, words: Words, at: int) -> _Ends:
+        begins = self.empty or self.first is None or words.word(at) in self.first
+        return self.ends(words, at) if begins else iter(())
 
 
-def _split(template: str) -> list[str]:
-    """Splits a template at the bars outside of its brackets."""
-    depths = list(accumulate((letter in "([") - (letter in ")]") for letter in template))
-    bars = [n for n, letter in enumerate(template) if letter == "|" and depths[n] == 0]
-    return [template[begin + 1 : end] for begin, end in pairwise([-1, *bars, len(template)])]
+def _word(spellings: Iterable[str]) -> _Part:
+    """One of some words."""
+    return _Part(lambda words, at: iter([(at + 1, ())]), frozenset(spellings))
 
 
-def _text(values: str | Iterable[str]) -> str:
-    return values if isinstance(values, str) else "|".join(values)
+def _sequence(parts: Sequence[_Part]) -> _Part:
+    def ends(words: Words, at: int, n: int = 0) -> _Ends:
+        if n == len(parts):
+            yield at, ()
+            return
+        for middle, slots in parts[n].ends_at(words, at):
+            for end, more in ends(words, middle, n + 1):
+                yield end, (*slots, *more)
+
+    begin = next((n for n, part in enumerate(parts) if not part.empty), len(parts))
+    return _Part(ends, _firsts(parts[: begin + 1]), begin == len(parts))
 
 
-@cache
-def _number() -> str:
-    """Expression for a number in digits, or in one or two words."""
-    word = f"(?:{any_of(lexicon().numbers.keys() - {'couple', 'dozen'})})"
-    return rf" (?:\d+(?:\.\d+)?|{word}(?: {word}|(?:-{word})*))(?![^ ])"
+def _choice(parts: Sequence[_Part]) -> _Part:
+    def ends(words: Words, at: int) -> _Ends:
+        for part in parts:
+            yield from part.ends_at(words, at)
+
+    return _Part(ends, _firsts(parts), any(part.empty for part in parts))
 
 
-_SLOT: Final = re.compile(r"\{\w+\}")
-_RULE: Final = re.compile(r"^<(\w+)>")
-_HEAD: Final = re.compile(r"(?:\((\w[\w| ]*)\)|(\w+))(?: |$)")
+def _firsts(parts: Sequence[_Part]) -> frozenset[str] | None:
+    firsts = [part.first for part in parts]
+    return None if None in firsts else frozenset(word for first in firsts for word in first or ())
+
+
+def _slot(name: str, part: _Part, instead: Mapping[str, str]) -> _Part:
+    """Part whose text is kept, or another text for it."""
+
+    def ends(words: Words, at: int) -> _Ends:
+        for end, slots in part.ends_at(words, at):
+            text = words.text[words.start(at) : words.spans[end - 1][1]]
+            yield end, ((name, instead.get(text.lower(), text)), *slots)
+
+    return part._replace(ends=ends)
+
+
+def _any(facts: Mapping[str, Any]) -> _Part:
+    """One or more words, as few as possible, or `most` of them; `without` some words."""
+
+    def ends(words: Words, at: int) -> _Ends:
+        for end in range(at + 1, min(len(words.words), at + int(facts.get("most", len(words.words)))) + 1):
+            if words.words[end - 1] in facts.get("without", ()):
+                break
+            yield end, ()
+
+    return _Part(ends)
+
+
+def _number(words: Words, at: int) -> _Ends:
+    """Number in digits, or in one or two words."""
+    first, known = words.word(at), lexicon().numbers.keys() - {"couple", "dozen"}
+    if first in known and words.word(at + 1) in known:
+        yield at + 2, ()
+    if first.replace(".", "", 1).isdigit() or known >= {*first.split("-")}:
+        yield at + 1, ()
+
+
+def _alternatives(parts: list[str], page: Page) -> _Part:
+    """Alternatives up to the closing bracket, which it removes from the reversed parts."""
+    choices, pieces, joined = list[_Part](), list[_Part](), False
+    while True:
+        part = parts.pop() if parts else ""
+        if part in ("|", ")", "]", ""):
+            choices.append(pieces[0] if len(pieces) == 1 else _sequence(pieces))
+            pieces, joined = [], False
+            if part != "|":
+                break
+            continue
+        mark = part.isspace() or part in _MARKS or (part == "[" and parts[-1] in _MARKS)
+        glued = joined and not mark
+        if not part.isspace():
+            found = _part(part, parts, page)
+            pieces[len(pieces) - glued :] = [_glued(pieces[-1], found) if glued else found]
+        joined = not mark
+    return choices[0] if len(choices) == 1 else _choice(choices)
+
+
+def _glued(one: _Part, other: _Part) -> _Part:
+    """Words that two parts spell, of which the other may be left out."""
+    return _word(map("".join, product(one.first or (), {*(other.first or ()), *([""] if other.empty else [])})))
+
+
+def _part(part: str, parts: list[str], page: Page) -> _Part:
+    if part in "([":
+        found = _alternatives(parts, page)
+        return found if part == "(" else _choice([found, _sequence(())])
+    if part[0] == "<":
+        return page.part(page.entry("rules", part[1:-1]) or page.table["rules"][part[1:-1]])
+    if part[0] != "{":
+        words = words_of(part).words
+        return _word(words) if len(words) == 1 else _sequence([_word([word]) for word in words])
+    name, _, slot = part[1:-1].partition(":")
+    values: Any = {} if name == "number" else page.entry("lists", name)
+    if isinstance(values, Mapping) and values.keys() <= {"most", "without"}:
+        return _slot(slot or name, _Part(_number) if name == "number" else _any(values), {})
+    inner = page.part(values) if values else _word(())
+    return _slot(slot or name, inner, values if isinstance(values, Mapping) else {})
+
+
 _PARTS: Final = re.compile(r"\s+|[()\[\]|]|<[^>]*>|\{[^}]*\}|[,;:.!?]|[^\s()\[\]|<>{},;:.!?]+")
 _MARKS: Final = tuple(",;:.!?")

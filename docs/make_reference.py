@@ -13,8 +13,19 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from bosdyn.api import (
+    arm_command_pb2,
+    full_body_command_pb2,
+    manipulation_api_pb2,
+    mobility_command_pb2,
+    robot_command_pb2,
+)
+from bosdyn.api.docking import docking_pb2
+from bosdyn.api.graph_nav import graph_nav_pb2
+from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 from pydantic import BaseModel
 
+import errand_spot.server
 from errand_spot.server.calls import service_calls
 from errand_spot.server.server import LISTED, MOTIONS, SERVICES
 from executive.app.prepare.scenarios import ScenarioFile
@@ -100,6 +111,28 @@ SCHEMA_PAGES = (
 )
 
 
+COMMANDS = (
+    robot_command_pb2.RobotCommand,
+    spot_command_pb2.MobilityParams,
+    manipulation_api_pb2.ManipulationApiRequest,
+    docking_pb2.DockingCommandRequest,
+    graph_nav_pb2.NavigateToRequest,
+    graph_nav_pb2.NavigateRouteRequest,
+    graph_nav_pb2.NavigateToAnchorRequest,
+)
+"""Messages of the commands that move the robot."""
+ONE_OF = {
+    field.name
+    for message in (
+        full_body_command_pb2.FullBodyCommand.Request,
+        arm_command_pb2.ArmCommand.Request,
+        mobility_command_pb2.MobilityCommand.Request,
+    )
+    for field in message.DESCRIPTOR.oneofs_by_name["command"].fields
+}
+"""Motions, which are refused when they are not served."""
+
+
 def pages() -> dict[str, str]:
     """The text of every page by file name."""
     written = {f"{page.name}.md": schema_page(page) for page in SCHEMA_PAGES}
@@ -118,8 +151,31 @@ def spot_api_page() -> str:
         f"directory.\n\n| service | calls |\n|---|---|\n"
         + "\n".join(rows)
         + "\n\nThe directory also lists services whose "
-        f"calls answer `UNIMPLEMENTED`: {listed}.\n\nMotions: {MOTIONS}\n"
+        f"calls answer `UNIMPLEMENTED`: {listed}.\n\nMotions: {MOTIONS}\n\n"
+        "## Fields that change nothing\n\nThese fields of commands are accepted and not read: limits of "
+        "acceleration, the choice of gait, stairs, terrain, and the like. Nor are the velocities and accelerations of "
+        "a trajectory's points. A value that an enumeration of the API lacks is refused as an invalid request.\n\n"
+        "| message | fields |\n|---|---|\n"
+        + "\n".join(f"| `{name}` | {', '.join(f'`{field}`' for field in fields)} |" for name, fields in unread_fields())
+        + "\n"
     )
+
+
+def unread_fields() -> Iterator[tuple[str, list[str]]]:
+    """Yields each message of the served commands with the fields whose names stand nowhere in the server's code."""
+    folder = Path(errand_spot.server.__file__).parent
+    sources = [*folder.glob("*.py"), folder.parent / "messages.py"]
+    words = set(re.findall(r"\w+", "\n".join(path.read_text(encoding="utf-8") for path in sources)))
+    known, waiting = {"bosdyn.api.RequestHeader", "bosdyn.api.Quaternion"}, [message.DESCRIPTOR for message in COMMANDS]
+    while waiting:
+        described = waiting.pop(0)
+        if described.full_name in known or described.full_name.startswith("google."):
+            continue
+        known.add(described.full_name)
+        waiting += [field.message_type for field in described.fields if field.message_type and field.name in words]
+        unread = [field.name for field in described.fields if field.name not in words and field.name not in ONE_OF]
+        if unread:
+            yield described.full_name.removeprefix("bosdyn.api."), unread
 
 
 def schema_page(page: SchemaPage) -> str:

@@ -10,7 +10,7 @@ from bosdyn.api import arm_command_pb2, basic_command_pb2
 from scipy.interpolate import PchipInterpolator
 
 from errand_spot.messages import InvalidRequestError, duration, finite, points_of, seconds
-from errand_spot.server.computer import Computer
+from errand_spot.server.computer import Computer, Solver
 from errand_spot.server.refusals import soon
 from skills.robot import ArmTrajectory, CommandState, FloatArray
 
@@ -23,6 +23,7 @@ USUAL_RAD_S: Final = 1.5
 _FASTEST_RAD_S: Final = 3.6
 _LEAST_S: Final = 0.2
 _SETTLING_S, _STILL_RAD_S, _NEAR_RAD = 1.0, 0.05, 0.1
+_SLACK_RAD: Final = 0.02
 _STEPS: Final = 20
 _SAMPLE_S: Final = 0.05
 
@@ -120,7 +121,7 @@ class JointMove(ArmMotion):
     going = arm_command_pb2.ArmJointMoveCommand.Feedback.STATUS_IN_PROGRESS
     stalled = arm_command_pb2.ArmJointMoveCommand.Feedback.STATUS_STALLED
 
-    def __init__(self, request: Any, now_rad: FloatArray, now_s: float) -> None:
+    def __init__(self, request: Any, now_rad: FloatArray, now_s: float, solver: Solver) -> None:
         trajectory = request.trajectory
         points = points_of(trajectory, "arm_joint_move_command.trajectory")
         fastest = trajectory.maximum_velocity.value if trajectory.HasField("maximum_velocity") else USUAL_RAD_S
@@ -131,7 +132,7 @@ class JointMove(ArmMotion):
         limited = trajectory.HasField("maximum_velocity")
         timed = any(point.HasField("time_since_reference") for point in points)
         for point in points:
-            goal = _joints(point.position, before)
+            goal = _joints(point.position, before, solver)
             at_s = offset_s + seconds(point.time_since_reference)
             fast_s = (self._times_s or [0.0])[-1] + 1.5 * float(np.abs(goal - before).max()) / max(1e-3, fastest)
             if not timed or (limited and at_s < fast_s):
@@ -162,14 +163,16 @@ class JointMove(ArmMotion):
         return made
 
 
-def _joints(message: Any, before: FloatArray) -> FloatArray:
-    """Joint angles of a message; omitted ones keep their value."""
-    return np.array(
-        [
-            finite(getattr(message, name).value, f"position.{name}") if message.HasField(name) else value
-            for name, value in zip(JOINTS, before, strict=True)
-        ]
-    )
+def _joints(message: Any, before: FloatArray, solver: Solver) -> FloatArray:
+    """Joint angles of a message; omitted ones keep their value. Raises InvalidRequestError for one out of its range."""
+    goal = before.copy()
+    for k, (name, low, high) in enumerate(zip(JOINTS, solver.lower_rad, solver.upper_rad, strict=True)):
+        if message.HasField(name):
+            angle = finite(getattr(message, name).value, f"position.{name}")
+            if not low - _SLACK_RAD <= angle <= high + _SLACK_RAD:
+                raise InvalidRequestError(f"position.{name} is {angle:.3f} rad; it must be {low:.3f} to {high:.3f}")
+            goal[k] = min(max(angle, low), high)
+    return goal
 
 
 class Named(ArmMotion):

@@ -20,7 +20,7 @@ from bosdyn.api import (
     robot_command_pb2,
 )
 
-from errand_spot.messages import InvalidRequestError, seconds, timestamp
+from errand_spot.messages import InvalidRequestError, check_values, seconds, timestamp
 from errand_spot.server import arm, gripper, hand, mobility
 from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer, Motion, Motors, Snapshot
@@ -162,18 +162,24 @@ class RobotCommandService(Service):
         return robot_command_pb2.RobotCommandFeedbackResponse(feedback=commanded.feedback())
 
     def ClearBehaviorFault(self, request: Any, _call: Call) -> Any:
-        """Answers that there is no such fault: the simulated robot has none."""
-        Response = robot_command_pb2.ClearBehaviorFaultResponse
-        used = self._leases.use(request.lease, _ALL)
-        return Response(lease_use_result=used, status=Response.STATUS_NOT_CLEARED)
+        """Clears the fault of a fall, when the robot lies still."""
+        Response, computer = robot_command_pb2.ClearBehaviorFaultResponse, self._computer
+        used, fault = self._leases.use(request.lease, _ALL), computer.fault
+        made = Response(lease_use_result=used, behavior_fault=fault, status=Response.STATUS_NOT_CLEARED)
+        known = fault is not None and fault.behavior_fault_id == request.behavior_fault_id
+        if used.status == lease_pb2.LeaseUseResult.STATUS_OK and known and computer.snapshot.sitting:
+            computer.fault, made.status = None, Response.STATUS_CLEARED
+        return made
 
     def _start(self, request: Any) -> int:
         """Starts a command and returns its number. Raises RefusedError or InvalidRequestError."""
-        command, computer = request.command, self._computer
-        snapshot = computer.snapshot
+        command, computer, snapshot = request.command, self._computer, self._computer.snapshot
+        check_values(command, "command")
         whole = _whole_motion(command.full_body_command) if command.HasField("full_body_command") else None
-        if snapshot.motors is not Motors.ON and not isinstance(whole, _PowerOff | _StopAll):
-            raise RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off")
+        if not computer.able and whole is None:
+            if snapshot.motors is not Motors.ON:
+                raise RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off")
+            raise RefusedError(Status.STATUS_BEHAVIOR_FAULT, "the robot has fallen: clear its behaviour fault")
         if whole is None and computer.docked() and _leaves_dock(command.synchronized_command):
             raise RefusedError(Status.STATUS_DOCKED, "the robot is docked: undock it first")
         parts: Mapping[str, Any] = {}
@@ -286,7 +292,7 @@ def _arm_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: flo
 
     made: dict[str, Callable[[], arm.ArmMotion]] = {
         "arm_joint_move_command": lambda: arm.JointMove(
-            request.arm_joint_move_command, computer.arm_rad(snapshot.joints), now_s
+            request.arm_joint_move_command, computer.arm_rad(snapshot.joints), now_s, computer.solver
         ),
         "named_arm_position_command": lambda: arm.Named(request.named_arm_position_command),
         "arm_cartesian_command": lambda: hand.Cartesian(request.arm_cartesian_command, snapshot, now_s),
@@ -300,7 +306,7 @@ def _arm_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: flo
 
 
 class _Whole:
-    """Command of the whole body."""
+    """Command of the whole body: stops it, freezes it, or rights it."""
 
     def __init__(self, feedback: Any) -> None:
         self.feedback = feedback
@@ -309,10 +315,6 @@ class _Whole:
     def begin_alone(self, computer: Computer) -> None:
         """Starts it in place of all motions."""
         computer.stop_parts(_ALL)
-
-
-class _StopAll(_Whole):
-    """Stops, freezes, or rights itself."""
 
 
 class _PowerOff(_Whole):
@@ -345,15 +347,12 @@ class _PowerOff(_Whole):
 def _whole_motion(request: Any) -> _Whole:
     """Motion of the whole body. Raises RefusedError."""
     made, which = full_body_command_pb2.FullBodyCommand.Feedback(), request.WhichOneof("command")
-    if which == "stop_request":
-        made.stop_feedback.SetInParent()
-        return _StopAll(made)
-    if which == "freeze_request":
-        made.freeze_feedback.SetInParent()
-        return _StopAll(made)
+    if which in ("stop_request", "freeze_request"):
+        getattr(made, which.replace("request", "feedback")).SetInParent()
+        return _Whole(made)
     if which == "selfright_request":
         made.selfright_feedback.status = basic_command_pb2.SelfRightCommand.Feedback.STATUS_COMPLETED
-        return _StopAll(made)
+        return _Whole(made)
     if which == "safe_power_off_request":
         made.safe_power_off_feedback.status = basic_command_pb2.SafePowerOffCommand.Feedback.STATUS_IN_PROGRESS
         return _PowerOff(made)

@@ -8,22 +8,25 @@ from __future__ import annotations
 import math
 import queue
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
+from itertools import count
 from threading import Event
-from typing import Final, Protocol, TypeVar
+from typing import Any, Final, Protocol, TypeVar
 
 import numpy as np
 from bosdyn.api import basic_command_pb2, estop_pb2, robot_state_pb2
 from pydrake.math import RigidTransform
 
-from errand_spot.messages import Frames, depth_frame, picture_frame, pose_between
+from errand_spot.messages import Frames, depth_frame, picture_frame, pose_between, timestamp
 from errand_spot.server.estop import EstopService
+from errand_spot.server.gripper import Grip
 from errand_spot.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
 from errand_spot.server.obstacles import Region, ScanPoints
+from errand_spot.server.refusals import known_frame
 from skills.robot import (
     Battery,
     Capabilities,
@@ -137,6 +140,10 @@ class Snapshot:
         """Pose of frame `b` in frame `a`. Raises KeyError for an unknown frame."""
         return pose_between(self.frames, a, b)
 
+    def X_OF(self, frame: str, allowed: Container[str] | None = None) -> RigidTransform:
+        """Pose in `odom` of a frame that a command names. Raises RefusedError for an unknown or forbidden one."""
+        return self.X_AB("odom", known_frame(frame, self.frames if allowed is None else allowed))
+
 
 class Motion(Protocol):
     """Motion of one part of the robot, or several, on a client's command; only the computer's thread calls it."""
@@ -149,29 +156,6 @@ class Motion(Protocol):
 
     def end(self, status: int) -> None:
         """Ends it with a status of `RobotCommandFeedbackStatus`."""
-
-
-@dataclass
-class Grip:
-    """Word of clients on the item in the gripper, in place of the robot's own: is one held, and how it is carried."""
-
-    holding: bool | None = None
-    carry: int | None = None
-
-    def holds(self, gripper: Gripper) -> bool:
-        """Returns whether an item is held."""
-        return gripper.holding if self.holding is None else self.holding
-
-    def carry_state(self, gripper: Gripper) -> int:
-        """Returns the carry state: unless clients say otherwise an item is carriable, since the grip stays firm."""
-        State = robot_state_pb2.ManipulatorState
-        own = State.CARRY_STATE_CARRIABLE if self.holds(gripper) else State.CARRY_STATE_NOT_CARRIABLE
-        return int(own if self.carry is None else self.carry)
-
-    def may_stow(self, gripper: Gripper) -> bool:
-        """Returns whether the arm may stow: with an item only on a client's word."""
-        stowable = robot_state_pb2.ManipulatorState.CARRY_STATE_CARRIABLE_AND_STOWABLE
-        return not self.holds(gripper) or self.carry_state(gripper) == stowable
 
 
 class Computer:
@@ -195,6 +179,9 @@ class Computer:
         self.capabilities: Capabilities = robot.capabilities()
         self.motors, self._motors_since_s = Motors.OFF, 0.0
         self.settling, self.grip = False, Grip()
+        self.fault: Any = None
+        """Behaviour fault of a fall, until a client clears it."""
+        self._falls = count(1)
         self.feet_O: Pose2D | None = None
         """Pose of the feet in `odom` while the body moves over them; None while they walk with it."""
         self.scan_points = ScanPoints()
@@ -297,11 +284,21 @@ class Computer:
             self.estop.motors_on = True
 
     def switch_off(self) -> None:
-        """Switches the motors off: all motions end, and the robot sinks down."""
+        """Switches the motors off: all motions end, and a robot that does not sit falls, which is a behaviour fault."""
+        if self.motors is not Motors.OFF and not self.snapshot.sitting:
+            Fault = robot_state_pb2.BehaviorFault
+            kind = {"cause": Fault.CAUSE_FALL, "status": Fault.STATUS_CLEARABLE}
+            onset = timestamp(self.now_s())
+            self.fault = Fault(behavior_fault_id=next(self._falls), onset_timestamp=onset, **kind)
         self.stop_parts((MOBILITY, ARM, GRIPPER))
         self.motors, self.settling = Motors.OFF, False
         self.estop.motors_on = False
         self.sit()
+
+    @property
+    def able(self) -> bool:
+        """Returns whether motions may begin: the motors are on, and no fault of a fall is left."""
+        return self.snapshot.motors is Motors.ON and self.fault is None
 
     def settle(self) -> None:
         """Sits down, and then switches the motors off."""

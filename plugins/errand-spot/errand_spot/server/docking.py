@@ -10,9 +10,9 @@ from bosdyn.api import lease_pb2
 from bosdyn.api.docking import docking_pb2
 from pydrake.math import RigidTransform
 
-from errand_spot.messages import InvalidRequestError, seconds
+from errand_spot.messages import InvalidRequestError, check_values, seconds
 from errand_spot.server.calls import Call, Service
-from errand_spot.server.computer import Computer, Motors
+from errand_spot.server.computer import Computer
 from errand_spot.server.identity import DOMAIN, TimeSyncService
 from errand_spot.server.leases import LeaseService
 from errand_spot.server.refusals import LONGEST_S
@@ -85,8 +85,7 @@ class DockingService(Service):
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Response(lease_use_result=used, status=Response.STATUS_ERROR_LEASE)
         behaviour = request.prep_pose_behavior or Api.PREP_POSE_USE_POSE
-        if behaviour not in Api.PrepPoseBehavior.values():
-            raise InvalidRequestError("prep_pose_behavior is unknown")
+        check_values(request)
         refused = self._refused(request, behaviour)
         if refused is not None or dock_O is None:
             return Response(lease_use_result=used, status=refused or Response.STATUS_ERROR_DOCK_NOT_FOUND)
@@ -135,7 +134,7 @@ class DockingService(Service):
     def _refused(self, request: Any, behaviour: int) -> int | None:
         """Status of a refused command; None for an allowed one."""
         Response, computer, dock_O = Api.DockingCommandResponse, self._computer, self._computer.dock_O
-        if computer.snapshot.motors is not Motors.ON:
+        if not computer.able:
             return int(Response.STATUS_ERROR_NOT_AVAILABLE)
         if behaviour == Api.PREP_POSE_UNDOCK:
             return None if computer.docked() else int(Response.STATUS_ERROR_NOT_DOCKED)

@@ -186,7 +186,7 @@ class GraphNavService(Service):
         if not known.waypoints:
             return _Set(status=_Set.STATUS_NO_MAP_LOADED)
         if snapshot.faults:
-            return _Set(status=_Set.STATUS_ROBOT_IMPAIRED, impaired_state=_impaired(snapshot))
+            return _Set(status=_Set.STATUS_ROBOT_IMPAIRED, impaired_state=_impaired(self._computer))
         if guess.waypoint_id not in known.waypoints and (guess.waypoint_id or not by_tag):
             return _Set(status=_Set.STATUS_UNKNOWN_WAYPOINT, error_report=f"{guess.waypoint_id!r} is not in the map")
         poses = known.poses(guess.waypoint_id or next(iter(known.waypoints)))
@@ -336,7 +336,7 @@ class GraphNavService(Service):
             if cannot.edges:
                 made.error_edge_ids.extend(cannot.edges)
             if made.status == Response.STATUS_ROBOT_IMPAIRED:
-                made.impaired_state.CopyFrom(_impaired(self._computer.snapshot))
+                made.impaired_state.CopyFrom(_impaired(self._computer))
         return made
 
     def _begin(self, request: Any, plan: Plan, lease: Any) -> int:
@@ -354,7 +354,7 @@ class GraphNavService(Service):
         if number and self._routes[number].status in (Feedback.STATUS_FOLLOWING_ROUTE, Feedback.STATUS_REACHED_GOAL):
             self._routes[number].end_s = end_s
             return number
-        if _impaired(self._computer.snapshot).impaired_status != _Impaired.IMPAIRED_STATUS_OK:
+        if _impaired(self._computer).impaired_status != _Impaired.IMPAIRED_STATUS_OK:
             raise CannotError("ROBOT_IMPAIRED")
         if self._computer.docked():  # the API has no status of its own for that
             raise CannotError("COULD_NOT_UPDATE_ROUTE")
@@ -385,7 +385,7 @@ class GraphNavService(Service):
         if number not in self._routes:
             raise InvalidRequestError(f"command_id: there is no command {number}")
         made = self._routes[number].feedback(number)
-        made.impaired_state.CopyFrom(_impaired(self._computer.snapshot))
+        made.impaired_state.CopyFrom(_impaired(self._computer))
         return made
 
 
@@ -431,9 +431,12 @@ def _goal(request: Any, place: Place, waypoint: str) -> Pose2D:
     return Pose2D.from_transform(place.poses[waypoint] @ X_WG)
 
 
-def _impaired(snapshot: Snapshot) -> Any:
+def _impaired(computer: Computer) -> Any:
     """The message of what keeps the robot from navigating."""
-    made = _Impaired(impaired_status=_Impaired.IMPAIRED_STATUS_OK)
+    made, snapshot = _Impaired(impaired_status=_Impaired.IMPAIRED_STATUS_OK), computer.snapshot
+    if computer.fault is not None:
+        made.impaired_status = _Impaired.IMPAIRED_STATUS_BEHAVIOR_FAULT
+        made.behavior_faults.append(computer.fault)
     if snapshot.motors is not Motors.ON:
         made.impaired_status = _Impaired.IMPAIRED_STATUS_NO_MOTOR_POWER
     if snapshot.faults:

@@ -1,18 +1,44 @@
-"""Motions of the gripper."""
+"""The gripper: its motions, and clients' word on the item that it holds."""
 
 from __future__ import annotations
 
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
 
-from bosdyn.api import gripper_command_pb2
+from bosdyn.api import basic_command_pb2, gripper_command_pb2, robot_state_pb2
 
-from errand_spot.messages import finite, points_of
-from errand_spot.server.arm import Status
-from errand_spot.server.computer import Computer
+from errand_spot.messages import InvalidRequestError, finite, points_of
 from plant.robots.spot.description import spot_facts
-from skills.robot import CommandState
+from skills.robot import CommandState, Gripper
 
-_OPENS: Final = 0.05
+if TYPE_CHECKING:
+    from errand_spot.server.computer import Computer
+
+Status: Final = basic_command_pb2.RobotCommandFeedbackStatus
+_OPENS, _SLACK_RAD = 0.05, 0.02
+
+
+@dataclass
+class Grip:
+    """Word of clients on the item in the gripper, in place of the robot's own: is one held, and how it is carried."""
+
+    holding: bool | None = None
+    carry: int | None = None
+
+    def holds(self, gripper: Gripper) -> bool:
+        """Returns whether an item is held."""
+        return gripper.holding if self.holding is None else self.holding
+
+    def carry_state(self, gripper: Gripper) -> int:
+        """Returns the carry state: unless clients say otherwise an item is carriable, since the grip stays firm."""
+        State = robot_state_pb2.ManipulatorState
+        own = State.CARRY_STATE_CARRIABLE if self.holds(gripper) else State.CARRY_STATE_NOT_CARRIABLE
+        return int(own if self.carry is None else self.carry)
+
+    def may_stow(self, gripper: Gripper) -> bool:
+        """Returns whether the arm may stow: with an item only on a client's word."""
+        stowable = robot_state_pb2.ManipulatorState.CARRY_STATE_CARRIABLE_AND_STOWABLE
+        return not self.holds(gripper) or self.carry_state(gripper) == stowable
 
 
 class Claw:
@@ -22,6 +48,10 @@ class Claw:
         """Takes a trajectory of angles, of which the last is the goal: 0 closed, negative open (rad)."""
         points = points_of(request.trajectory, "claw_gripper_command.trajectory")
         goal = finite(points[-1].point, "claw_gripper_command.trajectory.point")
+        if not -widest - _SLACK_RAD <= goal <= _SLACK_RAD:
+            raise InvalidRequestError(
+                f"claw_gripper_command.trajectory.point is {goal:.3f}; it must be {-widest:.3f} to 0"
+            )
         self._opening = min(max(-goal, 0.0), widest)
         torque = request.maximum_torque.value if request.HasField("maximum_torque") else 5.5
         force = finite(torque, "claw_gripper_command.maximum_torque") / float(spot_facts()["gripper"]["tip_radius"])

@@ -17,7 +17,7 @@ from errand_spot.server.arm import USUAL_RAD_S, ArmMotion, Named, Status
 from errand_spot.server.computer import HAND_X_M, Computer, Snapshot, Solver
 from errand_spot.server.leases import ARM
 from errand_spot.server.mobility import BaseMotion, Trajectory, way_to
-from errand_spot.server.refusals import times_of, unknown_frame, unsupported
+from errand_spot.server.refusals import known_frame, times_of, unsupported
 from skills.robot import ArmTrajectory, FloatArray, Pose2D
 
 _USUAL_M_S, _SLOWEST_M_S = 0.4, 0.02
@@ -48,7 +48,7 @@ class Cartesian(ArmMotion):
     stalled = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_STALLED
 
     def __init__(self, request: Any, snapshot: Snapshot, now_s: float) -> None:
-        frame = _known(request.root_frame_name, snapshot)
+        frame = known_frame(request.root_frame_name, snapshot.frames)
         X_WT = (
             transform(request.wrist_tform_tool, "wrist_tform_tool") if request.HasField("wrist_tform_tool") else X_HAND
         )
@@ -228,13 +228,13 @@ class Gaze(ArmMotion):
 
     def __init__(self, request: Any, snapshot: Snapshot) -> None:
         field, now_s = "arm_gaze_command.target_trajectory_in_frame1", snapshot.time_s
-        X_OF, given = snapshot.X_AB("odom", _known(request.frame1_name, snapshot)), request.target_trajectory_in_frame1
+        given, X_OF = request.target_trajectory_in_frame1, snapshot.X_OF(request.frame1_name)
         self._targets_O = [X_OF @ np.array(vector(point.point, field)) for point in points_of(given, field)]
         self._times_s, self._tool_times_s = times_of(given, now_s, field), [0.0]
         self._tools_O: list[FloatArray] = []
         if (tool := request.tool_trajectory_in_frame2).points:
             field = "arm_gaze_command.tool_trajectory_in_frame2"
-            X_OF = snapshot.X_AB("odom", _known(request.frame2_name, snapshot))
+            X_OF = snapshot.X_OF(request.frame2_name)
             self._tools_O = [(X_OF @ transform(each.pose, field)).translation() for each in points_of(tool, field)]
             self._tool_times_s = times_of(tool, now_s, field)
         super().__init__()
@@ -305,7 +305,7 @@ class Moving(ArmMotion):
             v = request.cylindrical_velocity.linear_velocity
             self._linear = tuple(finite(getattr(v, name), name) * 0.5 for name in ("r", "theta", "z"))
         else:
-            self._frame = _known(request.cartesian_velocity.frame_name, snapshot)
+            self._frame = known_frame(request.cartesian_velocity.frame_name, snapshot.frames)
             self._linear = vector(request.cartesian_velocity.velocity_in_frame_name, "velocity_in_frame_name")
         super().__init__()
 
@@ -349,13 +349,6 @@ class Moving(ArmMotion):
         made = arm_command_pb2.ArmCommand.Feedback(status=self.status)
         made.arm_velocity_feedback.SetInParent()
         return made
-
-
-def _known(frame: str, snapshot: Snapshot) -> str:
-    """Returns a frame of the tree. Raises RefusedError."""
-    if frame not in snapshot.frames:
-        raise unknown_frame(frame)
-    return frame
 
 
 def solutions(solver: Solver, X_BW: RigidTransform) -> list[FloatArray]:

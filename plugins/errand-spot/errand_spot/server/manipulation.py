@@ -19,6 +19,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from errand_spot.messages import (
     InvalidRequestError,
+    check_values,
     finite,
     frame_tree,
     frames_of,
@@ -27,7 +28,7 @@ from errand_spot.messages import (
     vector,
 )
 from errand_spot.server.calls import Call, Service
-from errand_spot.server.computer import Computer, Motors, Snapshot
+from errand_spot.server.computer import Computer, Snapshot
 from errand_spot.server.identity import DOMAIN
 from errand_spot.server.leases import LeaseService
 from errand_spot.server.rays import depth_points_O, first_hit_m
@@ -138,8 +139,9 @@ class ManipulationService(Service):
         used = self._leases.use(request.lease, WHOLE)
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Api.ManipulationApiResponse(lease_use_result=used)
-        if self._computer.snapshot.motors is not Motors.ON:
-            raise InvalidRequestError("the motors are off")
+        check_values(request)
+        if not self._computer.able:
+            raise InvalidRequestError("the motors are off, or the robot has fallen")
         if self._computer.docked():
             raise InvalidRequestError("the robot is docked: undock it first")
         task, number = self._task(request), next(self._ids)

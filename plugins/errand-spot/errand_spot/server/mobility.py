@@ -9,14 +9,14 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from bosdyn.api import basic_command_pb2, mobility_command_pb2, trajectory_pb2
 from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 
-from errand_spot.messages import InvalidRequestError, finite, points_of
+from errand_spot.messages import InvalidRequestError, check_values, finite, points_of
 from errand_spot.server.computer import PERIOD_S, Computer, Snapshot
 from errand_spot.server.obstacles import Clearance
 from errand_spot.server.posture import Posture
-from errand_spot.server.refusals import times_of, unknown_frame
+from errand_spot.server.refusals import known_frame, times_of
 from skills.geometry import compose, relative_pose
 from skills.robot import FloatArray, Pose2D
 
@@ -201,31 +201,35 @@ class _Driving(BaseMotion):
 
 
 class Velocity(_Driving):
-    """Drives at a velocity (m/s, m/s, rad/s) in a frame."""
+    """Drives at a velocity (m/s, m/s, rad/s) in a frame, and stops in front of obstacles."""
 
     field = "se2_velocity_feedback"
 
     def __init__(self, request: Any, params: Any, end_s: float, posture: Held = None) -> None:
-        v = request.velocity
-        self._velocity = tuple(
-            finite(value, f"se2_velocity_request.velocity.{name}")
-            for name, value in (("linear.x", v.linear.x), ("linear.y", v.linear.y), ("angular", v.angular))
-        )
-        self._frame, self.posture, self.end_s = known_frame(request.se2_frame_name), posture, end_s
-        self._limit = speed_limit(params)
+        self._velocity = _velocity(request.velocity, "se2_velocity_request.velocity")
+        slew = _velocity(request.slew_rate_limit, "se2_velocity_request.slew_rate_limit")
+        if slew.min() < 0.0:
+            raise InvalidRequestError("se2_velocity_request.slew_rate_limit must not be negative")
+        self._step, self._now = np.where(slew > 0.0, slew, math.inf) * PERIOD_S, np.zeros(3)
+        self._frame, self.posture, self.end_s = known_frame(request.se2_frame_name, FLAT_FRAMES), posture, end_s
+        self._limit, self._clearance = speed_limit(params), Clearance(params.obstacle_params)
         super().__init__()
 
     def begin(self, computer: Computer) -> None:
-        """Starts to drive."""
+        """Starts to drive, from the velocity that the robot has."""
+        self._now = self._turn(computer).T @ computer.snapshot.odometry.velocity
         self._stand(computer)
         self._drive(computer)
 
     def _drive(self, computer: Computer) -> None:
-        vx, vy, wz = self._velocity
-        turn_rad = _yaw(computer.snapshot.X_AB("body", self._frame))
-        ahead = math.cos(turn_rad) * vx - math.sin(turn_rad) * vy
-        aside = math.sin(turn_rad) * vx + math.cos(turn_rad) * vy
-        drive(computer, self._limit(np.array([ahead, aside, wz])), self.end_s)
+        self._now = self._now + np.clip(self._velocity - self._now, -self._step, self._step)
+        wanted = self._limit(self._turn(computer) @ self._now)
+        drive(computer, self._clearance.limit(computer, wanted), self.end_s)
+
+    def _turn(self, computer: Computer) -> FloatArray:
+        """Rotation (3, 3) of planar velocities from the command's frame to the body's."""
+        yaw_rad = Pose2D.from_transform(computer.snapshot.X_AB("body", self._frame)).yaw_rad
+        return RotationMatrix.MakeZRotation(yaw_rad).matrix()
 
 
 class Trajectory(_Driving):
@@ -236,7 +240,7 @@ class Trajectory(_Driving):
 
     def __init__(self, request: Any, params: Any, end_s: float, snapshot: Snapshot, posture: Held = None) -> None:
         """Takes the poses over into `odom`, in which they stay. Raises RefusedError or InvalidRequestError."""
-        field, X_OF = "se2_trajectory_request.trajectory", snapshot.X_AB("odom", known_frame(request.se2_frame_name))
+        field, X_OF = "se2_trajectory_request.trajectory", snapshot.X_OF(request.se2_frame_name, FLAT_FRAMES)
         poses = [Pose2D.from_transform(X_OF @ _planar(point.pose)) for point in points_of(request.trajectory, field)]
         self._times_s, self._goal = times_of(request.trajectory, snapshot.time_s, field), poses[-1]
         self._rows = np.array([[pose.x_m, pose.y_m, pose.yaw_rad] for pose in poses])
@@ -308,13 +312,13 @@ class Trajectory(_Driving):
         return Pose2D(*here.tolist()), np.array([c * vx + s * vy, c * vy - s * vx, wz])
 
 
-def way_to(goal_O: Pose2D, end_s: float, snapshot: Snapshot) -> Trajectory:
-    """Returns a motion straight to a pose in `odom`, until a robot time; it does not wait for obstacles."""
+def way_to(goal_O: Pose2D, end_s: float, snapshot: Snapshot, *, avoids: bool = True) -> Trajectory:
+    """Returns a motion straight to a pose in `odom`, until a robot time; it stops in front of obstacles or not."""
     request = basic_command_pb2.SE2TrajectoryCommand.Request(se2_frame_name="odom")
     params = spot_command_pb2.MobilityParams()
     goal = request.trajectory.points.add().pose
     goal.position.x, goal.position.y, goal.angle = goal_O.x_m, goal_O.y_m, goal_O.yaw_rad
-    params.obstacle_params.disable_vision_body_obstacle_avoidance = True
+    params.obstacle_params.disable_vision_body_obstacle_avoidance = not avoids
     return Trajectory(request, params, end_s, snapshot)
 
 
@@ -329,7 +333,7 @@ class Stance(BaseMotion):
         stance, field = request.stance, "stance_request.stance"
         if set(stance.foot_positions) != set(FEET_M):
             raise InvalidRequestError(f"{field}.foot_positions: {', '.join(FEET_M)} are needed")
-        pose_O = Pose2D.from_transform(snapshot.X_AB("odom", known_frame(stance.se2_frame_name)))
+        pose_O = Pose2D.from_transform(snapshot.X_OF(stance.se2_frame_name, FLAT_FRAMES))
         places = [stance.foot_positions[foot] for foot in FEET_M]
         wanted = np.array([[finite(p.x, field), finite(p.y, field)] for p in places])
         x, y = wanted.mean(axis=0)
@@ -383,15 +387,9 @@ def _planar(message: Any) -> RigidTransform:
     return Pose2D(x, y, finite(message.angle, "pose.angle")).transform()
 
 
-def _yaw(X_AB: RigidTransform) -> float:
-    return Pose2D.from_transform(X_AB).yaw_rad
-
-
-def known_frame(name: str) -> str:
-    """Returns the frame of a planar motion. Raises RefusedError."""
-    if name not in FLAT_FRAMES:
-        raise unknown_frame(name)
-    return name
+def _velocity(message: Any, field: str) -> FloatArray:
+    values = (("linear.x", message.linear.x), ("linear.y", message.linear.y), ("angular", message.angular))
+    return np.array([finite(value, f"{field}.{name}") for name, value in values])
 
 
 def mobility_params(request: Any) -> Any:
@@ -399,6 +397,7 @@ def mobility_params(request: Any) -> Any:
     params = spot_command_pb2.MobilityParams()
     if request.HasField("params") and not request.params.Unpack(params):
         raise InvalidRequestError(f"mobility_command.params is a {request.params.TypeName()}, not a MobilityParams")
+    check_values(params, "params")
     return params
 
 

@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from errand_spot.messages import InvalidRequestError, points_of, transform
 from errand_spot.server.computer import Computer, Snapshot
-from errand_spot.server.refusals import times_of, unknown_frame, unsupported
+from errand_spot.server.refusals import times_of, unsupported
 from skills.robot import FloatArray, Pose2D
 
 _SHIFT_M, _TWIST_RAD = 0.12, 0.5
@@ -38,10 +38,8 @@ class Posture:
             return
         trajectory, field, X_RN = control.base_offset_rt_footprint, f"body_control.{which}", self._poses[0]
         if which == "body_pose":
-            trajectory, frame, X_RN = control.body_pose.base_offset_rt_root, control.body_pose.root_frame_name, None
-            if frame not in snapshot.frames:
-                raise unknown_frame(frame)
-            self._X_OR = snapshot.X_AB("odom", frame)
+            trajectory, X_RN = control.body_pose.base_offset_rt_root, None
+            self._X_OR = snapshot.X_OF(control.body_pose.root_frame_name)
         if trajectory.points:
             self._times_s = times_of(trajectory, snapshot.time_s, field)
             poses = [transform(point.pose, field) for point in points_of(trajectory, field)]

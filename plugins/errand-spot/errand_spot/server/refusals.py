@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from itertools import pairwise
 from typing import Any, Final
 
@@ -26,9 +27,11 @@ def unsupported(command: str) -> RefusedError:
     return RefusedError(_Answer.STATUS_UNSUPPORTED, f"{command} is not simulated")
 
 
-def unknown_frame(name: str) -> RefusedError:
-    """Returns the error of a command in a frame that the robot does not know."""
-    return RefusedError(_Answer.STATUS_UNKNOWN_FRAME, f"frame {name!r} is unknown")
+def known_frame(name: str, frames: Container[str]) -> str:
+    """Returns a frame's name. Raises RefusedError for one that the robot does not know, or does not allow here."""
+    if name not in frames:
+        raise RefusedError(_Answer.STATUS_UNKNOWN_FRAME, f"frame {name!r} is unknown")
+    return name
 
 
 def end_of(message: Any, now_s: float, name: str) -> float:

@@ -18,7 +18,7 @@ from errand_spot.messages import finite, pose
 from errand_spot.server.computer import Computer
 from errand_spot.server.graph_map import GraphMap, Poses
 from errand_spot.server.mobility import drive, error_to, speed_limit
-from errand_spot.server.obstacles import seen_from
+from errand_spot.server.obstacles import Clearance
 from skills.robot import CommandId, FloatArray, Pose2D
 
 Feedback = graph_nav_pb2.NavigationFeedbackResponse
@@ -27,10 +27,6 @@ _NEXT_M: Final = 0.25
 _NEAR_M, _NEAR_RAD, _LEAST_M, _LEAST_RAD = 0.06, 0.06, 0.03, 0.04
 """Usual and least tolerances of distance and turn at the goal."""
 _GAIN_1_S, _TURN_FIRST_RAD = 1.5, 0.5
-_OUTLINE_M: Final = (0.6, 0.31)
-"""Half length and half width of the body, with a margin."""
-_BRAKING_S, _CLOSE_M = 0.7, 0.03
-"""Least time to a collision with an obstacle, and the distance at which the robot waits."""
 _STILL, _MOVED = 0.03, 0.05
 """Largest velocity (m/s, rad/s) of a standing robot, and the least motion (m plus rad) that counts."""
 STUCK_S: Final = 5.0
@@ -96,6 +92,7 @@ class FollowRoute:
         self.course, self.end_s = course, end_s
         self._graph, self._place, self._cause = graph, place, cause
         self.status: int = Feedback.STATUS_FOLLOWING_ROUTE
+        self._clearance = Clearance(robot_command_pb2.ObstacleParams())
         self._next, self._blocked, self._ko_tform_goal = 0, False, RigidTransform()
         self._standing: CommandId | None = None
         self._moved_s, self._moved_from = -math.inf, Pose2D(math.inf, 0.0, 0.0)
@@ -141,27 +138,14 @@ class FollowRoute:
             self.status = Feedback.STATUS_REACHED_GOAL if still else self.status
             return
         velocity = self.course.limit(_velocity(error, last=last))
-        speed, free_m = float(np.hypot(velocity[0], velocity[1])), self._free_m(computer, velocity)
-        self._blocked = speed > 0.0 and free_m < _CLOSE_M
-        velocity[:2] *= 0.0 if self._blocked else min(1.0, free_m / _BRAKING_S / max(speed, 1e-6))
-        drive(computer, velocity, self.end_s)
+        cleared = self._clearance.limit(computer, velocity)
+        self._blocked = bool(np.any(velocity) and not np.any(cleared))
+        drive(computer, cleared, self.end_s)
         moved = error_to(self._moved_from, here)
         if not math.hypot(moved[0], moved[1]) + abs(moved[2]) < _MOVED:
             self._moved_s, self._moved_from = computer.clock.now(), here
         elif computer.clock.now() - self._moved_s > self.course.wait_s:
             self.status = Feedback.STATUS_STUCK
-
-    def _free_m(self, computer: Computer, velocity: FloatArray) -> float:
-        """Free distance of the body in the direction of a velocity, by the obstacles of the last scan."""
-        speed = float(np.hypot(velocity[0], velocity[1]))
-        if speed == 0.0:
-            return math.inf
-        points = seen_from(computer.snapshot.odometry.pose, computer.scan_points.points_O)
-        points = points[(np.abs(points) > _OUTLINE_M).any(axis=1)]  # not the robot itself
-        direction = velocity[:2] / speed
-        along, across = points @ direction, points @ np.array([-direction[1], direction[0]])
-        ahead = along[(along > 0.0) & (np.abs(across) < _OUTLINE_M[1])]
-        return max(0.0, float(ahead.min(initial=math.inf)) - _OUTLINE_M[0])
 
     def feedback(self, number: int) -> Any:
         """The message of how far the robot has come."""

@@ -44,34 +44,7 @@ LISTED: Final[Mapping[str, str]] = {
     "spot-check": "bosdyn.api.spot.SpotCheckService",
 }
 """Services of a real Spot in the directory that answer UNIMPLEMENTED."""
-SERVICES: Final[tuple[type[Service], ...]] = (
-    identity.AuthService,
-    identity.RobotIdService,
-    identity.DirectoryService,
-    identity.DirectoryRegistrationService,
-    identity.LicenseService,
-    identity.TimeSyncService,
-    EstopService,
-    LeaseService,
-    KeepaliveService,
-    PowerService,
-    RobotCommandService,
-    state.RobotStateService,
-    pictures.ImageService,
-    pictures.GripperCameraParamService,
-    pictures.PointCloudService,
-    pictures.LocalGridService,
-    rays.RayCastService,
-    manipulation.ManipulationService,
-    docking.DockingService,
-    state.InverseKinematicsService,
-    state.WorldObjectService,
-    state.FaultService,
-    state.PayloadService,
-    state.DataBufferService,
-    state.LogStatusService,
-    GraphNavService,
-)
+SERVICES: Final = tuple(sorted(Service.__subclasses__(), key=lambda service: service.name))
 """Services that are served."""
 MOTIONS: Final = (
     "stand with height, pitch, turn and shift, sit, velocity, trajectory, follow arm, stance, stop, freeze, safe power "

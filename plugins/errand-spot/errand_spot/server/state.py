@@ -42,7 +42,7 @@ from errand_spot.server.obstacles import Region, region_of
 from skills.robot import Mount, NoImageError
 
 RUNTIME_S: Final = 5400.0
-_LOOK_S, _PICTURES_S = 0.5, 5.0
+_LOOK_S, _PICTURES_S, _LOW_M = 0.5, 5.0, 0.05
 _FIRST_TAG: Final = 1_000_000
 """Id of the object of tag 0; those of clients' objects are smaller."""
 _Kinds = world_object_pb2.WorldObjectType
@@ -76,7 +76,8 @@ class RobotStateService(Service):
             state.system_fault_state.faults.add(name=fault, uid=number, error_message=fault).onset_timestamp.CopyFrom(
                 stamp
             )
-        state.behavior_fault_state.SetInParent()
+        state.behavior_fault_state.faults.extend([] if self._computer.fault is None else [self._computer.fault])
+        state.behavior_state.state = self._behaviour(snapshot)
         state.service_fault_state.SetInParent()
         state.service_fault_state.faults.extend(self._service_faults())
         state.terrain_state.SetInParent()
@@ -85,6 +86,17 @@ class RobotStateService(Service):
         if self._computer.capabilities.gripper is not None:
             self._manipulator(state, snapshot)
         return made
+
+    def _behaviour(self, snapshot: Snapshot) -> int:
+        """State of the body: a robot that cannot move, or sits, is not ready."""
+        State, computer = robot_state_pb2.BehaviorState, self._computer
+        low = snapshot.odometry.X_OB.translation()[2] < computer.capabilities.height_range_m[0] - _LOW_M
+        if not computer.able or (computer.sits and snapshot.sitting):
+            return int(State.STATE_NOT_READY)
+        if computer.sits or low:
+            return int(State.STATE_TRANSITION)
+        steps = computer.feet_O is None and computer.base_moves(shifted=True)
+        return int(State.STATE_STEPPING if steps else State.STATE_STANDING)
 
     def GetRobotMetrics(self, _request: Any, _call: Call) -> Any:
         """Returns the time that the robot has been on."""
@@ -360,6 +372,11 @@ class PayloadService(Service):
         return payload_pb2.ListPayloadsResponse()
 
 
+def _discarding(Response: Any) -> Callable[[Any, Any, Call], Any]:
+    """Returns a call that takes a client's data and keeps none of them."""
+    return lambda _service, _request, _call: Response()
+
+
 class DataBufferService(Service):
     """Accepts and discards the logs of clients."""
 
@@ -368,25 +385,11 @@ class DataBufferService(Service):
     def __init__(self) -> None:
         self._ids = count(1)
 
-    def RecordTextMessages(self, _request: Any, _call: Call) -> Any:
-        """Takes text messages."""
-        return data_buffer_pb2.RecordTextMessagesResponse()
-
-    def RecordOperatorComments(self, _request: Any, _call: Call) -> Any:
-        """Takes comments of the operator."""
-        return data_buffer_pb2.RecordOperatorCommentsResponse()
-
-    def RecordDataBlobs(self, _request: Any, _call: Call) -> Any:
-        """Takes data."""
-        return data_buffer_pb2.RecordDataBlobsResponse()
-
-    def RecordEvents(self, _request: Any, _call: Call) -> Any:
-        """Takes events."""
-        return data_buffer_pb2.RecordEventsResponse()
-
-    def RecordSignalTicks(self, _request: Any, _call: Call) -> Any:
-        """Takes values of signals."""
-        return data_buffer_pb2.RecordSignalTicksResponse()
+    RecordTextMessages = _discarding(data_buffer_pb2.RecordTextMessagesResponse)
+    RecordOperatorComments = _discarding(data_buffer_pb2.RecordOperatorCommentsResponse)
+    RecordDataBlobs = _discarding(data_buffer_pb2.RecordDataBlobsResponse)
+    RecordEvents = _discarding(data_buffer_pb2.RecordEventsResponse)
+    RecordSignalTicks = _discarding(data_buffer_pb2.RecordSignalTicksResponse)
 
     def RegisterSignalSchema(self, _request: Any, _call: Call) -> Any:
         """Gives a schema its number."""

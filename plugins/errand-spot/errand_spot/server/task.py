@@ -78,7 +78,7 @@ def walk(computer: Computer, goal_O: Pose2D) -> Generator[None, None, bool]:
     pose = computer.snapshot.odometry.pose
     far_m = math.hypot(goal_O.x_m - pose.x_m, goal_O.y_m - pose.y_m)
     end_s = computer.now_s() + _LEAST_WALK_S + _WALK_S_PER_M * far_m
-    motion = way_to(goal_O, end_s, computer.snapshot)
+    motion = way_to(goal_O, end_s, computer.snapshot, avoids=False)
     motion.begin(computer)
     while motion.status == Status.STATUS_PROCESSING:
         yield

@@ -7,6 +7,7 @@ import bosdyn.client.robot_command as rc
 import numpy as np
 import pytest
 from bosdyn.api import arm_command_pb2, basic_command_pb2, gripper_command_pb2, power_pb2, robot_command_pb2
+from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 from bosdyn.client.exceptions import InvalidRequestError
 from bosdyn.client.frame_helpers import get_a_tform_b, get_odom_tform_body
 from bosdyn.client.math_helpers import SE3Pose
@@ -208,6 +209,56 @@ def test_a_command_that_cannot_be_done_says_why_and_moves_nothing(spot, ahead_s,
 
 
 Status = robot_command_pb2.RobotCommandResponse
+
+
+@pytest.mark.parametrize(*table(__file__, "ranges"))
+def test_a_goal_out_of_a_joints_range_is_refused_and_moves_nothing(spot, joint, angle):
+    command = Build.claw_gripper_open_angle_command(angle)
+    if joint != "f1x":
+        command = robot_command_pb2.RobotCommand()
+        points = command.synchronized_command.arm_command.arm_joint_move_command.trajectory.points
+        getattr(points.add().position, joint).value = angle
+    before = spot.served.scripted.q_rad.copy()
+    with pytest.raises(rc.InvalidRequestError) as refused:
+        spot.commands.robot_command(command)
+    assert ("trajectory.point" if joint == "f1x" else f"position.{joint}") in refused.value.response.message
+    time.sleep(0.3)
+    assert spot.served.scripted.q_rad == pytest.approx(before, abs=1e-6)
+
+
+def test_a_goal_at_the_end_of_a_joints_range_is_reached(spot):
+    ready(spot)
+    most = spot.served.server.computer.solver.upper_rad[5]
+    command = Build.arm_joint_command(0.0, -0.9, 1.8, 0.0, -0.9, most + 0.01)
+    block(spot, spot.commands.robot_command(command))
+    assert spot.served.scripted.q_rad[5] == pytest.approx(most, abs=0.03)
+
+
+@pytest.mark.parametrize(*table(__file__, "options"))
+def test_an_option_that_the_api_lacks_is_refused(spot, path, option, said):
+    command = Build.synchro_se2_trajectory_point_command(0.3, 0.0, 0.0, "odom")
+    params, given = spot_command_pb2.MobilityParams(), command.synchronized_command
+    for name in path.split("."):
+        given = params if name == "params" else getattr(given, name)
+    setattr(given, option, 99)
+    command.synchronized_command.mobility_command.params.Pack(params)
+    with pytest.raises(rc.InvalidRequestError) as refused:
+        sent(spot, command)
+    assert said in refused.value.response.message and "99" in refused.value.response.message
+
+
+def test_a_velocity_changes_no_faster_than_its_slew_rate(spot):
+    command = Build.synchro_velocity_command(0.6, 0.0, 0.5)
+    limit = command.synchronized_command.mobility_command.se2_velocity_request.slew_rate_limit
+    limit.linear.x = 0.3  # the turn has no limit
+    sent(spot, command, ahead_s=3.0)
+    seen = []
+    for _ in range(20):
+        time.sleep(0.1)
+        seen.append(spot.served.scripted.velocity)
+    ahead, _, turn = np.array(seen).T
+    assert ahead[9] == pytest.approx(0.3, abs=0.03) and ahead[-1] == pytest.approx(0.6, abs=0.02)
+    assert np.diff(ahead).max() < 0.04 and turn[4] == pytest.approx(0.5, abs=0.01)
 
 
 def test_feedback_of_an_unknown_command_is_an_invalid_request(spot):

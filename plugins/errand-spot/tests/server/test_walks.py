@@ -114,6 +114,9 @@ def params(**obstacles):
     return spot_command_pb2.MobilityParams(obstacle_params=spot_command_pb2.ObstacleParams(**obstacles))
 
 
+OFF = {"disable_vision_body_obstacle_avoidance": True}
+
+
 # obstacle parameters -> where a walk to 3 m ahead ends
 @pytest.mark.parametrize(
     ("given", "x_m"),
@@ -122,6 +125,36 @@ def params(**obstacles):
 def test_obstacle_parameters_set_the_distance_from_obstacles_or_switch_avoidance_off(spot, given, x_m):
     walked(spot, sent(spot, path([(3.0, 0.0, 0.0)], params=params(**given))))
     assert spot.served.scripted.pose.x_m == pytest.approx(x_m, abs=0.1)
+
+
+# obstacle parameters -> how far a velocity of 0.5 m/s for 5 s drives towards the wall, and the padding that it keeps
+@pytest.mark.parametrize(
+    ("given", "x_m"), [({}, 1.1), ({"obstacle_avoidance_padding": 0.4}, 0.74), (OFF, 2.5)], ids=["usual", "wide", "off"]
+)
+def test_a_velocity_stops_before_an_obstacle_unless_avoidance_is_off(spot, given, x_m):
+    sent(spot, Build.synchro_velocity_command(0.5, 0.0, 0.0, params=params(**given)), ahead_s=5.0)
+    time.sleep(5.5)
+    assert spot.served.scripted.pose.x_m == pytest.approx(x_m, abs=0.1)
+
+
+def test_a_velocity_stops_before_a_no_go_region_and_leaves_it_backwards(spot):
+    mutate(spot, action=Mutation.ACTION_ADD, object=region())
+    sent(spot, Build.synchro_velocity_command(0.3, 0.0, 0.0), ahead_s=3.0)
+    time.sleep(3.2)
+    stopped_m = spot.served.scripted.pose.x_m
+    assert 0.1 < stopped_m < 0.8 - 0.55
+    sent(spot, Build.synchro_velocity_command(-0.3, 0.0, 0.0), ahead_s=1.0)
+    time.sleep(1.2)
+    assert spot.served.scripted.pose.x_m == pytest.approx(stopped_m - 0.3, abs=0.08)
+
+
+def test_a_body_that_follows_the_hand_stops_before_an_obstacle(spot):
+    goal = Build.arm_pose_command(3.0, 0.0, 0.8, 1.0, 0.0, 0.0, 0.0, "odom", 1.0)
+    number = sent(spot, Build.build_synchro_command(Build.follow_arm_command(), goal))
+    time.sleep(12.0)
+    told = spot.commands.robot_command_feedback(number).feedback.synchronized_feedback.arm_command_feedback
+    assert spot.served.scripted.pose.x_m < 1.7 - 0.55
+    assert told.arm_cartesian_feedback.status == told.arm_cartesian_feedback.STATUS_TRAJECTORY_STALLED
 
 
 @pytest.mark.parametrize("padding", [-0.1, float("nan")])

@@ -1,0 +1,145 @@
+"""Behaviour state, and the fault of a robot that falls.
+
+motors off, fallen, or sitting      STATE_NOT_READY
+sits down, stands up                STATE_TRANSITION
+stands, also with a turned body     STATE_STANDING
+walks                               STATE_STEPPING
+power cut from standing             sinks to the floor; no motion until a client clears the fault of the fall
+"""
+
+import time
+
+import bosdyn.client.robot_command as rc
+import pytest
+from bosdyn.api import estop_pb2, manipulation_api_pb2, robot_command_pb2, robot_state_pb2
+from bosdyn.client.docking import blocking_undock
+from bosdyn.client.exceptions import InvalidRequestError, ResponseError
+from bosdyn.client.robot_command import RobotCommandBuilder as Build
+from bosdyn.geometry import EulerZXY
+
+from errand_spot.server.computer import Pace
+from errand_spot.server.graph_nav import _impaired
+
+PACE = Pace.CLIENT
+Fault = robot_state_pb2.BehaviorFault
+Clear = robot_command_pb2.ClearBehaviorFaultResponse
+
+
+def state(spot):
+    told = spot.states.get_robot_state().behavior_state.state
+    return robot_state_pb2.BehaviorState.State.Name(told).removeprefix("STATE_")
+
+
+def faults(spot):
+    return list(spot.states.get_robot_state().behavior_fault_state.faults)
+
+
+def power_off(spot, *, cut):
+    spot.robot.power_off(cut_immediately=cut, timeout_sec=10, update_frequency=20.0)
+
+
+def power_on(spot):
+    spot.robot.power_on(timeout_sec=10, update_frequency=20.0)
+
+
+def sent(spot, command, ahead_s=5.0):
+    return spot.commands.robot_command(command, end_time_secs=time.time() + ahead_s)
+
+
+def fallen(spot):
+    """Cuts the power of the standing robot, and switches it on again when the robot lies on the floor."""
+    power_off(spot, cut=True)
+    time.sleep(3.0)
+    power_on(spot)
+
+
+def test_the_behaviour_state_follows_the_body(spot):
+    assert state(spot) == "STANDING"
+    sent(spot, Build.synchro_velocity_command(0.3, 0.0, 0.0), ahead_s=1.0)
+    time.sleep(0.5)
+    assert state(spot) == "STEPPING"
+    time.sleep(1.5)
+    assert state(spot) == "STANDING"
+    sent(spot, Build.synchro_sit_command())
+    time.sleep(0.2)
+    assert state(spot) == "TRANSITION"
+    time.sleep(4.0)
+    assert state(spot) == "NOT_READY"
+    sent(spot, Build.synchro_stand_command())
+    time.sleep(0.2)
+    assert state(spot) == "TRANSITION"
+    time.sleep(4.0)
+    assert state(spot) == "STANDING"
+
+
+def test_a_body_that_turns_over_its_feet_does_not_step(spot):
+    sent(spot, Build.synchro_stand_command(params=Build.mobility_params(footprint_R_body=EulerZXY(yaw=0.4))))
+    seen = set()
+    for _ in range(20):
+        time.sleep(0.1)
+        seen.add(state(spot))
+    assert seen == {"STANDING"} and spot.served.scripted.pose.yaw_rad == pytest.approx(0.4, abs=0.03)
+
+
+def test_a_cut_from_standing_lets_the_robot_fall_and_leaves_a_fault(spot):
+    before = time.time()
+    power_off(spot, cut=True)
+    (fault,) = faults(spot)
+    assert (fault.cause, fault.status) == (Fault.CAUSE_FALL, Fault.STATUS_CLEARABLE)
+    assert before <= fault.onset_timestamp.seconds + 1e-9 * fault.onset_timestamp.nanos <= time.time()
+    time.sleep(3.0)
+    assert spot.served.scripted.height_m < 0.3
+    power_on(spot)
+    assert state(spot) == "NOT_READY"
+
+
+def test_a_robot_that_has_fallen_moves_only_after_a_client_clears_the_fault(spot):
+    fallen(spot)
+    for command in (Build.synchro_stand_command(), Build.synchro_velocity_command(0.2, 0.0, 0.0)):
+        with pytest.raises(rc.BehaviorFaultError):
+            sent(spot, command)
+    assert spot.served.scripted.height_m < 0.3
+    assert spot.commands.clear_behavior_fault(faults(spot)[0].behavior_fault_id)
+    assert not faults(spot)
+    rc.blocking_stand(spot.commands, timeout_sec=5.0, update_frequency=5.0)
+    assert (state(spot), spot.served.scripted.height_m) == ("STANDING", pytest.approx(0.52, abs=0.01))
+
+
+def test_a_robot_that_has_fallen_does_not_dock_pick_or_navigate(spot):
+    fallen(spot)
+    spot.served.server.computer.dock_O = spot.served.scripted.pose
+    with pytest.raises(ResponseError) as refused:
+        blocking_undock(spot.robot)
+    assert refused.value.response.status == refused.value.response.STATUS_ERROR_NOT_AVAILABLE
+    client = spot.robot.ensure_client("manipulation")
+    request = {"walk_to_object_ray_in_world": {"frame_name": "odom", "ray_end_rt_frame": {"x": 1.0}}}
+    with pytest.raises(InvalidRequestError, match="has fallen"):
+        client.manipulation_api_command(manipulation_api_pb2.ManipulationApiRequest(**request))
+    impaired = _impaired(spot.served.server.computer)
+    assert impaired.impaired_status == impaired.IMPAIRED_STATUS_BEHAVIOR_FAULT and len(impaired.behavior_faults) == 1
+
+
+def test_only_the_fault_that_there_is_can_be_cleared_and_only_by_the_lease_holder(spot):
+    for number, before in ((1, lambda: None), (1, lambda: power_off(spot, cut=True)), (2, lambda: time.sleep(3.0))):
+        before()  # there is no fault, the robot still falls, the fault has another number
+        with pytest.raises(rc.NotClearedError):
+            spot.commands.clear_behavior_fault(number)
+    request = robot_command_pb2.ClearBehaviorFaultRequest(behavior_fault_id=1)
+    request.header.client_name = "test"
+    assert spot.commands._stub.ClearBehaviorFault(request).status == Clear.STATUS_NOT_CLEARED
+    assert [fault.behavior_fault_id for fault in faults(spot)] == [1]
+    assert spot.commands.clear_behavior_fault(1)
+
+
+def test_a_robot_that_sits_or_settles_first_does_not_fall(spot):
+    power_off(spot, cut=False)
+    assert not faults(spot)
+    power_on(spot)
+    power_off(spot, cut=True)
+    assert not faults(spot)
+
+
+def test_an_estop_that_cuts_the_power_lets_the_robot_fall(spot):
+    spot.served.server.computer.estop._held["tablet"].level = estop_pb2.ESTOP_LEVEL_CUT
+    time.sleep(0.2)
+    assert [fault.cause for fault in faults(spot)] == [Fault.CAUSE_FALL]

@@ -155,11 +155,10 @@ class Session(RunRobot):
         except BaseException:
             self._guarded.give_lease_back()
             raise
-        self._after, self._real = entry.after, entry.real
+        self._after, self._real, self._held, self._lost_because = entry.after, entry.real, False, ""
         self._paused_because: str | None = None
         self._control, self._visitors = shared.control, shared.visitors
         self._given_up: tuple[TreeRun, ...] = ()
-        self._held = False
         self._lost_since_s: float | None = None
         self._preempting: tuple[RobotResult, ...] = ()
         self._later: tuple[CompiledTree, ...] = ()
@@ -247,7 +246,7 @@ class Session(RunRobot):
             return True
         resumed = self._lost_since_s is not None and self._control.pause_reason is None
         if self._lost_since_s is None:
-            self._lost_since_s = now_s
+            self._lost_since_s, self._lost_because = now_s, lost
             self._top.suspend()
             if not self._real:
                 self._control.note_lease(self.name, lost)
@@ -283,7 +282,8 @@ class Session(RunRobot):
             self._paused_because = why
             self._control.pause(why)
         if not self._control.attended and for_s > LEASE_PATIENCE_S:
-            self.gone = f"{why}; nobody resumed the mission within {LEASE_PATIENCE_S:g} s"
+            reasons = "; ".join(dict.fromkeys((self._lost_because, why)))
+            self.gone = f"{reasons}; nobody resumed the mission within {LEASE_PATIENCE_S:g} s"
             self.close(Ending(Outcome.FAILURE, Cause.EXECUTION, self.gone))
         return True
 

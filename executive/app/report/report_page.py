@@ -261,7 +261,7 @@ def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
         ("world", f"{report.world}, seed {report.seed}"),
         ("duration", report.duration_text),
         *((("zones", "; ".join(report.zones)),) if report.zones else ()),
-        *(("sensors", note) for note in report.notes),
+        *(("robot", note) for note in report.notes),
     )
     if not robot_name:
         return facts

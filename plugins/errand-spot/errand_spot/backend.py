@@ -58,7 +58,8 @@ class Spot:
     def connect(self, address: str, name: str) -> Iterator[ConnectedRobot]:
         """Connects to a Spot, checks it and gets its lease. Raises InputError."""
         with connected(name, self.access(address)) as made:
-            yield ConnectedRobot(made.robot, made.clock, made.make_ready, tuple(made.robot.sensors.notes))
+            who = f"Spot at spot://{address}, serial number {made.connection.identity.serial_number}."
+            yield ConnectedRobot(made.robot, made.clock, made.make_ready, (who, *made.robot.sensors.notes))
 
     def access(self, address: str) -> Access:
         """Returns the access to the robot; asks for what is missing at a terminal. Raises InputError."""

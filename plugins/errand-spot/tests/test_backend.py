@@ -22,7 +22,7 @@ from lock_step import PASSWORD, USER, scripted_spot
 from errand_spot import backend as real_spot
 from errand_spot.adapter import heartbeat
 from errand_spot.adapter.connection import CALL_S, Address, Connection
-from errand_spot.backend import Access, connected
+from errand_spot.backend import Access, Spot, connected
 from errand_spot.server import computer, identity, keepalive
 from errand_spot.server.computer import Motors
 from errand_spot.server.estop import Tablet
@@ -217,6 +217,29 @@ def test_the_robot_does_not_act_alone_while_another_client_moves_it(serve):
         assert in_time(made.clock, lambda: len(policies(serve)) == 1)
         (live,) = policies(serve).values()
         assert live.policy.actions[0].lease_stale.leases[0] == made.connection.lease
+
+
+def test_a_lease_that_another_client_takes_is_a_warning_at_once_and_only_one(serve, caplog):
+    with ready(serve) as made:
+        other = other_client(serve)
+        other.acquire(take=True)
+        assert in_time(made.clock, lambda: made.robot.lease_holder() is not None)
+        assert [record.getMessage() for record in caplog.records if record.levelname == "WARNING"] == [
+            "Alice: errand has taken the lease; the mission waits"
+        ]
+        holder = made.robot.lease_holder().holder
+        other.give_back()
+        beat(made, 4)
+        assert holder == "errand"
+        assert in_time(made.clock, lambda: made.robot.lease_holder() is None)
+    assert len([record for record in caplog.records if record.levelname == "WARNING"]) == 1
+
+
+def test_the_report_has_the_robots_address_and_serial_number(serve, monkeypatch):
+    monkeypatch.setenv("BOSDYN_CLIENT_PASSWORD", PASSWORD)
+    place = f"127.0.0.1:{serve.access.address.port}"
+    with Spot(user=USER, certificate=serve.access.address.certificate).connect(place, "Alice") as made:
+        assert made.notes == (f"Spot at spot://{place}, serial number {identity.SERIAL}.",)
 
 
 def in_time(clock, true):

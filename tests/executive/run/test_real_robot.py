@@ -88,3 +88,9 @@ def test_a_mission_that_nobody_can_resume_ends_with_a_cause(go, robot, script, t
     result, _ = go({4: begin}, control=Control(pace=None))
     assert (result.outcome, result.worst.cause) == (Outcome.FAILURE, Cause.EXECUTION)
     assert result.worst.message == f"{trouble}; nobody resumed the mission within 60 s"
+
+
+def test_a_mission_whose_lease_was_taken_and_given_back_names_the_taker_at_its_end(go, control, robot, script):
+    script.steps = 30
+    result, _ = go({4: lambda: taken(robot), 20: lambda: freed(robot)}, control=Control(pace=None))
+    assert result.worst.message == f"{TAKEN}; {FREE}; nobody resumed the mission within 60 s"

@@ -12,7 +12,7 @@ from typing import Any, Final, Protocol
 
 import bosdyn.client
 import grpc
-from bosdyn.api import estop_pb2, lease_pb2, power_pb2, robot_command_pb2, robot_id_pb2, robot_state_pb2, time_sync_pb2
+from bosdyn.api import estop_pb2, lease_pb2, power_pb2, robot_command_pb2, robot_state_pb2, time_sync_pb2
 from bosdyn.api.docking import docking_pb2
 from bosdyn.api.spot import door_pb2
 
@@ -27,7 +27,7 @@ SLOW_S: Final = 5.0
 """Timeouts of a call, and of the first calls, before the robot moves."""
 _ROUND_TRIPS: Final = 5
 _FILES: Final[Mapping[str, str]] = {
-    **{name: name.replace("-", "_") for name in ("estop", "image", "lease", "power", "robot-command", "robot-id")},
+    **{name: name.replace("-", "_") for name in ("estop", "image", "lease", "power", "robot-command")},
     **{name: name.replace("-", "_") for name in ("robot-state", "time-sync", "gripper-camera-param")},
     **{
         "docking": "docking.docking",
@@ -71,6 +71,7 @@ class Connection:
         try:
             self._robot.authenticate(user, password, timeout=SLOW_S)
             services = {entry.name: entry.type for entry in self._robot.list_services()}
+            self.identity = self._robot.ensure_client("robot-id").get_id(timeout=SLOW_S)
         except bosdyn.client.auth.InvalidLoginError as error:
             hint = "check --user, and the password that was typed or stands in BOSDYN_CLIENT_PASSWORD"
             raise InputError(f"{where}: the robot refuses user '{user}' with this password", hint=hint) from error
@@ -108,9 +109,8 @@ class Connection:
         return answer
 
     def software_version(self) -> tuple[int, int, int]:
-        """Returns the version of the robot's software. Raises LostError."""
-        answer = self.call("robot-id", "GetRobotId", robot_id_pb2.RobotIdRequest())
-        version = answer.robot_id.software_release.version
+        """Returns the version of the robot's software."""
+        version = self.identity.software_release.version
         return version.major_version, version.minor_version, version.patch_level
 
     # -- clock -------------------------------------------------------------------------------------------------------

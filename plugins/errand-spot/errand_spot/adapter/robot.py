@@ -6,6 +6,7 @@ begins with the connection.
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Iterable
@@ -43,6 +44,7 @@ from skills.robot import (
     Scan,
 )
 
+_LOG: Final = logging.getLogger(__name__)
 DRIVE_EXPIRY_S: Final = 0.6
 SILENT_S, GONE_S = 3.0, 15.0
 OLD_CLOCK_S: Final = 30.0
@@ -430,8 +432,11 @@ class ApiRobot:
         return self._refused(f"{what}: {error}", error.cause)
 
     def _lose(self, holder: str) -> None:
-        """Notes that another client has the lease; does not take it back."""
+        """Notes that another client has the lease, and warns at once; does not take it back."""
+        if self._connection.lease is not None:
+            _LOG.warning("%s: %s has taken the lease; the mission waits", self._name, holder or "another client")
         self._current, self._connection.lease, self._taken_by = None, None, holder
+        self._looked_s = time.monotonic()
 
     def _refused(self, reason: str, cause: CommandCause) -> CommandId:
         return self._sent.note(CommandState.REFUSED, reason, cause)

@@ -7,6 +7,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 from threading import Lock
 from typing import Any, Final
@@ -250,58 +251,39 @@ def _leaves_dock(command: Any) -> bool:
 
 def _base_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: float) -> mobility.BaseMotion:
     """Motion of the base."""
-    params, which = mobility.mobility_params(request), request.WhichOneof("command")
-    posture = Posture(params, computer, snapshot)
-
-    def velocity() -> mobility.BaseMotion:
-        given = request.se2_velocity_request
-        end_s = end_of(given, now_s, "se2_velocity_request")
-        return mobility.Velocity(given, params, end_s, posture.walking())
-
-    def trajectory() -> mobility.BaseMotion:
-        given = request.se2_trajectory_request
-        end_s = end_of(given, now_s, "se2_trajectory_request")
-        return mobility.Trajectory(given, params, end_s, snapshot, posture.walking())
-
-    def stance() -> mobility.BaseMotion:
-        end_s = end_of(request.stance_request, now_s, "stance_request")
-        return mobility.Stance(request.stance_request, end_s, snapshot)
-
+    params, which = mobility.mobility_params(request), request.WhichOneof("command") or "no command"
+    posture, given = Posture(params, computer, snapshot), getattr(request, which, None)
+    end = partial(end_of, given, now_s, which)
     made: dict[str, Callable[[], mobility.BaseMotion]] = {
         "stand_request": lambda: mobility.Stand(posture),
         "sit_request": mobility.Sit,
-        "se2_velocity_request": velocity,
-        "se2_trajectory_request": trajectory,
-        "stance_request": stance,
-        "follow_arm_request": lambda: hand.FollowArm(request.follow_arm_request),
+        "se2_velocity_request": lambda: mobility.Velocity(given, params, end(), posture.walking()),
+        "se2_trajectory_request": lambda: mobility.Trajectory(given, params, end(), snapshot, posture.walking()),
+        "stance_request": lambda: mobility.Stance(given, end(), snapshot),
+        "follow_arm_request": lambda: hand.FollowArm(given),
         "stop_request": lambda: mobility.Halt("stop_feedback"),
         "freeze_request": lambda: mobility.Halt("freeze_feedback"),
     }
     if which not in made:
-        raise unsupported(f"mobility_command: {which or 'no command'}")
+        raise unsupported(f"mobility_command: {which}")
     return made[which]()
 
 
 def _arm_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: float) -> arm.ArmMotion:
     """Motion of the arm."""
-    which = request.WhichOneof("command")
-
-    def velocity() -> arm.ArmMotion:
-        given = request.arm_velocity_command
-        return hand.Moving(given, snapshot, end_of(given, now_s, "arm_velocity_command"))
-
+    which = request.WhichOneof("command") or "no command"
+    given, now_rad, solver = getattr(request, which, None), computer.arm_rad(snapshot.joints), computer.solver
+    assert solver is not None
     made: dict[str, Callable[[], arm.ArmMotion]] = {
-        "arm_joint_move_command": lambda: arm.JointMove(
-            request.arm_joint_move_command, computer.arm_rad(snapshot.joints), now_s, computer.solver
-        ),
-        "named_arm_position_command": lambda: arm.Named(request.named_arm_position_command),
-        "arm_cartesian_command": lambda: hand.Cartesian(request.arm_cartesian_command, snapshot, now_s),
-        "arm_gaze_command": lambda: hand.Gaze(request.arm_gaze_command, snapshot),
-        "arm_velocity_command": velocity,
+        "arm_joint_move_command": lambda: arm.JointMove(given, now_rad, now_s, solver),
+        "named_arm_position_command": lambda: arm.Named(given),
+        "arm_cartesian_command": lambda: hand.Cartesian(given, snapshot, now_s),
+        "arm_gaze_command": lambda: hand.Gaze(given, snapshot),
+        "arm_velocity_command": lambda: hand.Moving(given, snapshot, end_of(given, now_s, which)),
         "arm_stop_command": arm.ArmHalt,
     }
     if which not in made:
-        raise unsupported(f"arm_command: {which or 'no command'}")
+        raise unsupported(f"arm_command: {which}")
     return made[which]()
 
 

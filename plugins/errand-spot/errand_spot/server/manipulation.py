@@ -215,10 +215,7 @@ def _allows(params: Any, snapshot: Snapshot) -> Allows:
     """Returns the test of a grasp's rotation by the parameters. Raises InvalidRequestError."""
     if params.position_constraint == Api.GRASP_POSITION_CONSTRAINT_FIXED_AT_USER_POSITION:
         raise InvalidRequestError("grasp_params.position_constraint: a fixed position is not simulated")
-    frame, tests = params.grasp_params_frame_name or "odom", list[Allows]()
-    if frame not in snapshot.frames:
-        raise InvalidRequestError(f"grasp_params.grasp_params_frame_name: {frame!r} is unknown")
-    R_OF = snapshot.X_AB("odom", frame).rotation()
+    R_OF, tests = _frame(params.grasp_params_frame_name or "odom", snapshot).rotation(), list[Allows]()
     for each in params.allowable_orientation:
         which = each.WhichOneof("constraint")
         if which == "rotation_with_tolerance":

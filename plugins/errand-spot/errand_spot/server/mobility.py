@@ -229,7 +229,7 @@ class Velocity(_Driving):
     def _turn(self, computer: Computer) -> FloatArray:
         """Rotation (3, 3) of planar velocities from the command's frame to the body's."""
         yaw_rad = Pose2D.from_transform(computer.snapshot.X_AB("body", self._frame)).yaw_rad
-        return RotationMatrix.MakeZRotation(yaw_rad).matrix()
+        return np.asarray(RotationMatrix.MakeZRotation(yaw_rad).matrix())
 
 
 class Trajectory(_Driving):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 from scipy.ndimage import distance_transform_edt
 
-from errand_spot.messages import InvalidRequestError, depth_frame, frame_tree, picture_frame, timestamp
+from errand_spot.messages import check_values, depth_frame, frame_tree, picture_frame, timestamp
 from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer, Snapshot
 from errand_spot.server.identity import DOMAIN
@@ -321,8 +321,7 @@ class GripperCameraParamService(Service):
 
     def SetParams(self, request: Any, _call: Call) -> Any:
         """Changes the given parameters. Raises InvalidRequestError for an unknown mode."""
-        if request.params.camera_mode not in request.params.CameraMode.values():
-            raise InvalidRequestError("params.camera_mode is unknown")
+        check_values(request)
         changed = gripper_camera_param_pb2.GripperCameraParams()
         changed.CopyFrom(self._params)
         changed.MergeFrom(request.params)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -137,7 +136,7 @@ class RobotCommandService(Service):
     def __init__(self, computer: Computer, leases: LeaseService, clocks: TimeSyncService) -> None:
         self._computer, self._leases, self._clocks = computer, leases, clocks
         self._ids, self._lock = count(1), Lock()
-        self._commands: OrderedDict[int, _Commanded] = OrderedDict()
+        self._commands: dict[int, _Commanded] = {}
 
     def RobotCommand(self, request: Any, _call: Call) -> Any:
         """Starts a command; commands for other parts go on."""
@@ -192,8 +191,7 @@ class RobotCommandService(Service):
         with self._lock:
             number = next(self._ids)
             self._commands[number] = commanded
-            while len(self._commands) > _REMEMBERED:
-                self._commands.popitem(last=False)
+            self._commands.pop(number - _REMEMBERED, None)
         begun = computer.do(lambda: computer.move(parts) if whole is None else whole.begin_alone(computer))
         begun.add_done_callback(_log_failure)
         return number

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import count
 from typing import Any, Final
 
@@ -15,14 +16,17 @@ from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer
 from errand_spot.server.identity import DOMAIN, TimeSyncService
 from errand_spot.server.leases import LeaseService
+from errand_spot.server.obstacles import room_m
 from errand_spot.server.refusals import LONGEST_S
 from errand_spot.server.task import WHOLE, Steps, Task, stow, walk
+from skills.geometry import compose
 from skills.robot import Pose2D
 
 DOCK_ID: Final = 520
 """Number of the dock: that of a real Spot's first fiducial."""
 _PREP_M: Final = 0.9
 _NEAR_M: Final = 4.0
+_FARTHER_M: Final = (0.0, 0.4, 0.8, 1.2, 1.6)
 _REMEMBERED: Final = 20
 Api: Final = docking_pb2
 Progress: Final = docking_pb2.DockingCommandFeedbackResponse
@@ -51,15 +55,11 @@ class _Docking(Task):
             return int(Progress.STATUS_DOCKED)
         if self.behaviour != Api.PREP_POSE_UNDOCK:
             yield from stow(computer)
-            here_O = computer.snapshot.odometry.pose  # there is more space to turn than before the dock
-            yield from walk(computer, Pose2D(here_O.x_m, here_O.y_m, self._dock_O.yaw_rad))
-        if self.behaviour != Api.PREP_POSE_SKIP_POSE:
-            if not (yield from walk(computer, self._prep_O)):
+        for pose_O in self._way(computer):
+            if not (yield from walk(computer, pose_O)):
                 return int(Progress.STATUS_ERROR_STUCK)
-            if self.behaviour in (Api.PREP_POSE_ONLY_POSE, Api.PREP_POSE_UNDOCK):
-                return int(Progress.STATUS_AT_PREP_POSE)
-        if not (yield from walk(computer, self._dock_O)):
-            return int(Progress.STATUS_ERROR_STUCK)
+        if self.behaviour in (Api.PREP_POSE_ONLY_POSE, Api.PREP_POSE_UNDOCK):
+            return int(Progress.STATUS_AT_PREP_POSE)
         computer.sit()
         while not computer.snapshot.sitting:
             yield
@@ -67,6 +67,22 @@ class _Docking(Task):
             return int(Progress.STATUS_MISALIGNED)
         computer.do(computer.switch_off)
         return int(Progress.STATUS_DOCKED)
+
+    def _way(self, computer: Computer) -> Sequence[Pose2D]:
+        """Poses on the way: to the prep pose, from farther out if the LiDAR shows more room there, then to the dock."""
+        here, yaw_rad, ways = computer.snapshot.odometry.pose, self._dock_O.yaw_rad, list[list[Pose2D]]()
+        if self.behaviour == Api.PREP_POSE_SKIP_POSE:
+            return [Pose2D(here.x_m, here.y_m, yaw_rad), self._dock_O]
+        if self.behaviour == Api.PREP_POSE_UNDOCK:
+            return [self._prep_O]
+        for out_m in _FARTHER_M:
+            via = compose(self._prep_O, Pose2D(out_m, 0.0, 0.0))
+            ahead_rad = math.atan2(via.y_m - here.y_m, via.x_m - here.x_m)
+            for turn in (yaw_rad, ahead_rad, ahead_rad + math.pi):
+                turned = [Pose2D(at.x_m, at.y_m, math.remainder(turn, math.tau)) for at in (here, via)]
+                ways.append([*turned, via, self._prep_O])
+        way = max(ways, key=lambda way: room_m(computer, [here, *way]))
+        return way if self.behaviour == Api.PREP_POSE_ONLY_POSE else [*way, self._dock_O]
 
 
 class DockingService(Service):
@@ -117,10 +133,8 @@ class DockingService(Service):
 
     def GetDockingState(self, _request: Any, _call: Call) -> Any:
         """Returns whether the robot is on its dock, drives to it, or leaves it."""
-        State, running = (
-            Api.DockState,
-            [task for task in self._tasks.values() if task.state == Progress.STATUS_IN_PROGRESS],
-        )
+        State = Api.DockState
+        running = [task for task in self._tasks.values() if task.state == Progress.STATUS_IN_PROGRESS]
         if running:
             leaves = running[-1].behaviour == Api.PREP_POSE_UNDOCK
             status = State.DOCK_STATUS_UNDOCKING if leaves else State.DOCK_STATUS_DOCKING

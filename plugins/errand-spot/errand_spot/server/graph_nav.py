@@ -365,8 +365,7 @@ class GraphNavService(Service):
         course, number = Course.of(*plan(known, place), place.poses, request.travel_params), number or next(self._ids)
         motion = FollowRoute(course, end_s, known, lambda: self._place, lambda: self._cause(lease))
         self._routes[number] = motion
-        while len(self._routes) > _REMEMBERED:
-            self._routes.pop(next(iter(self._routes)))
+        self._routes.pop(number - _REMEMBERED, None)
         self._computer.do(lambda: self._computer.move({MOBILITY: motion}))
         return number
 

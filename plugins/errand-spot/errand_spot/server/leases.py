@@ -69,24 +69,19 @@ class LeaseService(Service):
 
     def AcquireLease(self, request: Any, call: Call) -> Any:
         """Issues a lease on a resource without claims, or with stale ones."""
-        Response, resource = lease_pb2.AcquireLeaseResponse, request.resource
-        if not _exists(resource):
-            return Response(status=Response.STATUS_INVALID_RESOURCE)
-        with self._lock:
-            for leaf in leaves(resource):
-                claim = self._claims.get(leaf)
-                if claim is not None and not claim.stale:
-                    return Response(status=Response.STATUS_RESOURCE_ALREADY_CLAIMED, lease_owner=claim.owner)
-            lease, owner, changed = self._claim(resource, call)
-        self._lost(changed)
-        return Response(status=Response.STATUS_OK, lease=lease, lease_owner=owner)
+        return self._issue(request.resource, call, lease_pb2.AcquireLeaseResponse, take=False)
 
     def TakeLease(self, request: Any, call: Call) -> Any:
         """Gives a lease on a resource, also while another client claims it."""
-        Response, resource = lease_pb2.TakeLeaseResponse, request.resource
+        return self._issue(request.resource, call, lease_pb2.TakeLeaseResponse, take=True)
+
+    def _issue(self, resource: str, call: Call, Response: Any, *, take: bool) -> Any:
         if not _exists(resource):
             return Response(status=Response.STATUS_INVALID_RESOURCE)
         with self._lock:
+            claims = [self._claims[leaf] for leaf in leaves(resource) if leaf in self._claims]
+            if not take and (held := [claim for claim in claims if not claim.stale]):
+                return Response(status=Response.STATUS_RESOURCE_ALREADY_CLAIMED, lease_owner=held[0].owner)
             lease, owner, changed = self._claim(resource, call)
         self._lost(changed)
         return Response(status=Response.STATUS_OK, lease=lease, lease_owner=owner)

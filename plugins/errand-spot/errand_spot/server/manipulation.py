@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from itertools import count
 from typing import Any, Final, Protocol
@@ -132,7 +131,7 @@ class ManipulationService(Service):
 
     def __init__(self, computer: Computer, leases: LeaseService, picker: Picker | None) -> None:
         self._computer, self._leases, self._picker = computer, leases, picker
-        self._ids, self._tasks = count(1), OrderedDict[int, _ObjectTask]()
+        self._ids, self._tasks = count(1), dict[int, _ObjectTask]()
 
     def ManipulationApi(self, request: Any, _call: Call) -> Any:
         """Starts a manipulation task, which ends all motions; refuses an impossible task as invalid."""
@@ -146,8 +145,7 @@ class ManipulationService(Service):
             raise InvalidRequestError("the robot is docked: undock it first")
         task, number = self._task(request), next(self._ids)
         self._tasks[number] = task
-        while len(self._tasks) > _REMEMBERED:
-            self._tasks.popitem(last=False)
+        self._tasks.pop(number - _REMEMBERED, None)
         self._computer.do(lambda: self._computer.move(dict.fromkeys(WHOLE, task)))
         return Api.ManipulationApiResponse(lease_use_result=used, manipulation_cmd_id=number)
 

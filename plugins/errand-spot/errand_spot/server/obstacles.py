@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
@@ -20,6 +21,7 @@ _PADDING_M: Final = 0.05
 _NEAR_M, _CARRIED_M = 2.0, 0.35
 _REMEMBERED_S, _CELL_M = 15.0, 0.05
 _SPACING_M, _LARGEST_M = 0.05, 100.0
+_FAR_M, _ENOUGH_M, _PER_LEG = 5.0, 0.15, 12
 _BRAKING_S, _WAITS_S = 0.5, 0.04
 """Time to a collision from which on the robot slows down, and at which it waits."""
 _AHEAD_S: Final = np.linspace(0.05, _BRAKING_S, 14)
@@ -104,6 +106,21 @@ class Clearance:
             hand_B = snapshot.X_AB("body", "hand").translation()[:2]
             points_B = points_B[np.linalg.norm(points_B - hand_B, axis=1) > _CARRIED_M]
         return points_B
+
+
+def room_m(computer: Computer, poses: Sequence[Pose2D]) -> float:
+    """Least distance of the body from what the LiDAR shows on a way through poses in `odom`, at most 0.15 m."""
+    points_O = computer.scan_points.points_O
+    points_O = points_O[(np.abs(points_O - [poses[0].x_m, poses[0].y_m]) < _FAR_M).all(axis=1)]
+    corners, least_m = np.array(computer.capabilities.footprint_m), _ENOUGH_M
+    for a, b in pairwise(poses):
+        turn = math.remainder(b.yaw_rad - a.yaw_rad, math.tau)
+        for share in np.linspace(0.0, 1.0, _PER_LEG).tolist() if len(points_O) else ():
+            x, y = a.x_m + share * (b.x_m - a.x_m), a.y_m + share * (b.y_m - a.y_m)
+            points_B = seen_from(Pose2D(x, y, a.yaw_rad + share * turn), points_O)
+            off_m = np.maximum(corners.min(axis=0) - points_B, points_B - corners.max(axis=0)).max(axis=1)
+            least_m = min(least_m, float(off_m.min()))
+    return least_m
 
 
 def region_of(message: Any, until_s: float, snapshot: Snapshot) -> Region | None:

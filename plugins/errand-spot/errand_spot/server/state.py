@@ -46,6 +46,7 @@ _LOOK_S, _PICTURES_S, _LOW_M = 0.5, 5.0, 0.05
 _FIRST_TAG: Final = 1_000_000
 """Id of the object of tag 0; those of clients' objects are smaller."""
 _Kinds = world_object_pb2.WorldObjectType
+_ActiveLogs, _Log = log_status_pb2.GetActiveLogStatusesResponse, log_status_pb2.GetLogStatusResponse
 _FIELDS: Final[Mapping[int, str]] = {
     _Kinds.WORLD_OBJECT_DRAWABLE: "drawable_properties",
     _Kinds.WORLD_OBJECT_APRILTAG: "apriltag_properties",
@@ -362,19 +363,16 @@ def _fault_key(fault_id: Any) -> tuple[str, str]:
     return fault_id.service_name, fault_id.fault_name
 
 
+def _answering(Response: Any, **fields: Any) -> Callable[[Any, Any, Call], Any]:
+    """Returns a call that keeps nothing of its request and always gives the same answer."""
+    return lambda _service, _request, _call: Response(**fields)
+
+
 class PayloadService(Service):
     """Lists the payloads: none but the LiDAR, which the robot knows already."""
 
     name, type, authority = "payload", "bosdyn.api.PayloadService", f"payload.{DOMAIN}"
-
-    def ListPayloads(self, _request: Any, _call: Call) -> Any:
-        """Lists no payloads."""
-        return payload_pb2.ListPayloadsResponse()
-
-
-def _discarding(Response: Any) -> Callable[[Any, Any, Call], Any]:
-    """Returns a call that takes a client's data and keeps none of them."""
-    return lambda _service, _request, _call: Response()
+    ListPayloads = _answering(payload_pb2.ListPayloadsResponse)
 
 
 class DataBufferService(Service):
@@ -385,11 +383,11 @@ class DataBufferService(Service):
     def __init__(self) -> None:
         self._ids = count(1)
 
-    RecordTextMessages = _discarding(data_buffer_pb2.RecordTextMessagesResponse)
-    RecordOperatorComments = _discarding(data_buffer_pb2.RecordOperatorCommentsResponse)
-    RecordDataBlobs = _discarding(data_buffer_pb2.RecordDataBlobsResponse)
-    RecordEvents = _discarding(data_buffer_pb2.RecordEventsResponse)
-    RecordSignalTicks = _discarding(data_buffer_pb2.RecordSignalTicksResponse)
+    RecordTextMessages = _answering(data_buffer_pb2.RecordTextMessagesResponse)
+    RecordOperatorComments = _answering(data_buffer_pb2.RecordOperatorCommentsResponse)
+    RecordDataBlobs = _answering(data_buffer_pb2.RecordDataBlobsResponse)
+    RecordEvents = _answering(data_buffer_pb2.RecordEventsResponse)
+    RecordSignalTicks = _answering(data_buffer_pb2.RecordSignalTicksResponse)
 
     def RegisterSignalSchema(self, _request: Any, _call: Call) -> Any:
         """Gives a schema its number."""
@@ -400,13 +398,5 @@ class LogStatusService(Service):
     """Tells that no logs are written: the simulated robot keeps none, and starts none."""
 
     name, type, authority = "log-status", "bosdyn.api.log_status.LogStatusService", f"log.{DOMAIN}"
-
-    def GetActiveLogStatuses(self, _request: Any, _call: Call) -> Any:
-        """Lists no logs."""
-        Response = log_status_pb2.GetActiveLogStatusesResponse
-        return Response(status=Response.STATUS_OK)
-
-    def GetLogStatus(self, _request: Any, _call: Call) -> Any:
-        """Answers that there is no such log."""
-        Response = log_status_pb2.GetLogStatusResponse
-        return Response(status=Response.STATUS_ID_NOT_FOUND)
+    GetActiveLogStatuses = _answering(_ActiveLogs, status=_ActiveLogs.STATUS_OK)
+    GetLogStatus = _answering(_Log, status=_Log.STATUS_ID_NOT_FOUND)

@@ -2,6 +2,7 @@
 
 import time
 
+import numpy as np
 import pytest
 from bosdyn.api import robot_state_pb2
 from bosdyn.api.docking import docking_pb2
@@ -12,8 +13,10 @@ from bosdyn.client.robot_command import DockedError
 from bosdyn.client.robot_command import RobotCommandBuilder as Build
 
 from errand_spot.messages import timestamp
+from errand_spot.server import docking
 from errand_spot.server.computer import Pace
 from errand_spot.server.docking import DOCK_ID
+from errand_spot.server.obstacles import room_m
 from skills.robot import Pose2D
 from tests.tables import table
 
@@ -78,6 +81,22 @@ def test_the_prep_pose_is_before_the_dock(at_home):
     blocking_go_to_prep_pose(at_home.robot, DOCK_ID)
     body = get_odom_tform_body(at_home.tree)
     assert (body.x, abs(body.rot.to_yaw())) == (pytest.approx(-0.1, abs=0.05), pytest.approx(3.14, abs=0.06))
+
+
+WALL = [(x, -1.0) for x in np.arange(0.5, 2.0, 0.05)]
+"""Points of a wall beside the dock; the body strafes into it on the straight way to the place before the dock."""
+
+
+@pytest.mark.parametrize(("points", "out_m"), [([], 0.0), (WALL, 0.8)], ids=["free", "wall"])
+def test_the_robot_comes_from_farther_out_where_the_body_has_no_room(spot, points, out_m):
+    computer, dock_O = spot.served.server.computer, Pose2D(1.5, -1.5, 3.1416)
+    computer.scan_points.points_O = np.array(points).reshape(-1, 2)
+    way, here = docking._Docking(Api.PREP_POSE_USE_POSE, dock_O, 0.0)._way(computer), computer.snapshot.odometry.pose
+    *_, via, prep, last = way
+    assert room_m(computer, [here, *way[:-1]]) > 0.05
+    assert (prep.x_m, prep.y_m, last) == (pytest.approx(0.6, abs=0.01), pytest.approx(-1.5, abs=0.01), dock_O)
+    assert out_m - 0.01 < prep.x_m - via.x_m < out_m + 0.5
+    assert (room_m(computer, [here, Pose2D(0.0, 0.0, 3.1416), prep]) < 0.0) is bool(points)
 
 
 def far_away(spot):

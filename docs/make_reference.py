@@ -40,10 +40,13 @@ from skills.faults.fault_kinds import STANDARD_FAULTS
 from skills.quantities import DURATION_PATTERN
 from skills.stack import SLOTS, components, skill_options
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from file_schemas import write_schemas
 from make_api import api_page
 from mission_constructs import constructs_text
+
+from tests.benchmarks.sdk_promises import NOT_RUN, PROGRAMS, REFUSED, SERVED, Program
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "reference"
@@ -157,8 +160,44 @@ def spot_api_page() -> str:
         "a trajectory's points. A value that an enumeration of the API lacks is refused as an invalid request.\n\n"
         "| message | fields |\n|---|---|\n"
         + "\n".join(f"| `{name}` | {', '.join(f'`{field}`' for field in fields)} |" for name, fields in unread_fields())
+        + f"\n\n{examples_section()}"
+    )
+
+
+def examples_section() -> str:
+    """The section on the examples of Spot's SDK, in three tables."""
+    moves = [f"| `{each.line}` | {_compared(each)} |" for each in PROGRAMS]
+    still = [f"| `{folder}/{each.line.replace(' HOST', '')}` | output |" for folder, each in sorted(SERVED.items())]
+    refused = [
+        f"| `{folder}/{each.program.line.replace(' HOST', '')}` | {each.name} |"
+        for folder, each in sorted(REFUSED.items())
+    ]
+    reasons = dict[str, list[str]]()
+    for folder, reason in sorted(NOT_RUN.items()):
+        reasons.setdefault(reason, []).append(f"`{folder}`")
+    left_out = [f"| {', '.join(folders)} | {reason} |" for reason, folders in reasons.items()]
+    return (
+        "## Examples of the SDK\n\nEach folder of examples of Spot's SDK 5.1.4 stands in one of three tables. The "
+        "programs run unchanged.\n\n### Does what it says\n\n`python -m tests.benchmarks.sdk_motion --examples FOLDER` "
+        "compares programs that move the robot with the plant's truth, and "
+        "`python -m tests.benchmarks.sdk_examples --examples FOLDER` the output of the others.\n\n"
+        "| program | compared |\n|---|---|\n"
+        + "\n".join([*moves, *still])
+        + "\n\n### Refused by name\n\nChecked by `sdk_examples`, too.\n\n| program | what is refused |\n|---|---|\n"
+        + "\n".join(refused)
+        + "\n\n### Not run\n\n| folders | reason |\n|---|---|\n"
+        + "\n".join(left_out)
         + "\n"
     )
+
+
+def _compared(program: Program) -> str:
+    """What is compared of a program that moves the robot."""
+    promises = [
+        f"{promise.columns.replace(' ', ', ')}{' along the path' if promise.along else ''} to {promise.most:g}"
+        for promise in program.promises
+    ]
+    return "; ".join([*promises, "goals of its commands to 0.1 m"])
 
 
 def unread_fields() -> Iterator[tuple[str, list[str]]]:

@@ -1,7 +1,8 @@
-"""What programs of Spot's SDK say that the robot does, as data; the programs that are refused, and those not run.
+"""What the examples of Spot's SDK 5.1.4 do against the server, as data; `deviation` judges a promise.
 
-A program of the SDK's examples stands in one of three tables, by its folder. `deviation` compares a promise with the
-recorded truth along the whole path.
+Each folder of examples stands in one of three tables: it does what it says (`PROGRAMS` move the robot, `SERVED` do
+not), it is refused by name (`REFUSED`), or it is not run (`NOT_RUN`, with the reason). `tests.benchmarks.sdk_motion`
+runs the first, `tests.benchmarks.sdk_examples` the second and the third.
 """
 
 from dataclasses import dataclass
@@ -38,12 +39,25 @@ class Promise:
 
 @dataclass(frozen=True)
 class Program:
-    """Program with its arguments, what it promises, its exit code, and its start (x, y, yaw) if it needs another."""
+    """Program with its arguments, what it promises, its exit code, and its start (x, y, yaw) if it needs another.
+
+    Its output contains `says`. In the line, HOST stands for the robot's address, EMPTY for a file without content, and
+    PAYLOAD for a file with a payload's credentials. A program without an exit code runs until it is ended.
+    """
 
     line: str
     promises: tuple[Promise, ...] = ()
-    exit_code: int = 0
+    exit_code: int | None = 0
     start: tuple[float, float, float] | None = None
+    says: str = ""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Program whose request the server refuses, and the name of what is refused."""
+
+    program: Program
+    name: str
 
 
 def deviation(track, promise):
@@ -170,58 +184,95 @@ PROGRAMS = (
 )
 """Examples of the SDK that move the robot, with what they log."""
 
-REFUSED = {
-    "arm_constrained_manipulation": "constrained manipulation",
-    "arm_door": "DoorService",
-    "arm_force_control": "an axis in force mode",
-    "arm_impedance_control": "arm_impedance_command",
-    "arm_surface_contact": "ArmSurfaceContactService",
-    "access_controlled_doors": "DoorService",
-    "animation_recorder": "ChoreographyService",
-    "audio_visual": "AudioVisualService",
-    "auto_return": "AutoReturnService",
-    "bddf_download": "DataService",
-    "data_acquisition_service": "DataAcquisitionService",
-    "data_service": "DataService",
-    "get_mission_state": "MissionService",
-    "joint_control": "RobotCommandStreamingService",
-    "mission_question_answerer": "MissionService",
-    "mission_recorder": "GraphNavRecordingService",
-    "record_autowalk": "GraphNavRecordingService",
-    "replay_mission": "MissionService",
-    "reset_safety_stop": "ResetSafetyStop",
-    "self_registration": "PayloadRegistrationService",
-    "stance": "STATUS_TOO_FAR_AWAY: feet wider apart than the robot stands",
-    "payloads": "PayloadRegistrationService",
-    "upload_choreographed_sequence": "ChoreographyService",
-}
-"""Folders whose programs the server refuses, with what the refusal names."""
+_UNKNOWN, _UNSUPPORTED = "UnimplementedError", "UnsupportedError"
 
-NOT_MOVING = (
-    *("data_buffer", "directory", "estop", "fan_command", "get_depth_plus_visual_image", "get_image"),
-    *("get_robot_state", "get_robot_state_async", "get_world_objects", "gripper_camera_params", "log_status"),
-    *("ray_cast", "service_faults", "time_sync", "world_object_mutations", "world_object_with_image_coordinates"),
-    "disable_ir_emission",
-)
-"""Folders whose programs are served and move nothing."""
+
+def _refused(line, name, says=_UNKNOWN, exit_code=1):
+    return Refusal(Program(line, exit_code=exit_code, says=says), name)
+
+
+REFUSED = {
+    "animation_recorder": _refused("animation_recorder.py HOST", "ChoreographyService"),
+    "arm_force_control": _refused("force_trajectory.py HOST", "an axis in force mode", _UNSUPPORTED),
+    "arm_impedance_control": _refused("arm_impedance_control_simple.py HOST", "arm_impedance_command", _UNSUPPORTED),
+    "arm_surface_contact": _refused("arm_surface_contact.py HOST", "ArmSurfaceContactService"),
+    "audio_visual": _refused(
+        "audio_visual_params/audio_visual_params.py HOST", "AudioVisualService", 'Service name "audio-visual"'
+    ),
+    "auto_return": _refused("force_start_auto_return.py HOST", "AutoReturnService"),
+    "data_acquisition_service": _refused("data_acquisition_example.py HOST", "DataAcquisitionService"),
+    "data_service": _refused("get_index.py HOST text", "DataService"),
+    "disable_ir_emission": _refused(
+        "disable_ir_emission.py HOST --disable", "IREnableDisableService", 'Service name "ir-enable-disable-service"'
+    ),
+    "get_mission_state": _refused("get_mission_state.py HOST", "MissionService"),
+    "joint_control": _refused(
+        "noarm_squat.py HOST", "RobotStateStreamingService", "GetRobotStateStream is not served", exit_code=None
+    ),
+    "mission_question_answerer": _refused("mission_question_answerer.py HOST", "MissionService"),
+    "payloads": _refused(
+        "payloads.py HOST --payload-credentials-file-1 PAYLOAD --payload-credentials-file-2 PAYLOAD",
+        "PayloadRegistrationService",
+    ),
+    "replay_mission": _refused("replay_mission.py HOST simple EMPTY", "MissionService"),
+    "reset_safety_stop": _refused("reset_primary_safety_stop.py HOST", "ResetSafetyStop"),
+    "self_registration": _refused(
+        "self_register_payload.py HOST --name a --description b --payload-credentials-file PAYLOAD",
+        "PayloadRegistrationService",
+    ),
+    "upload_choreographed_sequence": _refused("upload_choreographed_sequence.py HOST", "ChoreographyService"),
+}
+"""Programs that the server refuses, by folder."""
+
+SERVED = {
+    "data_buffer": Program("data_buffer.py HOST operator hello", says="Added operator comment"),
+    "directory": Program("directory_modification.py HOST", says="robot-command"),
+    "fan_command": Program("basic_fan_command.py HOST", exit_code=1, says="STATUS_COMPLETE"),
+    "get_depth_plus_visual_image": Program("get_depth_plus_visual_image.py HOST --camera hand --to-depth"),
+    "get_image": Program("get_image.py --image-sources hand_color_image HOST"),
+    "get_robot_state": Program("get_robot_state.py HOST state", says="STATE_NOT_READY"),
+    "get_robot_state_async": Program("get_robot_state_async.py HOST", says="SUCCESS"),
+    "get_world_objects": Program("get_world_objects.py HOST", says="Fiducial objects"),
+    "gripper_camera_params": Program("set_gripper_camera_params.py HOST --brightness 0.5", says="0.5"),
+    "log_status": Program("log_status.py HOST active", says="Active Logs"),
+    "logging": Program("log_spot_data.py HOST", says="Added robot command log blob"),
+    "ray_cast": Program("cast_single_ray.py HOST -o 0 0 0 -d 1 0 0", says="TYPE_VOXEL_MAP"),
+    "service_faults": Program("service_faults.py HOST", exit_code=1, says="Shutting down live-service-test"),
+    "tester_programs": Program("image_service_tester.py HOST --service-name image", says="SUCCESS"),
+    "time_sync": Program("time_sync_client.py HOST", says="STATUS_OK"),
+    "world_object_mutations": Program("mutate_world_objects.py HOST", says="Found sphere named debug_sphere"),
+    "world_object_with_image_coordinates": Program("world_object_with_image_coordinates.py HOST", says="image_proper"),
+}
+"""Programs that are served and move nothing, by folder. Two end with 1 on a robot, too: they return nothing."""
 
 NOT_RUN = {
-    **dict.fromkeys(("arm_grasp", "arm_walk_to_object"), "waits for a click into a picture"),
+    **dict.fromkeys(("arm_grasp", "arm_walk_to_object", "arm_door"), "waits for a click into a picture"),
     "arm_grasp_carry_overrides": "waits for a person who puts an object into the gripper",
-    **dict.fromkeys(("arm_wasd", "wasd", "xbox_controller", "network_compute_bridge"), "waits for keys of a person"),
+    "arm_constrained_manipulation": "needs a handle in the gripper; its command is refused by name",
+    **dict.fromkeys(
+        ("arm_wasd", "wasd", "xbox_controller", "network_compute_bridge", "mission_recorder", "estop"),
+        "waits for keys of a person",
+    ),
     **dict.fromkeys(("graph_nav_command_line", "graph_nav_anchoring_optimization"), "waits for lines of a person"),
-    **dict.fromkeys(("visualizer", "graph_nav_view_map", "graph_nav_view_gps", "edit_autowalk"), "opens a window"),
-    **dict.fromkeys(("stitch_front_images", "orbit", "cloud_upload", "tester_programs"), "needs another server"),
+    **dict.fromkeys(
+        ("visualizer", "graph_nav_view_map", "graph_nav_view_gps", "stitch_front_images", "velodyne_client"),
+        "opens a window",
+    ),
+    **dict.fromkeys(("edit_autowalk", "record_autowalk"), "opens a window (Qt)"),
+    **dict.fromkeys(("orbit", "cloud_upload", "access_controlled_doors", "comms_test"), "needs another server"),
+    "bddf_download": "downloads logs by HTTPS; the simulated robot writes none",
+    "stance": "runs until Ctrl-C; its stance, wider than the robot stands, is STATUS_TOO_FAR_AWAY",
     **dict.fromkeys(
         ("spot_cam", "core_io_gpio", "spot_light", "gps_service", "metrics_over_coreio"), "needs a payload"
     ),
-    **dict.fromkeys(("velodyne_client", "fiducial_follow"), "plots, or follows a person who carries a fiducial"),
+    "fiducial_follow": "follows a person who carries a fiducial",
     **dict.fromkeys(("area_callback", "network_request_callback", "remote_mission_service"), "is itself a service"),
     **dict.fromkeys(("service_customization", "extensions", "post_docking_callbacks"), "is itself a service"),
     **dict.fromkeys(("graph_nav_extract_point_cloud", "extract_images_from_walk"), "reads files, no robot"),
-    **dict.fromkeys(("comms_mapping", "comms_test", "logging", "docs"), "no program for a robot"),
+    "comms_mapping": "is itself a service, for a payload",
+    "docs": "no program",
     "arm_gcode": "needs a pen in the gripper",
     "inverse_kinematics": "draws thousands of poses for an hour",
     "spot_tensorflow_detector": "needs a network's weights",
 }
-"""Folders that the benchmark does not run, and why."""
+"""Folders that are not run, and why."""

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from lock_step import PASSWORD, USER, scripted_spot
 
-from errand_spot import launch
+from errand_spot.commands import LAUNCH
 from errand_spot.server.identity import credentials
 from skills.testing.blocks import Block
 from tests.benchmarks.harness import command, show
@@ -34,7 +34,7 @@ def run(program, folder, python=sys.executable):
         (empty := Path(made) / "empty").touch()
         (payload := Path(made) / "payload").write_text(f"{uuid.uuid4()}\nsecret\n")
         values = {"HOST": "127.0.0.1", "EMPTY": str(empty), "PAYLOAD": str(payload)}
-        line = [python, launch.__file__, str(server.certificate), str(server.port), "real", str(folder / script)]
+        line = [python, LAUNCH, str(server.certificate), str(server.port), "real", str(folder / script)]
         user = {"BOSDYN_CLIENT_USERNAME": USER, "BOSDYN_CLIENT_PASSWORD": PASSWORD}
         limit_s = LIMIT_S if program.exit_code is not None else ENDED_S
         try:

@@ -1,8 +1,11 @@
 """Motion of SDK programs beside what they ask: base, height, hand and gaze, by the plant's truth. Prints JSON.
 
-    python -m tests.benchmarks.sdk_motion [--examples FOLDER] [--only NAME] [--seed 1] [--pace real|client]
+    python -m tests.benchmarks.sdk_motion [--examples FOLDER] [--wrapper FOLDER] [--only NAME] [--seed 1]
+                                          [--pace real|client] [--python COMMAND]
 
-A program of our own (`sdk_moves.py`) always runs. With the folder of the SDK's examples, by the option or the variable
+A program of our own (`sdk_moves.py`) always runs. With the folder of a clone of `spot_wrapper`, by the option or the
+variable `ERRAND_SPOT_WRAPPER`, a program of ours drives through it, under the interpreter COMMAND that has what
+`spot_wrapper` needs. With the folder of the SDK's examples, by the option or the variable
 `ERRAND_SDK_EXAMPLES`, those that move run too, unchanged. Each runs alone against a new server in real time. What a
 command asks is read from its message with the SDK's own geometry. It is compared when the server reports that the
 command is done; a command that another one replaces before is `cut`, and not compared. What a program says as a whole
@@ -29,6 +32,7 @@ from bosdyn.client.frame_helpers import get_a_tform_b
 from bosdyn.client.math_helpers import SE2Pose, SE3Pose
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from errand_spot.commands import LAUNCH
 from errand_spot.messages import frame_tree, seconds, transform
 from errand_spot.server.commands import RobotCommandService
 from errand_spot.server.computer import Pace
@@ -42,9 +46,9 @@ from skills.geometry import compose, inverse
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Pose2D
 from tests.benchmarks.harness import command, show
-from tests.benchmarks.sdk_promises import COLUMNS, OWN, PERIOD_S, PROGRAMS, deviation
+from tests.benchmarks.sdk_promises import COLUMNS, OWN, PERIOD_S, PROGRAMS, WRAPPER, deviation
 
-EXAMPLES = "ERRAND_SDK_EXAMPLES"
+EXAMPLES, SPOT_WRAPPER = "ERRAND_SDK_EXAMPLES", "ERRAND_SPOT_WRAPPER"
 MOST_M = 0.1
 """Largest error of a motion; of a gaze in rad."""
 BASE = ("base", "height", "velocity")
@@ -242,17 +246,22 @@ def judged(seed, start=START, pace=Pace.REAL):
             yield judges[0]
 
 
-def run(program, folder, *, seed=1, pace=Pace.REAL):
-    """Runs one program of a folder to its end; returns its exit code, the errors by kind, and those of its promises."""
+def run(program, folder, *, seed=1, pace=Pace.REAL, python=sys.executable, imports=()):
+    """Runs one program of a folder to its end; returns its exit code, the errors by kind, and those of its promises.
+
+    The program may import from the folders `imports`.
+    """
     script, *arguments = f"{folder}/{program.line}".split()
     code, ended = [], threading.Event()
     with judged(seed, START if program.start is None else Pose2D(*program.start), pace) as judge:
         server = judge.server
         user = {"BOSDYN_CLIENT_USERNAME": "user", "BOSDYN_CLIENT_PASSWORD": "simulated"}
-        launch = [sys.executable, "-m", "errand_spot.launch", str(server.certificate), str(server.port)]
+        path = os.pathsep.join([*map(str, imports), os.environ.get("PYTHONPATH", "")])
+        launch = [python, LAUNCH, str(server.certificate), str(server.port)]
 
         def execute():
-            line, environment = [*launch, pace.value, script, *arguments, "127.0.0.1"], {**os.environ, **user}
+            line = [*launch, pace.value, script, *arguments, "127.0.0.1"]
+            environment = {**os.environ, **user, "PYTHONPATH": path}
             try:
                 with tempfile.TemporaryDirectory() as folder:
                     done = subprocess.run(line, env=environment, cwd=folder, capture_output=True, timeout=_LIMIT_S)
@@ -286,15 +295,18 @@ def run(program, folder, *, seed=1, pace=Pace.REAL):
 
 def measure(
     examples: Path | None = Path(os.environ[EXAMPLES]) if EXAMPLES in os.environ else None,
+    wrapper: Path | None = Path(os.environ[SPOT_WRAPPER]) if SPOT_WRAPPER in os.environ else None,
     only: str = "",
     seed: int = 1,
     pace: Literal["real", "client"] = "real",
+    python: str = sys.executable,
 ):
-    programs = [(OWN, Path(__file__).parent), *((each, examples) for each in PROGRAMS if examples)]
-    results = []
+    own = [OWN, *([WRAPPER] if wrapper else [])]
+    programs = [*((each, Path(__file__).parent) for each in own), *((each, examples) for each in PROGRAMS if examples)]
+    results, imports = [], [wrapper] if wrapper else []
     for program, folder in programs:
         if only in program.line:
-            results.append(run(program, folder, seed=seed, pace=Pace(pace)))
+            results.append(run(program, folder, seed=seed, pace=Pace(pace), python=python, imports=imports))
             show(results[-1])
     return {"programs": len(results), "ended_and_true": sum(each["true"] and each["ended"] for each in results)}
 

@@ -40,7 +40,7 @@ _LEAST_BREADTH_M: Final = 0.15
 _FEWEST: Final = 12
 _OWN_M: Final = 0.12
 """Distance from the point within which points above the surface are the object's."""
-_ABOVE_M: Final = 0.01
+_ABOVE_M, _GAP_M = 0.01, 0.06
 _LEAST_SIDE_M: Final = 0.02
 _FLOOR_M: Final = 0.06
 
@@ -51,6 +51,8 @@ def observe(point: FloatArray, points: FloatArray, stamp_s: float) -> ObjectObse
     base_m = _surface_below(near, float(point[2]))
     own = near[(np.linalg.norm(near[:, :2] - point[:2], axis=1) < _OWN_M) & (near[:, 2] > base_m + _ABOVE_M)]
     own = np.vstack([own, point])
+    levels_m = np.sort(own[own[:, 2] >= point[2], 2])  # a cabinet above is not the object
+    own = own[own[:, 2] <= levels_m[np.append(np.diff(levels_m) > _GAP_M, True).argmax()]]
     low, high = own[:, :2].min(axis=0), own[:, :2].max(axis=0)
     height_m = max(float(own[:, 2].max()) - base_m, _LEAST_SIDE_M)
     (x, y), (dx, dy) = 0.5 * (low + high), np.maximum(high - low, _LEAST_SIDE_M)

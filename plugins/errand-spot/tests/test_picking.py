@@ -37,6 +37,12 @@ def test_an_object_stands_on_the_surface_below_the_point():
     assert seen.surface is None
 
 
+def test_an_object_below_a_cabinet_ends_at_its_own_top():
+    cabinet = table_points(1.2, -0.3, 1.6, 0.3, 1.4)
+    seen = observe(np.array([1.347, 0.0, 0.80]), np.concatenate([table_points(), can_points(), cabinet]), 3.0)
+    assert seen.position_W[2] + 0.5 * seen.size_m[2] == pytest.approx(TOP_M + 0.115, abs=0.01)
+
+
 def test_an_object_without_a_surface_stands_on_the_floor():
     seen = observe(np.array([1.0, 0.0, 0.05]), can_points(1.033, 0.0, 0.0), 0.0)
     assert seen.surface == "floor"

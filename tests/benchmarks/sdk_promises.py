@@ -114,7 +114,7 @@ OWN = Program(
 WRAPPER = Program(
     "spot_wrapper_moves.py",
     (
-        Promise("x y yaw", ((0, 0, 0), (0.6, 0.1, 0.4), (1.2, 0.35, 0.4)), 0.1),
+        Promise("x y yaw", ((0, 0, 0), (0.6, 0.1, 0.4), (0.03, -0.14, 0.4)), 0.1),
         Promise("in_body_x in_body_y in_body_z", ((0.54, 0, 0.31), (1.01, 0, 0.18), (0.75, 0.1, 0.3)), 0.05),
         Promise("in_body_x in_body_z", ((0.54, 0.31), (1.01, 0.18), (0.54, 0.31)), 0.05),
         Promise("z", ((0.0,), (-0.3,), (0.0,), (-0.3,)), 0.08, rests_s=0.5),

@@ -39,7 +39,7 @@ def main():
         ("power on", wrapper.power_on),
         ("stand", wrapper.simple_stand),
         ("walk", lambda: walk(wrapper, 0.6, 0.1, 0.4)),
-        ("drive", lambda: drive(wrapper, 0.3, 2.0)),
+        ("drive", lambda: drive(wrapper, -0.3, 2.0)),
         ("unstow", wrapper.spot_arm.arm_unstow),
         ("hand", lambda: hand(wrapper, 0.75, 0.1, 0.3)),
         ("joints", lambda: wrapper.spot_arm.arm_joint_move([0.3, -1.2, 1.9, 0.2, -0.6, 0.1])),

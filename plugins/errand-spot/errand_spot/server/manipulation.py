@@ -35,7 +35,7 @@ from errand_spot.server.task import WHOLE, Steps, Task, stow, walk
 from skills.robot import FloatArray, Lease, Pose2D
 
 Api: Final = manipulation_api_pb2
-_USUAL_OFFSET_M: Final = 0.9
+_USUAL_OFFSET_M, _NEARER_M = 0.9, 0.76
 _AHEAD_RAD: Final = 0.4
 _REACHING_M, _GRASPING_M = 0.3, 0.12
 _REMEMBERED: Final = 100
@@ -70,11 +70,12 @@ class _ObjectTask(Task):
     def __init__(self, aim: Aim, offset_m: float | None, picker: Picker | None, allows: Allows, *, walks: bool) -> None:
         self._aim, self._offset_m, self._picker, self._allows, self._walks = aim, offset_m, picker, allows, walks
         self.found_O: FloatArray | None = None
+        self._points_O = np.empty((0, 3))
         super().__init__(Api.MANIP_STATE_ATTEMPTING_RAYCASTING)
 
     def _run(self, computer: Computer) -> Steps:
-        points_O = depth_points_O(computer)
-        self.found_O = point_O = self._aim(points_O)
+        self._points_O = np.vstack([self._points_O, depth_points_O(computer)])
+        self.found_O = point_O = self._aim(self._points_O) if self.found_O is None else self.found_O
         if point_O is None:
             return int(Api.MANIP_STATE_GRASP_FAILED_TO_RAYCAST_INTO_MAP)
         if self._walks and not self._near(computer, point_O):
@@ -82,23 +83,26 @@ class _ObjectTask(Task):
             yield from stow(computer)
             if not (yield from walk(computer, self._before(computer, point_O))):
                 return int(Api.MANIP_STATE_GRASP_FAILED)
-            points_O = np.vstack([points_O, depth_points_O(computer)])
+            self._points_O = np.vstack([self._points_O, depth_points_O(computer)])
         if self._picker is None:
             return int(Api.MANIP_STATE_DONE)
-        self._picker.begin(computer.lease, point_O, points_O, self._allows)
+        self._picker.begin(computer.lease, point_O, self._points_O, self._allows)
         try:
             while (held := self._picker.step()) is None:
                 self.state = self._phase(computer, point_O)
                 yield
         finally:
             self._picker.end()
+        if self._picker.no_plan and self._walks and self._offset_m is None:
+            self._offset_m = _NEARER_M  # once more, from nearer
+            return (yield from self._run(computer))
         lacks = Api.MANIP_STATE_GRASP_PLANNING_NO_SOLUTION if self._picker.no_plan else Api.MANIP_STATE_GRASP_FAILED
         return int(Api.MANIP_STATE_GRASP_SUCCEEDED if held else lacks)
 
     def _near(self, computer: Computer, point_O: FloatArray) -> bool:
         """Returns whether the arm picks from here; a walk has its own distance, so it always walks."""
         arm = computer.capabilities.arm
-        if self._picker is None or arm is None:
+        if self._picker is None or arm is None or self._offset_m is not None:
             return False
         x, y, _ = computer.snapshot.X_AB("body", "odom") @ point_O
         least_m, most_m = arm.comfortable_m

@@ -152,6 +152,23 @@ def test_an_object_out_of_reach_is_walked_to_before_it_is_picked(spot, picker):
     assert picker.begun[0][0] == pytest.approx([1.5, 0.0, 0.3])
 
 
+def test_an_object_without_a_plan_is_tried_once_more_from_nearer_at_the_same_point(spot, picker):
+    picker.held, picker.no_plan = False, True
+    states = outcome(spot, started(spot, pick_object_ray_in_world=ray(1.0, 0.0, 0.0)), seconds=30.0)
+    assert states[-1] == Api.MANIP_STATE_GRASP_PLANNING_NO_SOLUTION
+    (first_O, _), (again_O, _) = picker.begun
+    assert again_O == pytest.approx(first_O)
+    assert get_odom_tform_body(spot.tree).x == pytest.approx(first_O[0] - 0.76, abs=0.06)
+
+
+def test_an_object_without_a_plan_is_not_approached_when_the_client_forbids_walking(spot, picker):
+    picker.held, picker.no_plan = False, True
+    request = {**ray(1.0, 0.0, 0.0), "walk_gaze_mode": Api.PICK_NO_AUTO_WALK_OR_GAZE}
+    states = outcome(spot, started(spot, pick_object_ray_in_world=request))
+    assert states[-1] == Api.MANIP_STATE_GRASP_PLANNING_NO_SOLUTION and len(picker.begun) == 1
+    assert get_odom_tform_body(spot.tree).x == pytest.approx(0.0, abs=0.02)
+
+
 def test_a_defect_of_the_picker_ends_the_pick_and_not_the_server(spot, picker, caplog):
     def fail():
         raise RuntimeError("a defect")

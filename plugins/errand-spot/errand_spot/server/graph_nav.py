@@ -14,7 +14,7 @@ from bosdyn.api import estop_pb2, lease_pb2, robot_command_pb2, robot_state_pb2
 from bosdyn.api.graph_nav import graph_nav_pb2, map_pb2, nav_pb2
 from pydrake.math import RigidTransform
 
-from errand_spot.messages import InvalidRequestError, finite, pose, timestamp, transform, vector
+from errand_spot.messages import InvalidRequestError, check_values, finite, pose, timestamp, transform, vector
 from errand_spot.server.calls import Call, Service, chunks, joined
 from errand_spot.server.computer import Computer, MapLocaliser, Motors, Perception, Snapshot
 from errand_spot.server.graph_map import GraphMap, InvalidGraphError, Poses
@@ -323,6 +323,7 @@ class GraphNavService(Service):
         return self._navigate(request, graph_nav_pb2.NavigateToAnchorResponse, plan)
 
     def _navigate(self, request: Any, Response: Any, plan: Plan) -> Any:
+        check_values(request)
         used = [self._leases.use(lease, (MOBILITY,)) for lease in request.leases or [lease_pb2.Lease()]]
         made, held = Response(lease_use_results=used), [each.attempted_lease for each in used if each.status == _OK]
         if not held:

@@ -246,6 +246,11 @@ def test_a_docked_robot_does_not_leave_its_dock(spot, nav, monkeypatch):
         nav.navigate_to("c", 5.0)
 
 
+def test_a_navigation_with_an_option_that_the_api_lacks_is_an_invalid_request(nav):
+    with pytest.raises(InvalidRequestError, match="planner_mode: the API has no option 99"):
+        nav.navigate_to("c", 5.0, travel_params=graph_nav_pb2.TravelParams(planner_mode=99))
+
+
 def test_a_navigation_that_cannot_begin_is_refused_with_its_status(spot, nav):
     Response = graph_nav_pb2.NavigateToResponse
     nav.upload_graph(graph=graph_of({**AT, "alone": (5.0, 5.0, 0.0)}))

@@ -194,8 +194,9 @@ class Conversation(RunVisitor):
     # -- requests ----------------------------------------------------------------------------------------------------
 
     def _remembered(self, now_s: float) -> _Spoken | None:
-        """Last request, as long as the robot remembers it."""
-        return self._last if self._last is not None and now_s - self._last.at_s <= REMEMBERED_S else None
+        """Last request, as long as the robot remembers it, or holds its object."""
+        recent = self._last is not None and (now_s - self._last.at_s <= REMEMBERED_S or self._held() is not None)
+        return self._last if recent else None
 
     def _understood(self, text: str, now_s: float) -> Understanding:
         last = self._remembered(now_s)

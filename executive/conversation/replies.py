@@ -114,6 +114,7 @@ class RemarkAnswers:
                 Remark.WHERE: self._where,
                 Remark.DOING: lambda: answer(doing_in_words(self.progress, control.state, speech.robot_name)),
                 Remark.ABLE: lambda: answer(known_line(speech.knowledge)),
+                Remark.HURRY: lambda: answer("I drive as fast as I may; a mission, a zone and people near me limit it"),
                 Remark.THANKS: lambda: answer("you are welcome"),
                 Remark.PRAISE: lambda: answer("you are welcome"),
             }

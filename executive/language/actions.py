@@ -146,10 +146,11 @@ def _being(clause: Predicate, being: Being) -> Action:
     places = [*roles.ats, *roles.sources, *there]
     place = next(iter(places), None)
     known = len(roles.goals) == len(there) and not (roles.unknown or roles.joined_goals)
-    fits = len(objects) == 1 and len(places) <= 1 and known and (place or being.existential)
+    kind = VerbKind.FIND if being.asked or clause.whether else None
+    located = place or being.existential or (kind is not None and objects and objects[0].relations)
+    fits = len(objects) == 1 and len(places) <= 1 and known and located
     before = [clause.subject] if clause.subject else []
     unknown = () if fits and not any(map(_asks, objects)) else (spoken_words([*before, being, *clause.items]),)
-    kind = VerbKind.FIND if being.asked or clause.whether else None
     choices = tuple(map(tuple, roles.choices))
     return Action(kind, "be", tuple(objects[:1]), place, unknown=unknown, choices=choices, teller=being.teller)
 

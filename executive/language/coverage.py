@@ -25,6 +25,7 @@ def cover(
     phrases = [phrase for action in actions for phrase in action.phrases]
     used = {token.index for phrase in phrases for token in phrase.tokens}
     described = {text for phrase in phrases for text in phrase.extra}
+    related = dict.fromkeys(each for phrase in phrases for each in phrase.relations)
     asides = [item.word for item in items if isinstance(item, Aside)]
     asides += [token.text for phrase in phrases for token in phrase.tokens[:-1] if (token.word,) in lexicon().noted]
     asides += [f"{one.preposition} {one.text}" for action in actions for one in action.passes if not is_door(one)]
@@ -38,9 +39,11 @@ def cover(
             favours = [chunk for chunk in unused if chunk.role is PrepositionRole.FOR and chunk.phrase.person]
             asides += [chunk.spoken for chunk in favours]
             lost += [(chunk.spoken, words) for chunk in unused if chunk not in favours]
+            lost += [(each.said, words) for one in chunks for each in one.phrase.relations if each not in related]
         elif unused or (" " in words and isinstance(verb := clause.verb, Being) and (verb.narrated or states)):
             told.append(words)
     targets = [one.target for one in actions if one.target is not None]
+    targets += [one for each in related for one in each.landmarks]
     owned = [one.spoken for one in targets if any(token.word in lexicon().owners for token in one.tokens[:-1])]
     notes = {
         _LEFT_OUT: asides,

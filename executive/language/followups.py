@@ -153,6 +153,7 @@ class Remark(enum.Enum):
     WHERE = "where"  # where the robot is
     DOING = "doing"  # its present action, and the reason
     ABLE = "able"  # its abilities
+    HURRY = "hurry"  # drive faster
     THANKS = "thanks"  # as ENOUGH
     PRAISE = "praise"  # nothing
 

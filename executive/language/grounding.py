@@ -11,10 +11,10 @@ from typing import Final
 
 from executive.language.command_frames import CommandFrame
 from executive.language.indirect import CONTENTS
-from executive.language.lexicon import lexicon
-from executive.language.limits import check_relation
+from executive.language.lexicon import lexicon, read_table
+from executive.language.limits import check_relation, relation_refusal
 from executive.language.parser import DependencyParser
-from executive.language.phrases import Phrase
+from executive.language.phrases import Phrase, SpokenRelation
 from executive.language.questions import ABLE, ClarifyingQuestion, RefusalError, Slot, perhaps_question, which_question
 from executive.language.roles import HERE, Location
 from executive.language.spelling import look_alikes, synonyms_for, synonyms_of
@@ -24,6 +24,7 @@ from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
 from skills.api import ObjectKind
 from skills.inputs.errors import known_names, listing
 from skills.perception.class_forms import known_attributes
+from skills.relations import DOOR, ORDERS, ROBOT, Landmark, Relation, RelationKind
 
 
 def known_line(knowledge: Knowledge | None) -> str:
@@ -93,30 +94,99 @@ class _Grounder:
             return
         if frame.verb in lexicon().stacks:
             raise RefusalError("I put objects side by side, and stack none", [frame.verb])
+        home = frame.goal is not None and frame.goal.name.lower() == _HOME and self.knowledge.place(_HOME) is None
+        if home and frame.item is None and frame.task is None:
+            self.notes.append(f"I take 'home' to be {'the dock' if self.knowledge.dock else 'here'}")
+            at_dock = Command(task=Task.CHARGE, verb=frame.verb)
+            yield at_dock if self.knowledge.dock else Command(goal=HERE.name, verb=frame.verb)
+            return
         item = None if frame.item is None else self.taken(frame.item)
         target = None if frame.object is None else self.target(frame.object, frame.task)
         for kind in filter(None, (item, target)):
-            if unseen := [word for word in kind.attributes if word not in known_attributes()]:
-                what = f"I cannot see which {kind.name} is {listing(map(repr, unseen))}"
-                raise RefusalError(f"{what}; I tell objects apart by colour, and big from small", unseen)
-        if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
-            raise RefusalError(f"which object? Known are {listing(self.knowledge.object_names())}", [target.name])
+            self._check_seen(kind)
+        place, spot = self._spot(frame.goal)
         people = target is not None and frame.task is Task.FIND and self.knowledge.somebody(target.name) is not None
-        goal, goal_at = (None, None) if frame.goal is None else self._supported_goal(frame, frame.goal, people)
+        goal, goal_at = (None, None) if place is None else self._supported_goal(frame, place, people)
         if goal is None and target is not None and target.name == EVERYTHING:
             raise RefusalError("everything from where? Name the surface or the room", [target.name])
         if goal is None and target is not None and frame.task in (Task.GRASP, Task.FIND):
             goal = self.knowledge.default_place(frame.task, target.name)
-        yield Command(
-            item=item,
-            goal=goal,
-            goal_at=goal_at,
-            task=frame.task,
-            object=target,
-            item_count=_count(frame.item, item),
-            object_count=_count(frame.object, target),
-            verb=frame.verb,
+        target = target and self._described(frame, target, goal)
+        if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or place is None):
+            raise RefusalError(f"which object? Known are {listing(self.knowledge.object_names())}", [target.name])
+        counts = _count(frame.item, item), _count(frame.object, target)
+        try:
+            yield Command(item, goal, goal_at, frame.task, target, *counts, frame.verb, spot)
+        except ValueError as error:  # two relations of one kind
+            raise RefusalError(str(error)) from error
+
+    def _check_seen(self, kind: ObjectKind | Landmark) -> None:
+        """Raises RefusalError for attributes that the robot cannot see."""
+        if unseen := [word for word in kind.attributes if word not in known_attributes()]:
+            what = f"I cannot see which {kind.name} is {listing(map(repr, unseen))}"
+            raise RefusalError(f"{what}; I tell objects apart by colour, and big from small", unseen)
+
+    def _described(self, frame: CommandFrame, target: ObjectKind, place: str | None) -> ObjectKind:
+        """Object with the relations that say which one at a place is meant. Raises RefusalError for impossible ones."""
+        phrase = frame.object
+        if phrase is None or frame.task not in (Task.GRASP, Task.FIND) or not phrase.relations:
+            return target
+        said, relations = phrase.relations[0].said, self._relations(phrase, "look")
+        if self.knowledge.somebody(target.name) or target.name in (ANYTHING, EVERYTHING):
+            raise RefusalError(f"I cannot tell who or what is '{said}'; name one kind of object", [said])
+        several = phrase.count == 0 or (phrase.count != 1 and any(each.nth > 1 for each in relations))
+        if (several or frame.verb == "be") and any(each.kind in ORDERS for each in relations):
+            raise RefusalError(f"I take or find the one '{said}'; I cannot tell how many, or whether one is", [said])
+        room = None if place is None else self.knowledge.room(place)
+        doors = sum(room in door.between for door in self.knowledge.doors)
+        if doors != 1 and any(one.name == DOOR for each in relations for one in each.landmarks):
+            raise RefusalError(f"I cannot tell which door is meant: the {room or 'place'} has {doors}", [DOOR])
+        return replace(target, relations=relations)
+
+    def _relations(self, phrase: Phrase, act: str) -> tuple[Relation, ...]:
+        """Relations of an object or a spot. Raises RefusalError for a landmark that a relation cannot have."""
+        said = phrase.relations
+        if all(each.kind is RelationKind.SEEN_FROM for each in said):
+            raise relation_refusal(act, "", said[0].said)
+        return tuple(Relation(e.kind, tuple(self._landmark(p, e, act) for p in e.landmarks), e.nth) for e in said)
+
+    def _landmark(self, phrase: Phrase, said: SpokenRelation, act: str) -> Landmark:
+        known = self.knowledge.place(phrase.text) or self.knowledge.person(phrase.text)
+        other = (
+            DOOR if phrase.text in read_table("relations.yaml")["doors"] else ROBOT if phrase.text == "you" else None
         )
+        compares, seen = said.kind in ORDERS, said.kind is RelationKind.SEEN_FROM
+        fits = act == "look" if compares else seen and known in self.knowledge.people
+        if fits and (known or other):
+            return Landmark(known or other or "")
+        named = phrase.count == 1 or said.kind is RelationKind.BETWEEN
+        unfit = known or phrase.speaker or phrase.somebody or phrase.addressed or phrase.pronoun or not named
+        if unfit or seen or (compares and not fits):
+            raise relation_refusal(act, "", said.said)
+        kind = self.object_kind(phrase)
+        self._check_seen(kind)
+        return Landmark(kind.name, kind.attributes)
+
+    def _spot(self, goal: Location | None) -> tuple[Location | None, tuple[Relation, ...]]:
+        """Surface of a spot, by what stands there if it is not named, and relations on it. Raises RefusalError."""
+        if goal is None or goal.phrase is None or not goal.phrase.relations:
+            return goal, ()
+        said, bare = goal.phrase.relations[0], replace(goal.phrase, relations=())
+        relations, there = self._relations(goal.phrase, "bring"), replace(goal, phrase=bare, preposition="on")
+        beside = bare in said.landmarks
+        around = self.place(there) if not beside else goal.within and self.place(goal.within)
+        if not beside and around in self.knowledge.surfaces:
+            return there, relations
+        if not said.landmarks:
+            raise relation_refusal("bring", f"{said.said} of", bare.spoken)
+        usual = self.knowledge.usual_surfaces(relations[0].landmarks[0].name)
+        names = [name for name in usual if around in (None, name, self.knowledge.room(name))]
+        if len(names) != 1:
+            where = tuple(f"on the {name}" for name in names)
+            what = f"On which surface is '{said.said}': {listing(where or ('name it',), last='or')}?"
+            raise _asking(ClarifyingQuestion(what, Slot.GOAL, where, next(iter(where), None)))
+        self.notes.append(f"I take '{said.said}' to be on the {names[0]}")
+        return Location(Phrase((replace(bare.head, text=names[0], lemma=names[0], known=True),)), "on"), relations
 
     def target(self, phrase: Phrase, task: Task | None) -> ObjectKind:
         """Object of a task: a known object or person, or a duration."""
@@ -289,7 +359,7 @@ class _Grounder:
         heard = forms[0]
         ends = (name for form in forms for spelling, name in known.items() if spelling == _last(form))
         near = (name for form in forms for name in look_alikes(form, known, self.parser))
-        candidates = tuple(dict.fromkeys([*ends, *near]))
+        candidates = tuple(name for name in dict.fromkeys([*ends, *near]) if name.lower() not in map(str.lower, forms))
         if candidates:
             return _asking(perhaps_question(slot, heard, candidates))
         return RefusalError(f"I know no {slot.noun} {heard!r}; {known_names(heard, known.values())}", [heard])
@@ -324,4 +394,5 @@ def _last(name: str) -> str:
 
 
 _BIN: Final = "bin"
+_HOME: Final = "home"
 _KINDS: Final = ("room", "surface", "person")

@@ -60,6 +60,8 @@ def how_many(row: Row, items: list[Item]) -> Item | None:
     if row.tokens[row.at].word != "how" or phrase is None or len(phrase.tokens) < 3 or not may_begin_command(items):
         return None
     end = row.at + len(phrase.tokens)
+    inner = row.phrase_at(end + 1) if [t.word for t in row.tokens[end : end + 1]] == ["of"] else None
+    end += 0 if inner is None else 1 + len(inner.tokens)
     be = row.tokens[end : end + 1]
     if row.tokens[row.at + 1].word != "many" or not be or be[0].lemma != "be":
         return None
@@ -72,7 +74,8 @@ def how_many(row: Row, items: list[Item]) -> Item | None:
         row.at += 1
     items += [Separator(""), Being(be[0].text, existential=True, asked=True)]
     head = phrase.head if phrase.plural else replace(phrase.head, text=plural(phrase.head.text), tag="NNS")
-    return Chunk(Phrase((*phrase.tokens[2:-1], head)))
+    counted = Phrase((*phrase.tokens[2:-1], head))
+    return Chunk(counted if inner is None else counted.with_contents(inner))
 
 
 def do_we_have(row: Row, items: list[Item]) -> Item | None:

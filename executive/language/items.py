@@ -146,6 +146,7 @@ class Row:
     phrases: Mapping[int, Phrase]
     at: int = 0
     silent: set[int] = field(default_factory=set)
+    prepositions: Mapping[tuple[str, ...], PrepositionRole] = field(default_factory=lambda: lexicon().prepositions)
 
     def match(self, phrases: Container[tuple[str, ...]]) -> tuple[str, ...] | None:
         """Longest of the phrases that begins at the position."""

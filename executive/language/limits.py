@@ -52,7 +52,10 @@ def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None
         words = dict.fromkeys(part for part, other in parts if other == clause)
         quoted = ", ".join(map(repr, words))
         named.append(quoted if not clause or clause in words else f"{quoted} in {clause!r}")
+    postures = sorted({word for part, _ in parts for word in lexicon().postures & {*part.split()}})
     reason = f"I do not understand {', '.join(named)}; {ABLE}"
+    if postures:
+        reason = f"I see where people are, but not whether they are {listing(postures, last='or')}"
     return RefusalError(reason, [part for part, _ in parts], kind=RefusalKind.NOT_UNDERSTOOD)
 
 
@@ -185,7 +188,7 @@ def check_routes_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Act
         act = "go" if isinstance(clause.verb, Verb) and clause.verb.kinds == {VerbKind.GO} else "bring"
         for chunk in clause.items:
             if isinstance(chunk, Chunk) and chunk.phrase.speaker and not _keeps(act, "person", chunk.preposition):
-                raise _refused(act, chunk.preposition, chunk.phrase.spoken)
+                raise relation_refusal(act, chunk.preposition, chunk.phrase.spoken)
 
 
 def check_relation(act: str, kinds: Sequence[str], location: Location) -> None:
@@ -199,12 +202,13 @@ def check_relation(act: str, kinds: Sequence[str], location: Location) -> None:
     open_top = "surface" in kinds and name.head.lemma.split()[-1] in read_table("relations.yaml")["open_tops"]
     supported = any(_keeps(act, kind, location.preposition) for kind in kinds)
     if not supported and not (open_top and _keeps("lie", "open_top", location.preposition)):
-        raise _refused(act, location.preposition, name.spoken)
+        raise relation_refusal(act, location.preposition, name.spoken)
     if around is not None and not _keeps("around", "place", around.preposition):
-        raise _refused("around", around.preposition, around.name)
+        raise relation_refusal("around", around.preposition, around.name)
 
 
-def _refused(act: str, preposition: str, name: str) -> RefusalError:
+def relation_refusal(act: str, preposition: str, name: str) -> RefusalError:
+    """Refusal of a relation to a place or to somebody, with what the robot does instead."""
     said = f"{preposition} {name}".strip()
     return RefusalError(f"{read_table('relations.yaml')['instead'][act]}, not {said!r}", [said])
 

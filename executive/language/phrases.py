@@ -13,6 +13,7 @@ from executive.language.nouns import NounKind
 from executive.language.tokens import Token
 from skills.api import ObjectKind
 from skills.detect.descriptions import plural
+from skills.relations import RelationKind
 
 _LEFT: Final = frozenset(
     {"det", "amod", "compound", "nummod", "poss", "nmod", "predet", "quantmod", "advmod", "case", "npadvmod", "punct"}
@@ -25,17 +26,35 @@ _HEADLIKE: Final = frozenset({"obj", "iobj", "obl", "nsubj", "attr", "conj", "ro
 
 
 @dataclass(frozen=True)
+class SpokenRelation:
+    """Relation as spoken before and behind a noun, with its landmarks, and the number in a row."""
+
+    kind: RelationKind
+    behind: str
+    landmarks: tuple[Phrase, ...] = ()
+    nth: int = 1
+    before: tuple[Token, ...] = ()
+
+    @property
+    def said(self) -> str:
+        """Words of the relation."""
+        return " ".join(filter(None, (*(t.text for t in self.before), self.behind)))
+
+
+@dataclass(frozen=True)
 class Phrase:
     """Noun with the words around it.
 
     `extra` are the words joined after the noun ("of wine"), `of_kind` is the kind of the noun after "of", and
-    `numbered` is a count that was said separately ("make that two").
+    `numbered` is a count that was said separately ("make that two"). `relations` say which object is meant, or of a
+    surface, where on it.
     """
 
     tokens: tuple[Token, ...]
     extra: tuple[str, ...] = ()
     of_kind: NounKind | None = None
     numbered: int | None = None
+    relations: tuple[SpokenRelation, ...] = ()
 
     @property
     def head(self) -> Token:
@@ -171,7 +190,8 @@ class Phrase:
     @property
     def spoken(self) -> str:
         """All words as spoken."""
-        return " ".join((*(t.text for t in self.tokens), *self.extra))
+        behind = filter(None, (each.behind for each in self.relations))
+        return " ".join((*(t.text for t in self.tokens), *self.extra, *behind))
 
     @property
     def counts(self) -> bool:
@@ -193,6 +213,10 @@ class Phrase:
     def with_extra(self, *words: str) -> Phrase:
         """Returns the phrase with additional words after the noun."""
         return replace(self, extra=(*self.extra, *words))
+
+    def with_relation(self, relation: SpokenRelation) -> Phrase:
+        """Returns the phrase with one more relation."""
+        return replace(self, relations=(*self.relations, relation))
 
     def with_contents(self, inner: Phrase) -> Phrase:
         """Returns the phrase with "of" and the contents after the noun; a mere number has no contents."""
@@ -219,7 +243,8 @@ class Phrase:
         *left, head = self.tokens
         units = {n for n in range(len(left)) if self._measures(n)}
         mine = {n for n, t in enumerate(left) if t.tag == "POS" and left[n - 1].tag not in ("PRP$", "PRP")}
-        return (*(t for n, t in enumerate(left) if n in units | mine or not _is_determiner(t)), head)
+        order = [t for each in self.relations for t in each.before]
+        return (*(t for n, t in enumerate(left) if n in units | mine or not (_is_determiner(t) or t in order)), head)
 
     def _numerals(self) -> Iterator[tuple[Token, ...]]:
         """Yields each number that counts objects, without numbers in measures ("ten inch nails")."""

@@ -18,7 +18,7 @@ from executive.language.phrases import Phrase, noun_phrases
 from executive.language.questions import ABLE, RefusalError, RefusalKind, Slot, which_question
 from executive.language.reading import Reader
 from executive.language.reference import Memory, resolve
-from executive.language.roles import Location
+from executive.language.roles import Location, prepositions, relate
 from executive.language.tokens import Token, name_table, parse_with_names, rephrase
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
@@ -100,9 +100,11 @@ class Pipeline:
         return replace(trace, tokens=parse_with_names(trace.opened, self.parser.parse, table))
 
     def _read(self, trace: Trace) -> Trace:
-        items = Reader(trace.tokens, noun_phrases(trace.tokens)).read(trace.lead)
+        known = prepositions(related=self.knowledge is not None)
+        items = Reader(trace.tokens, noun_phrases(trace.tokens), prepositions=known).read(trace.lead)
         repaired = repair_disfluencies(items)
-        return replace(trace, items=repaired, unwanted=unwanted_phrases(items), taken_back=left_out(items, repaired))
+        related = repaired if self.knowledge is None else relate(repaired)
+        return replace(trace, items=related, unwanted=unwanted_phrases(items), taken_back=left_out(items, repaired))
 
     def _split(self, trace: Trace) -> Trace:
         clauses = predicates(trace.items)

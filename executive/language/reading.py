@@ -117,7 +117,7 @@ class Reader(Row):
         return None
 
     def _chunk(self, items: list[Item]) -> Item | None:
-        preposition = self.match(lexicon().prepositions) or ()
+        preposition = self.match(self.prepositions) or ()
         start = self.at + len(preposition)
         phrase = self.phrase_at(start) or self._shown_at(start)
         if phrase is None:
@@ -129,7 +129,7 @@ class Reader(Row):
         while (end := self._description_end(phrase)) > self.at:
             phrase = phrase.with_extra(*(t.text for t in self.tokens[self.at : end] if t.tag != "DT"))
             self.at = end
-        return Chunk(phrase, " ".join(preposition), lexicon().prepositions[preposition] if preposition else None)
+        return Chunk(phrase, " ".join(preposition), self.prepositions[preposition] if preposition else None)
 
     def _level(self, items: list[Item]) -> Item | None:
         """Reads "upstairs" as a destination or a place to search; before a place, the word adds nothing."""

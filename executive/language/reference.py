@@ -8,7 +8,7 @@ from executive.language.lexicon import VerbKind
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
-from executive.language.roles import THERE, Location
+from executive.language.roles import HERE, THERE, Location
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ def _done(action: Action, before: Resolution) -> Resolution:
     memory = before.memory
     again = any(phrase.pronoun for phrase in action.objects)
     meant = _all_meant(action.objects, memory)
+    meant = tuple(_as_before(item, before.actions, memory) for item in meant)
     objects = tuple(_named_before(item, action, before.actions) or item for item in meant)
     goal, source = (_place(place, memory) for place in (action.goal, action.source))
     to = None if action.goal is None else action.goal.phrase
@@ -92,6 +93,17 @@ def _named_before(item: Phrase, action: Action, actions: Sequence[Action]) -> Ph
         return None
     taken = (one.target for one in reversed(actions) if one.target is not None and one.kind is not VerbKind.PLACE)
     return next((target for target in taken if target.text.lower() == item.text.lower()), None)
+
+
+def _as_before(item: Phrase, actions: Sequence[Action], memory: Memory) -> Phrase:
+    """Object with the relations that it had before, or without "other" if a person got one: the robot finds others."""
+    plain = replace(item, tokens=tuple(t for t in item.tokens if t.word != "other"))
+    given = (one for one in actions if one.goal == HERE or (one.goal and one.goal.living))
+    back = (one for one in actions if one.kind is VerbKind.ROUND_TRIP and one.goal is None)
+    if any(one.target is not None and one.target.text.lower() == plain.text.lower() for one in (*given, *back)):
+        return plain
+    same = (one for one in memory.objects if one.relations and one.text.lower() == item.text.lower())
+    return item if item.indefinite or item.relations else next(same, item)
 
 
 def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
@@ -178,7 +190,12 @@ def _place(place: Location | None, memory: Memory) -> Location | None:
     if phrase is not None and phrase.person:
         within = place.within or (None if memory.person is None else memory.person.within)
         return replace(memory.person or place, preposition=place.preposition, within=within)
+    spot = () if phrase is None else phrase.relations
+    if spot and (meant is None or meant.phrase is None or meant.living):
+        raise RefusalError(f"on which surface is '{spot[0].said}'?", question=True)
     if meant is None:
         word = THERE.preposition if phrase is None else phrase.text
         raise RefusalError(f"which place is {word!r}?", [word], question=True)
-    return meant if phrase is None or meant.phrase is None else replace(meant, preposition=place.preposition)
+    if phrase is None or meant.phrase is None:
+        return meant
+    return replace(meant, phrase=replace(meant.phrase, relations=spot), preposition=place.preposition)

@@ -1,15 +1,18 @@
-"""Assigns roles in a clause: the object of its verb, source, goal and recipient."""
+"""Assigns roles in a clause: the object of its verb, source, goal and recipient; relations first get their nouns."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Final
 
-from executive.language.items import PLACES, Adverb, Chunk, Item, Separator, Unknown, Whether
-from executive.language.lexicon import PrepositionRole, lexicon
+from executive.language.items import PLACES, Adverb, Being, Chunk, Item, Outside, Separator, Unknown, Verb, Whether
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, read_table
 from executive.language.nouns import NounKind
-from executive.language.phrases import Phrase
+from executive.language.phrases import Phrase, SpokenRelation
+from executive.language.tokens import Token
+from skills.relations import ROWS, RelationKind
 
 
 @dataclass(frozen=True)
@@ -243,3 +246,131 @@ def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
             break
         first -= 1
     return [one.chunk.phrase for one in row[first:]]
+
+
+_YOU: Final = Phrase((Token(0, 0, "you", "you", "PRON", "PRP", 0, "obl"),))
+_ONE: Final = Token(0, 0, "one", "one", "NOUN", "NN", 0, "obj")
+_THERE: Final = Phrase((Token(0, 0, "that", "that", "PRON", "DT", 0, "obl"),))
+_COMPARED: Final = (RelationKind.NEAREST_TO, RelationKind.SEEN_FROM)
+_GOES: Final = {VerbKind.GO, VerbKind.CHECK}
+_PLACED: Final = (PrepositionRole.AT, PrepositionRole.GOAL)
+
+
+@cache
+def _kinds(name: str) -> Mapping[str, RelationKind]:
+    """Kinds of relations by their words, from a part of the table."""
+    return {words: RelationKind[kind] for kind, each in read_table("relations.yaml")[name].items() for words in each}
+
+
+@cache
+def prepositions(*, related: bool) -> Mapping[tuple[str, ...], PrepositionRole]:
+    """All prepositions; those of relations only if they are wanted."""
+    own = (*_kinds("beside"), *(f"{words} of" for words in _kinds("parts"))) if related else ()
+    return {**{tuple(words.split()): PrepositionRole.BESIDE for words in own}, **lexicon().prepositions}
+
+
+def relate(items: Iterable[Item]) -> tuple[Item, ...]:
+    """Attaches relations to noun phrases; leaves those alone that describe no object and no spot."""
+    row = _Row(list(items))
+    while row.rest:
+        row.take(row.rest.pop(0))
+    return tuple(row.found)
+
+
+@dataclass
+class _Row:
+    """Items that are left and found, and the indices of the present verb's last object and last surface."""
+
+    rest: list[Item]
+    found: list[Item] = field(default_factory=list)
+    verb: Verb | Being | Outside | None = None
+    named: int | None = None
+    place: int | None = None
+
+    def take(self, item: Item) -> None:
+        """Takes the next item."""
+        if isinstance(item, Verb | Outside):
+            self.verb, self.named, self.place = item, None, None
+        elif isinstance(item, Being):
+            self.verb = item
+        elif isinstance(item, Chunk):
+            relation = self._relation(item)
+            if relation is not None and self._attach(item, relation):
+                return
+            if item.role is None and not _is_somebody(item):
+                self.named, item = len(self.found), replace(item, phrase=self._ordered(item.phrase))
+            elif item.role in _PLACED:
+                self.named, self.place = (None, self.place) if _is_somebody(item) else (self.named, len(self.found))
+        self.found.append(item)
+
+    def _ordered(self, phrase: Phrase) -> Phrase:
+        """Phrase with its order in place of "second", "biggest" or "leftmost"; takes "from the left" behind it."""
+        ordinals, behind = read_table("relations.yaml")["ordinals"], next(iter(self.rest), None)
+        numbers = [t for t in phrase.tokens if t.word in ordinals]
+        orders = [t for t in phrase.tokens[:-1] if t.word in _kinds("orders")]
+        side = behind.spoken if isinstance(behind, Chunk) and behind.spoken in _kinds("sides") and numbers else ""
+        if len(numbers) > 1 or len(orders) + bool(side) != 1:
+            return phrase
+        self.rest = self.rest[bool(side) :]
+        kind = _kinds("sides")[side] if side else _kinds("orders")[orders[0].word]
+        nth = int(ordinals[numbers[0].word]) if numbers else 1
+        before = tuple(t for t in phrase.tokens if t in (*numbers, *orders))
+        one = (replace(_ONE, index=phrase.head.index),) if phrase.head in numbers else ()
+        relation = SpokenRelation(kind, side, () if kind in ROWS else (_YOU,), nth, before)
+        return replace(phrase, tokens=(*phrase.tokens[: -1 if one else None], *one)).with_relation(relation)
+
+    def _relation(self, item: Chunk) -> SpokenRelation | None:
+        """Relation in a noun phrase with its preposition; takes the second landmark of "between"."""
+        beside, parts = _kinds("beside").get(item.preposition), _kinds("parts")
+        part, bare = item.preposition.removesuffix(" of"), item.spoken.lower()
+        if bare in parts or (part in parts and (beside is None or item.phrase.kind is NounKind.PLACE)):
+            said = bare if bare in parts else part
+            return SpokenRelation(parts[said], said)
+        if beside is None or (_is_somebody(item) and beside not in _COMPARED):
+            return None
+        joint, other = (*self.rest, None, None)[:2]
+        if beside is not RelationKind.BETWEEN:
+            return SpokenRelation(beside, item.spoken, (item.phrase,))
+        if not isinstance(other, Chunk) or getattr(joint, "word", "") != "and":
+            both = item.phrase.count in (0, 2)  # between the two beers
+            return SpokenRelation(beside, item.spoken, (item.phrase, item.phrase)) if both else None
+        self.rest = self.rest[2:]
+        return SpokenRelation(beside, f"{item.spoken} and {other.spoken}", (item.phrase, other.phrase))
+
+    def _attach(self, item: Chunk, relation: SpokenRelation) -> bool:
+        """Attaches a relation to the object, or to the surface; returns whether it belongs to one of them."""
+        verb, own = self.verb, not relation.landmarks and item.spoken.lower() not in _kinds("parts")
+        kinds = verb.kinds if isinstance(verb, Verb) else {VerbKind.FIND} if isinstance(verb, Being) else _GOES
+        if kinds <= _GOES:
+            return False
+        surface, last, behind = replace(item, preposition="on", role=PrepositionRole.AT), self.found[-1], self.rest[:1]
+        apart = isinstance(last, Separator) and last.word in lexicon().relative
+        aims = [id(one) for one in (*self.found, *self.rest) if isinstance(one, Chunk) and _is_aim(one)]
+        lacks = isinstance(verb, Verb) and verb.text in lexicon().at_is_goal and not (aims or apart)
+        if lacks and VerbKind.ROUND_TRIP in kinds:
+            return False  # it could say which one, or where to
+        aimed = self.place is not None and id(self.found[self.place]) in aims
+        is_spot = self.named is not None and (lacks or aimed or (VerbKind.PLACE in kinds and not apart))
+        if is_spot and (own or self.place is None):
+            placed = [one for one in behind if isinstance(one, Chunk) and one.role in _PLACED and not _is_somebody(one)]
+            named = surface if own or relation.landmarks else replace(surface, phrase=_THERE)
+            place = named if own or not placed else placed[0]
+            self.rest[: place is not named] = [replace(place, phrase=place.phrase.with_relation(relation))]
+            return True
+        at = self.place if is_spot else self.named
+        chunk = None if at is None else self.found[at]
+        if at is None or not isinstance(chunk, Chunk) or not (is_spot or own or relation.landmarks):
+            return False
+        self.found[at] = replace(chunk, phrase=chunk.phrase.with_relation(relation))
+        self.found = self.found[: len(self.found) - apart]
+        self.rest[:0] = [surface] if own else []
+        return True
+
+
+def _is_somebody(item: Chunk) -> bool:
+    return item.phrase.speaker or item.phrase.person
+
+
+def _is_aim(item: Chunk) -> bool:
+    """Returns whether a noun phrase says whereto, or to whom."""
+    return item.role is PrepositionRole.GOAL or (_is_somebody(item) and item.role in (None, PrepositionRole.FOR))

@@ -20,6 +20,7 @@ from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import steps_to_data, steps_to_yaml
+from skills.inputs.errors import requote
 
 if TYPE_CHECKING:
     from executive.language.addressees import RobotChoice
@@ -184,6 +185,7 @@ def _of_trace(trace: Trace) -> Understanding:
         return replace(found, commands=trace.commands, memory=trace.memory, steps=trace.steps)
     status = Status.QUESTION if refusal.question else Status.REFUSED
     reason = foreign_reason(trace.text) or refusal.reason
+    reason = reason if refusal.question else requote(reason, trace.text)
     return replace(found, status=status, reason=reason, unknown_words=refusal.unknown, question=refusal.question)
 
 

@@ -208,6 +208,35 @@ def with_article(noun: str) -> str:
     return f"{'an' if _VOWEL.match(noun) else 'a'} {noun}"
 
 
+def requote(reason: str, text: str) -> str:
+    """Replaces each quotation in a reason by the part of the speaker's text that has its words in their order."""
+    said = list(_SAID.finditer(text[:_MOST_QUOTED]))
+    spoken = [match[0].lower() for match in said]
+
+    def own(part: re.Match[str]) -> str:
+        words = _SAID.findall(part[1].lower())
+        for first in range(len(said)) if words else ():
+            last = first if spoken[first] == words[0] else -1
+            for word in words[1:] if last >= 0 else ():
+                near = range(last + 1, min(last + _APART, len(said)))
+                last = next((at for at in near if spoken[at] == word), -1)
+                if last < 0:
+                    break
+            if last >= 0:
+                return f"'{text[said[first].start() : said[last].end()]}'"
+        return part[0]
+
+    return _QUOTED.sub(own, reason)
+
+
+_QUOTED: Final = re.compile(r"(?<!\w)'((?:[^']|(?<=\w)'(?=\w))+)'(?!\w)")
+_SAID: Final = re.compile(r"[\w'-]+")
+_MOST_QUOTED: Final = 800
+"""Number of characters of the text in which a quotation is looked for."""
+_APART: Final = 5
+"""Number of words between two words of a quotation, and one more."""
+
+
 def definite(noun: str) -> str:
     """Noun with its definite article, if it needs one: "the hammer", "my mug"."""
     return noun if _DETERMINED.match(noun) else f"the {noun}"

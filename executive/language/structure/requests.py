@@ -114,7 +114,11 @@ def parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) -
     steps = list[Step]()
     for text in re.split(r",? and |, ", match["of"]):
         of = reader.knowledge.place(re.sub(r"^(?:the|a|an|my|our|your) ", "", text, flags=re.IGNORECASE))
-        of = of or str(reader.read_commands(text, state, (verb("find"),)).commands[0].object)
+        if of is None:
+            found = reader.read_commands(text, state, (verb("find"),)).commands[0].object
+            if found is not None and found.relations:
+                raise RefusalError(f"I cannot tell in a picture which one is '{text}'", [text])
+            of = str(found)
         steps.append(Picture(subject=Subject(of=of, at=at, camera=match["camera"] or None)))
     return tuple(steps), replace(state, goal=None, at=None), ()
 

@@ -149,7 +149,7 @@ def test_a_part_of_it_cannot_be_changed(compiling_talk):
 def converse(speech, control, run_tree):
     """Runs the mission of a sentence; `say` gives what is said after a tick. Returns the result and the replies."""
 
-    def run(sentence, say):
+    def run(sentence, say, later_s=0.0):
         meant, replies = speech.understand(sentence, None), []
         tree = speech.compile(steps_of_commands(meant.commands), frozenset())
         conversation = Conversation(speech, control)
@@ -158,7 +158,7 @@ def converse(speech, control, run_tree):
         def observe(progress):
             conversation.tick(progress)
             if (text := say(progress)) is not None:
-                replies.append(conversation.hear(text))
+                replies.append(conversation.hear(text, progress.now_s + later_s))
 
         return run_tree(tree, control=control, observer=observe), replies
 
@@ -186,7 +186,15 @@ def test_an_addition_is_corrected_while_it_waits(converse, script):
 HELD = [
     ("no, the beer", ["Take [coke] to [counter] and do [place] to [coke]", *fetch("beer")]),
     ("no, to the bedroom", carried("coke", "bedroom")[1:]),
+    ("no, bring it to the bedroom instead", carried("coke", "bedroom")[1:]),
+    ("no, bring it to the bedroom", carried("coke", "bedroom")[1:]),
 ]
+
+
+def test_it_is_the_held_object_also_after_a_minute(converse):
+    left = ["no, bring it to the bedroom instead"]
+    says = converse(BEGUN, lambda now: left.pop() if left and now.robots["Alice"].holding else None, later_s=100.0)
+    assert [str(command) for command in says[1][0].commands] == carried("coke", "bedroom")[1:]
 
 
 @pytest.mark.parametrize(("text", "commands"), HELD)

@@ -3,6 +3,7 @@
 import pytest
 
 from executive.language.understand import Status, understand
+from executive.words.command import START, Task
 from tests.tables import table
 
 
@@ -110,3 +111,24 @@ def test_everything_on_a_surface_is_taken_to_another(understood, sentence, task)
 def test_everything_needs_a_place_to_be_taken_from(understood):
     answer = understood("move all the things to the workbench")
     assert answer.status is not Status.OK and "from where" in answer.reason
+
+
+@pytest.mark.parametrize("sentence", ["go home", "please drive home", "go back home", "return home"])
+def test_home_is_the_dock_and_a_note_says_so(understood, sentence):
+    answer = understood(sentence)
+    assert [command.task for command in answer.commands] == [Task.CHARGE]
+    assert answer.notes == ("I take 'home' to be the dock",)
+
+
+def test_home_without_a_dock_is_where_the_robot_was_spoken_to(parser, knowledge):
+    bare = knowledge.model_copy(update={"dock": None})
+    answer = understand("go home", parser=parser, knowledge=bare, require_wake=False)
+    assert [command.goal for command in answer.commands] == [START]
+
+
+@pytest.mark.parametrize("sentence", ["count the coke cans in the kitchen", "count the cans of coke in the kitchen"])
+def test_the_plural_of_a_name_of_two_nouns_is_known(parser, knowledge, sentence):
+    coke = knowledge.things["coke"].model_copy(update={"aliases": ("coke can", "can of coke")})
+    named = knowledge.model_copy(update={"things": {**knowledge.things, "coke": coke}})
+    answer = understand(sentence, parser=parser, knowledge=named, require_wake=False)
+    assert [(str(command.object), command.object_count) for command in answer.commands] == [("coke", 0)]

@@ -1,6 +1,6 @@
 import pytest
 
-from skills.inputs.errors import MOST_LETTERS, InputError, definite, known_names, suggestion, with_article
+from skills.inputs.errors import MOST_LETTERS, InputError, definite, known_names, requote, suggestion, with_article
 
 
 def test_a_message_that_repeats_an_endless_name_is_cut_off():
@@ -44,3 +44,16 @@ def test_a_noun_gets_the_article_of_its_sound(phrase):
 )
 def test_a_noun_has_one_definite_article_at_most(noun, said):
     assert definite(noun) == said
+
+
+@pytest.mark.parametrize(
+    ("said", "part", "quoted"),
+    [
+        ("take the hammer to the moon", "take to the moon", "take the hammer to the moon"),
+        ("Meet my sister, Ann", "my sister Ann", "my sister, Ann"),
+        ("go to the moon", "go to the moon", "go to the moon"),
+        ("count all the plums", "how many plums", "how many plums"),
+    ],
+)
+def test_a_reason_quotes_the_speakers_own_words(said, part, quoted):
+    assert requote(f"I do not understand '{part}'; say more", said) == f"I do not understand '{quoted}'; say more"

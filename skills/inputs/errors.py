@@ -214,7 +214,7 @@ def requote(reason: str, text: str) -> str:
     spoken = [match[0].lower() for match in said]
 
     def own(part: re.Match[str]) -> str:
-        words = _SAID.findall(part[1].lower())
+        words = [] if part[1].lower() in text.lower() else _SAID.findall(part[1].lower())
         for first in range(len(said)) if words else ():
             last = first if spoken[first] == words[0] else -1
             for word in words[1:] if last >= 0 else ():

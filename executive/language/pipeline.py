@@ -109,7 +109,8 @@ class Pipeline:
     def _split(self, trace: Trace) -> Trace:
         clauses = predicates(trace.items)
         if not clauses:
-            raise RefusalError(f"nothing was said; {ABLE}")
+            what = f"{trace.text!r} asks for nothing" if trace.text else "nothing was said"
+            raise RefusalError(f"{what}; {ABLE}")
         refuse_harm(clauses)
         return replace(trace, clauses=clauses if self.knowledge else drop_name(clauses))
 

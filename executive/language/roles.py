@@ -266,7 +266,8 @@ def _kinds(name: str) -> Mapping[str, RelationKind]:
 def prepositions(*, related: bool) -> Mapping[tuple[str, ...], PrepositionRole]:
     """All prepositions; those of relations only if they are wanted."""
     own = (*_kinds("beside"), *(f"{words} of" for words in _kinds("parts"))) if related else ()
-    return {**{tuple(words.split()): PrepositionRole.BESIDE for words in own}, **lexicon().prepositions}
+    down = (f"down {words}" for words in own if words.startswith(("in ", "at ")))
+    return {**{tuple(words.split()): PrepositionRole.BESIDE for words in (*own, *down)}, **lexicon().prepositions}
 
 
 def relate(items: Iterable[Item]) -> tuple[Item, ...]:
@@ -321,8 +322,8 @@ class _Row:
 
     def _relation(self, item: Chunk) -> SpokenRelation | None:
         """Relation in a noun phrase with its preposition; takes the second landmark of "between"."""
-        beside, parts = _kinds("beside").get(item.preposition), _kinds("parts")
-        part, bare = item.preposition.removesuffix(" of"), item.spoken.lower()
+        words, parts, bare = item.preposition.removeprefix("down "), _kinds("parts"), item.spoken.lower()
+        beside, part = _kinds("beside").get(words), words.removesuffix(" of")
         if bare in parts or (part in parts and (beside is None or item.phrase.kind is NounKind.PLACE)):
             said = bare if bare in parts else part
             return SpokenRelation(parts[said], said)

@@ -176,7 +176,7 @@ class RobotCommandService(Service):
         command, computer, snapshot = request.command, self._computer, self._computer.snapshot
         check_values(command, "command")
         whole = _whole_motion(command.full_body_command) if command.HasField("full_body_command") else None
-        if not computer.able and whole is None:
+        if not computer.able and (whole is None or command.full_body_command.HasField("selfright_request")):
             if snapshot.motors is not Motors.ON:
                 raise RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off")
             raise RefusedError(Status.STATUS_BEHAVIOR_FAULT, "the robot has fallen: clear its behaviour fault")

@@ -274,12 +274,12 @@ class Trajectory(_Driving):
         error = error_to(pose, target)
         velocity = np.zeros(3) if arrived else self._limit(velocity + _GAIN_1_S * error)
         drive(computer, self._clearance.limit(computer, velocity), self.end_s)
-        part, near = self.Part, left_s <= 0.0 and far_m < _STOPPING_M
-        status = part.STATUS_STOPPING if near else part.STATUS_IN_PROGRESS
+        part, blocked = self.Part, self.Part.FINAL_GOAL_STATUS_BLOCKED  # which lasts until the robot has moved
+        status = part.STATUS_STOPPING if left_s <= 0.0 and far_m < _STOPPING_M else part.STATUS_IN_PROGRESS
         goal = part.FINAL_GOAL_STATUS_ACHIEVABLE if arrived else part.FINAL_GOAL_STATUS_IN_PROGRESS
-        if self._stuck(error, pose, now_s) and still:
-            goal = part.FINAL_GOAL_STATUS_BLOCKED
-        if still and goal != part.FINAL_GOAL_STATUS_IN_PROGRESS:
+        if self._stuck(error, pose, now_s) and (still or self._part().final_goal_status == blocked):
+            goal = blocked
+        if (still or goal == blocked) and goal != part.FINAL_GOAL_STATUS_IN_PROGRESS:
             status = part.STATUS_STOPPED
         body = part.BODY_STATUS_SETTLED if arrived and still else part.BODY_STATUS_MOVING
         self.feedback = self._made(part(status=status, body_movement_status=body, final_goal_status=goal))
@@ -408,6 +408,6 @@ def speed_limit(params: Any) -> Callable[[FloatArray], FloatArray]:
         if params.HasField("vel_limit") and params.vel_limit.HasField(name):
             given = getattr(params.vel_limit, name)
             limits[:] = given.linear.x, given.linear.y, given.angular
-    if not (np.isfinite(most).all() and np.isfinite(least).all()):
-        raise InvalidRequestError("mobility_command.params.vel_limit must be finite")
-    return lambda velocity: np.clip(velocity, np.minimum(least, most), np.maximum(least, most))
+    if not (np.isfinite([least, most]).all() and (least <= 0.0).all() and (most >= 0.0).all()):
+        raise InvalidRequestError("params.vel_limit: max_vel is finite and at least 0, min_vel at most 0")
+    return lambda velocity: np.clip(velocity, least, most)

@@ -95,7 +95,8 @@ def test_a_cut_from_standing_lets_the_robot_fall_and_leaves_a_fault(spot):
 
 def test_a_robot_that_has_fallen_moves_only_after_a_client_clears_the_fault(spot):
     fallen(spot)
-    for command in (Build.synchro_stand_command(), Build.synchro_velocity_command(0.2, 0.0, 0.0)):
+    walk = Build.synchro_velocity_command(0.2, 0.0, 0.0)
+    for command in (Build.synchro_stand_command(), walk, Build.selfright_command()):
         with pytest.raises(rc.BehaviorFaultError):
             sent(spot, command)
     assert spot.served.scripted.height_m < 0.3

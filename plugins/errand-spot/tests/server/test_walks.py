@@ -164,6 +164,26 @@ def test_a_padding_below_zero_is_an_invalid_request(spot, padding):
     assert "padding" in refused.value.response.message
 
 
+def test_a_blocked_walk_stays_blocked_while_the_measured_speed_is_never_zero(spot, monkeypatch):
+    number = sent(spot, path([(3.0, 0.0, 0.0)]))
+    walked(spot, number)
+    monkeypatch.setattr("errand_spot.server.mobility._STILL_M_S", 0.0)
+    for _ in range(5):
+        time.sleep(0.1)
+        told = feedback(spot, number)
+        assert (told.status, told.final_goal_status) == (Walk.STATUS_STOPPED, Walk.FINAL_GOAL_STATUS_BLOCKED)
+
+
+@pytest.mark.parametrize("limit", [{"max_vel": -0.5}, {"min_vel": 0.5}, {"max_vel": float("inf")}])
+def test_a_limit_that_reverses_or_has_no_bound_is_refused(spot, limit):
+    params = spot_command_pb2.MobilityParams()
+    for name, value in limit.items():
+        getattr(params.vel_limit, name).linear.x = value
+    with pytest.raises(InvalidCommandError) as refused:
+        sent(spot, path([(0.3, 0.0, 0.0)], params=params))
+    assert "vel_limit" in refused.value.response.message
+
+
 def region(frame="odom", lasts_s=0.0, **properties):
     """World object of a box across the way 0.9 m ahead."""
     box = geometry_pb2.Box2WithFrame(frame_name=frame)

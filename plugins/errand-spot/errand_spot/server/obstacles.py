@@ -17,11 +17,9 @@ if TYPE_CHECKING:
     from errand_spot.server.computer import Computer, Snapshot
 
 HEIGHTS_M: Final = (0.15, 1.0)
-_PADDING_M: Final = 0.05
-_NEAR_M, _CARRIED_M = 2.0, 0.35
-_REMEMBERED_S, _CELL_M = 15.0, 0.05
-_SPACING_M, _LARGEST_M = 0.05, 100.0
-_FAR_M, _ENOUGH_M, _PER_LEG = 5.0, 0.15, 12
+_PADDING_M, _NEAR_M, _CARRIED_M = 0.05, 2.0, 0.35
+_REMEMBERED_S, _CELL_M, _SEEN_M, _THIN_M, _AROUND_M = 15.0, 0.05, 0.01, 0.12, 0.2
+_SPACING_M, _LARGEST_M, _FAR_M, _ENOUGH_M, _PER_LEG = 0.05, 100.0, 5.0, 0.15, 12
 _BRAKING_S, _WAITS_S = 0.5, 0.04
 """Time to a collision from which on the robot slows down, and at which it waits."""
 _AHEAD_S: Final = np.linspace(0.05, _BRAKING_S, 14)
@@ -36,11 +34,11 @@ class Region:
 
 
 class ScanPoints:
-    """Highest points of the last scan, up to the body's height, and of earlier ones below what the LiDAR sees now."""
+    """Highest points of the last scan up to the body's height; earlier ones below or, if thin, between its beams."""
 
     def __init__(self) -> None:
         self._scan: Scan | None = None
-        self._points = np.empty((0, 4))  # x, y, z in `odom`, and their time
+        self._points = np.empty((0, 5))  # x, y, z in `odom`, their time, and whether they are of something thin
         self.points_O: FloatArray = self._points[:, :2]
 
     def take(self, scan: Scan | None) -> None:
@@ -51,12 +49,17 @@ class ScanPoints:
         points_O = points_O[(points_O[:, 2] > HEIGHTS_M[0]) & (points_O[:, 2] < HEIGHTS_M[1])]
         away = self._points[:, :3] - (scan.X_OB @ scan.X_BL).translation()
         far_m = np.hypot(away[:, 0], away[:, 1])
-        lowest = far_m * math.tan(float(scan.elevations_rad.min())) - _CELL_M
-        low = (away[:, 2] < lowest) & (far_m < _NEAR_M)
-        kept = self._points[low & (self._points[:, 3] > scan.stamp_s - _REMEMBERED_S)]
+        low = away[:, 2] < far_m * math.tan(float(scan.elevations_rad.min())) - _CELL_M
+        missed_m = np.abs(away[:, 2:] - far_m[:, None] * np.tan(scan.elevations_rad)).min(axis=1)
+        unseen = (far_m < _NEAR_M) & (low | ((missed_m > _SEEN_M) & (self._points[:, 4] > 0.0)))
+        kept = self._points[unseen & (self._points[:, 3] > scan.stamp_s - _REMEMBERED_S)]
         highest = points_O[np.argsort(-points_O[:, 2], kind="stable")]
-        _, first = np.unique(np.round(highest[:, :2] / _CELL_M), axis=0, return_index=True)
-        new = np.column_stack([highest[first], np.full(len(first), scan.stamp_s)])
+        first = np.unique(np.round(highest[:, :2] / _CELL_M), axis=0, return_index=True)[1]
+        around = np.round(highest[:, :2] / _AROUND_M)
+        _, top, inverse = np.unique(around, axis=0, return_index=True, return_inverse=True)
+        bottom = len(around) - 1 - np.unique(around[::-1], axis=0, return_index=True)[1]
+        thin = (highest[top, 2] - highest[bottom, 2] < _THIN_M)[inverse.ravel()][first]
+        new = np.column_stack([highest[first], np.full(len(first), scan.stamp_s), thin])
         self._scan, self._points = scan, np.concatenate([kept, new])
         self.points_O = self._points[:, :2]
 
@@ -82,10 +85,9 @@ class Clearance:
         away_m = np.maximum(low - points_B, points_B - high).max(axis=1)
         points_B, away_m = points_B[away_m > 0.0], away_m[away_m > 0.0]  # the others are the robot's own
         margin = np.minimum(away_m, self._padding_m)[:, None]
-        vx, vy, wz = velocity
-        turned = wz * _AHEAD_S
+        turned = velocity[2] * _AHEAD_S
         c, s = np.cos(turned)[:, None], np.sin(turned)[:, None]
-        x, y = points_B[:, 0] - (vx * _AHEAD_S)[:, None], points_B[:, 1] - (vy * _AHEAD_S)[:, None]
+        x, y = (points_B[:, k] - (velocity[k] * _AHEAD_S)[:, None] for k in (0, 1))
         ahead = np.stack([c * x + s * y, c * y - s * x], axis=2)
         touched = ((ahead > low - margin) & (ahead < high + margin)).all(axis=2).any(axis=1)
         if not touched.any():
@@ -96,10 +98,8 @@ class Clearance:
     def _points_B(self, computer: Computer) -> FloatArray:
         """Points (N, 2) near the body, without those at what the hand carries."""
         snapshot = computer.snapshot
-        points_O = [computer.scan_points.points_O] if self._sees else []
+        points_O = [computer.scan_points.points_O[: None if self._sees else 0]]
         points_O += [region.outline_O for region in computer.regions if region.until_s > snapshot.time_s]
-        if not points_O:
-            return np.empty((0, 2))
         points_B = seen_from(snapshot.odometry.pose, np.concatenate(points_O))
         points_B = points_B[(np.abs(points_B) < _NEAR_M).all(axis=1)]
         if snapshot.gripper.holding and "hand" in snapshot.frames:

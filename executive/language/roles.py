@@ -266,7 +266,7 @@ def _kinds(name: str) -> Mapping[str, RelationKind]:
 def prepositions(*, related: bool) -> Mapping[tuple[str, ...], PrepositionRole]:
     """All prepositions; those of relations only if they are wanted."""
     own = (*_kinds("beside"), *(f"{words} of" for words in _kinds("parts"))) if related else ()
-    down = (f"down {words}" for words in own if words.startswith(("in ", "at ")))
+    down = (f"down {words}" for words in own if words.startswith(("in ", "at ", "to ")))
     return {**{tuple(words.split()): PrepositionRole.BESIDE for words in (*own, *down)}, **lexicon().prepositions}
 
 

@@ -1,6 +1,7 @@
 """From a folder of pictures and a proposal network to the refinement network's file; skipped without torch."""
 
 from dataclasses import replace
+from shutil import copytree
 
 import cv2
 import numpy as np
@@ -31,17 +32,41 @@ def write_noise(folder, split, count, names=CLASSES):
     write_split(folder, split, drawn, boxes, names)
 
 
+def options_in(folder):
+    first, schedule = folder / "first.onnx", Schedule(1e-3)
+    data, out = folder / "data", folder / "out"
+    return RefineOptions(data, out, Budget(pictures=8), model=first, examined=2, batch=4, schedule=schedule)
+
+
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory):
+    """A folder as a data set and a proposal network stand after `errand dataset train`."""
+    folder = tmp_path_factory.mktemp("begun")
+    (folder / "data").mkdir()
+    write_noise(folder / "data", "train", 4)
+    write_noise(folder / "data", "val", 2)
+    real_first(folder / "first.onnx")
+    return folder
+
+
 @pytest.fixture
-def options(tmp_path):
-    """As a data set and a proposal network stand after `errand dataset train`."""
-    data = tmp_path / "data"
-    data.mkdir()
-    write_noise(data, "train", 4)
-    write_noise(data, "val", 2)
-    first = real_first(tmp_path / "first.onnx")
-    return RefineOptions(
-        data, tmp_path / "out", Budget(pictures=8), model=first, examined=2, batch=4, schedule=Schedule(1e-3)
-    )
+def options(begun, tmp_path):
+    """A refinement that has not begun, in a folder that a test may change."""
+    return options_in(copytree(begun, tmp_path / "begun"))
+
+
+@pytest.fixture(scope="module")
+def once(begun, tmp_path_factory):
+    """The folder of a finished refinement, and what it told."""
+    folder, told = copytree(begun, tmp_path_factory.mktemp("refined") / "once"), list[Report]()
+    refine(options_in(folder), told.append)
+    return folder, told
+
+
+@pytest.fixture
+def finished(once, tmp_path):
+    """Options of a copy of the finished refinement, which a test may change."""
+    return options_in(copytree(once[0], tmp_path / "once"))
 
 
 def real_first(file):
@@ -52,10 +77,10 @@ def real_first(file):
     return file
 
 
-def test_a_proposal_network_gets_a_refinement_network(options):
-    told = list[Report]()
-    file = refine(options, told.append)
-    assert file == refinement_file(options.out / MODEL)
+def test_a_proposal_network_gets_a_refinement_network(once):
+    folder, told = once
+    options = options_in(folder)
+    assert refinement_file(options.out / MODEL).is_file()
     model = load_model(options.out / MODEL)
     assert model.refinement is not None
     assert len(OnnxDetector(model).detect([picture_of()])) == 1
@@ -64,9 +89,8 @@ def test_a_proposal_network_gets_a_refinement_network(options):
     assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, TABLE, "training.jsonl"}
 
 
-def test_both_get_a_classifier_network_that_belongs_to_them(options, tmp_path):
-    refine(options, lambda _: None)
-    next_one = replace(options, classifier=True, model=options.out / MODEL, out=tmp_path / "next")
+def test_both_get_a_classifier_network_that_belongs_to_them(finished, tmp_path):
+    next_one = replace(finished, classifier=True, model=finished.out / MODEL, out=tmp_path / "next")
     file = refine(next_one, lambda _: None)
     assert file == classifier_file(next_one.out / MODEL)
     model = load_model(next_one.out / MODEL)
@@ -81,18 +105,16 @@ def test_without_a_refinement_network_there_is_no_classifier_network(options):
         refine(replace(options, classifier=True), lambda _: None)
 
 
-def test_a_training_resumes_from_its_checkpoint(options):
-    refine(options, lambda _: None)
+def test_a_training_resumes_from_its_checkpoint(finished):
     told = list[Report]()
-    refine(replace(options, budget=Budget(pictures=16), resume=True), told.append)
+    refine(replace(finished, budget=Budget(pictures=16), resume=True), told.append)
     assert [report.steps for report in told if report.figures is not None] == [3, 4]
 
 
-def test_weights_of_another_training_are_taken_over(options, tmp_path):
-    refine(options, lambda _: None)
-    budget, start = Budget(pictures=4), options.out / CHECKPOINT
-    refine(replace(options, out=tmp_path / "next", budget=budget, start=start, schedule=Schedule(0.0)), lambda _: None)
-    before, after = (read_checkpoint(out / CHECKPOINT) for out in (options.out, tmp_path / "next"))
+def test_weights_of_another_training_are_taken_over(finished, tmp_path):
+    budget, start = Budget(pictures=4), finished.out / CHECKPOINT
+    refine(replace(finished, out=tmp_path / "next", budget=budget, start=start, schedule=Schedule(0.0)), lambda _: None)
+    before, after = (read_checkpoint(out / CHECKPOINT) for out in (finished.out, tmp_path / "next"))
     assert after["progress"]["steps"] == 1
     averaged, weight = "module.scores.weight", "scores.weight"
     assert before["average"][averaged].abs().max() > 0
@@ -100,7 +122,7 @@ def test_weights_of_another_training_are_taken_over(options, tmp_path):
 
 
 def test_weights_of_a_refinement_networks_file_are_taken_over(options, tmp_path):
-    start, still = refine(replace(options, budget=Budget(pictures=32)), lambda _: None), Schedule(0.0)
+    start, still = refine(replace(options, budget=Budget(pictures=16)), lambda _: None), Schedule(0.0)
     out = tmp_path / "next"
     refine(replace(options, out=out, budget=Budget(pictures=4), start=start, schedule=still), lambda _: None)
     before, after = (read_checkpoint(folder / CHECKPOINT) for folder in (options.out, out))

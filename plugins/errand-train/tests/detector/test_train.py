@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from shutil import copytree
 
 import numpy as np
 import pytest
@@ -31,37 +32,58 @@ def write_blocks(folder, split, count):
     write_split(folder, split, pictures, [[100, 60, 80, 100]], NAMES)
 
 
+def options_in(folder):
+    return TrainOptions(folder / "data", folder / "out", Budget(pictures=8), examined=2, schedule=SMALL)
+
+
 @pytest.fixture
 def options(tmp_path):
+    """A training that has not begun."""
     data = tmp_path / "data"
     data.mkdir()
     write_blocks(data, "train", 4)
     write_blocks(data, "val", 2)
-    return TrainOptions(data, tmp_path / "out", Budget(pictures=8), examined=2, schedule=SMALL)
+    return options_in(tmp_path)
 
 
-def test_a_data_set_becomes_a_detectors_file(options):
-    told = list[Report]()
-    file = train(options, told.append)
-    assert file == options.out / MODEL
-    assert load_model(file).class_names == NAMES
+@pytest.fixture(scope="module")
+def once(tmp_path_factory):
+    """The folder of a finished training, and what it told."""
+    folder, told = tmp_path_factory.mktemp("once"), list[Report]()
+    (folder / "data").mkdir()
+    write_blocks(folder / "data", "train", 4)
+    write_blocks(folder / "data", "val", 2)
+    train(options_in(folder), told.append)
+    return folder, told
+
+
+@pytest.fixture
+def finished(once, tmp_path):
+    """Options of a copy of the finished training, which a test may change."""
+    copytree(once[0], tmp_path / "once")
+    return options_in(tmp_path / "once")
+
+
+def test_a_data_set_becomes_a_detectors_file(once):
+    folder, told = once
+    options = options_in(folder)
+    assert load_model(options.out / MODEL).class_names == NAMES
     assert told[-1].progress == 1.0
     assert told[-1].figures is not None
     assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, "training.jsonl", "pictures"}
 
 
-def test_a_resumed_training_counts_what_it_has_seen(options):
-    train(options, lambda _report: None)
+def test_a_resumed_training_counts_what_it_has_seen(finished):
     told = list[Report]()
-    train(replace(options, resume=True, budget=Budget(pictures=12)), told.append)
+    train(replace(finished, resume=True, budget=Budget(pictures=12)), told.append)
     assert told[-1].steps == 6
 
 
-def test_a_finished_training_writes_its_file_again(options):
-    file = train(options, lambda _report: None)
+def test_a_finished_training_writes_its_file_again(finished):
+    file = finished.out / MODEL
     content = file.read_bytes()
     file.unlink()
-    train(replace(options, resume=True), lambda _report: None)
+    assert train(replace(finished, resume=True), lambda _report: None) == file
     assert file.read_bytes() == content
 
 
@@ -71,18 +93,15 @@ def test_weights_that_are_not_there_are_named(options, tmp_path):
         train(chosen, lambda _report: None)
 
 
-def test_weights_of_another_training_are_taken_over(options, tmp_path):
-    train(options, lambda _report: None)
+def test_weights_of_another_training_are_taken_over(finished, tmp_path):
     told = list[Report]()
-    train(replace(options, out=tmp_path / "next", start=options.out / CHECKPOINT), told.append)
+    train(replace(finished, out=tmp_path / "next", start=finished.out / CHECKPOINT), told.append)
     assert told[-1].steps == 4
 
 
-def test_learning_goes_on_from_an_onnx_file(options, tmp_path):
-    start = train(options, lambda _report: None)
+def test_learning_goes_on_from_an_onnx_file(finished, tmp_path):
     told = list[Report]()
-    chosen = replace(options, out=tmp_path / "next", start=start)
-    train(chosen, told.append)
+    train(replace(finished, out=tmp_path / "next", start=finished.out / MODEL), told.append)
     assert told[-1].steps == 4
 
 

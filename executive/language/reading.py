@@ -186,7 +186,8 @@ class Reader(Row):
         if phrase.person and token.tag == "VBG":
             return self._doing_end()
         end = self.at + 1 + (0 if inner is None else len(inner.tokens))
-        if inner is not None and token.word == "on" and inner.head.word in ("left", "right"):
+        apart = PrepositionRole.BESIDE in self.prepositions.values()  # in a world, it says which one
+        if inner is not None and token.word == "on" and inner.head.word in ("left", "right") and not apart:
             return end if end == len(self.tokens) or self.tokens[end].word != "of" else self.at
         worn = inner is not None and inner.head.lemma in lexicon().worn
         joins = token.word in ("with", "containing", "holding")

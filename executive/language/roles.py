@@ -305,11 +305,13 @@ class _Row:
         self.found.append(item)
 
     def _ordered(self, phrase: Phrase) -> Phrase:
-        """Phrase with its order in place of "second", "biggest" or "leftmost"; takes "from the left" behind it."""
+        """Phrase with its order in place of "second", "biggest" or "left"; takes "from the left" or "on the left" behind."""
         ordinals, behind = read_table("relations.yaml")["ordinals"], next(iter(self.rest), None)
+        chosen = isinstance(self.verb, Verb) and VerbKind.PLACE not in self.verb.kinds
         numbers = [t for t in phrase.tokens if t.word in ordinals]
         orders = [t for t in phrase.tokens[:-1] if t.word in _kinds("orders")]
-        side = behind.spoken if isinstance(behind, Chunk) and behind.spoken in _kinds("sides") and numbers else ""
+        side = behind.spoken if isinstance(behind, Chunk) and behind.spoken in _kinds("sides") else ""
+        side = side if numbers or chosen else ""
         if len(numbers) > 1 or len(orders) + bool(side) != 1:
             return phrase
         self.rest = self.rest[bool(side) :]

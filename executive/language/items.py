@@ -131,7 +131,7 @@ def without_objects(items: Sequence[Item]) -> tuple[Item, ...]:
     )
 
 
-LONGEST: Final = 6
+LONGEST: Final = 8
 """Number of words of the longest phrase in the dictionaries."""
 
 

@@ -298,7 +298,7 @@ class _Row:
             relation = self._relation(item)
             if relation is not None and self._attach(item, relation):
                 return
-            if item.role is None and not _is_somebody(item):
+            if item.role in (None, PrepositionRole.FOR) and not _is_somebody(item):
                 self.named, item = len(self.found), replace(item, phrase=self._ordered(item.phrase))
             elif item.role in _PLACED:
                 self.named, self.place = (None, self.place) if _is_somebody(item) else (self.named, len(self.found))

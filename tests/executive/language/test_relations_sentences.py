@@ -11,7 +11,7 @@ from plant.worlds.world import load_world
 from tests.executive.language.notation import as_noted, noted
 from tests.tables import yaml_beside
 
-FILES = tuple(f"relations_sentences{part}.yaml" for part in ("", "_later", "_last"))
+FILES = tuple(f"relations_sentences{part}.yaml" for part in ("", "_later", "_last", "_fresh"))
 SENTENCES = [
     (world, text, expected)
     for file in FILES

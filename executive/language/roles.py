@@ -305,7 +305,7 @@ class _Row:
         self.found.append(item)
 
     def _ordered(self, phrase: Phrase) -> Phrase:
-        """Phrase with its order in place of "second", "biggest" or "left"; takes "from the left" or "on the left" behind."""
+        """Phrase with its order in place of "second", "biggest" or "left"; takes "on the left" behind it."""
         ordinals, behind = read_table("relations.yaml")["ordinals"], next(iter(self.rest), None)
         chosen = isinstance(self.verb, Verb) and VerbKind.PLACE not in self.verb.kinds
         numbers = [t for t in phrase.tokens if t.word in ordinals]

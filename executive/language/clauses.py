@@ -2,7 +2,7 @@
 
 import enum
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import pairwise
@@ -193,11 +193,32 @@ def join_clauses(clauses: Iterable[Clause]) -> str:
     return " ".join(f"{clause.joint}{clause.cue} {clause.text}".strip() for clause in clauses).strip(" ,;.")
 
 
+def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: bool = False) -> int:
+    """Index after the clauses, from `at` on, that a condition or rounds apply to.
+
+    `branch` marks a second branch, in which "then" goes on after both branches. A clause that follows the whole block
+    ends it; in "first ..., finally ..." it still belongs to the block.
+    """
+    first = any(re.search(r"\bfirst\b", one.joint, re.IGNORECASE) for one in clauses[at : at + 1])
+    for n, one in enumerate(clauses[at:], at):
+        after_all = n > at and ((one.outer and not first) or one.anyway)
+        then = n > at and branch and one.then
+        if rounds:
+            goes_on = one.kind in ATTACHED or (one.kind is Cue.IF and CHECKS["pronoun"].match(one.text) is not None)
+            if after_all or (one.begins and n > at and not goes_on):
+                return n
+        elif one.kind in (*ATTACHED, Cue.IF, Cue.UNLESS, Cue.SOON) or one.begins or after_all or then:
+            return n
+    return len(clauses)
+
+
 @cache
 def _verbs() -> frozenset[str]:
     return frozenset({first for first, *_ in lexicon().verbs} | set(CLAUSES.table["openers"]))
 
 
+ATTACHED: Final = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)
+"""Cues of clauses that refer to the last look or action."""
 _BEHIND: Final = (Cue.EVERY, Cue.TIMES, Cue.WHILE, Cue.UNTIL, Cue.UNLESS, Cue.IF)
 _WHOLE: Final = frozenset({Cue.FAILED, Cue.SO, Cue.NOT})
 _MARKS: Final = frozenset(",;.!?:")

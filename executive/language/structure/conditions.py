@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import Final
 
 from executive.language.amounts import parse_seconds, parse_share, parse_time
-from executive.language.clauses import CLAUSES
+from executive.language.clauses import CHECKS, CLAUSES
 from executive.language.indirect import CONTENTS, OBJECTS
-from executive.language.items import Adverb, Chunk, Whether, verb
+from executive.language.items import Chunk, verb
 from executive.language.questions import RefusalError, RefusalKind, Slot, which_question
 from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
-from executive.language.structure.plain import IS, IT, PlainReader, SpokenCondition, State, with_preposition
+from executive.language.structure.plain import PlainReader, SpokenCondition, State, attempt, with_preposition
 from executive.language.templates import Match, page
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
@@ -23,8 +23,8 @@ from skills.inputs.errors import listing
 _P: Final = page("conditions")
 _DOORS: Final = page("doors")
 _JOINED: Final = page("joined")
-Done = tuple[Steps, State, tuple[str, ...]]
-"""Steps, the state after them, and notes."""
+Done = tuple[Steps, State]
+"""Steps, and the state after them."""
 RequestParser = Callable[[str, Callable[[], State], PlainReader], Done | None]
 """Parses a clause; the state before it is only computed for a request that it understands."""
 FULL: Final = 0.99
@@ -39,25 +39,25 @@ def parse_condition(text: str, state: State, reader: PlainReader) -> SpokenCondi
         return found
     if (unreal := CLAUSES["unreal"].search(words)) is not None:
         raise RefusalError(f"I can only decide by what I see now, not by '{words}'", [unreal.text])
-    joined, left_open = _joined(words, state, reader)
-    if joined is not None:
+    joined = _joined(words, state, reader)
+    if isinstance(joined, SpokenCondition):
         return joined
-    try:
-        return _look(words, state, reader)
-    except RefusalError as refusal:
-        raise refusal if refusal.question is not None or left_open is None else left_open from None
+    alone = attempt(_look, words, state, reader)
+    if isinstance(alone, RefusalError):
+        raise alone if alone.question is not None or joined is None else joined
+    return alone
 
 
 def usual_condition(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
     """Parses a condition in a usual form: battery, gripper, place, clock, button, door, or people who come or go."""
-    if (pressed := _P["pressed"].fullmatch(words)) is not None:
-        return button_condition(pressed["button"], words, state)
     readers = (_measured, _door, _meeting)
     return next((found for read in readers if (found := read(words, state, reader)) is not None), None)
 
 
 def _measured(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
-    """Condition on a value that the robot measures: battery, gripper, place or time."""
+    """Condition on a button, or on a value that the robot measures: battery, gripper, place or time."""
+    if (match := _P["pressed"].fullmatch(words)) is not None:
+        return SpokenCondition(ButtonPressed(button=match["button"].lower() or "button"), words, state, state)
     if (match := _P["measured"].fullmatch(words)) is None:
         return None
     share, seconds, time = parse_share(match["share"]), parse_seconds(match["span"]), parse_time(match["time"])
@@ -68,15 +68,9 @@ def _measured(words: str, state: State, reader: PlainReader) -> SpokenCondition 
     facts, sign = reader.knowledge.battery, match["sign"] or ">="
     values = {"low": facts.low, "charged": facts.charged, "full": FULL, "sign": sign, "share": share, "span": seconds}
     text = match["value"].format(**values, time=None if time is None else time.text)
-    notes = () if time is None else time.notes(match["time"])
-    found = SpokenCondition(ValueIs(text=text), words, state, state, notes)
+    known = state if time is None else state.noting(time.notes(match["time"]))
+    found = SpokenCondition(ValueIs(text=text), words, known, known)
     return found.negate(words) if match["not"] else found
-
-
-def button_condition(button: str, words: str, state: State) -> SpokenCondition:
-    """Condition that a button is pressed; the text names the button with its article, `words` are the whole text."""
-    name = re.sub(r"^(?:the|a|any)\b\s*|\s*\bbutton$", "", button.strip(), flags=re.IGNORECASE).strip()
-    return SpokenCondition(ButtonPressed(button=name.lower() or "button"), words, state, state)
 
 
 def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
@@ -85,22 +79,21 @@ def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | No
     if match is None or (match["it"] and state.door is None):
         return None
     if (how := match["how"].lower()).endswith("locked"):
-        raise RefusalError(
-            f"I cannot see whether a door is {how}; ask whether it is closed", [how], kind=RefusalKind.UNSEEN
-        )
+        what = f"I cannot see whether a door is {how}; ask whether it is closed"
+        raise RefusalError(what, [how], kind=RefusalKind.UNSEEN)
     door = state.door if match["it"] and state.door is not None else DoorOpen(door=_between(match, reader.knowledge))
-    opens = how in ("open", "opened", "opens", "to open", "is opening", "has opened")
-    known = replace(state, door=door, goal=None, at=None)
+    known = replace(state.elsewhere, door=door)
     found = SpokenCondition(door, words, known, known)
+    opens = how in ("open", "opened", "opens", "to open", "is opening", "has opened")
     return found if opens != bool(match["not"]) else found.negate(words)
 
 
 def parse_opening(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
-    """Parses a request to have a door opened: its step, the state afterwards, no notes; None for other texts.
+    """Parses a request to have a door opened; None for other texts.
 
     Raises RefusalError like `_between`, and if the robot would have to open a door that has no plug-in.
     """
-    match = _DOORS["opening"].fullmatch(re.sub(r" for (?:me|us|you|him|her|them)$", "", text, flags=re.IGNORECASE))
+    match = _DOORS["opening"].fullmatch(text)
     if match is None or ((state := known()).door is None and match["it"]):
         return None
     own, doors = match["own"], [door for door in reader.knowledge.doors if door.opens is not None]
@@ -108,7 +101,7 @@ def parse_opening(text: str, known: Callable[[], State], reader: PlainReader) ->
     if door is None or (own and all(set(door.door) != {*one.between} for one in doors)):
         said = match["door"] or "it"
         raise RefusalError(f"I cannot open {said} myself; say 'ask somebody to open {said}'", [match.text])
-    return (OpenDoor(door=DoorToOpen(door=door.door)),), replace(state, door=door, goal=None, at=None), ()
+    return (OpenDoor(door=DoorToOpen(door=door.door)),), replace(state.elsewhere, door=door)
 
 
 def _between(match: Match, knowledge: Knowledge) -> tuple[str, str]:
@@ -144,35 +137,26 @@ def _room(name: str, knowledge: Knowledge) -> str:
 
 
 def _meeting(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
-    """Condition that somebody arrives at the robot's place, or leaves it."""
+    """Condition that somebody, or nobody, is at the robot's place or in a room, arrives there, or leaves it.
+
+    "There" may be an earlier room. Raises RefusalError when the robot's room is unknown.
+    """
     gone = _P["goes"].fullmatch(words)
     match = gone or _P["comes"].fullmatch(words)
     if match is None or CLAUSES["unreal"].search(words):
         return None
-    who, where = re.sub(r"\b(?:if|until)\b", "", match["who"]).strip(), match["place"] or None
-    where = "there" if where is None and re.search(r"\bthere(?: any more)?$", words, re.IGNORECASE) else where
-    if not (_P["nobody"].fullmatch(who) or reader.is_somebody(who, state)) or re.search(r"\b(?:or|and)\b", where or ""):
+    who, where = re.sub(r"\b(?:if|until)\b", "", match["who"]).strip(), match["place"]
+    nobody = _P["nobody"].fullmatch(who) is not None
+    if not (nobody or reader.is_somebody(who, state)) or re.search(r"\b(?:or|and)\b", where):
         return None
-    return presence_condition(who, where, words, state, reader, gone=gone is not None)
-
-
-def presence_condition(
-    who: str, where: str | None, words: str, state: State, reader: PlainReader, *, gone: bool = False
-) -> SpokenCondition:
-    """Condition that somebody, or nobody, is at the robot's place or in a room; `words` are its text. Raises
-    RefusalError.
-
-    "There" may be an earlier room.
-    """
-    place = (where or "here").lower()
+    place = where.lower() or ("there" if re.search(r"\bthere(?: any more)?$", words, re.IGNORECASE) else "here")
     room = state.at
     if place not in ("here", "there") or (place == "there" and state.memory.place != HERE):
-        room = reader.room(place if place == "there" else where or "", state)
+        room = reader.room(where or place, state)
     if room is None:
         raise RefusalError(f"in which room can I see whether '{words}'? Name it", [words])
-    nobody = _P["nobody"].fullmatch(who) is not None
     look = reader.look("anybody" if nobody or _P["anybody"].fullmatch(who) else who, room, words, state)
-    return replace(look, condition=Not(part=look.condition) if gone != nobody else look.condition)
+    return look if nobody == (gone is not None) else replace(look, condition=Not(part=look.condition))
 
 
 def _look(words: str, state: State, reader: PlainReader) -> SpokenCondition:
@@ -190,49 +174,46 @@ def _look(words: str, state: State, reader: PlainReader) -> SpokenCondition:
 
 def _seen(match: Match, words: str, state: State, reader: PlainReader) -> SpokenCondition:
     """Condition that the robot sees, or does not see, an object or a person."""
-    said = match["what"]
-    what = re.sub(r"^(?:him|them)(?= )", "it", said, flags=re.IGNORECASE)
+    what = match["what"]
     if re.fullmatch(r"it|one|him|her|them", what, re.IGNORECASE):
         found = reader.look_by_items((verb("find"), *reader.read_items(what)), words, state)
-    elif match["looks"] and state.at is not None and reader.is_somebody(said, state):
-        found = reader.look(said, state.at, words, state)
-    elif re.fullmatch(r"it there", what, re.IGNORECASE):
-        found = reader.look_by_items((verb("check"), Whether(), IT, IS, Adverb(here=False)), words, state)
+    elif match["looks"] and state.at is not None and reader.is_somebody(what, state):
+        found = reader.look(what, state.at, words, state)
     else:
-        found = reader.exists(what, words, state)
+        seen = re.sub(r"^(?:him|them)(?= )", "it", what, flags=re.IGNORECASE)
+        found = reader.check(f"there is {seen}", state, words)
     return found.negate(words) if match["not"] else found
 
 
-def _joined(words: str, state: State, reader: PlainReader) -> tuple[SpokenCondition | None, RefusalError | None]:
-    """Joins two conditions by "and" or "or"; returns None if that fails, with the first question that a half raised."""
+def _joined(words: str, state: State, reader: PlainReader) -> SpokenCondition | RefusalError | None:
+    """Joins two conditions by "and" or "or"; if that fails, returns the first question that a half raised, or None."""
     left_open: RefusalError | None = None
-    for word, kind in ((" and ", AllOf), (" or ", AnyOf)):
+    for word, kind in (("and", AllOf), ("or", AnyOf)):
         for before, after in _halves(words, word):
-            try:
-                first, second = _both(before, after, state, reader)
-            except RefusalError as refusal:
-                left_open = left_open or (refusal if refusal.question is not None else None)
+            halves = attempt(_both, before, after, state, reader)
+            if isinstance(halves, RefusalError):
+                left_open = left_open or (halves if halves.question is not None else None)
                 continue
+            first, second = halves
             known = second.holds
             if kind is AnyOf:  # the person of two conditions on one person, without the place
-                one, other = first.holds.memory.person, second.holds.memory.person
+                one, other = first.holds.memory.person, known.memory.person
                 same = one is not None and other is not None and one.name == other.name
                 person = replace(one, within=None) if one is not None and same else state.memory.person
-                known = replace(state, goal=None, at=None, memory=replace(state.memory, person=person))
+                memory = replace(state.memory, person=person)
+                known = replace(state.elsewhere, memory=memory).noting(known.notes)
             both = (first.condition, second.condition)
             parts = tuple(each for one in both for each in (one.parts if isinstance(one, kind) else (one,)))
             if any(isinstance(each, Not) and each.part in parts for each in parts):
                 raise RefusalError(f"'{words}' says one thing and its opposite; say one of the two", [words])
-            return SpokenCondition(kind(parts=parts), words, known, state, (*first.notes, *second.notes)), None
-    return None, left_open
+            return SpokenCondition(kind(parts=parts), words, known, state.noting(known.notes))
+    return left_open
 
 
 def _halves(words: str, word: str) -> Iterator[tuple[str, str]]:
-    start = words.lower().find(word)
-    while start > 0:
-        after = words[start + len(word) :].removeprefix("if ").removeprefix("that ")
-        yield (words[:start].removeprefix("both ").removeprefix("either ").strip(" ,"), after)
-        start = words.lower().find(word, start + 1)
+    """Yields the texts before and after each place of a joining word."""
+    for joint in re.finditer(rf" {word} (?:if )?(?:that )?", words, re.IGNORECASE):
+        yield re.sub(r"^(?:both |either )", "", words[: joint.start()]).strip(" ,"), words[joint.end() :]
 
 
 def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[SpokenCondition, SpokenCondition]:
@@ -240,15 +221,23 @@ def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[S
     first = parse_condition(before, state, reader)
     denied = isinstance(first.condition, Not)
     if _JOINED["there"].match(before) and _JOINED["bare"].match(after):
-        items = reader.read_items(after)
-        place = next((item for item in items if isinstance(item, Chunk) and item.role is not None), None)
-        if place is not None and not _JOINED["placed"].search(before):
-            first = reader.look_by_items((*first.items, place), before, state)
+        placed = [item for item in reader.read_items(after) if isinstance(item, Chunk) and item.role is not None]
+        if placed and not _JOINED["placed"].search(before):
+            first = reader.look_by_items((*first.items, placed[0]), before, state)
             first = first.negate(before) if denied else first
-        return first, reader.exists(after, after, first.holds)
+        return first, reader.check(f"there is {after}", first.holds, after)
     if _JOINED["at"].fullmatch(before) and re.match(r"(?:in|on|at|the) ", after, re.IGNORECASE) and " is " not in after:
         old = next((item for item in first.items if isinstance(item, Chunk) and item.role is not None), None)
         moved = with_preposition(reader.read_items(after), "in" if old is None else old.preposition)
         second = reader.look_by_items((*(one for one in first.items if one is not old), *moved), after, first.holds)
         return first, second.negate(after) if denied else second
     return first, parse_condition(after, first.holds, reader)
+
+
+def statement_of_check(text: str) -> str | None:
+    """Turns a check into a statement: "is the door open" becomes "the door is open"."""
+    if (checked := CHECKS["checked"].fullmatch(text)) is not None:
+        return checked["what"]
+    if (asked := CHECKS["asked"].fullmatch(text)) is None:
+        return None
+    return f"{asked['subject']} {'are' if asked['subject'].lower() == 'you' else 'is'} {asked['state']}"

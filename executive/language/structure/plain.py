@@ -1,14 +1,13 @@
-"""Reads plain parts of a sentence, from their items to commands, and collects steps in a row for the builders."""
+"""Reads plain parts of a sentence, from their words or items to commands, with the state of the mission around them."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Any, Final, TypeVar
 
-from executive.language.actions import Action
-from executive.language.clauses import CHECKS, CLAUSES, Clause, Cue
+from executive.language.clauses import CLAUSES
 from executive.language.items import Adverb, Being, Chunk, Item, Whether, verb
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
@@ -23,13 +22,21 @@ from executive.words.command import START, Command, Task
 from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import inside
-from executive.words.step import Step
-from executive.words.steps import Loop, Repeat, Steps
+from executive.words.steps import Steps
 from skills.api import ObjectKind
 
 _LEFT_OUT: Final = frozenset({"not", "n't", "but", "except", "instead", "rather", "neither", "nor"})
 _DENIALS: Final = page("denials")
 SEES: Final = "I can see whether something or somebody is somewhere"
+T = TypeVar("T")
+
+
+def attempt(read: Callable[..., T], *inputs: Any) -> T | RefusalError:
+    """Returns what a function reads from inputs, or its refusal."""
+    try:
+        return read(*inputs)
+    except RefusalError as refusal:
+        return refusal
 
 
 @dataclass(frozen=True)
@@ -38,7 +45,7 @@ class State:
 
     `memory` has the referents, `held` the object in the gripper, `goal` the robot's last destination, `at` its room
     (None: unknown), `door` the last door, `recipient` the default recipient of objects. `somebody` is True after a
-    condition has found anybody in the remembered place.
+    condition has found anybody in the remembered place. `notes` list words that were interpreted as others.
     """
 
     memory: Memory = field(default_factory=Memory)
@@ -48,6 +55,7 @@ class State:
     door: DoorOpen | None = None
     recipient: Location | None = None
     somebody: bool = False
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def initial(cls, knowledge: Knowledge, memory: Memory) -> State:
@@ -57,13 +65,22 @@ class State:
         return cls(memory=memory, at=room)
 
     def common(self, other: State) -> State:
-        """State after two branches: what both branches have in common."""
+        """State after two branches: what both branches have in common, and the notes of both."""
         return replace(
-            self,
+            self.noting(other.notes),
             held=self.held if self.held == other.held else None,
             goal=self.goal if self.goal == other.goal else None,
             at=self.at if self.at == other.at else None,
         )
+
+    def noting(self, notes: Iterable[str]) -> State:
+        """State with more notes."""
+        return replace(self, notes=tuple(dict.fromkeys((*self.notes, *notes))))
+
+    @property
+    def elsewhere(self) -> State:
+        """State in which the robot may be anywhere."""
+        return replace(self, goal=None, at=None)
 
 
 @dataclass(frozen=True)
@@ -78,13 +95,12 @@ class SpokenCondition:
     said: str
     holds: State
     fails: State
-    notes: tuple[str, ...] = ()
     quotable: bool = True
     items: tuple[Item, ...] = field(default=(), repr=False)
 
     def negate(self, said: str) -> SpokenCondition:
         """Negated condition, with its words."""
-        return SpokenCondition(negate(self.condition), said, self.fails, self.holds, self.notes, items=self.items)
+        return SpokenCondition(negate(self.condition), said, self.fails, self.holds, items=self.items)
 
     @property
     def opposite(self) -> SpokenCondition:
@@ -107,11 +123,14 @@ class SpokenCondition:
         there = Look.from_command(replace(look.command, goal=taken.goal))
         return replace(self, condition=Not(part=there) if isinstance(self.condition, Not) else there)
 
-    def rounds(self, kind: Cue | None) -> Rounds:
-        """Rounds that run until or while the condition holds."""
-        if kind is Cue.UNTIL:
-            return Rounds(Loop(until=self.condition), self.fails)
-        return Rounds(Loop(while_=self.condition), self.holds)
+
+@dataclass(frozen=True)
+class LastCheck:
+    """Condition of the last steps: they check it (`looked`) or need it to succeed; `steps` is the number of steps."""
+
+    supposed: SpokenCondition
+    looked: bool
+    steps: int = 1
 
 
 @dataclass(frozen=True)
@@ -143,6 +162,11 @@ def phrase_of_name(name: str, kind: NounKind) -> Phrase:
     return Phrase((Token(0, 0, name, name.lower(), pos, tag, 0, "obl", entity, kind, known=True),))
 
 
+def person_named(name: str, within: Location | None = None) -> Location:
+    """Person with a name in the world, as somebody to go to."""
+    return Location(phrase_of_name(name, NounKind.PERSON), "to", within)
+
+
 def names_of_world(knowledge: Knowledge) -> dict[str, tuple[str, ...]]:
     """Names of people and places, which templates leave open; the longest first."""
     names = {"names": knowledge.people, "around": knowledge.place_names()}
@@ -159,9 +183,7 @@ def with_preposition(items: Sequence[Item], preposition: str) -> tuple[Item, ...
     return (*items[:at], replace(first, preposition=preposition, role=role), *items[at + 1 :])
 
 
-IT: Final = Chunk(Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),)))
-IS: Final = Being("is", existential=False, asked=False)
-_THERE_IS: Final = Being("there is", existential=True, asked=False)
+_IS: Final = Being("is", existential=False, asked=False)
 
 
 @dataclass(frozen=True)
@@ -171,82 +193,65 @@ class PlainReader:
     pipeline: Pipeline
     knowledge: Knowledge
 
-    def _run(self, trace: Trace, *, behind: str | None = None, upto: str | None = None) -> Trace:
-        found = self.pipeline.run(trace, behind=behind, upto=upto)
-        if found.refusal is not None:
-            raise found.refusal
-        return found
+    def read(
+        self, state: State, text: str = "", *, behind: str | None = None, upto: str | None = None, **inputs: Any
+    ) -> PlainReading:
+        """Understands a part as far as a step of the pipeline, from its text, or from `inputs` that a step gives."""
+        trace = self.pipeline.run(Trace(text, state.memory, **inputs), behind=behind, upto=upto)
+        if trace.refusal is not None:
+            raise trace.refusal
+        commands = trace.commands
+        if commands and state.held is not None and (commands[0].task, commands[0].object) == (Task.GRASP, state.held):
+            commands = commands[1:]
+        return PlainReading(commands, self.state_after(commands, trace.memory, state).noting(trace.notes), trace)
 
     def read_commands(self, text: str, state: State, lead: Sequence[Item] = ()) -> PlainReading:
         """Understands a plain part after the items `lead`."""
-        trace = Trace(text, state.memory, tuple(lead), elliptic=True, recipient=state.recipient)
-        return self._reading(self._run(trace), state)
+        return self.read(state, text, lead=tuple(lead), elliptic=True, recipient=state.recipient)
 
     def commands_from_items(self, items: Sequence[Item], state: State, tokens: Sequence[Token] = ()) -> PlainReading:
         """Understands items and the words that they were read from."""
-        trace = Trace("", state.memory, tokens=tuple(tokens), items=tuple(items))
-        return self._reading(self._run(trace, behind="reading"), state)
-
-    def commands_from_actions(self, trace: Trace, actions: Sequence[Action], state: State) -> PlainReading:
-        """Understands these actions instead of the actions in a trace."""
-        trace = replace(trace, actions=tuple(actions), memory=state.memory)
-        return self._reading(self._run(trace, behind="understanding"), state)
-
-    def read_actions(self, text: str, state: State) -> Trace:
-        """Understands a plain part as far as its actions."""
-        return self._run(Trace(text, state.memory, elliptic=True), upto="understanding")
-
-    def _reading(self, trace: Trace, state: State) -> PlainReading:
-        commands = trace.commands
-        first = commands[0] if commands else None
-        if first is not None and state.held is not None and first.task is Task.GRASP and first.object == state.held:
-            commands = commands[1:]
-        return PlainReading(commands, self.state_after(commands, trace.memory, state), trace)
+        return self.read(state, behind="reading", items=tuple(items), tokens=tuple(tokens))
 
     def read_items(self, text: str) -> tuple[Item, ...]:
         """Reads words as items."""
-        return self._run(Trace(text), upto="reading").items
+        return self.read(State(), text, upto="reading").trace.items
 
-    def go_to(self, text: str, state: State) -> PlainReading:
-        """Understands going to a place, which a noun phrase or "there" names."""
-        items = (Adverb(here=False),) if text.lower() == "there" else self.read_items(text)
-        return self.commands_from_items((verb("go"), *with_preposition(items, "to")), state)
+    def go_to(self, text: str, state: State, *, by: str = "go") -> PlainReading:
+        """Understands going to a place, which a noun phrase, "here" or "there" names."""
+        spot = text.lower() in ("here", "there")
+        items = (Adverb(here=text.lower() == "here"),) if spot else self.read_items(text)
+        return self.commands_from_items((verb(by), *with_preposition(items, "to")), state)
 
-    def check(self, text: str, state: State, lead: Sequence[Item] = (), *, said: str | None = None) -> SpokenCondition:
-        """Condition that the statement in a text holds; `said` is the full text."""
-        denied = (_DENIALS["existing"] if lead else _DENIALS["statement"]).fullmatch(text)
+    def check(self, text: str, state: State, said: str = "") -> SpokenCondition:
+        """Condition that the statement in a text holds; `said` are the full words of the speaker."""
+        denied, said = _DENIALS["statement"].fullmatch(text), said or text
         affirmed = text if denied is None else denied.instead
-        read = self._run(Trace(affirmed, lead=(verb("check"), Whether(), *lead)), upto="reading")
+        read = self.read(state, affirmed, lead=(verb("check"), Whether()), upto="reading").trace
         if (left_out := next((token.word for token in read.tokens if token.word in _LEFT_OUT), None)) is not None:
-            raise RefusalError(f"I cannot see whether '{said or text}'; say it without '{left_out}'", [said or text])
-        found = self.look_by_items(read.items, said or text, state, read.tokens)
-        return found.negate(said or text) if denied is not None else found
-
-    def exists(self, what: str, text: str, state: State) -> SpokenCondition:
-        """Condition that an object exists, or does not exist ("no beer in the hall"); `text` is the full text."""
-        return self.check(what, state, (_THERE_IS,), said=text)
+            raise RefusalError(f"I cannot see whether '{said}'; say it without '{left_out}'", [said])
+        found = self.look_by_items(read.items, said, state, read.tokens)
+        return found if denied is None else found.negate(said)
 
     def look(self, who: str, room: str, text: str, state: State) -> SpokenCondition:
         """Condition that somebody is in a room."""
         where = Chunk(phrase_of_name(room, NounKind.PLACE), "in", PrepositionRole.AT)
-        return self.look_by_items((verb("check"), Whether(), *self.read_items(who), IS, where), text, state)
+        return self.look_by_items((verb("check"), Whether(), *self.read_items(who), _IS, where), text, state)
 
     def look_by_items(
         self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()
     ) -> SpokenCondition:
         """Condition of the looks that given items ask for; `text` is the full text."""
-        try:
-            reading = self.commands_from_items([self._by_name(item, state) for item in items], state, tokens)
-        except RefusalError as refusal:
-            if refusal.kind is not RefusalKind.NOT_UNDERSTOOD:
-                raise
-            raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text]) from None
+        reading = attempt(self.commands_from_items, [self._by_name(item, state) for item in items], state, tokens)
+        if isinstance(reading, RefusalError) and reading.kind is not RefusalKind.NOT_UNDERSTOOD:
+            raise reading
+        commands = () if isinstance(reading, RefusalError) else reading.commands
+        if isinstance(reading, RefusalError) or {command.task for command in commands} != {Task.FIND}:
+            raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text])
         if any(action.choices for action in reading.trace.actions):
             raise RefusalError(f"I cannot tell which one '{text}' means; name one", [text])
-        if not reading.commands or any(command.task is not Task.FIND for command in reading.commands):
-            raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text])
         there = replace(state, goal=reading.state.goal, at=reading.state.at)
-        return replace(self.condition_of_looks(reading, there, state, text), items=tuple(items))
+        return replace(self._condition_of_looks(reading, there, state, text), items=tuple(items))
 
     def _by_name(self, item: Item, state: State) -> Item:
         """Replaces "he" by the name of the last person."""
@@ -275,50 +280,46 @@ class PlainReader:
         spoken_of = words in lexicon().somebody and state.memory.person is not None
         return spoken_of or self.knowledge.person(who) is not None
 
-    def condition_of_looks(self, reading: PlainReading, state: State, before: State, text: str) -> SpokenCondition:
+    def _condition_of_looks(self, reading: PlainReading, state: State, before: State, text: str) -> SpokenCondition:
         """Condition that the looks in a reading succeed; `text` is the full text."""
         looks = tuple(Look.from_command(command) for command in reading.commands if command.task is Task.FIND)
-        known = self._state_if_seen(reading, state)
+        known = self._state_if_seen(reading, state).noting(reading.trace.notes)
         fails = replace(known, memory=replace(known.memory, where=None, locations=before.memory.locations))
-        condition = looks[0] if len(looks) == 1 else AllOf(parts=looks)
-        return SpokenCondition(condition, text, known, fails, reading.trace.notes)
+        return SpokenCondition(looks[0] if len(looks) == 1 else AllOf(parts=looks), text, known, fails)
 
-    def last_check(self, reading: PlainReading, before: State) -> LastCheck | None:
-        """Look or fetch that the last command of a reading stands for."""
+    def last_check(self, reading: PlainReading, before: State, said: str = "") -> LastCheck | None:
+        """Look or fetch that the last command of a reading stands for; `said` is the statement of the look."""
         commands = reading.commands
         if commands and commands[-1].task is Task.FIND:
             looks = sum(command.task is Task.FIND for command in commands)
-            return LastCheck(self.condition_of_looks(reading, reading.state, before, ""), looked=True, steps=looks)
+            return LastCheck(self._condition_of_looks(reading, reading.state, before, said), looked=True, steps=looks)
         taken = next((command for command in reversed(commands) if command.task is Task.GRASP), None)
         if taken is None:
             return None
-        found = Command(
-            goal=taken.goal, task=Task.FIND, object=taken.object, object_count=taken.object_count, verb="find"
-        )
+        found = Look.from_command(replace(taken, task=Task.FIND, verb="find"))
         memory = replace(reading.state.memory, where=None, locations=before.memory.locations)
-        fails = replace(reading.state, memory=memory, held=None, goal=None, at=None)
-        supposed = SpokenCondition(Look.from_command(found), "", reading.state, fails)
-        return LastCheck(supposed, looked=False, steps=len(commands))
+        fails = replace(reading.state.elsewhere, memory=memory, held=None)
+        return LastCheck(SpokenCondition(found, "", reading.state, fails), looked=False, steps=len(commands))
 
     def _state_if_seen(self, reading: PlainReading, state: State) -> State:
         """State if the look succeeds."""
-        action = reading.trace.resolved[-1]
-        memory = reading.trace.memory
+        action, memory = reading.trace.resolved[-1], reading.trace.memory
         target, where = action.target, action.source
         if target is None:
             return replace(state, memory=memory)
+        place = where or memory.place
         locations = memory.locations if where is None else (*memory.locations, (target, where))
         sought = reading.commands[-1].object
         somebody = sought is not None and self.knowledge.somebody(sought.name) is not None
-        if somebody or target.person:
-            known = sought is not None and self.knowledge.person(sought.name) is not None
-            person = Location(target) if known else state.memory.person
-            met = replace(memory, objects=state.memory.objects, where=state.memory.where, person=person)
-            return replace(state, memory=replace(met, place=where or memory.place), somebody=not known)
-        memory = replace(memory, objects=(target,), where=where, place=where or memory.place, locations=locations)
-        return replace(state, memory=memory)
+        if not (somebody or target.person):
+            memory = replace(memory, objects=(target,), where=where, place=place, locations=locations)
+            return replace(state, memory=memory)
+        known = sought is not None and self.knowledge.person(sought.name) is not None
+        person = Location(target) if known else state.memory.person
+        met = replace(memory, objects=state.memory.objects, where=state.memory.where, person=person, place=place)
+        return replace(state, memory=met, somebody=not known)
 
-    def state_after(self, commands: tuple[Command, ...], memory: Memory, state: State) -> State:
+    def state_after(self, commands: Sequence[Command], memory: Memory, state: State) -> State:
         """State after some commands."""
         held, goal = state.held, state.goal
         for command in commands:
@@ -337,81 +338,3 @@ class PlainReader:
         else:
             at = None if place is None or self.knowledge.place(place) is None else self.knowledge.room(place)
         return replace(state, memory=memory, held=held, goal=goal, at=at)
-
-
-ATTACHED = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)
-"""Cues of clauses that refer to the last look or action."""
-
-
-@dataclass
-class StepRow:
-    """Steps built so far, and pending clauses, which will be understood together.
-
-    `asked` is the last look or fetch; `begun` is the index of the present sentence's first step.
-    """
-
-    state: State
-    steps: list[Step] = field(default_factory=list)
-    plain: list[Clause] = field(default_factory=list)
-    asked: LastCheck | None = None
-    begun: int = 0
-
-
-@dataclass(frozen=True)
-class LastCheck:
-    """Condition of the last steps: they check it (`looked`) or need it to succeed; `steps` is the number of steps.
-
-    `decided` is True if the last step depends on the condition.
-    """
-
-    supposed: SpokenCondition
-    looked: bool
-    decided: bool = False
-    steps: int = 1
-
-
-@dataclass(frozen=True)
-class Rounds:
-    """Number or condition of an action's rounds, and the state where a round begins."""
-
-    loop: Loop
-    state: State
-
-
-def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: bool = False) -> int:
-    """Index after the clauses, from `at` on, that a condition or rounds apply to.
-
-    `branch` marks a second branch, in which "then" goes on after both branches. A clause that follows the whole block
-    ends it; in "first ..., finally ..." it still belongs to the block.
-    """
-    first = any(re.search(r"\bfirst\b", one.joint, re.IGNORECASE) for one in clauses[at : at + 1])
-    for n, one in enumerate(clauses[at:], at):
-        after_all = n > at and ((one.outer and not first) or one.anyway)
-        then = n > at and branch and one.then
-        if rounds:
-            goes_on = one.kind in ATTACHED or (one.kind is Cue.IF and CHECKS["pronoun"].match(one.text) is not None)
-            if after_all or (one.begins and n > at and not goes_on):
-                return n
-        elif one.kind in (*ATTACHED, Cue.IF, Cue.UNLESS, Cue.SOON) or one.begins or after_all or then:
-            return n
-    return len(clauses)
-
-
-def statement_of_check(text: str) -> str | None:
-    """Turns a check into a statement: "is the door open" becomes "the door is open"."""
-    if (checked := CHECKS["checked"].fullmatch(text)) is not None:
-        return checked["what"]
-    if (asked := CHECKS["asked"].fullmatch(text)) is None:
-        return None
-    return f"{asked['subject']} {'are' if asked['subject'].lower() == 'you' else 'is'} {asked['state']}"
-
-
-def merge_repeats(block: Repeat) -> Repeat:
-    """Merges rounds that contain endless rounds; the merged rounds end as the outer rounds do."""
-    inner, outer = block.steps[0], block.loop
-    if len(block.steps) > 1 or not isinstance(inner, Repeat) or not inner.loop.is_endless:
-        return block
-    if outer.every_s is not None or outer.times is not None:
-        raise RefusalError("an endless repetition cannot be repeated again; say how often", [])
-    ends = {"until": outer.until, "while_": outer.while_, "until_clock": outer.until_clock}
-    return inner.model_copy(update={"loop": inner.loop.model_copy(update=ends)})

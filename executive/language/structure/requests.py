@@ -13,16 +13,15 @@ from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.roles import Location
-from executive.language.structure.conditions import (
-    FULL,
-    Done,
-    button_condition,
-    parse_condition,
-    parse_opening,
-    presence_condition,
-    usual_condition,
+from executive.language.structure.conditions import FULL, Done, parse_condition, parse_opening, usual_condition
+from executive.language.structure.plain import (
+    PlainReader,
+    PlainReading,
+    State,
+    names_of_world,
+    person_named,
+    phrase_of_name,
 )
-from executive.language.structure.plain import PlainReader, PlainReading, State, names_of_world, phrase_of_name
 from executive.language.templates import Match, page
 from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.knowledge import ANYBODY, Knowledge
@@ -33,8 +32,10 @@ from skills.api import ObjectKind
 from skills.inputs.errors import listing, with_article
 
 _WAITING: Final = page("waiting")
+_PICTURE: Final = page("pictures")["picture"]
 ROOMS: Final = page("rooms")
 SPEECH: Final = page("speech")
+PEOPLE: Final = page("people")
 _SUBJECTS: Final = r"(?:the|a|an|my|your|our|his|her|their|this|all|every)\b"
 _ADVERBIAL: Final = re.compile(
     rf"(?!{_SUBJECTS})([\w' ]+?),? that (?=\w)|({any_of(map(' '.join, lexicon().noted))}) ", re.IGNORECASE
@@ -43,46 +44,40 @@ _ADVERBIAL: Final = re.compile(
 
 
 def parse_wait(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
-    """Parses a wait for a condition; None for other texts, and for a wait of a given duration. Raises RefusalError."""
+    """Parses a wait in a place: until a condition holds, while it holds, or for a person ("for").
+
+    Returns None for other texts, and for a wait of a given duration. Raises RefusalError when the place or the
+    condition cannot be understood.
+    """
     match = _WAITING["wait"].fullmatch(text)
     if match is None or _WAITING["only_span"].fullmatch(match["what"]):
         return None
-    return wait_steps(match["where"], match["how"].lower(), match["what"], known(), reader)
-
-
-def wait_steps(where: str, how: str, what: str, state: State, reader: PlainReader) -> Done:
-    """Builds a wait in a place: until a condition holds, while it holds, or for a person ("for").
-
-    Raises RefusalError when the place or the condition cannot be understood.
-    """
-    steps, there = _gone(where, state, reader)
+    (steps, there), how, what = _gone(match["where"], known(), reader), match["how"].lower(), match["what"]
     if how in ("until", "till"):
-        passed, clock = _WAITING["passed"].fullmatch(what), _WAITING["time"].fullmatch(what)
-        if passed is not None and (span := parse_seconds(passed["span"])) is not None:
-            return (*steps, Wait(awaited=Awaited(seconds=span))), there, ()
-        if (time := parse_time(what if clock is None else clock["time"])) is not None:
-            return (*steps, Wait(awaited=Awaited(until_clock=time.text))), there, time.notes(what)
+        ends = _WAITING["ends"].fullmatch(what)
+        if (seconds := parse_seconds("" if ends is None else ends["span"])) is not None:
+            return (*steps, Wait(awaited=Awaited(seconds=seconds))), there
+        if (time := parse_time(what if ends is None else ends["time"])) is not None:
+            return (*steps, Wait(awaited=Awaited(until_clock=time.text))), there.noting(time.notes(what))
         found = parse_condition(what, there, reader)
     elif how != "for":
         found = parse_condition(what, there, reader).negate(what)
-    elif (match := _WAITING["button"].fullmatch(what)) is not None:
-        found = button_condition(match["button"], what, there)
-    elif " to " in what and (usual := usual_condition(what, there, reader)) is not None:
-        found = usual
-    elif (match := _WAITING["person_at"].fullmatch(what)) is not None and reader.is_somebody(match["who"], there):
-        reading = reader.go_to(match["where"], there)
-        steps, there = (*steps, *steps_of_commands(reading.commands)), reading.state
-        found = presence_condition(match["who"], None, what, there, reader)
-    elif reader.is_somebody(what, there):
-        found = presence_condition(what, None, what, there, reader)
     else:
-        raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
+        who, at = what, _WAITING["person_at"].fullmatch(what)
+        if at is not None and reader.is_somebody(at["who"], there):
+            reading = reader.go_to(at["where"], there)
+            steps, there, who = (*steps, *steps_of_commands(reading.commands)), reading.state, at["who"]
+        event = f"{who} is here" if reader.is_somebody(who, there) else _WAITING["button"].reword(what, whole=True)
+        usual = usual_condition(event, there, reader)
+        if usual is None:
+            raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
+        found = usual
     after = replace(found.holds, goal=found.holds.goal or there.goal)
-    return (*steps, Wait(awaited=Awaited(condition=found.condition))), after, found.notes
+    return (*steps, Wait(awaited=Awaited(condition=found.condition))), after
 
 
-def _gone(where: str, state: State, reader: PlainReader) -> tuple[Steps, State]:
-    """Adds the drive to the place of a wait; returns the state there."""
+def _gone(where: str, state: State, reader: PlainReader) -> Done:
+    """Adds the drive to the place of a wait."""
     if _WAITING["here"].fullmatch(where):
         return (), state
     match = _WAITING["place"].fullmatch(where)
@@ -96,41 +91,32 @@ def _gone(where: str, state: State, reader: PlainReader) -> tuple[Steps, State]:
 
 def parse_charging(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
     """Parses charging up to a level; None if the text states no level."""
-    match = _WAITING["charge"].fullmatch(text)
-    if match is None:
+    if (match := _WAITING["charge"].fullmatch(text)) is None:
         return None
-    level = FULL if match["level"].lower().startswith("full") else parse_share(match["level"])
+    level = FULL if match["full"] else parse_share(match["level"])
     if level is None:
         raise RefusalError(f"'{match['level']}' is no charge; say it in percent", [match["level"]])
-    return (Dock(charging=Charging(level=level)),), replace(known(), goal=None, at=None), ()
+    return (Dock(charging=Charging(level=level)),), known().elsewhere
 
 
 def parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
     """Parses a request for pictures; None for other texts. Raises RefusalError for an unknown name."""
-    if (match := page("pictures")["picture"].fullmatch(text)) is None or trailing_cue(text) is not None:
+    if (match := _PICTURE.fullmatch(text)) is None or trailing_cue(text) is not None:
         return None
-    state = known()
+    state, steps = known(), list[Step]()
     at = (match["at"] or None) and reader.go_to(match["at"], state).commands[0].goal
-    steps = list[Step]()
-    for text in re.split(r",? and |, ", match["of"]):
-        of = reader.knowledge.place(re.sub(r"^(?:the|a|an|my|our|your) ", "", text, flags=re.IGNORECASE))
+    for what in re.split(r",? and |, ", match["of"]):
+        of = reader.knowledge.place(re.sub(r"^(?:the|a|an|my|our|your) ", "", what, flags=re.IGNORECASE))
         if of is None:
-            found = reader.read_commands(text, state, (verb("find"),)).commands[0].object
+            found = reader.read_commands(what, state, (verb("find"),)).commands[0].object
             if found is not None and found.relations:
-                raise RefusalError(f"I cannot tell in a picture which one is '{text}'", [text])
+                raise RefusalError(f"I cannot tell in a picture which one is '{what}'", [what])
             of = str(found)
         steps.append(Picture(subject=Subject(of=of, at=at, camera=match["camera"] or None)))
-    return tuple(steps), replace(state, goal=None, at=None), ()
+    return tuple(steps), state.elsewhere
 
 
 REQUESTS: Final = (parse_opening, parse_pictures, parse_charging, parse_wait)
-
-Speech = tuple[str, Match]
-"""Text, empty if the sentence does not say it ("tell Robin"), and its listener.
-
-The listener are slots: the `speaker`, a `pronoun`, a `name` or everybody (`crowd`), and `where` they are; without these
-the robot speaks where it is.
-"""
 
 
 @dataclass(frozen=True)
@@ -143,24 +129,21 @@ class QuestionRequest:
     yes_or_no: bool = False
 
 
-def parse_speech(text: str, reader: PlainReader) -> Speech | None:
+def parse_speech(text: str, reader: PlainReader) -> Match | None:
     """Parses a clause that asks the robot to speak; None for other clauses.
 
-    Raises RefusalError when the robot cannot say it in the speaker's place, or does not know the listener.
+    The match has the `text`, empty if the sentence does not say it ("tell Robin"), and the listener: the `speaker`, a
+    `pronoun`, a `name` or everybody (`crowd`), and `where` they are; without these the robot speaks where it is. Raises
+    RefusalError when the robot cannot say it in the speaker's place, or does not know the listener.
     """
-    forms, parser = page("speech", **names_of_world(reader.knowledge)), reader.pipeline.parser
+    forms = page("speech", **names_of_world(reader.knowledge))
     if forms["say_within"].fullmatch(text) is not None:
         raise RefusalError(f"I do not understand to whom to say '{text}'; name one person at the end", [text])
-    if (match := forms["says_to"].fullmatch(text) or forms["says"].fullmatch(text)) is not None:
-        return _words(match["text"], parser), match
-    if (match := forms["formula"].fullmatch(text)) is not None:
-        return match["says"], match
-    if (match := forms["tells"].fullmatch(text)) is not None:
-        return _told(f"{match['polite']}{match['text']}"), match
-    if (match := forms["relays"].fullmatch(text)) is None:
-        _refuse_stranger(text, reader.knowledge)
-        return None
-    return _relayed(match["text"], text, match, parser)
+    for intent, words in _WORDS.items():
+        if (match := forms[intent].fullmatch(text)) is not None:
+            return replace(match, slots={**match.slots, "text": words(match, reader.pipeline.parser)})
+    _refuse_stranger(text, reader.knowledge)
+    return None
 
 
 def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
@@ -173,18 +156,19 @@ def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
     raise RefusalError(f"I know no person '{match['who']}'{known}", [match["who"]])
 
 
-def _relayed(said: str, text: str, to: Match, parser: DependencyParser) -> Speech:
-    """Parses what to say in "tell Robin dinner is ready" or "let Robin know it"."""
+def _relayed(match: Match, parser: DependencyParser) -> str:
+    """Words of "tell Robin dinner is ready"; none of "let Robin know it"."""
+    said, text = match["text"], match.text
     if re.match(r"(?:and|or)\b", said, re.IGNORECASE):
         raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
     if re.fullmatch(r"|so|it|that|about it|about that", said, re.IGNORECASE):
-        return "", to
+        return ""
     adverbial = _ADVERBIAL.match(said)
     if adverbial is not None and is_clause(said[adverbial.end() :], parser):
         raise RefusalError(f"I tell it as soon as I am there, not {adverbial[1] or adverbial[2]!r}", [adverbial[0]])
-    states = not (to["speaker"] or SPEECH["question"].match(said)) and is_clause(said, parser)
+    states = not (match["speaker"] or SPEECH["question"].match(said)) and is_clause(said, parser)
     if SPEECH["greetings"].fullmatch(said) or states:
-        return _told(said), to
+        return _told(match, parser)
     raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
 
 
@@ -196,9 +180,9 @@ def is_clause(text: str, parser: DependencyParser) -> bool:
     return bool(finite) and any(t.relation in ("nsubj", "nsubjpass", "expl") and t.head in verbs for t in tokens)
 
 
-def _words(text: str, parser: DependencyParser) -> str:
+def _said(match: Match, parser: DependencyParser) -> str:
     """Words to say. Raises RefusalError when they describe a text, or name an unknown person."""
-    clause = is_clause(text, parser)
+    text, clause = match["text"], is_clause(match["text"], parser)
     whom = re.search(r" to (?:the|a|an|my|our|all|every|each|some|any|somebody|someone)\b.*$", text, re.IGNORECASE)
     if whom is not None and (not clause or re.search(r"\b(?:person|guest|visitor)\b", whom[0], re.IGNORECASE)):
         raise RefusalError(f"I do not know to whom to say it: '{whom[0].strip()}'", [whom[0].strip()])
@@ -214,13 +198,24 @@ def _literal(text: str) -> str:
     return text.strip(" ,.'\"")
 
 
-def _told(text: str) -> str:
+def _told(match: Match, parser: DependencyParser) -> str:
     """Statement as the robot says it for the speaker. Raises RefusalError when this would change the meaning."""
+    text = f"{match['polite']}{match['text']}"
     word = CLAUSES["deictic"].search(text) or SPEECH["inner"].search(text)
     if word is not None:
         meant = "would mean somebody or something else"
         raise RefusalError(f"I cannot say '{text}' for you: '{word.text}' {meant}", [text])
     return _literal(text)
+
+
+_WORDS: Final[dict[str, Callable[[Match, DependencyParser], str]]] = {
+    "says_to": _said,
+    "says": _said,
+    "formula": lambda match, _: match["text"],
+    "tells": _told,
+    "relays": _relayed,
+}
+"""Intents of speech, and how the words to say are found."""
 
 
 def escape_braces(text: str) -> str:
@@ -236,18 +231,17 @@ def parse_question(text: str, knowledge: Knowledge) -> QuestionRequest | None:
     forms = page("speech", **names_of_world(knowledge))
     if not re.match(r"ask\b", text, re.IGNORECASE) or forms["tells"].fullmatch(text):
         return None
-    text = re.sub(r" or not$", "", text, flags=re.IGNORECASE)
     match = forms["wants_one"].fullmatch(text) or forms["wants_what"].fullmatch(text)
     if match is None or not match["name"]:
         _refuse_stranger(text, knowledge)
         able = "I can ask somebody by name whether they want this or that"
         raise RefusalError(f"I do not understand the question in '{text}'; {able}", [text])
     if not match["what"]:  # what he wants to drink: a choice among all known objects of that kind
-        kind = (match["kind"] or ("drink" if "drink" in text.lower() else "")).lower()
+        kind = (match["kind"] or match["drink"]).lower()
         names = knowledge.classes(kind.removesuffix("s")) if kind else ()
         if not names:
             raise RefusalError(f"I do not know what there is to choose from in '{text}'; name it", [text])
-        spoken = "What do you want to drink?" if not match["kind"] else f"Which {kind} do you want?"
+        spoken = f"Which {kind} do you want?" if match["kind"] else "What do you want to drink?"
         return QuestionRequest(spoken, match, tuple(map(with_article, names)))
     if (word := CLAUSES["deictic"].search(match["what"])) is not None:
         raise RefusalError(f"I cannot ask that for you: '{word.text}' would mean somebody else", [text])
@@ -262,69 +256,53 @@ def steps_for_everyone(text: str, known: Callable[[], State], reader: PlainReade
     """
     if ROOMS["gives"].match(text) is None or ROOMS["everyone"].search(text) is None:
         return None
-    trace = reader.read_actions(text, state := known())
-    goals = [one.goal for one in trace.actions if one.goal is not None and one.goal.phrase is not None]
-    to = next((goal for goal in goals if goal.phrase and ROOMS["everyone"].fullmatch(goal.phrase.spoken)), None)
-    if to is None or to.phrase is None:
+    begun = state = known()
+    trace = reader.read(state, text, upto="understanding", elliptic=True).trace
+    named = [(one.goal, one.goal.phrase.spoken) for one in trace.actions if one.goal and one.goal.phrase]
+    to, who = next(((goal, said) for goal, said in named if ROOMS["everyone"].fullmatch(said)), (None, ""))
+    if to is None:
         return None
-    who = to.phrase.spoken
     if to.within is None or to.within.phrase is None:
         raise RefusalError(f"I bring objects to one person at a time, not to {who}; name one, or a room", [who])
     room, knowledge = reader.room(to.within.phrase.spoken, state), reader.knowledge
     people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
     if not people:
         raise RefusalError(f"I know nobody in the {room} to bring anything to: {who}", [who])
-    steps: list[Step] = []
-    begun = state
+    steps: Steps = ()
     for name in people:
-        person = Location(phrase_of_name(name, NounKind.PERSON), "to", to.within)
-        actions = [replace(one, goal=person) if one.goal == to else one for one in trace.actions]
-        reading = reader.commands_from_actions(trace, actions, begun)
+        goal = person_named(name, to.within)
+        actions = tuple(replace(one, goal=goal) if one.goal == to else one for one in trace.actions)
+        reading = reader.read(begun, behind="understanding", actions=actions, notes=trace.notes)
         if any(action.target is not None and not action.target.indefinite for action in reading.trace.resolved):
             raise RefusalError(f"there is only one of it, and I cannot bring it to {who}; name one person", [who])
-        steps += steps_of_commands(reading.commands)
-        begun = replace(reading.state, memory=state.memory)
-    return tuple(steps), begun, ()
+        steps, begun = (*steps, *steps_of_commands(reading.commands)), replace(reading.state, memory=state.memory)
+    return steps, begun
 
 
 def search_for(what: str, state: State, reader: PlainReader) -> PlainReading:
     """Understands a search for an object or a person in all rooms. Raises RefusalError when it is unclear."""
     reading = reader.read_commands(what, state, (verb("find"),))
-    finds = [command for command in reading.commands if command.task is Task.FIND]
-    if len(finds) != len(reading.commands) or re.search(r"\b(?:in|on|at|near)\b", what):
+    if any(one.task is not Task.FIND for one in reading.commands) or re.search(r"\b(?:in|on|at|near)\b", what):
         raise RefusalError(f"I cannot look for {listing([what])} in every room", [what])
-    commands = tuple(replace(command, goal=None, goal_at=None) for command in finds)
-    return replace(reading, commands=commands, state=replace(reading.state, goal=None, at=None))
+    commands = tuple(replace(command, goal=None, goal_at=None) for command in reading.commands)
+    return replace(reading, commands=commands, state=reading.state.elsewhere)
 
 
 _TASKS: Final = {"follow": Task.FOLLOW, "guide": Task.GUIDE, "greet": Task.GREET}
 """Tasks of the intents; the robot goes to the person for the other intents."""
-PEOPLE: Final = page("people")
 
 
-@dataclass(frozen=True)
-class PeopleRequest:
-    """Request about a person: its intent, and its match with the slots `who` (empty: the speaker), `at` and `to`."""
-
-    form: str
-    match: Match
-
-    @property
-    def refers(self) -> bool:
-        """Returns whether a pronoun refers to the person."""
-        return bool(self.match["him"] or self.match["that_person"])
-
-
-def parse_people(text: str, knowledge: Knowledge) -> PeopleRequest | None:
+def parse_people(text: str, knowledge: Knowledge) -> Match | None:
     """Parses a clause about following, guiding, meeting or greeting people; None for other clauses.
 
-    Raises RefusalError when such a clause does not say clearly whom it means.
+    The match has its intent as `form`, the person `who` (empty: the speaker), and the places `at` and `to`. Raises
+    RefusalError when such a clause does not say clearly whom it means.
     """
     forms = page("people", **names_of_world(knowledge))
     text = text if (around := forms["around"].fullmatch(text)) is None else around["clause"]
     for name in (*_TASKS, "meet", "find", "stated"):
         if (match := forms[name].fullmatch(text)) is not None:
-            return PeopleRequest(name, match)
+            return replace(match, slots={**match.slots, "form": name})
     if forms["certain"].match(text) is None or forms["greets_known"].match(text) is not None:
         return None
     known = f"; known are {listing(knowledge.people)}" if knowledge.people else ""
@@ -340,41 +318,46 @@ def parse_people(text: str, knowledge: Knowledge) -> PeopleRequest | None:
     raise RefusalError(f"{what}; {hint}", [text])
 
 
-def steps_on_people(request: PeopleRequest, state: State, reader: PlainReader) -> Done:
-    """Builds the steps for a request, with the state after them and notes. Raises RefusalError."""
-    person, notes = _person(request, state, reader), tuple[str, ...]()
-    said, task, to = request.match.text, _TASKS.get(request.form), request.match["to"]
-    found = person == ANYBODY and request.refers and state.memory.person is None and state.memory.place is not None
-    where = request.match["at"] or ("there" if found else "")
-    at = _place(where, state, reader) if where else None
-    goal = _place(to, state, reader) if to else None
-    if to.lower() == "home":
-        goal, notes = _home(request, person, reader)
-    here = state.goal if state.goal is not None and reader.knowledge.place(state.goal) is not None else None
+def refers_to_person(match: Match) -> bool:
+    """Returns whether a pronoun refers to the person of a request."""
+    return bool(match["him"] or match["that_person"])
+
+
+def steps_on_people(match: Match, state: State, reader: PlainReader) -> Done:
+    """Builds the steps for a request, with the state after them. Raises RefusalError."""
+    person, knowledge, refers = _person(match, state, reader), reader.knowledge, refers_to_person(match)
+    said, task, to, where = match.text, _TASKS.get(match["form"]), match["to"], match["at"]
+    if not where and person == ANYBODY and refers and state.memory.person is None and state.memory.place:
+        where = "there"
+    at, goal = (_place(text, state, reader) if text else None for text in (where, to))
+    if to.lower() == "home" and goal is None:
+        if person not in knowledge.people:
+            raise RefusalError(f"{said}: which room is home?", ["home"], question=True)
+        goal = knowledge.room(knowledge.people[person].at)
+        state = state.noting([f"I take {person}'s home to be the {goal}"])
+    here = state.goal if state.goal is not None and knowledge.place(state.goal) is not None else None
     verb = said.split()[0].lower()
-    if request.form == "greet":
-        if at is None and here is None:
-            raise RefusalError(f"{said}: in which room?", question=True)
-        whom, count = ObjectKind(ANYBODY), 0 if person == ANYBODY and not request.match["one"] else 1
-        commands = [Command(goal=at or here, task=Task.GREET, object=whom, object_count=count, verb=verb)]
+    if (at or here) is None and (task is Task.GREET or (task is None and person == ANYBODY)):
+        raise RefusalError(f"{said}: in which room?", question=True)
+    if task is Task.GUIDE and goal is None:
+        raise RefusalError(f"{said}: where to?", question=True)
+    if person == SPEAKER and goal == START:
+        raise RefusalError(f"{said}: you are here; name another place", [said])
+    if task is Task.GREET:
+        count = 0 if person == ANYBODY and not match["one"] else 1
+        commands = [Command(goal=at or here, task=task, object=ObjectKind(ANYBODY), object_count=count, verb=verb)]
     elif task is None:
-        if person == ANYBODY and (at or here) is None:
-            raise RefusalError(f"{said}: in which room?", question=True)
         commands = _go_to(person, at or here, verb, state)
     else:
-        if task is Task.GUIDE and goal is None:
-            raise RefusalError(f"{said}: where to?", question=True)
-        if person == SPEAKER and goal == START:
-            raise RefusalError(f"{said}: you are here; name another place", [said])
         first = [] if at is None else _go_to(person, at, verb, state)
         commands = [*first, Command(goal=goal, task=task, object=ObjectKind(person), verb=verb)]
-    memory = replace(state.memory, person=Location(phrase_of_name(person, NounKind.PERSON), "to"))
+    memory = replace(state.memory, person=person_named(person))
     last = commands[-1] if commands else Command()
-    if last.goal is not None and reader.knowledge.place(last.goal) is not None:
+    if last.goal is not None and knowledge.place(last.goal) is not None:
         memory = replace(memory, place=Location(phrase_of_name(last.goal, NounKind.PLACE), "in"))
-    after = reader.state_after(tuple(commands), memory, state)
+    after = reader.state_after(commands, memory, state)
     gone = last.task is Task.FOLLOW and last.goal is None
-    return steps_of_commands(commands), replace(after, goal=None, at=None) if gone else after, notes
+    return steps_of_commands(commands), after.elsewhere if gone else after
 
 
 def _go_to(person: str, at: str | None, verb: str, state: State) -> list[Command]:
@@ -384,14 +367,14 @@ def _go_to(person: str, at: str | None, verb: str, state: State) -> list[Command
     return [] if at == state.goal else [Command(goal=at, verb=verb)]
 
 
-def _person(request: PeopleRequest, state: State, reader: PlainReader) -> str:
+def _person(match: Match, state: State, reader: PlainReader) -> str:
     """Person that a request is about: known, the speaker or anybody. Raises RefusalError for an unclear pronoun."""
-    match, before = request.match, state.memory.person
+    before = state.memory.person
     if not match["who"]:
         if match["at"]:
             raise RefusalError(f"you are not there: '{match.text}'; say only where to", [match["at"]])
         return SPEAKER
-    if request.refers and before is not None and request.form != "greet":
+    if refers_to_person(match) and before is not None and match["form"] != "greet":
         return reader.knowledge.person(before.name) or before.name
     if match["him"] and not state.somebody:
         raise RefusalError(f"who is meant by '{match['who']}' in '{match.text}'?", [match["who"]], question=True)
@@ -399,18 +382,7 @@ def _person(request: PeopleRequest, state: State, reader: PlainReader) -> str:
 
 
 def _place(text: str, state: State, reader: PlainReader) -> str | None:
-    """World's name for a place in words; None for "home". Raises RefusalError when it is no place."""
-    if text.lower() == "home" and reader.knowledge.place(text) is None:
-        return None
+    """World's name for a place in words; None for "home" where no place is called so. Raises RefusalError."""
+    if text.lower() == "home":
+        return reader.knowledge.place(text)
     return START if text.lower() in ("here", "back") else reader.place(text, state)
-
-
-def _home(request: PeopleRequest, person: str, reader: PlainReader) -> tuple[str, tuple[str, ...]]:
-    """Room where a person usually is, and a note. Raises RefusalError when that room is unknown."""
-    knowledge = reader.knowledge
-    if (place := knowledge.place("home")) is not None:
-        return place, ()
-    if person not in knowledge.people:
-        raise RefusalError(f"{request.match.text}: which room is home?", ["home"], question=True)
-    room = knowledge.room(knowledge.people[person].at)
-    return room, (f"I take {person}'s home to be the {room}",)

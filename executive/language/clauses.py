@@ -177,15 +177,13 @@ def without_whatever(text: str) -> str:
 
 def begins_action(text: str) -> bool:
     """Returns whether the first word is a verb that can begin a clause."""
-    word = re.match(r"[\w']+", text)
-    return word is not None and word[0].lower() in _verbs()
+    return words_of(text).word(0) in _verbs()
 
 
 def verb_positions(text: str) -> Iterator[int]:
     """Yields the positions of verbs after the first word, where a clause may begin without a comma before it."""
-    for match in re.finditer(r"[\w']+", text):
-        if match.start() and match[0].lower() in _verbs():
-            yield match.start()
+    words = words_of(text)
+    yield from (words.start(at) for at in range(1, len(words.words)) if words.word(at) in _verbs())
 
 
 def join_clauses(clauses: Iterable[Clause]) -> str:

@@ -20,9 +20,8 @@ from executive.language.clauses import (
 )
 from executive.language.items import verb
 from executive.language.questions import RefusalError
-from executive.language.structure.conditions import Done, parse_condition, statement_of_check
+from executive.language.structure.conditions import Done, parse_condition, parse_wait, statement_of_check
 from executive.language.structure.plain import (
-    LastCheck,
     PlainReader,
     PlainReading,
     SpokenCondition,
@@ -30,7 +29,6 @@ from executive.language.structure.plain import (
     attempt,
     negate,
 )
-from executive.language.structure.requests import parse_wait
 from executive.language.templates import words_of
 from executive.words.command import Task
 from executive.words.leaf_steps import Awaited, Do, Speak, Wait, steps_of_commands
@@ -70,7 +68,7 @@ class Builder:
     ) -> None:
         self.reader, self.act, self.state, self.statement, self.given = reader, act, state, statement, given
         self.clauses, self.steps, self.plain = [*clauses], list[Step](), list[Clause]()
-        self.asked: LastCheck | None = None
+        self.asked: SpokenCondition | None = None
         self.at = self.begun = 0
         self.special = False
 
@@ -192,11 +190,11 @@ class Builder:
             raise clause.missing_action(clause.text)
         body = self.take(rest, end)
         if asked is not None and asked.looked:
-            if supposed.condition in (asked.supposed.condition, negate(asked.supposed.condition)):
+            if supposed.condition in (asked.condition, negate(asked.condition)):
                 del self.steps[-asked.steps :]
         elif asked is not None and clause.kind is Cue.IF:
             there = supposed.at_source(tuple(self.steps[-asked.steps :]), clause.text).condition
-            if there == negate(asked.supposed.condition):  # get a coke; if there is no coke, get a beer
+            if there == negate(asked.condition):  # get a coke; if there is no coke, get a beer
                 self._replace_missing(asked, supposed.said, body)
                 return
         self._choose(supposed.opposite if clause.kind is Cue.UNLESS else supposed, body)
@@ -264,7 +262,7 @@ class Builder:
             raise RefusalError(f"'{clause.cue}' refers to nothing that was said before", words)
         if asked is not None and asked.looked and cue is not Cue.FAILED:
             del self.steps[-asked.steps :]
-            supposed = asked.supposed if cue is Cue.SO else asked.supposed.opposite
+            supposed = asked if cue is Cue.SO else asked.opposite
             self._choose(supposed, self.take(clause.text, end_of_scope(self.clauses, self.at)))
             return
         last = self.steps[-1] if self.steps else None
@@ -288,7 +286,7 @@ class Builder:
         del self.steps[len(self.steps) - count :]
         self.put((block,), self.state.common(state))
 
-    def _replace_missing(self, asked: LastCheck, said: str, body: Sequence[Clause]) -> None:
+    def _replace_missing(self, asked: SpokenCondition, said: str, body: Sequence[Clause]) -> None:
         """Builds a choice: the last steps if their object is found, otherwise the steps of the body.
 
         Raises RefusalError when "there" could be the object's source or its destination.
@@ -297,8 +295,8 @@ class Builder:
         puts = any(command.task is Task.PLACE for step in done for command in step.commands)
         if puts and re.search(r"\bthere$", said, re.IGNORECASE):
             raise RefusalError(f"'{said}' could mean two places; name the place", [said])
-        otherwise, state = self.nest(body, asked.supposed.fails, asked.supposed.opposite)
-        self._wrap(len(done), Choose(condition=asked.supposed.condition, then=done, otherwise=otherwise), state)
+        otherwise, state = self.nest(body, asked.fails, asked.opposite)
+        self._wrap(len(done), Choose(condition=asked.condition, then=done, otherwise=otherwise), state)
 
     def _wait(self, clause: Clause) -> None:
         """Builds a wait for "as soon as Robin comes, ..."."""

@@ -16,13 +16,14 @@ from executive.language.structure.plain import PlainReader, SpokenCondition, Sta
 from executive.language.templates import Match, page
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
-from executive.words.leaf_steps import DoorToOpen, OpenDoor
+from executive.words.leaf_steps import Awaited, DoorToOpen, OpenDoor, Wait, steps_of_commands
 from executive.words.steps import Steps
 from skills.inputs.errors import listing
 
 _P: Final = page("conditions")
 _DOORS: Final = page("doors")
 _JOINED: Final = page("joined")
+_WAITING: Final = page("waiting")
 Done = tuple[Steps, State]
 """Steps, and the state after them."""
 RequestParser = Callable[[str, Callable[[], State], PlainReader], Done | None]
@@ -241,3 +242,49 @@ def statement_of_check(text: str) -> str | None:
     if (asked := CHECKS["asked"].fullmatch(text)) is None:
         return None
     return f"{asked['subject']} {'are' if asked['subject'].lower() == 'you' else 'is'} {asked['state']}"
+
+
+def parse_wait(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
+    """Parses a wait in a place: until a condition holds, while it holds, or for a person ("for").
+
+    Returns None for other texts, and for a wait of a given duration. Raises RefusalError when the place or the
+    condition cannot be understood.
+    """
+    match = _WAITING["wait"].fullmatch(text)
+    if match is None or _WAITING["only_span"].fullmatch(match["what"]):
+        return None
+    (steps, there), how, what = _gone(match["where"], known(), reader), match["how"].lower(), match["what"]
+    if how in ("until", "till"):
+        ends = _WAITING["ends"].fullmatch(what)
+        if (seconds := parse_seconds("" if ends is None else ends["span"])) is not None:
+            return (*steps, Wait(awaited=Awaited(seconds=seconds))), there
+        if (time := parse_time(what if ends is None else ends["time"])) is not None:
+            return (*steps, Wait(awaited=Awaited(until_clock=time.text))), there.noting(time.notes(what))
+        found = parse_condition(what, there, reader)
+    elif how != "for":
+        found = parse_condition(what, there, reader).negate(what)
+    else:
+        who, at = what, _WAITING["person_at"].fullmatch(what)
+        if at is not None and reader.is_somebody(at["who"], there):
+            reading = reader.go_to(at["where"], there)
+            steps, there, who = (*steps, *steps_of_commands(reading.commands)), reading.state, at["who"]
+        event = f"{who} is here" if reader.is_somebody(who, there) else _WAITING["button"].reword(what, whole=True)
+        usual = usual_condition(event, there, reader)
+        if usual is None:
+            raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
+        found = usual
+    after = replace(found.holds, goal=found.holds.goal or there.goal)
+    return (*steps, Wait(awaited=Awaited(condition=found.condition))), after
+
+
+def _gone(where: str, state: State, reader: PlainReader) -> Done:
+    """Adds the drive to the place of a wait."""
+    if _WAITING["here"].fullmatch(where):
+        return (), state
+    match = _WAITING["place"].fullmatch(where)
+    if match is None:
+        raise RefusalError(f"I do not understand where to wait: '{where}'", [where])
+    if match["there"] and state.goal is not None and state.at is not None:
+        return (), state
+    reading = reader.go_to(match["place"] or "there", state)
+    return steps_of_commands(reading.commands), reading.state

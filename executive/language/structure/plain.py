@@ -88,7 +88,7 @@ class SpokenCondition:
     """Condition with its words, and the state of the mission after true and after false.
 
     The words of a `quotable` condition may be repeated as a statement; `items` are the items of a look, which another
-    condition may omit.
+    condition may omit. The last `steps` check the condition (`looked`), or need it to succeed.
     """
 
     condition: Condition
@@ -97,6 +97,8 @@ class SpokenCondition:
     fails: State
     quotable: bool = True
     items: tuple[Item, ...] = field(default=(), repr=False)
+    steps: int = 1
+    looked: bool = False
 
     def negate(self, said: str) -> SpokenCondition:
         """Negated condition, with its words."""
@@ -122,15 +124,6 @@ class SpokenCondition:
             return self
         there = Look.from_command(replace(look.command, goal=taken.goal))
         return replace(self, condition=Not(part=there) if isinstance(self.condition, Not) else there)
-
-
-@dataclass(frozen=True)
-class LastCheck:
-    """Condition of the last steps: they check it (`looked`) or need it to succeed; `steps` is the number of steps."""
-
-    supposed: SpokenCondition
-    looked: bool
-    steps: int = 1
 
 
 @dataclass(frozen=True)
@@ -287,19 +280,19 @@ class PlainReader:
         fails = replace(known, memory=replace(known.memory, where=None, locations=before.memory.locations))
         return SpokenCondition(looks[0] if len(looks) == 1 else AllOf(parts=looks), text, known, fails)
 
-    def last_check(self, reading: PlainReading, before: State, said: str = "") -> LastCheck | None:
+    def last_check(self, reading: PlainReading, before: State, said: str = "") -> SpokenCondition | None:
         """Look or fetch that the last command of a reading stands for; `said` is the statement of the look."""
         commands = reading.commands
         if commands and commands[-1].task is Task.FIND:
             looks = sum(command.task is Task.FIND for command in commands)
-            return LastCheck(self._condition_of_looks(reading, reading.state, before, said), looked=True, steps=looks)
+            return replace(self._condition_of_looks(reading, reading.state, before, said), looked=True, steps=looks)
         taken = next((command for command in reversed(commands) if command.task is Task.GRASP), None)
         if taken is None:
             return None
         found = Look.from_command(replace(taken, task=Task.FIND, verb="find"))
         memory = replace(reading.state.memory, where=None, locations=before.memory.locations)
         fails = replace(reading.state.elsewhere, memory=memory, held=None)
-        return LastCheck(SpokenCondition(found, "", reading.state, fails), looked=False, steps=len(commands))
+        return SpokenCondition(found, "", reading.state, fails, steps=len(commands))
 
     def _state_if_seen(self, reading: PlainReading, state: State) -> State:
         """State if the look succeeds."""

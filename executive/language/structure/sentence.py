@@ -1,50 +1,59 @@
 """Reads a sentence with conditions, loops, waits or speech, and builds the steps of its actions."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.clauses import CHECKS, Clause, Cue, end_of_scope, split, trailing_cue
+from executive.language.amounts import parse_share
+from executive.language.clauses import CHECKS, Clause, Cue, split, trailing_cue
 from executive.language.coverage import TOLD, note_adverbs
-from executive.language.items import Chunk, without_objects
+from executive.language.items import verb, without_objects
+from executive.language.nouns import NounKind
 from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
+from executive.language.roles import Location
 from executive.language.structure.builder import Builder
-from executive.language.structure.conditions import RequestParser, parse_condition, statement_of_check
+from executive.language.structure.conditions import (
+    FULL,
+    Done,
+    RequestParser,
+    parse_condition,
+    parse_opening,
+    parse_wait,
+    statement_of_check,
+)
 from executive.language.structure.plain import (
-    LastCheck,
     PlainReader,
     State,
     attempt,
+    names_of_world,
     person_named,
+    phrase_of_name,
 )
-from executive.language.structure.requests import (
-    PEOPLE,
-    REQUESTS,
-    ROOMS,
-    SPEECH,
-    QuestionRequest,
-    escape_braces,
-    is_clause,
-    parse_people,
-    parse_question,
-    parse_speech,
-    refers_to_person,
-    search_for,
-    steps_for_everyone,
-    steps_on_people,
-)
-from executive.language.templates import Match
-from executive.words.command import PEOPLE_TASKS, SPEAKER, START
+from executive.language.structure.speech import ROOMS, SPEECH, asks, is_clause, say_in_each_room, says
+from executive.language.templates import Match, page
+from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.condition import Look
-from executive.words.leaf_steps import Check, Do, Speak
+from executive.words.knowledge import ANYBODY, Knowledge
+from executive.words.leaf_steps import Charging, Check, Do, Dock, Picture, Speak, Subject, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Repeat, Steps, Together, Try
+from skills.api import ObjectKind
+from skills.inputs.errors import listing
 from skills.inputs.schema import first_error
+
+_CHARGE: Final = page("waiting")["charge"]
+_PICTURE: Final = page("pictures")["picture"]
+_PEOPLE: Final = page("people")
+_TASKS: Final = {"follow": Task.FOLLOW, "guide": Task.GUIDE, "greet": Task.GREET}
+"""Tasks of the intents on people; the robot goes to the person for the other intents."""
+MOST_NESTED: Final = 2
+
+MOST_CLAUSES: Final = 24
 
 
 def act(row: Builder, clause: Clause) -> None:
@@ -74,24 +83,89 @@ def _skips(row: Builder, clause: Clause) -> bool:
     return idle or looked
 
 
+def _requests(row: Builder, clause: Clause, parsers: Sequence[RequestParser]) -> bool:
+    """Adds the steps of a request that one of the parsers understands."""
+    done = next((done for parse in parsers if (done := parse(clause.text, row.known, row.reader)) is not None), None)
+    if done is not None:
+        row.put(*done)
+    return done is not None
+
+
+def _parse_charging(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
+    """Parses charging up to a level; None if the text states no level."""
+    if (match := _CHARGE.fullmatch(text)) is None:
+        return None
+    level = FULL if match["full"] else parse_share(match["level"])
+    if level is None:
+        raise RefusalError(f"'{match['level']}' is no charge; say it in percent", [match["level"]])
+    return (Dock(charging=Charging(level=level)),), known().elsewhere
+
+
+def _parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
+    """Parses a request for pictures; None for other texts. Raises RefusalError for an unknown name."""
+    if (match := _PICTURE.fullmatch(text)) is None or trailing_cue(text) is not None:
+        return None
+    state, steps = known(), list[Step]()
+    at = (match["at"] or None) and reader.go_to(match["at"], state).commands[0].goal
+    for what in re.split(r",? and |, ", match["of"]):
+        of = reader.knowledge.place(re.sub(r"^(?:the|a|an|my|our|your) ", "", what, flags=re.IGNORECASE))
+        if of is None:
+            found = reader.read_commands(what, state, (verb("find"),)).commands[0].object
+            if found is not None and found.relations:
+                raise RefusalError(f"I cannot tell in a picture which one is '{what}'", [what])
+            of = str(found)
+        steps.append(Picture(subject=Subject(of=of, at=at, camera=match["camera"] or None)))
+    return tuple(steps), state.elsewhere
+
+
+def _steps_for_everyone(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
+    """Builds a delivery to each person in a group; None if the recipient is no group.
+
+    Raises RefusalError when no room is named, no known person is there, or there is only one such object.
+    """
+    if ROOMS["gives"].match(text) is None or ROOMS["everyone"].search(text) is None:
+        return None
+    begun = state = known()
+    trace = reader.read(state, text, upto="understanding", elliptic=True).trace
+    named = [(one.goal, one.goal.phrase.spoken) for one in trace.actions if one.goal and one.goal.phrase]
+    to, who = next(((goal, said) for goal, said in named if ROOMS["everyone"].fullmatch(said)), (None, ""))
+    if to is None:
+        return None
+    if to.within is None or to.within.phrase is None:
+        raise RefusalError(f"I bring objects to one person at a time, not to {who}; name one, or a room", [who])
+    room, knowledge = reader.room(to.within.phrase.spoken, state), reader.knowledge
+    people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
+    if not people:
+        raise RefusalError(f"I know nobody in the {room} to bring anything to: {who}", [who])
+    steps: Steps = ()
+    for name in people:
+        goal = person_named(name, to.within)
+        actions = tuple(replace(one, goal=goal) if one.goal == to else one for one in trace.actions)
+        reading = reader.read(begun, behind="understanding", actions=actions, notes=trace.notes)
+        if any(action.target is not None and not action.target.indefinite for action in reading.trace.resolved):
+            raise RefusalError(f"there is only one of it, and I cannot bring it to {who}; name one person", [who])
+        steps, begun = (*steps, *steps_of_commands(reading.commands)), replace(reading.state, memory=state.memory)
+    return steps, begun
+
+
 def _meets_people(row: Builder, clause: Clause) -> bool:
     """Adds a request about people; finding somebody counts only before another request about the same person."""
     knowledge, found, then = row.reader.knowledge, trailing_cue(clause.text), row.ahead()
     if found is not None and found.kind in (Cue.WHILE, Cue.UNTIL):
         found = None  # how long the robot follows
-    request = parse_people(clause.text if found is None else found.before, knowledge)
+    request = _parse_people(clause.text if found is None else found.before, knowledge)
     if request is None:
         return False
-    refers = PEOPLE["refers"].search(then) is not None
-    if request["form"] == "find" and not (refers or (row.special and refers_to_person(request))):
+    refers = _PEOPLE["refers"].search(then) is not None
+    if request["form"] == "find" and not (refers or (row.special and _refers_to_person(request))):
         return False
-    if request["form"] == "stated" and not (refers and parse_people(then, knowledge)):
+    if request["form"] == "stated" and not (refers and _parse_people(then, knowledge)):
         return False
     if found is not None:
         row.modify(clause, found)
     else:
         _flush_reasons(row)
-        row.put(*steps_on_people(request, row.state, row.reader))
+        row.put(*_steps_on_people(request, row.state, row.reader))
     return True
 
 
@@ -110,114 +184,100 @@ def _flush_reasons(row: Builder) -> None:
         row.state = replace(row.state, memory=replace(row.state.memory, person=person_named(named[0])))
 
 
-def _requests(row: Builder, clause: Clause, parsers: Sequence[RequestParser] = REQUESTS) -> bool:
-    """Adds the steps of a request that one of the parsers understands."""
-    done = next((done for parse in parsers if (done := parse(clause.text, row.known, row.reader)) is not None), None)
-    if done is not None:
-        row.put(*done)
-    return done is not None
+def _parse_people(text: str, knowledge: Knowledge) -> Match | None:
+    """Parses a clause about following, guiding, meeting or greeting people; None for other clauses.
+
+    The match has its intent as `form`, the person `who` (empty: the speaker), and the places `at` and `to`. Raises
+    RefusalError when such a clause does not say clearly whom it means.
+    """
+    forms = page("people", **names_of_world(knowledge))
+    text = text if (around := forms["around"].fullmatch(text)) is None else around["clause"]
+    for name in (*_TASKS, "meet", "find", "stated"):
+        if (match := forms[name].fullmatch(text)) is not None:
+            return replace(match, slots={**match.slots, "form": name})
+    if forms["certain"].match(text) is None or forms["greets_known"].match(text) is not None:
+        return None
+    known = f"; known are {listing(knowledge.people)}" if knowledge.people else ""
+    hint = f"name one person, or say 'the person in the kitchen'{known}"
+    if (cue := trailing_cue(text)) is not None and _parse_people(cue.before, knowledge) is not None:
+        what, hint = f"I cannot do '{cue.before}' {cue.cue} {cue.text}", "I do it up to a place, or until you say stop"
+    elif (unseen := forms["unseen"].search(text)) is not None:
+        what = f"I cannot tell people apart by {unseen['by']}, such as '{unseen.text}'"
+    elif (crowd := forms["crowd"].search(text)) is not None:
+        what = f"I follow and guide one person at a time, not '{crowd.text}'"
+    else:
+        what = f"I do not understand whom and where '{text}' means"
+    raise RefusalError(f"{what}; {hint}", [text])
 
 
-def _asks(row: Builder, clause: Clause) -> bool:
-    """Adds a question to somebody, with the steps that follow each answer."""
-    person, text = row.state.memory.person, clause.text
-    if person is not None:
-        text = re.sub(r"^(ask) (?:him|her)\b", rf"\1 {person.name}", text, flags=re.IGNORECASE)
-    if (asked := parse_question(text, row.reader.knowledge)) is None:
-        return False
-    row.flush()
-    _goes_to_listener(row, asked.of)
-    choices = (_agreed if asked.yes_or_no else _chosen)(row, asked)
-    row.put((Ask(ask=escape_braces(asked.text), choices=choices),), row.state.elsewhere)
-    return True
+def _refers_to_person(match: Match) -> bool:
+    """Returns whether a pronoun refers to the person of a request."""
+    return bool(match["him"] or match["that_person"])
 
 
-def _agreed(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
-    """Steps that follow the answers yes and no."""
-    found: dict[str, Steps] = {"yes": (), "no": ()}
-    while row.at < len(row.clauses):
-        clause, rest = row.clauses[row.at], row.clauses[row.at].text
-        answer = {Cue.SO: "yes", Cue.NOT: "no", Cue.OTHERWISE: "no"}.get(clause.kind) if clause.kind else None
-        for said, intent in (("no", "declines"), ("yes", "agrees")):
-            match = CHECKS[intent].match(rest) if clause.kind is Cue.IF and answer is None else None
-            if match is not None:
-                answer, rest = said, rest[match.end :].strip(" ,")
-        if clause.kind is None and not any(found.values()) and CHECKS["brings_it"].match(rest):
-            answer = "yes"
-        if answer is None or found[answer]:
-            break
-        row.at += 1
-        body = row.take(rest, end_of_scope(row.clauses, row.at, branch=True))
-        if not body:
-            raise clause.missing_action(clause.text)
-        found[answer] = _steps_if_chosen(row, body, asked, asked.choices[0])
-    if not found["yes"] and CHECKS["brings"].match(row.ahead()):
-        raise RefusalError("say 'if yes' before the action for that answer", [row.ahead()])
-    return found
+def _steps_on_people(match: Match, state: State, reader: PlainReader) -> Done:
+    """Builds the steps for a request, with the state after them. Raises RefusalError."""
+    person, knowledge, refers = _person(match, state, reader), reader.knowledge, _refers_to_person(match)
+    said, task, to, where = match.text, _TASKS.get(match["form"]), match["to"], match["at"]
+    if not where and person == ANYBODY and refers and state.memory.person is None and state.memory.place:
+        where = "there"
+    at, goal = (_place(text, state, reader) if text else None for text in (where, to))
+    if to.lower() == "home" and goal is None:
+        if person not in knowledge.people:
+            raise RefusalError(f"{said}: which room is home?", ["home"], question=True)
+        goal = knowledge.room(knowledge.people[person].at)
+        state = state.noting([f"I take {person}'s home to be the {goal}"])
+    here = state.goal if state.goal is not None and knowledge.place(state.goal) is not None else None
+    verb = said.split()[0].lower()
+    if (at or here) is None and (task is Task.GREET or (task is None and person == ANYBODY)):
+        raise RefusalError(f"{said}: in which room?", question=True)
+    if task is Task.GUIDE and goal is None:
+        raise RefusalError(f"{said}: where to?", question=True)
+    if person == SPEAKER and goal == START:
+        raise RefusalError(f"{said}: you are here; name another place", [said])
+    if task is Task.GREET:
+        count = 0 if person == ANYBODY and not match["one"] else 1
+        commands = [Command(goal=at or here, task=task, object=ObjectKind(ANYBODY), object_count=count, verb=verb)]
+    elif task is None:
+        commands = _go_to(person, at or here, verb, state)
+    else:
+        first = [] if at is None else _go_to(person, at, verb, state)
+        commands = [*first, Command(goal=goal, task=task, object=ObjectKind(person), verb=verb)]
+    memory = replace(state.memory, person=person_named(person))
+    last = commands[-1] if commands else Command()
+    if last.goal is not None and knowledge.place(last.goal) is not None:
+        memory = replace(memory, place=Location(phrase_of_name(last.goal, NounKind.PLACE), "in"))
+    after = reader.state_after(commands, memory, state)
+    gone = last.task is Task.FOLLOW and last.goal is None
+    return steps_of_commands(commands), after.elsewhere if gone else after
 
 
-def _chosen(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
-    """Steps that follow each of the choices: the robot brings the chosen object if the sentence says so."""
-    body = row.take("", row.at + 1) if CHECKS["brings"].match(row.ahead()) else []
-    article = r"^(?:a|an|some|the|any|another) "
-    return {
-        re.sub(article, "", choice, flags=re.IGNORECASE): _steps_if_chosen(row, body, asked, choice) if body else ()
-        for choice in asked.choices
-    }
+def _go_to(person: str, at: str | None, verb: str, state: State) -> list[Command]:
+    """Goes to a known person at a place; for anybody only to the place, unless the robot is there already."""
+    if person != ANYBODY:
+        return [Command(goal=person, goal_at=at, verb=verb)]
+    return [] if at == state.goal else [Command(goal=at, verb=verb)]
 
 
-def _steps_if_chosen(row: Builder, body: Sequence[Clause], asked: QuestionRequest, choice: str) -> Steps:
-    """Steps after an answer: "it" refers to the chosen object, and the asked person receives it."""
-    objects = tuple(item.phrase for item in row.reader.read_items(choice) if isinstance(item, Chunk))
-    person = person_named(asked.of["name"])
-    memory = replace(row.state.memory, objects=objects, gathered=objects, where=None, person=person)
-    steps, after = row.nest(body, replace(row.state, memory=memory, recipient=person))
-    row.state = row.state.noting(after.notes)
-    return steps
+def _person(match: Match, state: State, reader: PlainReader) -> str:
+    """Person that a request is about: known, the speaker or anybody. Raises RefusalError for an unclear pronoun."""
+    before = state.memory.person
+    if not match["who"]:
+        if match["at"]:
+            raise RefusalError(f"you are not there: '{match.text}'; say only where to", [match["at"]])
+        return SPEAKER
+    if _refers_to_person(match) and before is not None and match["form"] != "greet":
+        return reader.knowledge.person(before.name) or before.name
+    if match["him"] and not state.somebody:
+        raise RefusalError(f"who is meant by '{match['who']}' in '{match.text}'?", [match["who"]], question=True)
+    return reader.knowledge.person(match["who"]) or ANYBODY
 
 
-def _says(row: Builder, clause: Clause) -> bool:
-    """Adds speech, behind the drive to the listener."""
-    text, found = clause.text, trailing_cue(clause.text)
-    if (match := SPEECH["tells_when"].fullmatch(text)) is not None:
-        row.flush()
-        statement = parse_condition(match["what"], row.state, row.reader).statement
-        if statement is None:
-            raise RefusalError(f"what am I to say in '{text}'?", [text])
-        told = Clause("", f"tell {match['who']} that {statement}")
-        row.clauses[row.at : row.at] = [Clause("", match["what"], Cue.SOON, "when"), told]
-        return True
-    if not SPEECH["speaks"].match(text) or SPEECH["asks_back"].match(text):
-        return False
-    if (everywhere := ROOMS["says_everywhere"].fullmatch(text)) is not None:
-        _say_in_each_room(row, everywhere["said"])
-        return True
-    counts = found is not None and found.kind in (Cue.TIMES, Cue.EVERY) and found.text
-    if found is not None and (not counts or re.match(r"for|until|every", found.text)):
-        row.modify(clause, found)  # unless it is a part of what is said
-        return True
-    if (said := parse_speech(text, row.reader)) is None:
-        return False
-    if not (words := said["text"] or row.statement):
-        raise RefusalError(f"what am I to say in '{text}'?", [text])
-    row.flush()
-    _goes_to_listener(row, said)
-    row.put((Speak(speak=escape_braces(words)),), row.state)
-    return True
-
-
-def _goes_to_listener(row: Builder, to: Match) -> None:
-    """Adds the drive to the listener."""
-    said, place = to["name"] or to["pronoun"], to["where"]
-    if not (said or place or to["speaker"]):
-        return
-    words = "here" if to["speaker"] else " in ".join(filter(None, (said, place)))
-    reading = row.reader.go_to(words, row.state, by="come" if to["speaker"] else "go")
-    last = row.steps[-1].commands[-1:] if row.steps and not place else ()
-    if any(one.task in PEOPLE_TASKS and str(one.object) == reading.commands[-1].goal for one in last):
-        return  # the robot has just followed or guided that person
-    if reading.commands[-1].goal != row.state.goal or reading.commands[-1].goal_at is not None:
-        row.add(reading)
+def _place(text: str, state: State, reader: PlainReader) -> str | None:
+    """World's name for a place in words; None for "home" where no place is called so. Raises RefusalError."""
+    if text.lower() == "home":
+        return reader.knowledge.place(text)
+    return START if text.lower() in ("here", "back") else reader.place(text, state)
 
 
 def _checks(row: Builder, clause: Clause) -> bool:
@@ -235,7 +295,7 @@ def _checks(row: Builder, clause: Clause) -> bool:
         raise supposed if clear else plain
     found = supposed.condition
     row.put((Do.from_command(found.command) if isinstance(found, Look) else Check(condition=found),), supposed.holds)
-    row.asked = LastCheck(supposed, looked=True)
+    row.asked = replace(supposed, looked=True)
     return True
 
 
@@ -256,39 +316,33 @@ def _searches_rooms(row: Builder, clause: Clause) -> bool:
         says = looks is None and SPEECH["speaks"].match(ahead) is not None and trailing_cue(ahead) is None
         row.at += says or looks is not None
         if says:
-            _say_in_each_room(row, ahead)
+            say_in_each_room(row, ahead)
             return True
     if looks is None:
         return False
-    reading = search_for(looks["what"], row.known(), row.reader)
+    what = looks["what"]
+    reading = row.reader.read_commands(what, row.known(), (verb("find"),))
+    if any(one.task is not Task.FIND for one in reading.commands) or re.search(r"\b(?:in|on|at|near)\b", what):
+        raise RefusalError(f"I cannot look for {listing([what])} in every room", [what])
+    commands = tuple(replace(command, goal=None, goal_at=None) for command in reading.commands)
     row.flush()
-    row.add(reading)
+    row.add(replace(reading, commands=commands, state=reading.state.elsewhere))
     row.special = True
     return True
-
-
-def _say_in_each_room(row: Builder, said: str) -> None:
-    """Goes on with speech in every room."""
-    goes = (f"go to the {room}" for room in row.reader.knowledge.rooms)
-    row.clauses[row.at : row.at] = [Clause("", text) for go in goes for text in (go, said)]
 
 
 _ACTS: Final = (
     _skips,
     _meets_people,
-    _requests,
-    _asks,
-    _says,
+    lambda row, clause: _requests(row, clause, (parse_opening, _parse_pictures, _parse_charging, parse_wait)),
+    asks,
+    says,
     _checks,
     _is_modified,
-    lambda row, clause: _requests(row, clause, (steps_for_everyone,)),
+    lambda row, clause: _requests(row, clause, (_steps_for_everyone,)),
     _searches_rooms,
 )
 """Actions in the order of trying."""
-
-MOST_NESTED: Final = 2
-
-MOST_CLAUSES: Final = 24
 
 
 def read_structure(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pipeline, memory: Memory) -> Trace:

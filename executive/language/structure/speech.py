@@ -1,0 +1,267 @@
+"""Adds speech and questions to somebody, behind the drive to the listener."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from executive.language.clauses import CHECKS, CLAUSES, Clause, Cue, end_of_scope, trailing_cue
+from executive.language.items import Chunk
+from executive.language.lexicon import any_of, lexicon
+from executive.language.parser import DependencyParser
+from executive.language.questions import RefusalError
+from executive.language.structure.builder import Builder
+from executive.language.structure.conditions import parse_condition
+from executive.language.structure.plain import PlainReader, names_of_world, person_named
+from executive.language.templates import Match, page
+from executive.words.command import PEOPLE_TASKS
+from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import Speak
+from executive.words.steps import Ask, Steps
+from skills.inputs.errors import listing, with_article
+
+ROOMS: Final = page("rooms")
+SPEECH: Final = page("speech")
+_SUBJECTS: Final = r"(?:the|a|an|my|your|our|his|her|their|this|all|every)\b"
+_ADVERBIAL: Final = re.compile(
+    rf"(?!{_SUBJECTS})([\w' ]+?),? that (?=\w)|({any_of(map(' '.join, lexicon().noted))}) ", re.IGNORECASE
+)
+"""Words before what is told that say when or how it is told."""
+
+
+def says(row: Builder, clause: Clause) -> bool:
+    """Adds speech, behind the drive to the listener."""
+    text, found = clause.text, trailing_cue(clause.text)
+    if (match := SPEECH["tells_when"].fullmatch(text)) is not None:
+        row.flush()
+        statement = parse_condition(match["what"], row.state, row.reader).statement
+        if statement is None:
+            raise RefusalError(f"what am I to say in '{text}'?", [text])
+        told = Clause("", f"tell {match['who']} that {statement}")
+        row.clauses[row.at : row.at] = [Clause("", match["what"], Cue.SOON, "when"), told]
+        return True
+    if not SPEECH["speaks"].match(text) or SPEECH["asks_back"].match(text):
+        return False
+    if (everywhere := ROOMS["says_everywhere"].fullmatch(text)) is not None:
+        say_in_each_room(row, everywhere["said"])
+        return True
+    counts = found is not None and found.kind in (Cue.TIMES, Cue.EVERY) and found.text
+    if found is not None and (not counts or re.match(r"for|until|every", found.text)):
+        row.modify(clause, found)  # unless it is a part of what is said
+        return True
+    if (said := _parse_speech(text, row.reader)) is None:
+        return False
+    if not (words := said["text"] or row.statement):
+        raise RefusalError(f"what am I to say in '{text}'?", [text])
+    row.flush()
+    _goes_to_listener(row, said)
+    row.put((Speak(speak=_escape_braces(words)),), row.state)
+    return True
+
+
+def say_in_each_room(row: Builder, said: str) -> None:
+    """Goes on with speech in every room."""
+    goes = (f"go to the {room}" for room in row.reader.knowledge.rooms)
+    row.clauses[row.at : row.at] = [Clause("", text) for go in goes for text in (go, said)]
+
+
+def _goes_to_listener(row: Builder, to: Match) -> None:
+    """Adds the drive to the listener."""
+    said, place = to["name"] or to["pronoun"], to["where"]
+    if not (said or place or to["speaker"]):
+        return
+    words = "here" if to["speaker"] else " in ".join(filter(None, (said, place)))
+    reading = row.reader.go_to(words, row.state, by="come" if to["speaker"] else "go")
+    last = row.steps[-1].commands[-1:] if row.steps and not place else ()
+    if any(one.task in PEOPLE_TASKS and str(one.object) == reading.commands[-1].goal for one in last):
+        return  # the robot has just followed or guided that person
+    if reading.commands[-1].goal != row.state.goal or reading.commands[-1].goal_at is not None:
+        row.add(reading)
+
+
+def _parse_speech(text: str, reader: PlainReader) -> Match | None:
+    """Parses a clause that asks the robot to speak; None for other clauses.
+
+    The match has the `text`, empty if the sentence does not say it ("tell Robin"), and the listener: the `speaker`, a
+    `pronoun`, a `name` or everybody (`crowd`), and `where` they are; without these the robot speaks where it is. Raises
+    RefusalError when the robot cannot say it in the speaker's place, or does not know the listener.
+    """
+    forms = page("speech", **names_of_world(reader.knowledge))
+    if forms["say_within"].fullmatch(text) is not None:
+        raise RefusalError(f"I do not understand to whom to say '{text}'; name one person at the end", [text])
+    for intent, words in _WORDS.items():
+        if (match := forms[intent].fullmatch(text)) is not None:
+            return replace(match, slots={**match.slots, "text": words(match, reader.pipeline.parser)})
+    _refuse_stranger(text, reader.knowledge)
+    return None
+
+
+def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
+    """Raises RefusalError for a listener with an unknown name."""
+    match = re.match(r"(?:[Tt]ell|[Aa]sk) (?P<who>[A-Z][a-z]+)\b", text)
+    names = knowledge.spellings(knowledge.people)
+    if match is None or any(name.lower().startswith(match["who"].lower()) for name in names):
+        return
+    known = f"; known are {listing(knowledge.people)}" if knowledge.people else ""
+    raise RefusalError(f"I know no person '{match['who']}'{known}", [match["who"]])
+
+
+def _said(match: Match, parser: DependencyParser) -> str:
+    """Words to say. Raises RefusalError when they describe a text, or name an unknown person."""
+    text, clause = match["text"], is_clause(match["text"], parser)
+    whom = re.search(r" to (?:the|a|an|my|our|all|every|each|some|any|somebody|someone)\b.*$", text, re.IGNORECASE)
+    if whom is not None and (not clause or re.search(r"\b(?:person|guest|visitor)\b", whom[0], re.IGNORECASE)):
+        raise RefusalError(f"I do not know to whom to say it: '{whom[0].strip()}'", [whom[0].strip()])
+    if SPEECH["named"].match(text) and not clause:
+        raise RefusalError(f"what are the words of '{text}'?", [text])
+    return _literal(text)
+
+
+def _told(match: Match, parser: DependencyParser) -> str:
+    """Statement as the robot says it for the speaker. Raises RefusalError when this would change the meaning."""
+    text = f"{match['polite']}{match['text']}"
+    word = CLAUSES["deictic"].search(text) or SPEECH["inner"].search(text)
+    if word is not None:
+        meant = "would mean somebody or something else"
+        raise RefusalError(f"I cannot say '{text}' for you: '{word.text}' {meant}", [text])
+    return _literal(text)
+
+
+def _relayed(match: Match, parser: DependencyParser) -> str:
+    """Words of "tell Robin dinner is ready"; none of "let Robin know it"."""
+    said, text = match["text"], match.text
+    if re.match(r"(?:and|or)\b", said, re.IGNORECASE):
+        raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
+    if re.fullmatch(r"|so|it|that|about it|about that", said, re.IGNORECASE):
+        return ""
+    adverbial = _ADVERBIAL.match(said)
+    if adverbial is not None and is_clause(said[adverbial.end() :], parser):
+        raise RefusalError(f"I tell it as soon as I am there, not {adverbial[1] or adverbial[2]!r}", [adverbial[0]])
+    states = not (match["speaker"] or SPEECH["question"].match(said)) and is_clause(said, parser)
+    if SPEECH["greetings"].fullmatch(said) or states:
+        return _told(match, parser)
+    raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
+
+
+def is_clause(text: str, parser: DependencyParser) -> bool:
+    """Returns whether a text is a statement: a finite verb with a subject before it."""
+    tokens = parser.parse(text)
+    finite = {t.index for t in tokens if t.tag in ("VBZ", "VBP", "VBD", "MD")}
+    verbs = finite | {t.index for t in tokens if t.relation == "root"}
+    return bool(finite) and any(t.relation in ("nsubj", "nsubjpass", "expl") and t.head in verbs for t in tokens)
+
+
+def _literal(text: str) -> str:
+    """Words to say literally. Raises RefusalError when they only describe a text."""
+    if SPEECH["nothing"].fullmatch(text) or SPEECH["question"].match(text) or re.match(r"to\b", text, re.IGNORECASE):
+        raise RefusalError(f"what am I to say? '{text}' says nothing", [text])
+    return text.strip(" ,.'\"")
+
+
+_WORDS: Final[dict[str, Callable[[Match, DependencyParser], str]]] = {
+    "says_to": _said,
+    "says": _said,
+    "formula": lambda match, _: match["text"],
+    "tells": _told,
+    "relays": _relayed,
+}
+"""Intents of speech, and how the words to say are found."""
+
+
+def _escape_braces(text: str) -> str:
+    """Escapes braces in a text."""
+    return text.replace("{", "{{").replace("}", "}}")
+
+
+@dataclass(frozen=True)
+class QuestionRequest:
+    """Question to a person, the objects to choose from (with their articles), and whether its answer is yes or no."""
+
+    text: str
+    of: Match
+    choices: tuple[str, ...]
+    yes_or_no: bool = False
+
+
+def asks(row: Builder, clause: Clause) -> bool:
+    """Adds a question to somebody, with the steps that follow each answer."""
+    person, text = row.state.memory.person, clause.text
+    if person is not None:
+        text = re.sub(r"^(ask) (?:him|her)\b", rf"\1 {person.name}", text, flags=re.IGNORECASE)
+    if (asked := _parse_question(text, row.reader.knowledge)) is None:
+        return False
+    row.flush()
+    _goes_to_listener(row, asked.of)
+    choices = (_agreed if asked.yes_or_no else _chosen)(row, asked)
+    row.put((Ask(ask=_escape_braces(asked.text), choices=choices),), row.state.elsewhere)
+    return True
+
+
+def _agreed(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
+    """Steps that follow the answers yes and no."""
+    found: dict[str, Steps] = {"yes": (), "no": ()}
+    while row.at < len(row.clauses):
+        clause, rest = row.clauses[row.at], row.clauses[row.at].text
+        answer = {Cue.SO: "yes", Cue.NOT: "no", Cue.OTHERWISE: "no"}.get(clause.kind) if clause.kind else None
+        for said, intent in (("no", "declines"), ("yes", "agrees")):
+            match = CHECKS[intent].match(rest) if clause.kind is Cue.IF and answer is None else None
+            if match is not None:
+                answer, rest = said, rest[match.end :].strip(" ,")
+        if clause.kind is None and not any(found.values()) and CHECKS["brings_it"].match(rest):
+            answer = "yes"
+        if answer is None or found[answer]:
+            break
+        row.at += 1
+        body = row.take(rest, end_of_scope(row.clauses, row.at, branch=True))
+        if not body:
+            raise clause.missing_action(clause.text)
+        found[answer] = _steps_if_chosen(row, body, asked, asked.choices[0])
+    if not found["yes"] and CHECKS["brings"].match(row.ahead()):
+        raise RefusalError("say 'if yes' before the action for that answer", [row.ahead()])
+    return found
+
+
+def _chosen(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
+    """Steps that follow each of the choices: the robot brings the chosen object if the sentence says so."""
+    body = row.take("", row.at + 1) if CHECKS["brings"].match(row.ahead()) else []
+    article = r"^(?:a|an|some|the|any|another) "
+    return {
+        re.sub(article, "", choice, flags=re.IGNORECASE): _steps_if_chosen(row, body, asked, choice) if body else ()
+        for choice in asked.choices
+    }
+
+
+def _steps_if_chosen(row: Builder, body: Sequence[Clause], asked: QuestionRequest, choice: str) -> Steps:
+    """Steps after an answer: "it" refers to the chosen object, and the asked person receives it."""
+    objects = tuple(item.phrase for item in row.reader.read_items(choice) if isinstance(item, Chunk))
+    person = person_named(asked.of["name"])
+    memory = replace(row.state.memory, objects=objects, gathered=objects, where=None, person=person)
+    steps, after = row.nest(body, replace(row.state, memory=memory, recipient=person))
+    row.state = row.state.noting(after.notes)
+    return steps
+
+
+def _parse_question(text: str, knowledge: Knowledge) -> QuestionRequest | None:
+    """Parses a clause that tells the robot to ask somebody a question; None for other clauses.
+
+    Raises RefusalError for a question that the robot cannot put.
+    """
+    forms = page("speech", **names_of_world(knowledge))
+    if not re.match(r"ask\b", text, re.IGNORECASE) or forms["tells"].fullmatch(text):
+        return None
+    match = forms["wants_one"].fullmatch(text) or forms["wants_what"].fullmatch(text)
+    if match is None or not match["name"]:
+        _refuse_stranger(text, knowledge)
+        able = "I can ask somebody by name whether they want this or that"
+        raise RefusalError(f"I do not understand the question in '{text}'; {able}", [text])
+    if not match["what"]:  # what he wants to drink: a choice among all known objects of that kind
+        kind = (match["kind"] or match["drink"]).lower()
+        names = knowledge.classes(kind.removesuffix("s")) if kind else ()
+        if not names:
+            raise RefusalError(f"I do not know what there is to choose from in '{text}'; name it", [text])
+        spoken = f"Which {kind} do you want?" if match["kind"] else "What do you want to drink?"
+        return QuestionRequest(spoken, match, tuple(map(with_article, names)))
+    if (word := CLAUSES["deictic"].search(match["what"])) is not None:
+        raise RefusalError(f"I cannot ask that for you: '{word.text}' would mean somebody else", [text])
+    choices = tuple(re.split(r",? or |, ", match["what"], flags=re.IGNORECASE))
+    return QuestionRequest(f"Do you want {match['what']}?", match, choices, yes_or_no=len(choices) == 1)

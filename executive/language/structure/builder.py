@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Final
 
 from executive.language.amounts import parse_seconds, parse_time, parse_times
 from executive.language.clauses import (
@@ -20,7 +20,7 @@ from executive.language.clauses import (
 )
 from executive.language.items import verb
 from executive.language.questions import RefusalError
-from executive.language.structure.conditions import Done, parse_condition, parse_wait, statement_of_check
+from executive.language.structure.conditions import parse_condition, parse_wait, statement_of_check
 from executive.language.structure.plain import (
     PlainReader,
     PlainReading,
@@ -29,11 +29,14 @@ from executive.language.structure.plain import (
     attempt,
     negate,
 )
-from executive.language.templates import words_of
+from executive.language.templates import Match, words_of
 from executive.words.command import Task
 from executive.words.leaf_steps import Awaited, Do, Speak, Wait, steps_of_commands
 from executive.words.step import OnFailure, Step
 from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, Try
+
+_ROUNDS: Final = (Cue.EVERY, Cue.TIMES, Cue.WHILE, Cue.UNTIL)
+"""Cues of repeated actions."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +46,6 @@ class Rounds:
     loop: Loop
     holds: State
     statement: str | None = None
-
-
-_Head = TypeVar("_Head", bound=SpokenCondition | Rounds)
 
 
 class Builder:
@@ -84,19 +84,15 @@ class Builder:
                 self._always(clause)
             elif clause.kind is None:
                 self.act(self, clause)
-            elif clause.kind in (Cue.IF, Cue.UNLESS):
-                self._decide(clause)
             elif clause.kind in ATTACHED:
                 self._attach(clause)
-            elif clause.kind is Cue.SOON:
-                self._wait(clause)
             else:
-                self._repeat(clause)
+                self._lead(clause)
         self.flush()
         return tuple(self.steps), self.state
 
     def _inner(self, clauses: Sequence[Clause], state: State, statement: str | None) -> "Builder":
-        clauses = [replace(clauses[0], joint=""), *clauses[1:]]
+        clauses = [replace(one, joint="" if n == 0 else one.joint) for n, one in enumerate(clauses)]
         return Builder(self.reader, self.act, clauses, state, statement, self.given)
 
     def nest(
@@ -120,8 +116,7 @@ class Builder:
                 self._read_together(self.plain[:n], self.state)
             raise
         last, self.plain = self.plain[-1].text, []
-        there = re.sub(r"^(?:is|are) there ", "there is ", last, flags=re.IGNORECASE)
-        self.add(reading, statement_of_check(last) or (there if there != last else ""))
+        self.add(reading, statement_of_check(last) or "")
 
     def _read_together(self, clauses: Sequence[Clause], state: State) -> PlainReading:
         """Understands several plain clauses together."""
@@ -169,26 +164,72 @@ class Builder:
         self.steps = [Group(steps=tuple(self.steps), always=always)]
         self.state, self.asked = state, None
 
-    def _decide(self, clause: Clause) -> None:
-        """Builds a choice for "if" and "unless"."""
-        end = end_of_scope(self.clauses, self.at)
+    def _lead(self, clause: Clause) -> None:
+        """Builds a clause with a cue before its action: "if", "as soon as", "every ten minutes"."""
+        end = end_of_scope(self.clauses, self.at, rounds=clause.kind in _ROUNDS)
         follows = self.clauses[self.at : end]
-        bare_and = bool(follows) and re.match(r",?\s*and\b", follows[0].joint.strip(), re.IGNORECASE) is not None
-        if (self.plain or self.steps) and not clause.begins and (not follows or bare_and):
-            alone = attempt(parse_condition, clause.text, self.known(), self.reader)
-            if not isinstance(alone, RefusalError):
-                if not self.plain:
-                    what = f"what am I to do {clause.cue} {clause.text}? Say the condition first"
-                    raise RefusalError(what, [clause.text])
-                main = self.plain.pop()  # bring me a beer, if there is one
-                self.modify(main, replace(clause, before=main.text))
-                return
+        if clause.kind in (Cue.IF, Cue.UNLESS) and self._stands_behind(clause, follows):
+            return
         self.flush()
-        asked = self.asked
-        supposed, rest = self._split(clause.text, follows, self._condition)
-        if not rest and not follows:
-            raise clause.missing_action(clause.text)
+        if (under_way := self._under_way(clause)) is not None:
+            at = next((one for one in _places_to_cut(clause.text, follows) if one > under_way.end), len(clause.text))
+            self._put_together(clause.text[under_way.end : at], self.take(clause.text[at:], end))
+            return
+        head, rest = self._split(clause, follows)
         body = self.take(rest, end)
+        if not body:
+            raise clause.missing_action(clause.text)
+        if isinstance(head, Rounds):
+            said = clause.text[: len(clause.text) - len(rest)].strip(" ,")
+            self._put_rounds(head, body, f"{body[0].text} {clause.cue} {said}")
+        elif clause.kind is Cue.SOON:
+            self.put((Wait(awaited=Awaited(condition=head.condition)),), head.holds)
+            self.clauses[self.at : self.at] = body
+            self.begun = len(self.steps)
+        else:
+            self._decide(clause, head, body)
+
+    def _stands_behind(self, clause: Clause, follows: Sequence[Clause]) -> bool:
+        """Adds the pending action with a whole condition that stands behind it: "bring me a beer, if there is one"."""
+        bare_and = bool(follows) and re.match(r",?\s*and\b", follows[0].joint.strip(), re.IGNORECASE) is not None
+        if not (self.plain or self.steps) or clause.begins or (follows and not bare_and):
+            return False
+        if isinstance(attempt(parse_condition, clause.text, self.known(), self.reader), RefusalError):
+            return False
+        if not self.plain:
+            raise RefusalError(f"what am I to do {clause.cue} {clause.text}? Say the condition first", [clause.text])
+        main = self.plain.pop()
+        self.modify(main, replace(clause, before=main.text))
+        return True
+
+    def _under_way(self, cue: Clause) -> Match | None:
+        """Match of "while driving to the kitchen"."""
+        return CHECKS["under_way"].match(cue.text) if cue.kind is Cue.WHILE else None
+
+    def _split(self, clause: Clause, follows: Sequence[Clause]) -> tuple[SpokenCondition | Rounds, str]:
+        """Splits a condition or rounds from an action that follows without a comma."""
+        text, refusals = clause.text, list[RefusalError]()
+        if clause.kind is Cue.TIMES or (clause.kind is Cue.EVERY and not CHECKS["limited"].match(text)):
+            return self._read(replace(clause, text=""), self.state), text
+        begins = [start for start, _ in words_of(text).spans[1:]] if self.given is not None else []
+        objects = [start for start in begins if CHECKS["no_verb"].fullmatch(text[start:])]
+        for cut_at in (*_places_to_cut(text, follows), *objects, len(text)):
+            rest = re.sub(r"^(?:then|please)\s+", "", text[cut_at:], flags=re.IGNORECASE)
+            said = re.sub(r"\s+(?:then|please|and)$", "", text[:cut_at].rstrip(" ,"), flags=re.IGNORECASE)
+            head = attempt(self._read, replace(clause, text=said), self.state)
+            if isinstance(head, RefusalError):
+                refusals.append(head)
+                continue
+            body = [*cut(rest), *follows] if rest else []
+            done = attempt(self._inner(body, head.holds, head.statement).build)
+            if not isinstance(done, RefusalError):
+                return head, rest
+            refusals.insert(0, done)  # the refusal of the action says more
+        raise next((refusal for refusal in refusals if refusal.question is not None), refusals[0])
+
+    def _decide(self, clause: Clause, supposed: SpokenCondition, body: Sequence[Clause]) -> None:
+        """Builds a choice for "if" and "unless"; a look or fetch before it may belong to the choice."""
+        asked = self.asked
         if asked is not None and asked.looked:
             if supposed.condition in (asked.condition, negate(asked.condition)):
                 del self.steps[-asked.steps :]
@@ -198,30 +239,6 @@ class Builder:
                 self._replace_missing(asked, supposed.said, body)
                 return
         self._choose(supposed.opposite if clause.kind is Cue.UNLESS else supposed, body)
-
-    def _condition(self, text: str) -> SpokenCondition:
-        return parse_condition(text, self.state, self.reader)
-
-    def _split(self, text: str, follows: Sequence[Clause], read: Callable[[str], _Head]) -> tuple[_Head, str]:
-        """Splits a condition or rounds from an action that follows without a comma."""
-        refusal: RefusalError | None = None
-        begins = [start for start, _ in words_of(text).spans[1:]] if self.given is not None else []
-        objects = [start for start in begins if CHECKS["no_verb"].fullmatch(text[start:])]
-        for cut_at in (*_places_to_cut(text, follows), *objects, len(text)):
-            rest = re.sub(r"^(?:then|please)\s+", "", text[cut_at:], flags=re.IGNORECASE)
-            said = re.sub(r"\s+(?:then|please|and)$", "", text[:cut_at].rstrip(" ,"), flags=re.IGNORECASE)
-            found = head = attempt(read, said)
-            if rest and not isinstance(head, RefusalError):
-                body = self._inner([*cut(rest), *follows], head.holds, head.statement)
-                done = attempt(body.build)
-                found = done if isinstance(done, RefusalError) else head
-            if not isinstance(head, RefusalError) and not isinstance(found, RefusalError):
-                return head, rest
-            assert isinstance(found, RefusalError)
-            asks = found.question is not None or found is not head
-            refusal = found if refusal is None or (refusal.question is None and asks) else refusal
-        assert refusal is not None
-        raise refusal
 
     def _choose(self, supposed: SpokenCondition, body: Sequence[Clause]) -> None:
         """Adds a choice of two branches, of which the next clause may begin the second."""
@@ -256,7 +273,7 @@ class Builder:
         cue, words, asked = clause.kind, [clause.cue], self.asked
         if cue in (Cue.SO, Cue.NOT) and asked is None and CHECKS["somebody"].search(clause.cue):
             said = re.sub(r"^if ", "", clause.cue, flags=re.IGNORECASE)
-            self._choose(self._condition(said), self.take(clause.text, end_of_scope(self.clauses, self.at)))
+            self._lead(replace(clause, kind=Cue.IF, text=f"{said} {clause.text}".strip()))
             return
         if not self.steps[self.begun :] and not (asked and self.steps):
             raise RefusalError(f"'{clause.cue}' refers to nothing that was said before", words)
@@ -298,46 +315,11 @@ class Builder:
         otherwise, state = self.nest(body, asked.fails, asked.opposite)
         self._wrap(len(done), Choose(condition=asked.condition, then=done, otherwise=otherwise), state)
 
-    def _wait(self, clause: Clause) -> None:
-        """Builds a wait for "as soon as Robin comes, ..."."""
-        self.flush()
-        follows = self.clauses[self.at : end_of_scope(self.clauses, self.at)]
-        supposed, rest = self._split(clause.text, follows, self._condition)
-        if not rest and not follows:
-            raise clause.missing_action(supposed.said)
-        self.put((Wait(awaited=Awaited(condition=supposed.condition)),), supposed.holds)
-        self.clauses[self.at : self.at] = cut(rest)
-        self.begun = len(self.steps)
-
-    def _repeat(self, clause: Clause) -> None:
-        """Builds rounds for "every ten minutes", "three times" or "as long as ..." before an action."""
-        self.flush()
-        end, text = end_of_scope(self.clauses, self.at, rounds=True), clause.text
-        follows = self.clauses[self.at : end]
-        if clause.kind is Cue.WHILE and (under_way := CHECKS["under_way"].match(text)) is not None:
-            at = next((one for one in _places_to_cut(text, follows) if one > under_way.end), len(text))
-            self._put_together(text[under_way.end : at], self.take(text[at:], end))
-            return
-        limited = re.match(r"(?:for|until|till|as long as|while)\b", text, re.IGNORECASE) is not None
-        if clause.kind is Cue.TIMES or (clause.kind is Cue.EVERY and not limited):
-            rounds, rest = self._rounds(replace(clause, text=""), self.state), text
-        else:
-            rounds, rest = self._split(text, follows, lambda said: self._rounds(replace(clause, text=said), self.state))
-        body = self.take(rest, end)
-        if not body:
-            raise clause.missing_action()
-        done: Done | None = None
-        if clause.kind in (Cue.WHILE, Cue.UNTIL) and len(body) == 1 and CHECKS["stays"].fullmatch(body[0].text):
-            said = text[: len(text) - len(rest)].strip(" ,")  # until Robin comes, wait in the hall
-            done = parse_wait(f"{body[0].text} {clause.kind.value} {said}", self.known, self.reader)
-        if done is not None:
-            self.put(*done)
-        else:
-            self._put_rounds(rounds, body)
-
-    def _rounds(self, cue: Clause, state: State) -> Rounds:
-        """Rounds of a cue and its words: "three times", "every hour for a day", "until there are none left"."""
+    def _read(self, cue: Clause, state: State) -> SpokenCondition | Rounds:
+        """Condition, or rounds, of a cue and its words: "three times", "every hour for a day", "until it is open"."""
         every_s: float | None = None
+        if cue.kind not in _ROUNDS:
+            return parse_condition(cue.text, state, self.reader)
         if cue.kind is Cue.TIMES:
             return Rounds(Loop(times=int(cue.parse_amount(parse_times, "number of times"))), state)
         if cue.kind is Cue.EVERY:  # "for an hour" and "until three" may stand behind
@@ -358,15 +340,26 @@ class Builder:
             return Rounds(Loop(until=supposed.condition, every_s=every_s), supposed.fails)
         return Rounds(Loop(while_=supposed.condition, every_s=every_s), supposed.holds)
 
-    def _put_rounds(self, rounds: Rounds, body: Sequence[Clause]) -> None:
-        """Adds rounds that repeat given clauses."""
-        steps, state = self.nest(body, rounds.holds.elsewhere)
+    def _put_rounds(self, rounds: Rounds, body: Sequence[Clause], waits: str = "") -> None:
+        """Adds rounds that repeat given clauses, or a wait if the text `waits` asks for one."""
+        ends = rounds.loop.times is None and rounds.loop.every_s is None
+        stays = ends and len(body) == 1 and CHECKS["stays"].fullmatch(body[0].text) is not None
+        if stays and (done := parse_wait(waits, self.known, self.reader)) is not None:
+            self.put(*done)
+            return
+        loop, (steps, state) = rounds.loop, self.nest(body, rounds.holds.elsewhere)
         commands = [command for step in steps for each in step.walk() for command in each.commands]
         stays = len(commands) == 1 and commands[0].item is None and commands[0].task in (None, Task.CHARGE)
-        idle = stays and all(isinstance(step, Do) for step in steps)  # only goes to one place, or charges
-        if rounds.loop.times is None and rounds.loop.every_s is None and idle:
+        if ends and stays and all(isinstance(step, Do) for step in steps):  # only goes to one place, or charges
             raise RefusalError("I see no action to repeat; say 'wait there until ...'", [join_clauses(body)])
-        self.put((_merge_repeats(Repeat(loop=rounds.loop, steps=_done(steps, join_clauses(body)))),), state)
+        if not steps:
+            what = join_clauses(body)
+            raise RefusalError(f"'{what}' is nothing to do; leave it out", [what])
+        if len(steps) == 1 and isinstance(inner := steps[0], Repeat) and inner.loop.is_endless:
+            if not ends:
+                raise RefusalError("an endless repetition cannot be repeated again; say how often", [])
+            loop, steps = loop.model_copy(update={"every_s": inner.loop.every_s}), inner.steps
+        self.put((Repeat(loop=loop, steps=steps),), state)
 
     def _put_together(self, where: str, body: Sequence[Clause]) -> None:
         """Adds speech in parallel to a drive."""
@@ -382,15 +375,22 @@ class Builder:
             raise RefusalError(f"I do not understand how often: '{cue.cue} {cue.text}'", [cue.cue])
         if not cue.text and cue.kind not in (Cue.EVERY, Cue.TIMES):
             raise RefusalError(f"{cue.cue.lower()} what?", [cue.cue])
-        scope = self._scope(clause, cue)
-        if cue.kind in (Cue.IF, Cue.UNLESS):
-            self._guard(scope, cue)
-        elif cue.kind is Cue.WHILE and (under_way := CHECKS["under_way"].match(cue.text)) is not None:
+        scope, before = self._scope(clause, cue), self.state
+        if (under_way := self._under_way(cue)) is not None:
             self._put_together(cue.text[under_way.end :], scope)
-        else:
-            _, state = self._inner(scope, self.state, None).build()  # "until there are none left"
-            rounds = self._rounds(cue, state)
-            self._put_rounds(replace(rounds, holds=self.state.noting(rounds.holds.notes)), scope)
+            return
+        steps, state = self._inner(scope, before, self.statement).build()  # "if there is one", "until there are none"
+        head = self._read(cue, state if cue.kind in _ROUNDS else replace(state, goal=before.goal, at=before.at))
+        noted = before.noting(head.holds.notes)
+        if isinstance(head, Rounds):
+            self._put_rounds(replace(head, holds=noted), scope)
+            return
+        supposed = head.at_source(steps, cue.text)
+        begun = replace(noted, goal=supposed.holds.goal)
+        if cue.kind is Cue.IF:
+            begun = replace(begun, memory=replace(begun.memory, locations=supposed.holds.memory.locations))
+        both = supposed.negate(supposed.said) if cue.kind is Cue.UNLESS else supposed
+        self._choose(replace(both, holds=begun), scope)
 
     def _scope(self, clause: Clause, cue: Clause) -> list[Clause]:
         """Clauses that a trailing cue applies to. Raises RefusalError when these are ambiguous."""
@@ -411,38 +411,9 @@ class Builder:
             raise cue.ambiguous
         return scope
 
-    def _guard(self, scope: Sequence[Clause], cue: Clause) -> None:
-        """Adds an action with a trailing condition."""
-        steps, state = self._inner(scope, self.state, self.statement).build()
-        supposed = parse_condition(cue.text, replace(state, goal=self.state.goal, at=self.state.at), self.reader)
-        supposed = supposed.at_source(steps, cue.text)
-        begun = replace(self.state, goal=supposed.holds.goal)
-        if cue.kind is Cue.IF:
-            begun = replace(begun, memory=replace(begun.memory, locations=supposed.holds.memory.locations))
-        both = supposed.negate(supposed.said) if cue.kind is Cue.UNLESS else supposed
-        self._choose(replace(both, holds=begun.noting(supposed.holds.notes)), scope)
-
 
 def _places_to_cut(text: str, follows: Sequence[Clause]) -> Iterator[int]:
     """Yields where an action may begin: behind the text if clauses follow, and at verbs in it."""
     if follows:
         yield len(text)
     yield from verb_positions(text)
-
-
-def _done(steps: Steps, said: str) -> Steps:
-    """Returns the steps. Raises RefusalError when there are no steps ("do nothing twice")."""
-    if not steps:
-        raise RefusalError(f"'{said}' is nothing to do; leave it out", [said])
-    return steps
-
-
-def _merge_repeats(block: Repeat) -> Repeat:
-    """Merges rounds that contain endless rounds; the merged rounds end as the outer rounds do."""
-    inner, outer = block.steps[0], block.loop
-    if len(block.steps) > 1 or not isinstance(inner, Repeat) or not inner.loop.is_endless:
-        return block
-    if outer.every_s is not None or outer.times is not None:
-        raise RefusalError("an endless repetition cannot be repeated again; say how often", [])
-    ends = {"until": outer.until, "while_": outer.while_, "until_clock": outer.until_clock}
-    return inner.model_copy(update={"loop": inner.loop.model_copy(update=ends)})

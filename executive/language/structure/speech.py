@@ -1,13 +1,13 @@
 """Adds speech and questions to somebody, behind the drive to the listener."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from executive.language.clauses import CHECKS, CLAUSES, Clause, Cue, end_of_scope, trailing_cue
 from executive.language.items import Chunk
-from executive.language.lexicon import any_of, lexicon
+from executive.language.lexicon import lexicon
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.structure.builder import Builder
@@ -21,12 +21,8 @@ from executive.words.steps import Ask, Steps
 from skills.inputs.errors import listing, with_article
 
 ROOMS: Final = page("rooms")
-SPEECH: Final = page("speech")
-_SUBJECTS: Final = r"(?:the|a|an|my|your|our|his|her|their|this|all|every)\b"
-_ADVERBIAL: Final = re.compile(
-    rf"(?!{_SUBJECTS})([\w' ]+?),? that (?=\w)|({any_of(map(' '.join, lexicon().noted))}) ", re.IGNORECASE
-)
-"""Words before what is told that say when or how it is told."""
+SPEECH: Final = page("speech", noted=tuple(map(" ".join, lexicon().noted)))
+_ANSWERS: Final = {Cue.SO: "yes", Cue.NOT: "no", Cue.OTHERWISE: "no"}
 
 
 def says(row: Builder, clause: Clause) -> bool:
@@ -89,9 +85,9 @@ def _parse_speech(text: str, reader: PlainReader) -> Match | None:
     forms = page("speech", **names_of_world(reader.knowledge))
     if forms["say_within"].fullmatch(text) is not None:
         raise RefusalError(f"I do not understand to whom to say '{text}'; name one person at the end", [text])
-    for intent, words in _WORDS.items():
+    for intent in ("says_to", "says", "formula", "tells", "relays"):
         if (match := forms[intent].fullmatch(text)) is not None:
-            return replace(match, slots={**match.slots, "text": words(match, reader.pipeline.parser)})
+            return replace(match, slots={**match.slots, "text": _words(match, intent, reader.pipeline.parser)})
     _refuse_stranger(text, reader.knowledge)
     return None
 
@@ -106,41 +102,36 @@ def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
     raise RefusalError(f"I know no person '{match['who']}'{known}", [match["who"]])
 
 
-def _said(match: Match, parser: DependencyParser) -> str:
-    """Words to say. Raises RefusalError when they describe a text, or name an unknown person."""
-    text, clause = match["text"], is_clause(match["text"], parser)
-    whom = re.search(r" to (?:the|a|an|my|our|all|every|each|some|any|somebody|someone)\b.*$", text, re.IGNORECASE)
-    if whom is not None and (not clause or re.search(r"\b(?:person|guest|visitor)\b", whom[0], re.IGNORECASE)):
-        raise RefusalError(f"I do not know to whom to say it: '{whom[0].strip()}'", [whom[0].strip()])
-    if SPEECH["named"].match(text) and not clause:
-        raise RefusalError(f"what are the words of '{text}'?", [text])
-    return _literal(text)
+def _words(match: Match, intent: str, parser: DependencyParser) -> str:
+    """Words to say; none of "let Robin know it".
 
-
-def _told(match: Match, parser: DependencyParser) -> str:
-    """Statement as the robot says it for the speaker. Raises RefusalError when this would change the meaning."""
-    text = f"{match['polite']}{match['text']}"
-    word = CLAUSES["deictic"].search(text) or SPEECH["inner"].search(text)
-    if word is not None:
+    Raises RefusalError when they only describe a text, or would have another meaning when the robot says them.
+    """
+    said, text = f"{match['polite']}{match['text']}", match.text
+    if intent == "formula" or not said:
+        return said
+    clause = intent != "tells" and is_clause(said, parser)
+    if intent in ("says_to", "says"):
+        whom = SPEECH["whom"].fullmatch(said)
+        if whom is not None and (not clause or whom["human"]):
+            raise RefusalError(f"I do not know to whom to say it: '{whom['whom']}'", [whom["whom"]])
+        if SPEECH["named"].match(said) and not clause:
+            raise RefusalError(f"what are the words of '{said}'?", [said])
+    elif intent == "relays":
+        if SPEECH["another"].match(said) is not None:
+            raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
+        when = SPEECH["adverbial"].fullmatch(said)
+        if when is not None and is_clause(when["told"], parser):
+            raise RefusalError(f"I tell it as soon as I am there, not {when['when']!r}", [when["when"]])
+        if SPEECH["greetings"].fullmatch(said) is None and (match["speaker"] or not clause):
+            raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
+    inner = None if intent in ("says_to", "says") else CLAUSES["deictic"].search(said) or SPEECH["inner"].search(said)
+    if inner is not None:
         meant = "would mean somebody or something else"
-        raise RefusalError(f"I cannot say '{text}' for you: '{word.text}' {meant}", [text])
-    return _literal(text)
-
-
-def _relayed(match: Match, parser: DependencyParser) -> str:
-    """Words of "tell Robin dinner is ready"; none of "let Robin know it"."""
-    said, text = match["text"], match.text
-    if re.match(r"(?:and|or)\b", said, re.IGNORECASE):
-        raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
-    if re.fullmatch(r"|so|it|that|about it|about that", said, re.IGNORECASE):
-        return ""
-    adverbial = _ADVERBIAL.match(said)
-    if adverbial is not None and is_clause(said[adverbial.end() :], parser):
-        raise RefusalError(f"I tell it as soon as I am there, not {adverbial[1] or adverbial[2]!r}", [adverbial[0]])
-    states = not (match["speaker"] or SPEECH["question"].match(said)) and is_clause(said, parser)
-    if SPEECH["greetings"].fullmatch(said) or states:
-        return _told(match, parser)
-    raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
+        raise RefusalError(f"I cannot say '{said}' for you: '{inner.text}' {meant}", [said])
+    if SPEECH["nothing"].fullmatch(said) is not None:
+        raise RefusalError(f"what am I to say? '{said}' says nothing", [said])
+    return said.strip(" ,.'\"")
 
 
 def is_clause(text: str, parser: DependencyParser) -> bool:
@@ -149,23 +140,6 @@ def is_clause(text: str, parser: DependencyParser) -> bool:
     finite = {t.index for t in tokens if t.tag in ("VBZ", "VBP", "VBD", "MD")}
     verbs = finite | {t.index for t in tokens if t.relation == "root"}
     return bool(finite) and any(t.relation in ("nsubj", "nsubjpass", "expl") and t.head in verbs for t in tokens)
-
-
-def _literal(text: str) -> str:
-    """Words to say literally. Raises RefusalError when they only describe a text."""
-    if SPEECH["nothing"].fullmatch(text) or SPEECH["question"].match(text) or re.match(r"to\b", text, re.IGNORECASE):
-        raise RefusalError(f"what am I to say? '{text}' says nothing", [text])
-    return text.strip(" ,.'\"")
-
-
-_WORDS: Final[dict[str, Callable[[Match, DependencyParser], str]]] = {
-    "says_to": _said,
-    "says": _said,
-    "formula": lambda match, _: match["text"],
-    "tells": _told,
-    "relays": _relayed,
-}
-"""Intents of speech, and how the words to say are found."""
 
 
 def _escape_braces(text: str) -> str:
@@ -201,12 +175,10 @@ def _agreed(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
     """Steps that follow the answers yes and no."""
     found: dict[str, Steps] = {"yes": (), "no": ()}
     while row.at < len(row.clauses):
-        clause, rest = row.clauses[row.at], row.clauses[row.at].text
-        answer = {Cue.SO: "yes", Cue.NOT: "no", Cue.OTHERWISE: "no"}.get(clause.kind) if clause.kind else None
-        for said, intent in (("no", "declines"), ("yes", "agrees")):
-            match = CHECKS[intent].match(rest) if clause.kind is Cue.IF and answer is None else None
-            if match is not None:
-                answer, rest = said, rest[match.end :].strip(" ,")
+        clause = row.clauses[row.at]
+        match = CHECKS["answers"].match(clause.text) if clause.kind is Cue.IF else None
+        answer = _ANSWERS.get(clause.kind) if match is None and clause.kind else match and match["answer"]
+        rest = clause.text if match is None else clause.text[match.end :].strip(" ,")
         if clause.kind is None and not any(found.values()) and CHECKS["brings_it"].match(rest):
             answer = "yes"
         if answer is None or found[answer]:

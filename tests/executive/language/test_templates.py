@@ -13,7 +13,7 @@ from executive.language.templates import Template, page
 TABLES = Path(executive.language.__file__).with_name("tables")
 PAGES = sorted(path.stem for path in (TABLES / "intents").glob("*.yaml") if path.stem != "common")
 WORLD = {"names": ("Robin", "Maya"), "around": ("office", "kitchen", "hall")}
-GIVEN = {"people": WORLD, "speech": WORLD, "clauses": {"asking": tuple(lexicon().openers)}}
+GIVEN = {"people": WORLD, "speech": {**WORLD, "noted": ("slowly",)}, "clauses": {"asking": tuple(lexicon().openers)}}
 EXPRESSIONS, LOOK_AROUNDS = 0, 0
 """Regular expressions in the pages of templates, and those of them that look around."""
 LONGEST_LINE = 120

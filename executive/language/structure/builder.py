@@ -116,7 +116,8 @@ class Builder:
                 self._read_together(self.plain[:n], self.state)
             raise
         last, self.plain = self.plain[-1].text, []
-        self.add(reading, statement_of_check(last) or "")
+        there = CHECKS["asks_there"].fullmatch(last)
+        self.add(reading, statement_of_check(last) or ("" if there is None else there.instead))
 
     def _read_together(self, clauses: Sequence[Clause], state: State) -> PlainReading:
         """Understands several plain clauses together."""

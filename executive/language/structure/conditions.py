@@ -28,6 +28,7 @@ Done = tuple[Steps, State]
 """Steps, and the state after them."""
 RequestParser = Callable[[str, Callable[[], State], PlainReader], Done | None]
 """Parses a clause; the state before it is only computed for a request that it understands."""
+_SUBJECTS: Final = {"him": "he", "her": "she"}
 FULL: Final = 0.99
 """Share at which a battery is full."""
 
@@ -156,7 +157,8 @@ def _meeting(words: str, state: State, reader: PlainReader) -> SpokenCondition |
         room = reader.room(where or place, state)
     if room is None:
         raise RefusalError(f"in which room can I see whether '{words}'? Name it", [words])
-    look = reader.look("anybody" if nobody or _P["anybody"].fullmatch(who) else who, room, words, state)
+    subject = "anybody" if nobody or _P["anybody"].fullmatch(who) else _SUBJECTS.get(who.lower(), who)
+    look = reader.check(f"{subject} is in the {room}", state, words)
     return look if nobody == (gone is not None) else replace(look, condition=Not(part=look.condition))
 
 
@@ -179,7 +181,7 @@ def _seen(match: Match, words: str, state: State, reader: PlainReader) -> Spoken
     if re.fullmatch(r"it|one|him|her|them", what, re.IGNORECASE):
         found = reader.look_by_items((verb("find"), *reader.read_items(what)), words, state)
     elif match["looks"] and state.at is not None and reader.is_somebody(what, state):
-        found = reader.look(what, state.at, words, state)
+        found = reader.check(f"{_SUBJECTS.get(what.lower(), what)} is in the {state.at}", state, words)
     else:
         seen = re.sub(r"^(?:him|them)(?= )", "it", what, flags=re.IGNORECASE)
         found = reader.check(f"there is {seen}", state, words)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
 from executive.language.clauses import CLAUSES
-from executive.language.items import Adverb, Being, Chunk, Item, Whether, verb
-from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
+from executive.language.items import Adverb, Chunk, Item, Whether, verb
+from executive.language.lexicon import VerbKind, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.pipeline import Pipeline, Trace
@@ -176,9 +176,6 @@ def with_preposition(items: Sequence[Item], preposition: str) -> tuple[Item, ...
     return (*items[:at], replace(first, preposition=preposition, role=role), *items[at + 1 :])
 
 
-_IS: Final = Being("is", existential=False, asked=False)
-
-
 @dataclass(frozen=True)
 class PlainReader:
     """Reads plain parts in one world. Its methods raise RefusalError for words that they cannot understand."""
@@ -225,11 +222,6 @@ class PlainReader:
             raise RefusalError(f"I cannot see whether '{said}'; say it without '{left_out}'", [said])
         found = self.look_by_items(read.items, said, state, read.tokens)
         return found if denied is None else found.negate(said)
-
-    def look(self, who: str, room: str, text: str, state: State) -> SpokenCondition:
-        """Condition that somebody is in a room."""
-        where = Chunk(phrase_of_name(room, NounKind.PLACE), "in", PrepositionRole.AT)
-        return self.look_by_items((verb("check"), Whether(), *self.read_items(who), _IS, where), text, state)
 
     def look_by_items(
         self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()

@@ -41,7 +41,7 @@ from executive.words.condition import Look
 from executive.words.knowledge import ANYBODY, Knowledge
 from executive.words.leaf_steps import Charging, Check, Do, Dock, Picture, Speak, Subject, steps_of_commands
 from executive.words.step import Step
-from executive.words.steps import Ask, Choose, Repeat, Steps, Together, Try
+from executive.words.steps import Ask, Choose, Repeat, Together, Try
 from skills.api import ObjectKind
 from skills.inputs.errors import listing
 from skills.inputs.schema import first_error
@@ -49,8 +49,6 @@ from skills.inputs.schema import first_error
 _CHARGE: Final = page("waiting")["charge"]
 _PICTURE: Final = page("pictures")["picture"]
 _PEOPLE: Final = page("people")
-_TASKS: Final = {"follow": Task.FOLLOW, "guide": Task.GUIDE, "greet": Task.GREET}
-"""Tasks of the intents on people; the robot goes to the person for the other intents."""
 MOST_NESTED: Final = 2
 
 MOST_CLAUSES: Final = 24
@@ -83,14 +81,6 @@ def _skips(row: Builder, clause: Clause) -> bool:
     return idle or looked
 
 
-def _requests(row: Builder, clause: Clause, parsers: Sequence[RequestParser]) -> bool:
-    """Adds the steps of a request that one of the parsers understands."""
-    done = next((done for parse in parsers if (done := parse(clause.text, row.known, row.reader)) is not None), None)
-    if done is not None:
-        row.put(*done)
-    return done is not None
-
-
 def _parse_charging(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
     """Parses charging up to a level; None if the text states no level."""
     if (match := _CHARGE.fullmatch(text)) is None:
@@ -118,34 +108,43 @@ def _parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) 
     return tuple(steps), state.elsewhere
 
 
-def _steps_for_everyone(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
-    """Builds a delivery to each person in a group; None if the recipient is no group.
+_REQUESTS: Final[tuple[RequestParser, ...]] = (parse_opening, _parse_pictures, _parse_charging, parse_wait)
+
+
+def _requests(row: Builder, clause: Clause) -> bool:
+    """Adds the steps of a request for a door, pictures, charging or a wait."""
+    done = next(filter(None, (parse(clause.text, row.known, row.reader) for parse in _REQUESTS)), None)
+    if done is not None:
+        row.put(*done)
+    return done is not None
+
+
+def _brings_to_everyone(row: Builder, clause: Clause) -> bool:
+    """Goes on with a delivery to each person of a group.
 
     Raises RefusalError when no room is named, no known person is there, or there is only one such object.
     """
-    if ROOMS["gives"].match(text) is None or ROOMS["everyone"].search(text) is None:
-        return None
-    begun = state = known()
-    trace = reader.read(state, text, upto="understanding", elliptic=True).trace
-    named = [(one.goal, one.goal.phrase.spoken) for one in trace.actions if one.goal and one.goal.phrase]
-    to, who = next(((goal, said) for goal, said in named if ROOMS["everyone"].fullmatch(said)), (None, ""))
-    if to is None:
-        return None
-    if to.within is None or to.within.phrase is None:
+    if ROOMS["gives"].match(clause.text) is None or ROOMS["everyone"].search(clause.text) is None:
+        return False
+    state, knowledge = row.known(), row.reader.knowledge
+    actions = row.reader.read(state, clause.text, upto="understanding", elliptic=True).trace.actions
+    goals = (one.goal for one in actions if one.goal is not None and one.goal.phrase is not None)
+    to = next((goal for goal in goals if ROOMS["everyone"].fullmatch(goal.phrase.spoken if goal.phrase else "")), None)
+    if to is None or to.phrase is None:
+        return False
+    who, place = to.phrase.spoken, to.within
+    if place is None or place.phrase is None:
         raise RefusalError(f"I bring objects to one person at a time, not to {who}; name one, or a room", [who])
-    room, knowledge = reader.room(to.within.phrase.spoken, state), reader.knowledge
+    room = row.reader.room(place.phrase.spoken, state)
     people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
     if not people:
         raise RefusalError(f"I know nobody in the {room} to bring anything to: {who}", [who])
-    steps: Steps = ()
-    for name in people:
-        goal = person_named(name, to.within)
-        actions = tuple(replace(one, goal=goal) if one.goal == to else one for one in trace.actions)
-        reading = reader.read(begun, behind="understanding", actions=actions, notes=trace.notes)
-        if any(action.target is not None and not action.target.indefinite for action in reading.trace.resolved):
-            raise RefusalError(f"there is only one of it, and I cannot bring it to {who}; name one person", [who])
-        steps, begun = (*steps, *steps_of_commands(reading.commands)), replace(reading.state, memory=state.memory)
-    return steps, begun
+    if any(not phrase.indefinite for action in actions for phrase in action.objects):
+        raise RefusalError(f"there is only one of it, and I cannot bring it to {who}; name one person", [who])
+    each = [re.sub(re.escape(who), name, clause.text, count=1) for name in people]
+    row.clauses[row.at : row.at] = [Clause(". ", text) for text in each]
+    row.special = True
+    return True
 
 
 def _meets_people(row: Builder, clause: Clause) -> bool:
@@ -187,16 +186,14 @@ def _flush_reasons(row: Builder) -> None:
 def _parse_people(text: str, knowledge: Knowledge) -> Match | None:
     """Parses a clause about following, guiding, meeting or greeting people; None for other clauses.
 
-    The match has its intent as `form`, the person `who` (empty: the speaker), and the places `at` and `to`. Raises
-    RefusalError when such a clause does not say clearly whom it means.
+    The match has the `task`, the person `who` (empty: the speaker), and the places `at` and `to`; its `form` is "find"
+    or "stated" if it asks for nothing alone. Raises RefusalError when it is not clear whom the clause means.
     """
     forms = page("people", **names_of_world(knowledge))
     text = text if (around := forms["around"].fullmatch(text)) is None else around["clause"]
-    for name in (*_TASKS, "meet", "find", "stated"):
-        if (match := forms[name].fullmatch(text)) is not None:
-            return replace(match, slots={**match.slots, "form": name})
-    if forms["certain"].match(text) is None or forms["greets_known"].match(text) is not None:
-        return None
+    match = forms["request"].fullmatch(text)
+    if match is not None or forms["certain"].match(text) is None or forms["greets_known"].match(text) is not None:
+        return match
     known = f"; known are {listing(knowledge.people)}" if knowledge.people else ""
     hint = f"name one person, or say 'the person in the kitchen'{known}"
     if (cue := trailing_cue(text)) is not None and _parse_people(cue.before, knowledge) is not None:
@@ -218,7 +215,7 @@ def _refers_to_person(match: Match) -> bool:
 def _steps_on_people(match: Match, state: State, reader: PlainReader) -> Done:
     """Builds the steps for a request, with the state after them. Raises RefusalError."""
     person, knowledge, refers = _person(match, state, reader), reader.knowledge, _refers_to_person(match)
-    said, task, to, where = match.text, _TASKS.get(match["form"]), match["to"], match["at"]
+    said, task, to, where = match.text, Task(match["task"]) if match["task"] else None, match["to"], match["at"]
     if not where and person == ANYBODY and refers and state.memory.person is None and state.memory.place:
         where = "there"
     at, goal = (_place(text, state, reader) if text else None for text in (where, to))
@@ -266,7 +263,7 @@ def _person(match: Match, state: State, reader: PlainReader) -> str:
         if match["at"]:
             raise RefusalError(f"you are not there: '{match.text}'; say only where to", [match["at"]])
         return SPEAKER
-    if _refers_to_person(match) and before is not None and match["form"] != "greet":
+    if _refers_to_person(match) and before is not None and match["task"] != "greet":
         return reader.knowledge.person(before.name) or before.name
     if match["him"] and not state.somebody:
         raise RefusalError(f"who is meant by '{match['who']}' in '{match.text}'?", [match["who"]], question=True)
@@ -334,12 +331,12 @@ def _searches_rooms(row: Builder, clause: Clause) -> bool:
 _ACTS: Final = (
     _skips,
     _meets_people,
-    lambda row, clause: _requests(row, clause, (parse_opening, _parse_pictures, _parse_charging, parse_wait)),
+    _requests,
     asks,
     says,
     _checks,
     _is_modified,
-    lambda row, clause: _requests(row, clause, (_steps_for_everyone,)),
+    _brings_to_everyone,
     _searches_rooms,
 )
 """Actions in the order of trying."""

@@ -22,7 +22,7 @@ from skills.inputs.errors import listing, with_article
 
 ROOMS: Final = page("rooms")
 SPEECH: Final = page("speech", noted=tuple(map(" ".join, lexicon().noted)))
-_ANSWERS: Final = {Cue.SO: "yes", Cue.NOT: "no", Cue.OTHERWISE: "no"}
+_ANSWERS: Final[dict[Cue | None, str]] = {Cue.SO: "yes", Cue.NOT: "no", Cue.OTHERWISE: "no"}
 
 
 def says(row: Builder, clause: Clause) -> bool:
@@ -177,8 +177,9 @@ def _agreed(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
     while row.at < len(row.clauses):
         clause = row.clauses[row.at]
         match = CHECKS["answers"].match(clause.text) if clause.kind is Cue.IF else None
-        answer = _ANSWERS.get(clause.kind) if match is None and clause.kind else match and match["answer"]
-        rest = clause.text if match is None else clause.text[match.end :].strip(" ,")
+        answer, rest = _ANSWERS.get(clause.kind), clause.text
+        if match is not None:
+            answer, rest = match["answer"], rest[match.end :].strip(" ,")
         if clause.kind is None and not any(found.values()) and CHECKS["brings_it"].match(rest):
             answer = "yes"
         if answer is None or found[answer]:

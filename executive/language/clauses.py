@@ -2,7 +2,7 @@
 
 import enum
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import pairwise
@@ -85,12 +85,6 @@ class Clause:
         """Refusal of a condition to which no action belongs."""
         said = f"{self.cue} {text}".strip()
         return RefusalError(f"what am I to do {f'{self.cue.lower()} {text}'.strip()}?", [said])
-
-    def parse_amount(self, parse: Callable[[str], float | None], what: str) -> float:
-        """Interval or number of rounds in the cue."""
-        if (found := parse(self.amount)) is None:
-            raise RefusalError(f"'{self.cue}' is no {what} that I understand", [self.cue])
-        return found
 
 
 def split(text: str, robots: tuple[str, ...] = ()) -> tuple[Addressee | None, tuple[Clause, ...]]:

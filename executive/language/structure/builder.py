@@ -318,19 +318,19 @@ class Builder:
 
     def _read(self, cue: Clause, state: State) -> SpokenCondition | Rounds:
         """Condition, or rounds, of a cue and its words: "three times", "every hour for a day", "until it is open"."""
-        every_s: float | None = None
         if cue.kind not in _ROUNDS:
             return parse_condition(cue.text, state, self.reader)
-        if cue.kind is Cue.TIMES:
-            return Rounds(Loop(times=int(cue.parse_amount(parse_times, "number of times"))), state)
-        if cue.kind is Cue.EVERY:  # "for an hour" and "until three" may stand behind
-            every_s, times = cue.parse_amount(parse_seconds, "time"), parse_times(cue.text)
+        every_s, times = parse_seconds(cue.amount), parse_times(cue.amount)
+        if cue.amount and every_s is None and times is None:
+            raise RefusalError(f"'{cue.cue}' is no time or number of times that I understand", [cue.cue])
+        if cue.kind is Cue.EVERY and every_s:  # "for an hour" and "until three" may stand behind
+            times = parse_times(cue.text)
             if (match := CHECKS["for_span"].fullmatch(cue.text)) is not None:
                 times = int((parse_seconds(match["span"]) or 0.0) // every_s)
                 if times < 1:
                     raise RefusalError(f"'{cue.text}' is shorter than one round", [cue.text])
-            if times is not None or not cue.text:
-                return Rounds(Loop(times=times, every_s=every_s), state)
+        if times is not None or (every_s is not None and not cue.text):
+            return Rounds(Loop(times=times, every_s=every_s), state)
         ends = leading_cue(cue.text) if cue.kind is Cue.EVERY else cue
         if ends is None or ends.kind not in (Cue.UNTIL, Cue.WHILE):
             raise RefusalError(f"I do not understand how often: '{cue.cue} {cue.text}'", [cue.cue])

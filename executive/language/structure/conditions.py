@@ -221,19 +221,13 @@ def _halves(words: str, word: str) -> Iterator[tuple[str, str]]:
 
 def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[SpokenCondition, SpokenCondition]:
     """Parses two joined conditions; the second may omit words of the first, and the first the place of both."""
-    first = parse_condition(before, state, reader)
-    denied = isinstance(first.condition, Not)
     if _JOINED["there"].match(before) and _JOINED["bare"].match(after):
-        placed = [item for item in reader.read_items(after) if isinstance(item, Chunk) and item.role is not None]
-        if placed and not _JOINED["placed"].search(before):
-            first = reader.look_by_items((*first.items, placed[0]), before, state)
-            first = first.negate(before) if denied else first
-        return first, reader.check(f"there is {after}", first.holds, after)
-    if _JOINED["at"].fullmatch(before) and re.match(r"(?:in|on|at|the) ", after, re.IGNORECASE) and " is " not in after:
-        old = next((item for item in first.items if isinstance(item, Chunk) and item.role is not None), None)
-        moved = with_preposition(reader.read_items(after), "in" if old is None else old.preposition)
-        second = reader.look_by_items((*(one for one in first.items if one is not old), *moved), after, first.holds)
-        return first, second.negate(after) if denied else second
+        place = None if _JOINED["placed"].search(before) else _JOINED["placed"].search(after)
+        before = before if place is None else f"{before} {after[place.start :]}"
+        after = f"there is {after}"
+    elif (first_at := _JOINED["at"].fullmatch(before)) and (second_at := _JOINED["elsewhere"].fullmatch(after)):
+        after = f"{first_at['stem']} {second_at['on'] or first_at['on']} {second_at['place']}"
+    first = parse_condition(before, state, reader)
     return first, parse_condition(after, first.holds, reader)
 
 

@@ -87,8 +87,8 @@ class State:
 class SpokenCondition:
     """Condition with its words, and the state of the mission after true and after false.
 
-    The words of a `quotable` condition may be repeated as a statement; `items` are the items of a look, which another
-    condition may omit. The last `steps` check the condition (`looked`), or need it to succeed.
+    The words of a `quotable` condition may be repeated as a statement. The last `steps` check the condition (`looked`),
+    or need it to succeed.
     """
 
     condition: Condition
@@ -96,13 +96,12 @@ class SpokenCondition:
     holds: State
     fails: State
     quotable: bool = True
-    items: tuple[Item, ...] = field(default=(), repr=False)
     steps: int = 1
     looked: bool = False
 
     def negate(self, said: str) -> SpokenCondition:
         """Negated condition, with its words."""
-        return SpokenCondition(negate(self.condition), said, self.fails, self.holds, items=self.items)
+        return SpokenCondition(negate(self.condition), said, self.fails, self.holds)
 
     @property
     def opposite(self) -> SpokenCondition:
@@ -236,7 +235,7 @@ class PlainReader:
         if any(action.choices for action in reading.trace.actions):
             raise RefusalError(f"I cannot tell which one '{text}' means; name one", [text])
         there = replace(state, goal=reading.state.goal, at=reading.state.at)
-        return replace(self._condition_of_looks(reading, there, state, text), items=tuple(items))
+        return self._condition_of_looks(reading, there, state, text)
 
     def _by_name(self, item: Item, state: State) -> Item:
         """Replaces "he" by the name of the last person."""

@@ -34,7 +34,7 @@ from executive.language.structure.plain import (
     person_named,
     phrase_of_name,
 )
-from executive.language.structure.speech import ROOMS, SPEECH, asks, is_clause, say_in_each_room, says
+from executive.language.structure.speaking import ROOMS, SPEECH, asks, is_clause, say_in_each_room, says
 from executive.language.templates import Match, page
 from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.condition import Look

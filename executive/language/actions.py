@@ -17,7 +17,7 @@ from executive.language.items import (
     requested_predicates,
     spoken_words,
 )
-from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
+from executive.language.lexicon import PrepositionRole, VerbKind, word_list
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
@@ -66,9 +66,8 @@ class Action:
 
 _IT: Final = Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),))
 _BIN: Final = Location(Phrase((Token(0, 0, "bin", "bin", "NOUN", "NN", 0, "obl", kind=NounKind.PLACE),)), "to")
+_AIMS: Final = (PrepositionRole.GOAL, PrepositionRole.FOR)
 _ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})
-_GIVING: Final = frozenset({"bring", "get", "fetch", "give", "take", "hand", "serve"})
-_THEN: Final = frozenset({"then", "after that", "afterwards", "next", "second", "subsequently"})
 _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
 
@@ -84,11 +83,11 @@ def read_actions(
     for clause in requested_predicates(clauses):
         before = [each for each in (clause.subject, clause.verb) if each is not None]
         chunks = [item for item in clause.items if isinstance(item, Chunk)]
-        named = any(one.role in (PrepositionRole.GOAL, PrepositionRole.FOR) for one in chunks)
-        named = named or any(one.role is None and (one.phrase.speaker or one.phrase.person) for one in chunks)
-        gives = recipient is not None and not (named or any(isinstance(item, Adverb) for item in clause.items))
+        named = any(one.role in _AIMS or (one.role is None and one.phrase.receiver) for one in chunks)
+        named = named or any(isinstance(item, Adverb) for item in clause.items)
         for action in _actions(clause):
-            goal = recipient if gives and action.verb.partition(" ")[0] in _GIVING else action.goal
+            gives = recipient is not None and not named and action.verb.partition(" ")[0] in word_list("to_recipient")
+            goal = recipient if gives else action.goal
             action = replace(action, said=spoken_words([*before, *clause.items]), follows=follows, goal=goal)
             lacks = action.unknown == (action.verb,) and not action.objects and action.kind in _ELIDING
             if elliptic and lacks and (goal is not None or action.kind is VerbKind.FIND):
@@ -96,7 +95,7 @@ def read_actions(
             elliptic = elliptic or any(not phrase.speaker for phrase in action.objects)
             found.append(action)
         end = takewhile(lambda item: isinstance(item, Separator), reversed(clause.items))
-        follows = any(isinstance(item, Separator) and item.word in _THEN for item in end)
+        follows = any(isinstance(item, Separator) and item.word in word_list("follows") for item in end)
     found = _without_idle_waits(found)
     last = [replace(action, unknown=(action.said,)) if action.departs else action for action in found[-1:]]
     # The "go" of "go and find" is left out.
@@ -106,7 +105,7 @@ def read_actions(
 
 def _without_idle_waits(actions: list[Action]) -> list[Action]:
     """Removes a wait without a time after the last drive: the robot stays there. Raises RefusalError for others."""
-    waits = [action for action in actions if action.verb in lexicon().wait and action.time is None]
+    waits = [action for action in actions if action.verb in word_list("wait") and action.time is None]
     idle = [action for action in waits if action.kind is VerbKind.WAIT and action.unknown == (action.verb,)]
     if idle and idle[-1] is actions[-1] and len(actions) > 1 and actions[-2].kind is VerbKind.GO:
         return _without_idle_waits(actions[:-1])
@@ -161,7 +160,7 @@ def _narrated(clause: Predicate, being: Being) -> Action:
     lacked = [place.phrase for place in roles.sources if place.preposition == "out of"]
     topics = [phrase for phrase in (*roles.objects, roles.searched, *lacked) if phrase is not None]
     topics = topics or [phrase for phrase in (being.topic,) if phrase is not None]
-    named = tuple(phrase for phrase in topics if not (phrase.pronoun or phrase.speaker or phrase.person))
+    named = tuple(phrase for phrase in topics if not (phrase.pronoun or phrase.receiver))
     place = next(iter([*roles.ats, *roles.goals]), None)
     return Action(None, being.text, named[:1], place, teller=being.teller)
 
@@ -181,7 +180,7 @@ def _asks(phrase: Phrase) -> bool:
 
 def _acting(clause: Predicate, verb: Verb) -> Iterator[Action]:
     roles = read_roles(clause.items, describes=verb.kinds != {VerbKind.GO}, puts=VerbKind.PLACE in verb.kinds)
-    if verb.text in lexicon().gives and len(roles.objects) > 1 and not roles.recipient and not roles.listed:
+    if verb.text in word_list("gives") and len(roles.objects) > 1 and not roles.recipient and not roles.listed:
         roles.unknown.append(roles.objects[0].spoken)
     if _departs(verb, roles):
         yield Action(None, verb.text, departs=True)
@@ -207,8 +206,8 @@ def _acting(clause: Predicate, verb: Verb) -> Iterator[Action]:
 
 def _departs(verb: Verb, roles: Roles) -> bool:
     """Returns whether a place is only left on the way elsewhere, as in "leave the kitchen and go to the hall"."""
-    left = roles.objects if verb.text in lexicon().leaves else []
-    if verb.text not in lexicon().leaves and VerbKind.GO in verb.kinds and not roles.objects:
+    left = roles.objects if verb.text in word_list("leaves") else []
+    if verb.text not in word_list("leaves") and VerbKind.GO in verb.kinds and not roles.objects:
         left = [place.phrase for place in roles.sources if place.phrase is not None]
     places = bool(left) and all(phrase.kind is NounKind.PLACE for phrase in left)
     return places and not (roles.goals or roles.ats or roles.recipient or roles.unknown or roles.searched)
@@ -225,7 +224,7 @@ def _going(blank: Action, roles: Roles) -> Iterator[Action]:
     if bare and blank.verb.endswith((" down", " up", " along")):
         passed += [replace(place, preposition=blank.verb.split()[-1]) for place in bare if roles.goals]
         bare = [] if roles.goals else bare
-    elif bare and (blank.verb not in lexicon().bare_goal or (blank.verb in lexicon().enters and objects)):
+    elif bare and (blank.verb not in word_list("bare_goal") or (blank.verb in word_list("enters") and objects)):
         blank = replace(blank, unknown=(*blank.unknown, *(phrase.spoken for phrase in roles.objects)))
     sought = roles.searched
     fetched = sought is not None and sought.kind is NounKind.THING and not sought.pronoun
@@ -237,7 +236,7 @@ def _going(blank: Action, roles: Roles) -> Iterator[Action]:
     places = [*roles.goals, *ats, *bare, *([] if headed is None else [Location(headed)]), *roles.joined_goals]
     passed += roles.paths if places else []
     places = places or roles.paths
-    if not places and blank.verb in lexicon().goes_back:
+    if not places and blank.verb in word_list("goes_back"):
         places = [HERE]
     me = ["me"] if roles.recipient is HERE and not roles.favour else []
     unknown = (*blank.unknown, *me, *([] if places else [blank.verb]))
@@ -273,7 +272,7 @@ def _waiting(blank: Action, roles: Roles) -> Action:
 
 def _charging(blank: Action, roles: Roles) -> Action:
     """Charges the robot's own battery at its dock; the robot charges nothing else and nowhere else."""
-    docks = (place for place in (*roles.ats, *roles.goals) if place.phrase and place.phrase.text in lexicon().docks)
+    docks = (place for place in (*roles.ats, *roles.goals) if place.phrase and place.phrase.text in word_list("docks"))
     return replace(blank, passes=tuple(docks))
 
 
@@ -287,14 +286,15 @@ def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
         to_place = bool(goals) and not goals[0].person
         rest = [] if to_place and roles.favour else [roles.recipient]
         goals = [*goals, *rest] if to_place else [roles.recipient, *goals]
-    discards, hurls = blank.verb in lexicon().discards, blank.verb in lexicon().hurls
+    discards, hurls = blank.verb in word_list("discards"), blank.verb in word_list("hurls")
     lies_there = discards or (hurls and bool(ats) and ats[-1].preposition not in ("in", "inside"))
-    at_is_goal = (blank.kind is VerbKind.PLACE and not lies_there) or blank.verb in lexicon().at_is_goal or len(ats) > 1
+    puts = blank.kind is VerbKind.PLACE and not lies_there
+    at_is_goal = puts or blank.verb in word_list("at_is_goal") or len(ats) > 1
     lies = any(place.role is not PrepositionRole.SOURCE for place in sources)  # the cup that is on the desk
     if ats and not goals and (at_is_goal or lies):
         goals.append(ats.pop())
     sources += ats
-    bare = _BIN if discards else HERE if blank.verb in lexicon().hands and not sources else None
+    bare = _BIN if discards else HERE if blank.verb in word_list("hands") and not sources else None
     goal = next(iter(goals), bare)
     if goal is None and hurls:
         blank = replace(blank, unknown=(*blank.unknown, blank.verb))

@@ -7,10 +7,12 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
+from typing import Any, Final
 
 from executive.language.cleaning import find_address
-from executive.language.lexicon import Patterns, any_of, lexicon, read_table
+from executive.language.lexicon import any_of, lexicon, word_list
 from executive.language.questions import RefusalError
+from executive.language.templates import Match, Page, page, words_of
 from executive.words.robot_config import display_name, find_robot
 from skills.inputs.errors import listing
 
@@ -47,10 +49,9 @@ class AddressedText:
 @cache
 def _verbs() -> Mapping[str, str]:
     """Returns verbs by their forms: "bring" and "brings" map to "bring"."""
-    table = read_table("robots.yaml")
-    bases = {verb[0] for verb in lexicon().verbs} | set(table["verbs_too"])
+    bases = {verb[0] for verb in lexicon().verbs} | word_list("verbs_too")
     forms = {f"{base}{'es' if re.search('(?:s|x|z|ch|sh)$', base) else 's'}": base for base in bases}
-    return {**forms, **table["third_persons"], **{base: base for base in bases}}
+    return {**forms, **lexicon().third_persons, **{base: base for base in bases}}
 
 
 @cache
@@ -66,40 +67,46 @@ class Addressees:
     names: tuple[str, ...]
 
     @cached_property
-    def begins(self) -> tuple[tuple[str, re.Pattern[str]], ...]:
-        """Patterns that begin another robot's part, in the order in which they are tried."""
-        return self.forms.mapping("begins")
+    def forms(self) -> Page:
+        """Templates of calls and instructions."""
+        return page("robots", one=self.names, verb=tuple(_verbs()))
 
     @cached_property
-    def forms(self) -> Patterns:
-        """Patterns for calls and instructions."""
-        words = {"one": rf"(?:{any_of(self.names)})(?![\w'-])", "verbs": rf"(?:{any_of(_verbs())})(?![\w'])"}
-        return Patterns("robots.yaml", words=words)
+    def name(self) -> re.Pattern[str]:
+        """Pattern of the robots' names."""
+        return re.compile(rf"\b(?:{any_of(self.names)})(?![\w'-])", re.IGNORECASE)
+
+    @cached_property
+    def _third_person(self) -> re.Pattern[str]:
+        before = r"(^|[,.;]\s*|\b(?:and|then|or|also)\s+)(?:to\s+)?"
+        return re.compile(rf"{before}({any_of(_verbs())})(?![\w'])", re.IGNORECASE)
+
+    def words(self, name: str) -> Any:
+        """Words of a list of the page."""
+        return self.forms.table["lists"][name]
 
     def find_robots(self, said: str, but: Sequence[str] = ()) -> Addressee:
         """Finds the robots that `said` names; "the other robot" is the robot that is not in `but`.
 
         Raises RefusalError when `said` states a wrong number of robots.
         """
-        words = " ".join(said.lower().split())
-        if self.forms.other.fullmatch(words):
+        if self.forms["other"].fullmatch(said):
             others = tuple(name for name in self.names if name not in but)
             if len(others) != 1:
                 raise RefusalError(f"which robot is '{said}'? say its name", [said])
             return others
-        if self.forms.everybody.fullmatch(words):
-            numbers = (int(read_table("robots.yaml")["numbers"].get(word, 0)) for word in words.split())
-            if next(filter(None, numbers), len(self.names)) != len(self.names):
+        if (everybody := self.forms["everybody"].fullmatch(said)) is not None:
+            if int(everybody["count"] or len(self.names)) != len(self.names):
                 known = listing(map(display_name, self.names))
                 raise RefusalError(f"there are {len(self.names)} robots, {known}: which are '{said}'?", [said])
             return RobotChoice.ALL
-        found = self.forms.one.findall(said)
-        return tuple(dict.fromkeys(filter(None, (find_robot(name, self.names) for name in found))))
+        found = (find_robot(name, self.names) for name in self.name.findall(said))
+        return tuple(dict.fromkeys(filter(None, found)))
 
     def split_call(self, text: str) -> tuple[Addressee, str] | None:
         """Splits off the robots that a text calls at its beginning. Raises RefusalError like `find_robots`."""
-        match = self.forms.talk.match(text)
-        return None if match is None else (self.find_robots(match["who"]), text[match.end() :])
+        match = self.forms["talk"].match(text)
+        return None if match is None else (self.find_robots(match["who"]), match.rest)
 
     def parts(self, text: str) -> tuple[Addressee | None, tuple[AddressedText, ...]]:
         """Splits a sentence into its addressee and its parts; joins adjacent parts that are for the same robots.
@@ -120,36 +127,50 @@ class Addressees:
 
     def listener(self, text: str) -> tuple[Addressee | None, str]:
         """Splits off the addressee of a sentence. Raises RefusalError like `find_robots`."""
-        if (match := self.forms.first.match(text)) is not None:
-            return self.find_robots(_who(match)), text[match.end() :]
-        if (match := self.forms.last.search(text)) is not None:
-            before = text[: match.start()]
+        if (match := self.forms["first"].match(text)) is not None:
+            return self.find_robots(match["who"]), match.rest
+        if (match := self.forms["last"].search(text)) is not None:
+            before = text[: match.start]
             if not (before[:1].islower() and re.search(r"\b[A-Z]\w*$", before)):  # a beer for Robin, Alice and Bob
-                return self.find_robots(_who(match)), before
+                return self.find_robots(match["who"]), before
         address = find_address(text, self.names)
         if address.name is not None:
             return (address.name,), address.text
-        if (match := self.forms.called_back.search(text)) is not None:
-            return self.find_robots(_who(match)), f"{text[: match.start()]}{match['mark']}{text[match.end() :]}"
+        if (match := self.forms["called_back"].search(text)) is not None:
+            return self.find_robots(match["who"]), f"{text[: match.start]}{match['mark']} {match.rest}"
         return None, text
+
+    def without_descriptions(self, text: str) -> str:
+        """Removes statements on how robots are: "Bob is not" of "Bob is not there"."""
+        while (match := self.forms["narrated"].search(text)) is not None:
+            text = f"{text[: match.start]}{match.rest}"
+        return text
 
     def imperative(self, text: str) -> str:
         """Turns statements into commands: "goes to the hall and brings" -> "go to the hall and bring"."""
-        return self.forms.third_person.sub(lambda match: f"{match[1]}{_verbs()[match[2].lower()]}", text)
+        return self._third_person.sub(lambda match: f"{match[1]}{_verbs()[match[2].lower()]}", text)
 
-    def tidy(self, text: str) -> str:
-        """Strips punctuation from both ends of a text, and joining words from its beginning."""
-        return self.forms.begins_with_joints.sub("", text.strip(" ,;:-")).strip(" ,;:-")
+    def joint(self, text: str) -> int:
+        """Position of the words at the end of a text that join it to the next one."""
+        words = words_of(text)
+        ends = (0, *(end for _, end in words.spans))
+        joins = (end for n, end in enumerate(ends) if self.forms["joints"].fullmatch(text[words.start(n) :]))
+        return next(joins, len(text))
+
+    def opener(self, text: str) -> int:
+        """Position of a condition or time at the end of a text, with no action behind it, which is for what follows."""
+        words = words_of(text)
+        begins = [words.start(n) for n in range(len(words.words)) if words.word(n - 1) in ("", ",", ".", ";", "and")]
+        at = next((at for at in begins if self.forms["opener"].fullmatch(text[at:])), len(text))
+        return len(text) if self.forms["opened"].search(text[at:]) else at
 
 
-@dataclass(frozen=True)
-class _Found:
-    """Beginning of another robot's part: the part's text begins at `end`, after the implied verb `lead`."""
+def _tidy(text: str) -> str:
+    """Strips punctuation from both ends of a text, and joining words from its beginning."""
+    return _JOINTS.sub("", text.strip(" ,;:-")).strip(" ,;:-")
 
-    who: str
-    end: int
-    kind: str
-    lead: str = ""
+
+_JOINTS: Final = re.compile(r"^(?:(?:and|but|so|then|while|meanwhile|first|also)\b[\s,]*)*", re.IGNORECASE)
 
 
 @dataclass
@@ -164,16 +185,19 @@ class _Parting:
 
     def parts(self) -> tuple[AddressedText, ...]:
         """Parts of the sentence, in order."""
-        text, self.address, at = self.text, self.listener, 0
+        words, text, self.address, at = words_of(self.text), self.text, self.listener, 0
         self.found = [AddressedText(self.listener, "")]
-        for start in (0, *(match.end() for match in self.calls.forms.boundary.finditer(text))):
-            if start < at:
+        boundary, opening = self.calls.words("boundary"), self.calls.words("opening")
+        for n, word in enumerate(words.words):
+            start = words.start(n)
+            if start < at or not (not n or words.words[n - 1] in boundary or word in opening):
                 continue
-            if (found := self._begins(start, at)) is not None:
-                called = self.calls.find_robots(found.who) if self.listener is None and found.kind == "call" else None
-                self.listener = self.listener or called
-                self._take(found, text[at:start])
-                at = found.end
+            if (begun := self._begins(n, start, at)) is not None:
+                match, lead = begun
+                calls = self.listener is None and match["kind"] == "call"
+                self.listener = self.listener or (self.calls.find_robots(match["who"]) if calls else None)
+                self._take(match, lead, text[at:start])
+                at = words.start(match.after)
             elif self.found[-1].past and text[:start].rstrip().endswith(","):
                 self._add(text[at:start])
                 self.found.append(AddressedText(self.address, "", then=True))
@@ -184,88 +208,80 @@ class _Parting:
             self.found[-1] = replace(self.found[-1], behind=behind)
         return tuple(self._sentences())
 
-    def _begins(self, start: int, at: int) -> _Found | None:
-        """Part for another robot that begins here; None if none begins. Raises RefusalError if it forbids an action."""
-        current, table = self.found[-1], read_table("robots.yaml")
-        for kind, form in self.calls.begins:
-            match = form.match(self.text, start)
-            if match is None or (_who(match).lower() in table["you"] and (current.who is None or not start)):
-                continue
-            if kind in table["refused"]:
-                raise RefusalError(f"{table['refused'][kind]}: '{match[0].strip()}'", [match[0].strip()])
-            return _Found(_who(match), match.end(), kind, table["leads"].get(kind, ""))
-        match = self.calls.forms.gap.match(self.text, start)
-        if match is None or current.who is None or not self.text[:start].strip():
-            return None
-        said = self.calls.imperative(self.calls.tidy(f"{current.text}{self.text[at:start]}"))
-        verb = self.calls.forms.begins_with_verb.match(said)
-        return None if verb is None else _Found(match["who"], match.end(), "gap", f"{verb[1]} ")
+    def _begins(self, n: int, start: int, at: int) -> tuple[Match, str] | None:
+        """Beginning of a part for another robot at a word, with the verb that it implies; None if there is none.
 
-    def _take(self, found: _Found, before: str) -> None:
-        """Ends the present part with the text `before`, and begins the part that was found."""
-        joint_at = self.calls.forms.joint.search(before)
-        at = len(before) if joint_at is None else joint_at.start()
-        said, joint = before[:at], before[at:]
-        if found.kind in ("after", "wait"):
+        Raises RefusalError if it forbids an action.
+        """
+        current = self.found[-1]
+        for match in self.calls.forms["begins"].matches(self.text, n):
+            if match["who"].lower() in self.calls.words("yourself") and (current.who is None or not n):
+                continue
+            if match["refused"]:
+                raise RefusalError(f"{match['refused']}: '{match.text}'", [match.text])
+            return match, match["lead"]
+        gap = self.calls.forms["gap"].match(self.text, n)
+        if gap is None or current.who is None or not n:
+            return None
+        said = self.calls.imperative(_tidy(f"{current.text}{self.text[at:start]}"))
+        verb = self.calls.forms["verb"].match(said)
+        return None if verb is None else (gap, f"{verb.text} ")
+
+    def _take(self, begun: Match, lead: str, before: str) -> None:
+        """Ends the present part with the text `before`, and begins the next one."""
+        at = self.calls.joint(before)
+        said, joint, kind = before[:at], before[at:], begun["kind"]
+        if kind in ("after", "wait"):
             self._add(said)
-            now = self.found[-1].who
-            who = now if found.kind == "wait" or self.address is None else self.address
-            behind = (
-                None
-                if found.who.lower() in read_table("robots.yaml")["somebody"]
-                else self.calls.find_robots(found.who)
-            )
+            who = self.found[-1].who if kind == "wait" or self.address is None else self.address
+            named = begun["who"].lower() not in self.calls.words("him")
+            behind = self.calls.find_robots(begun["who"]) if named else None
             behind = behind or next((one.who for one in reversed(self.found) if one.who is not None), None)
             if behind is None:
-                raise RefusalError(f"who is '{found.who}'? say the robot's name", [found.who])
+                raise RefusalError(f"who is '{begun['who']}'? say the robot's name", [begun["who"]])
             self.found.append(AddressedText(who, "", joint, behind=behind))
             return
-        who = self._who(found)
-        bare, opener = said.strip(" ,"), ""  # a condition at its end belongs to the next part: "if there is a coke,"
-        match = self.calls.forms.opener.search(bare) if found.kind != "past" else None
-        if match is not None and not self.calls.forms.opened.search(match[1]):
-            said, opener = bare[: match.start()], match[1]
+        who = self._who(begun["who"])
+        bare = said.strip(" ,")
+        opener = len(bare) if kind == "past" else self.calls.opener(bare)
+        if opener < len(bare):  # it belongs to the next part: "if there is a coke,"
+            said, lead = bare[:opener], f"{bare[opener:]}, {lead}"
         self._add(said)
-        last = self.found[-1]
-        begun = AddressedText(
+        last, joins = self.found[-1], {*words_of(joint).words}
+        part = AddressedText(
             who,
-            f"{opener}, {found.lead}" if opener else found.lead,
+            lead,
             joint,
-            then=last.past or self.calls.forms.then.search(joint) is not None or (last.then and not last.text),
+            then=last.past or bool(joins & {*self.calls.words("follows")}) or (last.then and not last.text),
             behind=None if last.text else last.behind,
-            otherwise=self.calls.forms.otherwise.search(joint) is not None,
-            past=found.kind == "past",
+            otherwise=bool(joins & {*self.calls.words("otherwise")}),
+            past=kind == "past",
         )
-        self.found.append(begun)
-        self.address = who if found.kind == "call" else self.address
+        self.found.append(part)
+        self.address = who if kind == "call" else self.address
 
     def _add(self, more: str) -> None:
         """Adds to the text of the last part, if the text is not empty."""
         last = self.found[-1]
-        self.found[-1] = replace(last, text=self.calls.tidy(f"{last.text}{more}"))
+        self.found[-1] = replace(last, text=_tidy(f"{last.text}{more}"))
 
-    def _who(self, found: _Found) -> Addressee:
+    def _who(self, said: str) -> Addressee:
         """Robots that a name, "you" or "the other robot" stands for."""
         named = [name for one in self.found if isinstance(one.who, tuple) for name in one.who]
-        if found.who.lower() in read_table("robots.yaml")["you"]:
+        if said.lower() in self.calls.words("yourself"):
             return self.calls.find_robots("the other robot", named) if self.address is None else self.address
-        return self.calls.find_robots(found.who, self.address if isinstance(self.address, tuple) else named[-1:])
+        return self.calls.find_robots(said, self.address if isinstance(self.address, tuple) else named[-1:])
 
     def _sentences(self) -> Iterator[AddressedText]:
         """Yields the parts with text; a new sentence inside another robot's part is for the addressee again."""
-        tidy, imperative = self.calls.tidy, self.calls.imperative
+        imperative = self.calls.imperative
         for one in self.found:
             split = self.address is not None and self.address != one.who
             first, *rest = re.split(r"(?<=[.!?])\s+", one.text) if split else [one.text]
             if _says(replace(one, text=first)):
-                yield replace(one, text=tidy(first) if one.past else imperative(tidy(first)))
+                yield replace(one, text=_tidy(first) if one.past else imperative(_tidy(first)))
             if rest:
-                yield AddressedText(self.address, imperative(tidy(" ".join(rest))))
-
-
-def _who(match: re.Match[str]) -> str:
-    """Words in a match that name the robots."""
-    return next(words for key, words in match.groupdict().items() if key.startswith("who") and words)
+                yield AddressedText(self.address, imperative(_tidy(" ".join(rest))))
 
 
 def _says(saying: AddressedText) -> bool:

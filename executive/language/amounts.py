@@ -1,13 +1,16 @@
 """Parses spoken numbers, durations, times of day and fractions."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from executive.language.lexicon import lexicon
 from executive.language.templates import page
 
-_AMOUNTS: Final = page("amounts")
+_PAGE: Final = page("amounts")
+_DOZEN: Final = "dozen"
+_TENS: Final = range(20, 100, 10)
 
 
 @dataclass(frozen=True)
@@ -27,30 +30,41 @@ class TimeOfDay:
         return (f"I take '{said}' as {self.text}",) if self.taken else ()
 
 
+def number_of_word(word: str) -> int | None:
+    """Whole number below 1000 in one word or in digits."""
+    return int(word) if word.isdecimal() and len(word) < 4 else lexicon().numbers.get(word)
+
+
+def number_of_words(words: Sequence[str]) -> int | None:
+    """Whole number in one or two words: "4", "twenty one", "two dozen"; None for other words."""
+    first, *rest = map(number_of_word, words or [""])
+    if first is None or not rest:
+        return first
+    if len(rest) > 1 or rest[0] is None:
+        return None
+    if words[1] == _DOZEN:
+        return first * rest[0]
+    return first + rest[0] if first in _TENS and 0 < rest[0] < 10 else None
+
+
 def parse_number(text: str) -> float | None:
     """Parses a number in digits or words."""
-    words = text.lower().replace("-", " ").split()
-    if len(words) == 1 and re.fullmatch(r"\d+(?:\.\d+)?", words[0]):
-        return float(words[0])
-    numbers = [lexicon().numbers.get(word) for word in words]
-    if not numbers or any(number is None for number in numbers) or len(numbers) > 2:
-        return None
-    first, *rest = (number for number in numbers if number is not None)
-    if rest and not (first in range(20, 100, 10) and 0 < rest[0] < 10):
-        return None
-    return float(first + sum(rest))
+    if re.fullmatch(r"\s*\d+(?:\.\d+)?\s*", text):
+        return float(text)
+    number = number_of_words(text.lower().replace("-", " ").split())
+    return None if number is None else float(number)
 
 
 def parse_times(text: str) -> int | None:
     """Parses "three times" or "twice"; None for any text but whole numbers from 1 to 100."""
-    match = _AMOUNTS["times"].fullmatch(text)
+    match = _PAGE["times"].fullmatch(text)
     number = None if match is None else parse_number(match["count"])
     return int(number) if number is not None and number == int(number) and 1 <= number <= 100 else None
 
 
 def parse_seconds(text: str) -> float | None:
     """Parses a duration (s); None for any other text."""
-    match = _AMOUNTS["seconds"].fullmatch(text)
+    match = _PAGE["seconds"].fullmatch(text)
     count = None if match is None else parse_number(match["count"])
     if match is None or count is None:
         return None
@@ -59,14 +73,14 @@ def parse_seconds(text: str) -> float | None:
 
 def parse_share(text: str) -> float | None:
     """Parses a fraction from 0 to 1, such as "thirty percent" or "half"."""
-    match = _AMOUNTS["share"].fullmatch(text)
+    match = _PAGE["share"].fullmatch(text)
     number = None if match is None else parse_number(match["count"])
     return number / 100 if number is not None and 0 < number <= 100 else None
 
 
 def parse_time(text: str) -> TimeOfDay | None:
     """Parses a time of day; "one" to "six" without more words are in the afternoon."""
-    match = _AMOUNTS["time"].fullmatch(text.replace("o' clock", "o'clock"))
+    match = _PAGE["time"].fullmatch(text.replace("o' clock", "o'clock"))
     if match is None:
         return None
     said, _, minutes = match["hour"].replace(".", ":").partition(":")

@@ -10,12 +10,12 @@ from typing import Final
 
 from executive.language.addressees import AddressedText, Addressee, addressees
 from executive.language.items import Item
-from executive.language.lexicon import lexicon
+from executive.language.lexicon import lexicon, word_list
 from executive.language.questions import RefusalError
 from executive.language.templates import Match, Words, page, words_of
 from executive.language.tokens import smooth
 
-CLAUSES: Final = page("clauses", asking=tuple(sorted(lexicon().openers, key=len, reverse=True)))
+CLAUSES: Final = page("clauses", asking=tuple(sorted(word_list("openers"), key=len, reverse=True)))
 _REWORDING: Final = page("rewording")
 CHECKS: Final = page("checks")
 

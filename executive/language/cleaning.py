@@ -9,11 +9,11 @@ import re
 import unicodedata
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Final
 
-from executive.language.lexicon import Patterns, lexicon, read_table
+from executive.language.lexicon import read_table, word_list
 from executive.language.spelling import sound_distance
+from executive.language.templates import page
 
 _APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
 _ALLOWED: Final = re.compile(r"[^\w\s,.;:!?'\-]|_")
@@ -61,7 +61,7 @@ def foreign_reason(text: str) -> str | None:
     return f"I understand English only, and this looks like {language}"
 
 
-_FORMS: Final = Patterns("wake.yaml")
+_PAGE: Final = page("wake")
 SAME_NAME: Final = 0.13
 """Largest distance in sound (see `sound_distance`) of a misheard name after a greeting."""
 SAME_NAME_ALONE: Final = 0.05
@@ -78,7 +78,7 @@ class Address:
 
 def find_address(text: str, names: Collection[str]) -> Address:
     """Finds the robot among `names` that a sentence calls, by the first wake phrase."""
-    calls = [(start, -end, name) for name in names for start, end in _calls(text, name)]
+    calls = [(start, -end, name) for name in names for start, end in _calls(text.replace("’", "'"), name)]
     if not calls:
         return Address(None, text)
     start, end, name = min(calls, key=lambda call: call[:2])
@@ -107,33 +107,42 @@ def strip_wake(text: str, name: str, others: Collection[str] = ()) -> Address:
     address = find_address(text, (name, *others))
     if address.name is not None:
         return address if address.name == name else replace(address, text=text)
-    other = _FORMS.other.match(text)
-    return Address(other[1] if other and other[1] != name else None, _forms(name).bare.sub("", text, count=1))
+    other, bare = called_stranger(text), page("wake", own=(name,))["bare"].match(text)
+    plain = text if bare is None or _PAGE["told"].match(bare.rest) else bare.rest
+    return Address(None if other == name else other, plain)
 
 
-@lru_cache(maxsize=64)
-def _forms(name: str) -> Patterns:
-    """Patterns for calls to a robot with that name."""
-    return _FORMS.with_words(own=rf"{re.escape(name)}\b")
+def called_stranger(text: str) -> str | None:
+    """Name that a greeting calls at the beginning of a text, of any robot or of none."""
+    match = _PAGE["stranger"].match(text)
+    return match["name"] if match is not None and match["name"][0].isupper() else None
 
 
 def _calls(text: str, name: str) -> Iterator[tuple[int, int]]:
     """Yields spans of text that call a robot: by a greeting, or by the name at the beginning or the end."""
-    forms = _forms(name)
-    for match in forms.greets.finditer(text):
-        before, after = text[: match.start()], text[match.end() :]
-        narrated = forms.says_before.fullmatch(before) or forms.told_behind_greeting.fullmatch(after)
+    forms = page("wake", own=(name,))
+    for match in forms["greets"].finditer(text):
+        before, after = text[: match.start], match.rest
+        narrated = forms["says_before"].fullmatch(before) or forms["told"].match(after) or _is_listed(after)
         ended = not before.strip(" ,.!?;:-'\"") or before.rstrip().endswith((",", ".", "!", "?", ";", ":"))
-        if not narrated and (ended or forms.politely.fullmatch(before) or not after.strip(" .!?,")):
-            yield match.span()
-    first = forms.begins.match(text)
-    if first and not forms.told_behind_name.fullmatch(text[first.end() :]):
-        yield first.start("name"), first.end()
-    last = forms.ends.search(text)
-    if last and not forms.tells_of.fullmatch(before := text[: last.start()]):
+        if not narrated and (ended or forms["politely"].fullmatch(before) or not after.strip(" .!?,")):
+            yield match.start, match.end
+    if (first := forms["begins"].match(text)) is not None:
+        aside = forms["apposition"].match(first.rest)
+        told = forms["told"].match(first.rest) or (aside and forms["told"].match(aside.rest))
+        if not told and not forms["relates"].match(first.rest) and not _is_listed(first.rest):
+            yield first.end - len(first["name"]), first.end
+    last = next((match for match in forms["ends"].finditer(text) if not re.search(r"\w", match.rest)), None)
+    if last is not None and not forms["tells_of"].match(before := text[: last.start]):
         noun = re.sub(r"\W+$", "", before).rpartition(" ")[2].lower()
-        if noun not in lexicon().people and not re.search(r",\s*[A-Z]\w*\s*$", before):
-            yield last.span()
+        if noun not in word_list("people") and not re.search(r",\s*[A-Z]\w*\s*$", before):
+            yield last.start, last.end
+
+
+def _is_listed(after: str) -> bool:
+    """Returns whether another name follows a name: ", Bob and", "and Bob"."""
+    match = _PAGE["listed"].match(after)
+    return match is not None and match["next"][0].isupper()
 
 
 def _corrected(transcript: str, name: str, others: Collection[str]) -> Iterator[str]:
@@ -147,7 +156,7 @@ def _corrected(transcript: str, name: str, others: Collection[str]) -> Iterator[
     for at, word in enumerate(words[:_LATEST_GREETING]):
         for count in (1, 2):
             behind = words[at + 1 : at + 1 + count]
-            greets = word.group().lower() in _HEARD_GREETINGS and len(behind) == count
+            greets = word.group().lower() in word_list("heard_greetings") and len(behind) == count
             if greets and alike(transcript[behind[0].start() : behind[-1].end()], SAME_NAME):
                 yield f"{transcript[: word.start()]}Hey {name}{transcript[behind[-1].end() :]}"
         if sound_distance(word.group(), f"hey{name}") <= SAME_NAME and len(word.group()) > len(name):
@@ -156,6 +165,5 @@ def _corrected(transcript: str, name: str, others: Collection[str]) -> Iterator[
         yield f"{name}{transcript[words[0].end() :]}"
 
 
-_HEARD_GREETINGS: Final = frozenset({"hey", "hay", "hei", "hi", "high", "ok", "okay", "hello", "he", "ay", "eh", "a"})
 _HEARD_WORDS: Final = 6
 _LATEST_GREETING: Final = 3

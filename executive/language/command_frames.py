@@ -6,7 +6,7 @@ from itertools import zip_longest
 from typing import Final
 
 from executive.language.actions import Action
-from executive.language.lexicon import VerbKind, lexicon
+from executive.language.lexicon import VerbKind, word_list
 from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE, Location
@@ -51,9 +51,9 @@ def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
         later = any(other.again and other.target == target for other in joined[index + 1 :])
         goal = action.goal or (HERE if action.kind is VerbKind.ROUND_TRIP and not later else None)
         name = "it" if target is None else f"the {target.text}"
-        if goal is None and verb in lexicon().goal_wanted and not later:
+        if goal is None and verb in word_list("goal_wanted") and not later:
             raise RefusalError(f"{verb} {name}: where to?", question=True)
-        if verb in lexicon().source_wanted and action.source is None and action.goal is None:
+        if verb in word_list("source_wanted") and action.source is None and action.goal is None:
             raise RefusalError(f"{verb} {name}: from where?", [verb])
         taking = [CommandFrame(verb, goal=action.source, task=Task.GRASP, object=target)] if held != target else []
         if after is not None and _puts_down(after, action) and after.goal not in (None, HERE):
@@ -119,7 +119,7 @@ def _join_going(actions: Sequence[Action]) -> tuple[Action, ...]:
         back = before and before.goal is HERE and action.kind is VerbKind.ROUND_TRIP
         to_them = before and before.goal and before.goal.living and action.goal and action.goal.name == before.goal.name
         goal = before.goal.phrase if before and before.goal else None
-        docks = action.kind is VerbKind.CHARGE and goal is not None and goal.head.lemma in lexicon().docks
+        docks = action.kind is VerbKind.CHARGE and goal is not None and goal.head.lemma in word_list("docks")
         if same or back or to_them or docks:
             joined.pop()
             takes_source = takes_source and not (back or to_them)

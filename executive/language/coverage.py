@@ -10,7 +10,7 @@ from typing import Final
 
 from executive.language.actions import Action
 from executive.language.items import Aside, Being, Chunk, Item, Predicate, Unknown, Verb, spoken_words
-from executive.language.lexicon import PrepositionRole, any_of, lexicon
+from executive.language.lexicon import PrepositionRole, any_of, lexicon, word_list
 from executive.language.limits import is_door
 from skills.inputs.errors import listing
 
@@ -44,7 +44,7 @@ def cover(
             told.append(words)
     targets = [one.target for one in actions if one.target is not None]
     targets += [one for each in related for one in each.landmarks]
-    owned = [one.spoken for one in targets if any(token.word in lexicon().owners for token in one.tokens[:-1])]
+    owned = [one.spoken for one in targets if any(token.word in word_list("owners") for token in one.tokens[:-1])]
     notes = {
         _LEFT_OUT: asides,
         TOLD: told,

@@ -160,7 +160,7 @@ def _replaced(clause: Sequence[Item], new: Item) -> list[Item]:
         if phrase.stands_for_one:
             phrase = phrase.replace_one(old.phrase)
         elif phrase.counts:
-            phrase = old.phrase.with_count(phrase.count)
+            phrase = replace(old.phrase, numbered=phrase.count)
         new = replace(old, phrase=phrase)
     return [*clause[:at], new, *clause[at + 1 :]]
 
@@ -177,6 +177,6 @@ def _corrects(new: Item, old: Item) -> bool:
         return isinstance(new, Chunk) and isinstance(old, Adverb) and new.role in _WHERE_TO
     if new.role is not None:
         return old.role is not None and any({old.role, new.role} <= group for group in (_WHERE_FROM, _WHERE_TO))
-    if new.phrase.person or old.phrase.person or old.phrase.speaker:
-        return new.phrase.person and (old.phrase.person or old.phrase.speaker)
+    if new.phrase.person or old.phrase.receiver:
+        return new.phrase.person and old.phrase.receiver
     return (new.phrase.kind is NounKind.PLACE) == (old.role is not None)

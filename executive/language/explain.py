@@ -8,7 +8,7 @@ from typing import Any, Final
 from executive.language.actions import Action
 from executive.language.command_frames import spoken_command
 from executive.language.items import Predicate, spoken_words
-from executive.language.lexicon import any_of, lexicon
+from executive.language.lexicon import any_of, lexicon, word_list
 from executive.language.pipeline import Trace
 from executive.language.tokens import Token
 from executive.words.steps import steps_to_yaml
@@ -27,7 +27,7 @@ def word_uses(trace: Trace) -> tuple[tuple[str, Use], ...]:
     """Words of a sentence in order, each with where it went."""
     refused = () if trace.refusal is None else trace.refusal.unknown
     noted = re.findall(r"'((?:[^']|(?<=\w)'(?=\w))+)'", " ".join(trace.notes))
-    small = (*map(" ".join, lexicon().fillers), *lexicon().asides, *lexicon().openers, *lexicon().hesitations)
+    small = (*map(" ".join, lexicon().fillers), *word_list("asides"), *word_list("openers"), *word_list("hesitations"))
     forms = {Use.REFUSED: refused, Use.NOTE: noted, Use.FILLER: filter(_WORD.search, small)}
     groups = (rf"(?P<{use.name}>\b(?:{any_of(texts) or '(?!)'})(?!\w))" for use, texts in forms.items())
     found = re.compile("|".join(groups), re.IGNORECASE)
@@ -93,9 +93,8 @@ def _action_values(action: Action) -> dict[str, Any]:
 
 def _part(clause: Predicate) -> str:
     """Words of a clause, with its verb first."""
-    verb = [] if clause.verb is None else [spoken_words([clause.verb])]
-    subject = [clause.subject.phrase.spoken] if clause.subject is not None else []
-    return " | ".join([*verb, *subject, *filter(None, (spoken_words([item]) for item in clause.items))])
+    parts = (one for one in (clause.verb, clause.subject, *clause.items) if one is not None)
+    return " | ".join(filter(None, (spoken_words([part]) for part in parts)))
 
 
 def explanation_lines(trace: Trace) -> Iterator[str]:

@@ -5,12 +5,10 @@ Follow-ups amend the commands of the earlier request, once their names are groun
 
 import enum
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Final
 
-from executive.language.lexicon import read_table
 from executive.language.templates import page
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
@@ -18,11 +16,11 @@ from skills.api import ObjectKind
 
 
 class FollowUpKind(enum.Enum):
-    """Relation of a sentence to the previous request."""
+    """Relation of a sentence to the previous request, in the order of trying."""
 
+    AGAIN = "again"  # the same once more, after it
     CORRECTION = "correction"  # in place of it
     ADDITION = "addition"  # after it
-    AGAIN = "again"  # the same once more, after it
 
 
 @dataclass(frozen=True)
@@ -58,10 +56,8 @@ class Amendment:
 def parse_follow_up(text: str) -> FollowUp | None:
     """Parses a follow-up; None for a sentence that is complete without the earlier request."""
     plain = " ".join(text.replace("’", "'").split()).strip(" .!,")
-    if _FORMS["again"].fullmatch(plain):
-        return FollowUp(FollowUpKind.AGAIN)
-    for kind in (FollowUpKind.CORRECTION, FollowUpKind.ADDITION):
-        if (match := _FORMS[kind.value].fullmatch(plain)) is not None:
+    for kind in FollowUpKind:
+        if (match := _PAGE[kind.value].fullmatch(plain)) is not None:
             return FollowUp(kind, match["said"], match["preposition"].lower(), match["old"])
     return None
 
@@ -138,16 +134,16 @@ def _place_of(commands: Sequence[Command], by: Amendment) -> int:
     return next(iter([*named, *said[-1:], *goals[-1:], *sources]))
 
 
-_FORMS: Final = page("followups")
+_PAGE: Final = page("followups")
 
 
 class Remark(enum.Enum):
-    """Meaning of a remark about the run."""
+    """Meaning of a remark about the run, in the order of trying."""
 
     FREEZE = "freeze"  # stand still at once
+    WAIT = "wait"  # pause
     STOP = "stop"  # end a step that waits for this, such as following; else stand still
     ENOUGH = "enough"  # end a step that waits for this
-    WAIT = "wait"  # pause
     GO_ON = "go_on"  # go on after a pause or a stop
     CANCEL = "cancel"  # give the mission up
     WHERE = "where"  # where the robot is
@@ -160,15 +156,8 @@ class Remark(enum.Enum):
 
 def parse_remark(text: str) -> Remark | None:
     """Parses a whole sentence as a remark; None for any other sentence, such as a request."""
-    words = " ".join(re.sub(r"[^\w\s']", " ", text[:_MOST_LETTERS].lower().replace("’", "'")).split())
-    plain = page("remarks")["remark"].fullmatch(words)
-    return _remarks().get(words) or (None if plain is None else _remarks().get(plain["remark"]))
-
-
-@cache
-def _remarks() -> Mapping[str, Remark]:
-    remarks = read_table("remarks.yaml").items()
-    return {" ".join(phrase.split()): Remark(name) for name, phrases in remarks for phrase in phrases}
+    words = re.sub(r"[^\w\s']", " ", text[:_MOST_LETTERS].replace("’", "'"))
+    return next((remark for remark in Remark if page("remarks")[remark.value].fullmatch(words)), None)
 
 
 _MOST_LETTERS: Final = 200

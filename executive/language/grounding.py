@@ -11,7 +11,7 @@ from typing import Final
 
 from executive.language.command_frames import CommandFrame
 from executive.language.indirect import CONTENTS
-from executive.language.lexicon import lexicon, read_table
+from executive.language.lexicon import read_table, word_list
 from executive.language.limits import check_relation, relation_refusal
 from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase, SpokenRelation
@@ -92,7 +92,7 @@ class _Grounder:
         if rooms and frame.item is None and frame.task is None:
             yield from (Command(goal=room, verb=frame.verb) for room in self.knowledge.rooms)
             return
-        if frame.verb in lexicon().stacks:
+        if frame.verb in word_list("stacks"):
             raise RefusalError("I put objects side by side, and stack none", [frame.verb])
         home = frame.goal is not None and frame.goal.name.lower() == _HOME and self.knowledge.place(_HOME) is None
         if home and frame.item is None and frame.task is None:
@@ -152,15 +152,14 @@ class _Grounder:
 
     def _landmark(self, phrase: Phrase, said: SpokenRelation, act: str) -> Landmark:
         known = self.knowledge.place(phrase.text) or self.knowledge.person(phrase.text)
-        other = (
-            DOOR if phrase.text in read_table("relations.yaml")["doors"] else ROBOT if phrase.text == "you" else None
-        )
+        door = phrase.text in read_table("relations.yaml")["doors"]
+        named = known or (DOOR if door else ROBOT if phrase.text == "you" else None)
         compares, seen = said.kind in ORDERS, said.kind is RelationKind.SEEN_FROM
         fits = act == "look" if compares else seen and known in self.knowledge.people
-        if fits and (known or other):
-            return Landmark(known or other or "")
-        named = phrase.count == 1 or said.kind is RelationKind.BETWEEN
-        unfit = known or phrase.speaker or phrase.somebody or phrase.addressed or phrase.pronoun or not named
+        if fits and named:
+            return Landmark(named)
+        one = phrase.count == 1 or said.kind is RelationKind.BETWEEN
+        unfit = known or phrase.speaker or phrase.somebody or phrase.addressed or phrase.pronoun or not one
         if unfit or seen or (compares and not fits):
             raise relation_refusal(act, "", said.said)
         kind = self.object_kind(phrase)
@@ -212,12 +211,11 @@ class _Grounder:
             raise RefusalError(f"I know nobody by face, and cannot tell {person} from {others}", [phrase.text])
         if person is not None:
             return person
-        if len(phrase.content) == 1 and not phrase.extra and phrase.head.word in lexicon().any_person:
+        if len(phrase.content) == 1 and not phrase.extra and phrase.head.word in word_list("any_person"):
             return ANYBODY
         if phrase.named_person:
             raise self._unknown(Slot.PERSON, (phrase.text,), self._known(self.knowledge.people))
-        somebody = phrase.person or phrase.stands_for_somebody or phrase.head.word in lexicon().anyone
-        if somebody and self.knowledge.object_name(phrase.text) is None:
+        if (phrase.somebody or phrase.stands_for_somebody) and self.knowledge.object_name(phrase.text) is None:
             what = f"I see whether anybody is there, but not whether it is {phrase.spoken!r}"
             raise RefusalError(what, [phrase.text])
         return None
@@ -230,19 +228,16 @@ class _Grounder:
         act = "look" if looks else "go" if frame.item is None else "bring"
         check_relation(act, _KINDS, location)
         person = None if location == HERE or location.phrase is None else self._person(location.phrase)
-        if location == HERE:
-            goal, goal_at = HERE.name, None
-        elif person is None:
-            goal, goal_at = self.place(location), None
-        else:
-            goal, goal_at = person, None if location.within is None else self.place(location.within)
+        goal = HERE.name if location == HERE else person or self.place(location)
+        goal_at = self.place(location.within) if person is not None and location.within is not None else None
         if frame.object == CONTENTS and goal in self.knowledge.rooms:
             what = f"I cannot tell whether all of the {goal} is empty; ask whether anybody is in it, or what is in it"
             raise RefusalError(what, [location.text])
         if people and goal in self.knowledge.surfaces:
             raise RefusalError(f"I look for people in rooms, and the {goal} is none", [goal])
-        own = (goal in self.knowledge.rooms, goal in (*self.knowledge.surfaces, *self.knowledge.poses), True)
-        check_relation(act, [kind for kind, fits in zip(_KINDS, own, strict=True) if fits][:1], location)
+        surface = goal in (*self.knowledge.surfaces, *self.knowledge.poses)
+        kind = "room" if goal in self.knowledge.rooms else "surface" if surface else "person"
+        check_relation(act, [kind], location)
         return goal, goal_at
 
     def object_kind(self, phrase: Phrase) -> ObjectKind:
@@ -311,15 +306,15 @@ class _Grounder:
             return [exact]
         synonyms = [name for form in forms for name in synonyms_of(form, known)]
         if synonyms:
-            self._note(bare.text, *(names := tuple(dict.fromkeys(synonyms))))
-            return names
-        nouns = _forms(phrase.head)
+            self._note(bare.text, *dict.fromkeys(synonyms))
+            return list(dict.fromkeys(synonyms))
+        nouns = {*_forms(phrase.head)}
         own = [name for name in self.knowledge.place_names() if _last(name) in nouns]
         other = [name for spelling, name in known.items() if _last(spelling) in nouns]
-        called = [
-            name for spelling, name in known.items() if any(_last(word) in nouns for word in synonyms_for(spelling))
-        ]
-        return list(dict.fromkeys([*own, *other, *called] if room is not None else own or other))
+        if room is None:
+            return list(dict.fromkeys(own or other))
+        called = (name for spelling, name in known.items() if nouns & {*map(_last, synonyms_for(spelling))})
+        return list(dict.fromkeys([*own, *other, *called]))
 
     def _left_over(self, phrase: Phrase, name: str) -> bool:
         """Returns whether words remain that belong neither to the place's name nor to its room's ("kitchen 3")."""

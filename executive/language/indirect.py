@@ -6,15 +6,12 @@ from itertools import pairwise
 from typing import Final
 
 from executive.language.items import Being, Chunk, Item, Row, Separator, Unknown, Verb, may_begin_command, verb
-from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, word_list
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.tokens import Token
 from skills.detect.descriptions import plural
 
-_BELONGS: Final = frozenset({"go", "goes", "belong", "belongs"})
-_WHERE: Final = frozenset({"in", "on", "into", "onto", "inside", "under", "next"})
-_WANTS: Final = frozenset({"need", "want", "have", "like", "love", "say", "mean"})
 OBJECTS: Final = Phrase((Token(0, 0, "objects", "object", "NOUN", "NNS", 0, "obj", kind=NounKind.THING),))
 
 CONTENTS: Final = Phrase((replace(OBJECTS.head, relation="attr"),))
@@ -29,50 +26,48 @@ def _asks(items: Sequence[Item]) -> bool:
 
 def where_is(row: Row, items: list[Item]) -> Item | None:
     """Reads "where is the hammer", "check where the hammer is" as a request to find an object or a person."""
-    asks = _asks(items)
-    if row.tokens[row.at].word != "where" or not (asks or may_begin_command(items)):
+    asks, inverted = _asks(items), _is_be(row.token(1))
+    if row.word() != "where" or not (asks or may_begin_command(items)):
         return None
-    inverted = _is_be(row, row.at + 1)
-    start = row.at + 1 + inverted
-    phrase = row.phrase_at(start)
+    phrase = row.phrase_at(row.at + 1 + inverted)
     if phrase is None or phrase.speaker or phrase.kind not in (NounKind.THING, NounKind.PERSON, None):
         return None
     if (phrase.indefinite or phrase.pronoun) and not (phrase.named_person or phrase.known):  # a good restaurant
         return None
-    end = start + len(phrase.tokens)
-    if not inverted and not _is_be(row, end):
+    end = 1 + inverted + len(phrase.tokens)
+    if not inverted and not _is_be(row.token(end)):
         return None
-    row.at = start
-    row.silent |= set() if inverted else {end}
+    row.silent |= set() if inverted else {row.at + end}
+    row.at += 1 + inverted
     if asks:
         items.pop()
     return verb("find")
 
 
-def _is_be(row: Row, at: int) -> bool:
-    """Returns whether a form of "to be" is at a position."""
-    return at < len(row.tokens) and (row.tokens[at].lemma == "be" or row.tokens[at].word == "'s")
+def _is_be(token: Token) -> bool:
+    """Returns whether a word is a form of "to be"."""
+    return token.lemma == "be" or token.word == "'s"
 
 
 def how_many(row: Row, items: list[Item]) -> Item | None:
     """Reads "how many chairs are in the hall" as a request to look for chairs there."""
     phrase = row.phrases.get(row.at)
-    if row.tokens[row.at].word != "how" or phrase is None or len(phrase.tokens) < 3 or not may_begin_command(items):
+    if row.word() != "how" or phrase is None or len(phrase.tokens) < 3 or not may_begin_command(items):
         return None
-    end = row.at + len(phrase.tokens)
-    inner = row.phrase_at(end + 1) if [t.word for t in row.tokens[end : end + 1]] == ["of"] else None
+    end = len(phrase.tokens)
+    inner = row.phrase_at(row.at + end + 1) if row.word(end) == "of" else None
     end += 0 if inner is None else 1 + len(inner.tokens)
-    be = row.tokens[end : end + 1]
-    if row.tokens[row.at + 1].word != "many" or not be or be[0].lemma != "be":
+    be = row.token(end)
+    if row.word(1) != "many" or be.lemma != "be":
         return None
-    if phrase.person and (len(phrase.tokens) > 3 or phrase.head.word not in lexicon().any_person):
+    if phrase.person and (len(phrase.tokens) > 3 or phrase.head.word not in word_list("any_person")):
         return None
-    if any(t.tag == "IN" and b.word in ("a", "an") for t, b in pairwise(row.tokens[end:])):
+    if any(t.tag == "IN" and b.word in ("a", "an") for t, b in pairwise(row.tokens[row.at + end :])):
         return None
-    row.at = end + 1
-    while row.at < len(row.tokens) and row.tokens[row.at].word in ("there", "left"):
+    row.at += end + 1
+    while row.word() in ("there", "left"):
         row.at += 1
-    items += [Separator(""), Being(be[0].text, existential=True, asked=True)]
+    items += [Separator(""), Being(be.text, existential=True, asked=True)]
     head = phrase.head if phrase.plural else replace(phrase.head, text=plural(phrase.head.text), tag="NNS")
     counted = Phrase((*phrase.tokens[2:-1], head))
     return Chunk(counted if inner is None else counted.with_contents(inner))
@@ -80,65 +75,60 @@ def how_many(row: Row, items: list[Item]) -> Item | None:
 
 def do_we_have(row: Row, items: list[Item]) -> Item | None:
     """Reads "do we have any coke left" as a question whether there is any."""
-    words = [token.word for token in row.tokens[row.at : row.at + 3]]
-    has = len(words) == 3 and words[0] in ("do", "have") and words[2] in ("have", "got")
-    phrase = row.phrase_at(row.at + 3) if has and words[1] in ("we", "you", "i", "they") else None
+    do, who, have = (row.word(ahead) for ahead in range(3))
+    has = do in ("do", "have") and who in ("we", "you", "i", "they") and have in ("have", "got")
+    phrase = row.phrase_at(row.at + 3) if has else None
     if phrase is None or not may_begin_command(items) or not (phrase.known or phrase.kind is NounKind.THING):
         return None
     row.at += 3
-    return Being(" ".join(words), existential=True, asked=True)
+    return Being(f"{do} {who} {have}", existential=True, asked=True)
 
 
 def what_is(row: Row, items: list[Item]) -> Item | None:
     """Reads "what is on the bench" or "is the bench empty" as a request to look for all objects there."""
     asks = _asks(items)
-    whatever = _whatever(row) if asks or may_begin_command(items) else None
-    found = whatever or (_fullness(row) if asks or may_begin_command(items) else None)
-    if found is None:
+    if not (asks or may_begin_command(items)):
         return None
-    if asks:
-        items.pop()
-    items += [verb("find"), Chunk(CONTENTS if whatever is None else OBJECTS)]
-    return found
+    for contents, read in ((OBJECTS, _whatever), (CONTENTS, _fullness)):
+        if (place := read(row)) is not None:
+            items[len(items) - asks :] = [verb("find"), Chunk(contents)]
+            return place
+    return None
 
 
 def _whatever(row: Row) -> Chunk | None:
     """Place, with its preposition, after "what is" or "is there anything"."""
-    at, asked = row.at, False
-    for word in (token.word for token in row.tokens[row.at :]):
-        whatever = word in ("what", "anything", "something")
-        if word not in lexicon().asked_with and (asked or not whatever):
-            break
-        asked = asked or whatever
-        at += 1
-    longest = (tuple(t.word for t in row.tokens[at : at + n]) for n in range(3, 0, -1))
-    preposition = next((words for words in longest if words in lexicon().prepositions), None)
-    phrase = row.phrase_at(at + len(preposition)) if asked and preposition is not None else None
-    if preposition is None or phrase is None or not (phrase.known or phrase.kind is NounKind.PLACE):
+    ahead, asked = 0, False
+    while (word := row.word(ahead)) in word_list("asked_with") or (word in word_list("whatever") and not asked):
+        asked = asked or word in word_list("whatever")
+        ahead += 1
+    preposition = row.match(lexicon().prepositions, ahead) if asked else ()
+    ahead += len(preposition)
+    phrase = row.phrase_at(row.at + ahead) if preposition else None
+    if phrase is None or not (phrase.known or phrase.kind is NounKind.PLACE):
         return None
-    row.at = at + len(preposition) + len(phrase.tokens)
+    row.at += ahead + len(phrase.tokens)
     return Chunk(phrase, " ".join(preposition), PrepositionRole.AT)
 
 
 def _fullness(row: Row) -> Chunk | None:
     """Place that "is the bench empty" asks about."""
-    phrase = row.phrase_at(row.at + 1) if _is_be(row, row.at) else None
-    end = row.at + 1 + (0 if phrase is None else len(phrase.tokens))
-    if phrase is None or end >= len(row.tokens) or row.tokens[end].word not in lexicon().fullness:
+    phrase = row.phrase_at(row.at + 1) if _is_be(row.token()) else None
+    if phrase is None or row.token(1 + len(phrase.tokens)).word not in word_list("fullness"):
         return None
     if not (phrase.known or phrase.kind is NounKind.PLACE) or phrase.person:
         return None
-    row.at = end + 1
+    row.at += 2 + len(phrase.tokens)
     return Chunk(phrase, "at", PrepositionRole.AT)
 
 
 def reported_speech(row: Row, items: list[Item]) -> Item | None:
     """Reads "I left it in the hall" as a statement on the place; after a noun it only identifies the object."""
     subject = items[-1] if items else None
-    if not isinstance(subject, Chunk) or row.tokens[row.at].word not in lexicon().placing or subject.role is not None:
+    if not isinstance(subject, Chunk) or subject.role is not None or row.word() not in word_list("placing"):
         return None
     phrase = subject.phrase
-    if phrase.head.word not in lexicon().subjects and not phrase.person:
+    if phrase.head.word not in word_list("subjects") and not phrase.person:
         return None
     items.pop()
     text = row.take(1)
@@ -161,12 +151,10 @@ def _subject(items: Sequence[Item]) -> tuple[int, Chunk | None]:
 def stated_need(row: Row, items: list[Item]) -> Item | None:
     """Reads "the patient in room four needs a blanket" as a request to bring it."""
     found, (at, who) = row.match(lexicon().needs), _subject(items)
-    behind = row.tokens[row.at + len(found or ()) :][:1]
-    if found is None or who is None or who.phrase.head.word in ("her", "him", "them"):
+    behind = row.token(len(found))
+    if not found or who is None or not who.phrase.living or who.phrase.head.word in ("her", "him", "them"):
         return None
-    if not (who.phrase.person or who.phrase.kind is NounKind.PERSON):
-        return None
-    if not behind or behind[0].tag in ("TO", "IN") or behind[0].pos in ("PUNCT", "CCONJ"):
+    if behind.tag in ("", "TO", "IN") or behind.pos in ("PUNCT", "CCONJ"):
         return None
     row.at += len(found)
     items.insert(at, verb("bring"))
@@ -175,10 +163,9 @@ def stated_need(row: Row, items: list[Item]) -> Item | None:
 
 def belonging(row: Row, items: list[Item]) -> Item | None:
     """Reads "the plates go in the cupboard" as a request to put them there."""
-    (at, item), behind = _subject(items), row.ahead()
-    if row.tokens[row.at].word not in _BELONGS or not behind or behind[0].word not in _WHERE or item is None:
-        return None
-    if item.phrase.speaker or item.phrase.person or item.phrase.kind is NounKind.PERSON:
+    at, item = _subject(items)
+    belongs = row.word() in word_list("belongs") and row.word(1) in word_list("belongs_where")
+    if not belongs or item is None or item.phrase.speaker or item.phrase.living:
         return None
     row.at += 1
     items[at + 1 :] = [
@@ -190,8 +177,8 @@ def belonging(row: Row, items: list[Item]) -> Item | None:
 
 def ongoing_event(row: Row, items: list[Item]) -> Item | None:
     """Reads "my back hurts" as an event, which asks for nothing."""
-    token, subject = row.tokens[row.at], items[-1] if items else None
-    if token.tag != "VBZ" or token.pos != "VERB" or token.lemma in _WANTS or token.lemma in lexicon().asks:
+    token, subject = row.token(), items[-1] if items else None
+    if token.tag != "VBZ" or token.pos != "VERB" or token.lemma in word_list("wants") | word_list("asks"):
         return None
     if not isinstance(subject, Chunk) or subject.role is not None or not may_begin_command(items[:-1]):
         return None
@@ -210,25 +197,24 @@ def narration(row: Row, items: list[Item]) -> Item | None:
         return None
     length, phrase = _told_verb(row), subject.phrase
     asked = any(token.tag.startswith("W") for token in phrase.tokens)
-    if not length or asked or row.tokens[row.at + length - 1].lemma in lexicon().asks:
+    if not length or asked or row.tokens[row.at + length - 1].lemma in word_list("asks"):
         return None
     del items[at:]
-    living = phrase.person or phrase.speaker or phrase.kind is NounKind.PERSON
+    living = phrase.living or phrase.speaker
     teller, topic = (phrase if living and not phrase.speaker else None), None if living else phrase
     return Being(row.take(length), existential=True, asked=False, teller=teller, narrated=True, topic=topic)
 
 
 def _told_verb(row: Row) -> int:
     """Number of words in a narrating verb that begins here; 0 if none does."""
-    tags = [t.tag for t in row.tokens[row.at : row.at + 4]]
-    first, words = row.tokens[row.at], [t.word for t in row.tokens[row.at : row.at + 3]]
+    first, second, third, fourth = map(row.token, range(4))
     if first.tag == "VBD" and first.pos == "VERB":
         return 1
-    if first.tag == "MD" and words[1:2] and words[1] in ("not", "n't", "nt") and tags[2:3] == ["VB"]:
+    if first.tag == "MD" and second.word in ("not", "n't", "nt") and third.tag == "VB":
         return 3
-    progressive = first.lemma == "be" and tags[1:2] == ["VBG"] and words[1] not in lexicon().relative
-    perfect = first.lemma == "have" and first.pos == "AUX" and tags[1:2] == ["VBN"]
-    if progressive and words[1:] == ["going", "to"] and tags[3:] == ["VB"]:
+    progressive = first.lemma == "be" and second.tag == "VBG" and second.word not in word_list("relative")
+    perfect = first.lemma == "have" and first.pos == "AUX" and second.tag == "VBN"
+    if progressive and (second.word, third.word, fourth.tag) == ("going", "to", "VB"):
         return 4
     return 2 if progressive or perfect else 0
 

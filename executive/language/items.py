@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from typing import Final
 
-from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, word_list
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
-from executive.language.tokens import Token
+from executive.language.tokens import NO_TOKEN, Token, longest_of
 
 
 @dataclass(frozen=True)
@@ -121,13 +121,12 @@ def without_objects(items: Sequence[Item]) -> tuple[Item, ...]:
     verbs = [item for item in items if isinstance(item, Verb | Being | Outside | Negation | Correction)]
     if len(verbs) != 1 or not isinstance(verbs[0], Verb):
         return ()
-    at = {VerbKind.PLACE, VerbKind.FIND} & verbs[0].kinds or verbs[0].text in lexicon().at_is_goal
+    at = {VerbKind.PLACE, VerbKind.FIND} & verbs[0].kinds or verbs[0].text in word_list("at_is_goal")
     roles = (PrepositionRole.GOAL, *((PrepositionRole.AT, PrepositionRole.BESIDE) if at else ()))
     return tuple(
         item
         for item in items
-        if isinstance(item, Verb | Adverb)
-        or (isinstance(item, Chunk) and (item.role in roles or item.phrase.person or item.phrase.speaker))
+        if isinstance(item, Verb | Adverb) or (isinstance(item, Chunk) and (item.role in roles or item.phrase.receiver))
     )
 
 
@@ -148,10 +147,19 @@ class Row:
     silent: set[int] = field(default_factory=set)
     prepositions: Mapping[tuple[str, ...], PrepositionRole] = field(default_factory=lambda: lexicon().prepositions)
 
-    def match(self, phrases: Container[tuple[str, ...]]) -> tuple[str, ...] | None:
-        """Longest of the phrases that begins at the position."""
-        spoken = tuple(t.word for t in self.tokens[self.at : self.at + LONGEST])
-        return next((spoken[:length] for length in range(len(spoken), 0, -1) if spoken[:length] in phrases), None)
+    def token(self, ahead: int = 0) -> Token:
+        """Word at the position, or `ahead` of it; a word without text outside the sentence."""
+        at = self.at + ahead
+        return self.tokens[at] if 0 <= at < len(self.tokens) else NO_TOKEN
+
+    def word(self, ahead: int = 0) -> str:
+        """Text of a word in lower case; empty outside the sentence."""
+        return self.token(ahead).word
+
+    def match(self, phrases: Container[tuple[str, ...]], ahead: int = 0) -> tuple[str, ...]:
+        """Longest of the phrases that begins at the position, or `ahead` of it; empty if none does."""
+        start = self.at + ahead
+        return longest_of(phrases, [t.word for t in self.tokens[start : start + LONGEST]])
 
     def phrase_at(self, start: int) -> Phrase | None:
         """Noun phrase that begins at `start`, even if its first words have been taken."""
@@ -170,10 +178,6 @@ class Row:
         """Takes the words of a phrase from the dictionaries."""
         self.at += len(phrase)
         return " ".join(phrase)
-
-    def ahead(self, count: int = 1) -> Sequence[Token]:
-        """Next `count` words after the present one; fewer at the end."""
-        return self.tokens[self.at + 1 : self.at + 1 + count]
 
 
 def may_begin_command(items: Sequence[Item]) -> bool:
@@ -216,13 +220,18 @@ def predicates(items: Iterable[Item]) -> tuple[Predicate, ...]:
 
 def _ungapped(clause: Predicate) -> Iterator[Predicate]:
     """Repeats an omitted verb: "a beer to Robin and a coke to Charlie"."""
-    items, between = clause.items, range(1, len(clause.items) - 1)
-    cut = next((n for n in between if _gives_another(items, n)), None)
-    recipient: tuple[Item, ...] = ()
-    if cut is None and (cut := next((n for n in between if _gap(items, n)), None)) is not None:
+    items = clause.items
+    pairs = [
+        (n, one, other)
+        for n, (joint, one, other) in enumerate(zip(items[1:], items[2:], items[3:], strict=False), 1)
+        if isinstance(joint, Separator) and isinstance(one, Chunk) and isinstance(other, Chunk) and one.role is None
+    ]
+    # me the book and Anna the pen
+    gifts = [n for n, who, what in pairs if what.role is None and who.phrase.receiver and not what.phrase.receiver]
+    cut, recipient = next((n for n in gifts if isinstance(items[n - 1], Chunk)), None), tuple[Item, ...]()
+    if cut is None and (cut := next((n for n, _, place in pairs if _gap(items[:n], place)), None)) is not None:
         first = items[0]
-        speaks = isinstance(first, Chunk) and first.role is None and first.phrase.speaker
-        recipient = (first,) if speaks else ()
+        recipient = (first,) if isinstance(first, Chunk) and first.role is None and first.phrase.speaker else ()
     if cut is None or not isinstance(clause.verb, Verb):
         yield clause
         return
@@ -230,23 +239,11 @@ def _ungapped(clause: Predicate) -> Iterator[Predicate]:
     yield from _ungapped(Predicate(clause.verb, (*recipient, *items[cut + 1 :])))
 
 
-def _gives_another(items: Sequence[Item], at: int) -> bool:
-    """Returns whether another recipient and object follow a separator: "me the book and Anna the pen"."""
-    joint, who, what = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
-    if not (isinstance(joint, Separator) and isinstance(who, Chunk) and isinstance(what, Chunk)):
-        return False
-    bare = who.role is None and what.role is None and isinstance(items[at - 1], Chunk)
-    return bare and (who.phrase.person or who.phrase.speaker) and not (what.phrase.person or what.phrase.speaker)
-
-
-def _gap(items: Sequence[Item], at: int) -> bool:
-    """Returns whether a separator is between two objects, each of which has a place with the same role."""
-    joint, what, place = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
-    if not (isinstance(joint, Separator) and isinstance(what, Chunk) and isinstance(place, Chunk)):
-        return False
-    before = [item for item in items[:at] if isinstance(item, Chunk)]
+def _gap(items: Sequence[Item], place: Chunk) -> bool:
+    """Returns whether the items have an object, and a place with the same role as another object's place."""
+    before = [item for item in items if isinstance(item, Chunk)]
     bare = any(item.role is None and not item.phrase.speaker for item in before)
-    return what.role is None and bare and place.role is not None and place.role in [item.role for item in before]
+    return bare and place.role is not None and place.role in [item.role for item in before]
 
 
 def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
@@ -312,7 +309,7 @@ def _without_reasons(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
     def own_affair(verb: Verb | Being | Outside | None, before: Sequence[Item]) -> bool:
         """Returns whether the verb expresses a plan of the speaker and no request: "I am about to sing"."""
         wants = [item.word for item in before if isinstance(item, Unknown)]
-        return isinstance(verb, Outside) and verb.word.lower() not in lexicon().asks and wants[-1:] == ["to"]
+        return isinstance(verb, Outside) and verb.word.lower() not in word_list("asks") and wants[-1:] == ["to"]
 
     if len(clauses) > 1 and isinstance(clauses[-2].verb, Verb):
         items = clauses[-2].items

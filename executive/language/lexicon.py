@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Set
 from functools import cache
 from importlib import resources
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import yaml
 
@@ -46,47 +46,53 @@ def read_table(name: str) -> Any:
     return yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
 
 
+WordList = Literal[
+    "any_person", "anyone", "asides", "asked_with", "asks", "at_is_goal", "bare_goal", "belongs", "belongs_where",
+    "by_hand", "calls", "definite", "directions", "discards", "docks", "ends", "enters", "everyone", "fixtures",
+    "follows", "fullness", "gives", "goal_wanted", "goes_back", "hands", "heard_greetings", "here", "hesitations",
+    "hurls", "leaves", "levels", "light_whole", "loose", "loose_numbers", "no_numbers", "openers", "owners", "people",
+    "placing", "pointing", "postures", "prepared", "pronouns", "quantities", "relative", "requests", "some_of_them",
+    "somebody", "source_wanted", "speaker", "stacks", "subjects", "there", "titles", "to_recipient", "units",
+    "vague_numbers", "verbs_too", "wait", "wants", "whatever", "worn", "written", "yes",
+]  # fmt: skip
+"""Name of a plain list of words in verbs.yaml or words.yaml."""
+
+
+@cache
+def word_list(name: WordList) -> Set[str]:
+    """Returns the words, or the phrases, of a list in the order of its table."""
+    return dict.fromkeys({**read_table("verbs.yaml"), **read_table("words.yaml")}[name]).keys()
+
+
 class Lexicon:
-    """Word lists of verbs.yaml and words.yaml by their names; phrases are tuples of lower-case words.
+    """Dictionaries of verbs.yaml and words.yaml; phrases are tuples of lower-case words.
 
     `corrections` maps each phrase to True if it may be a filler; `light_nouns` maps a verb to the nouns of its light
     verb constructions ("take a picture").
     """
 
     def __init__(self) -> None:
-        self._lists: dict[str, Any] = {**read_table("verbs.yaml"), **read_table("words.yaml")}
+        verbs, words = read_table("verbs.yaml"), read_table("words.yaml")
         kinds: dict[Phrase, set[VerbKind]] = {}
         for kind in VerbKind:
-            for phrase in self._phrases(kind.value):
-                kinds.setdefault(phrase, set()).add(kind)
+            for text in verbs[kind.value]:
+                kinds.setdefault(tuple(text.split()), set()).add(kind)
         self.verbs = {phrase: frozenset(each) for phrase, each in kinds.items()}
-        names = ("fillers", "noted", "needs", "negations")
-        self.fillers, self.noted, self.needs, self.negations = map(self._phrases, names)
-        roles = self._lists["prepositions"].items()
+        self.fillers, self.noted, self.needs, self.negations = (
+            {tuple(text.split()): None for text in words[name]}.keys()
+            for name in ("fillers", "noted", "needs", "negations")
+        )
+        roles, softness = words["prepositions"].items(), words["corrections"].items()
         self.prepositions = {tuple(one.split()): PrepositionRole(role) for role, each in roles for one in each}
-        softness = self._lists["corrections"].items()
         self.corrections = {tuple(one.split()): name == "soft" for name, each in softness for one in each}
-        self.light_nouns: Mapping[str, frozenset[str]] = {
-            verb: frozenset(nouns) for verb, nouns in self._lists["light_nouns"].items()
-        }
-        self.short_forms: Mapping[str, str] = self._lists["short_forms"]
-        self.numbers = {word: int(number) for word, number in self._lists["numbers"].items()}
-
-    def __getattr__(self, name: str) -> Set[str]:
-        if name.startswith("__"):
-            raise AttributeError(name)
-        words = dict.fromkeys(self._lists[name]).keys()
-        setattr(self, name, words)
-        return words
-
-    def _phrases(self, name: str) -> Set[Phrase]:
-        return {tuple(text.split()): None for text in self._lists[name]}.keys()
+        self.light_nouns = {verb: frozenset(nouns) for verb, nouns in words["light_nouns"].items()}
+        self.short_forms: Mapping[str, str] = words["short_forms"]
+        self.third_persons: Mapping[str, str] = verbs["third_persons"]
+        self.numbers = {word: int(number) for word, number in words["numbers"].items()}
 
 
-@cache
-def lexicon() -> Lexicon:
-    """Dictionaries that come with the package."""
-    return Lexicon()
+lexicon = cache(Lexicon)
+"""Returns the dictionaries that come with the package."""
 
 
 def any_of(phrases: Iterable[str]) -> str:
@@ -106,38 +112,3 @@ def expression(entry: Any) -> str:
         return "".join(entry)
     texts = {name: each if name == "not_before" else [expression(each)] for name, each in entry.items()}
     return "".join(form.format(text) for name, form in _AROUND.items() for text in texts.get(name, ()))
-
-
-class Patterns:
-    """Regular expressions from a table, case-insensitive; each is compiled at first use.
-
-    {name} in an expression stands for another expression in the table, or in `words`.
-    """
-
-    def __init__(self, table: str, words: Mapping[str, str] | None = None) -> None:
-        self._table, self._words = table, dict(words or {})
-
-    def __getattr__(self, name: str) -> re.Pattern[str]:
-        if name.startswith("__"):
-            raise AttributeError(name)
-        found = self.compiled(self.text(name))
-        setattr(self, name, found)
-        return found
-
-    def compiled(self, text: str) -> re.Pattern[str]:
-        """Compiles an expression that is not in any table."""
-        return re.compile(re.sub(r"\{([a-z_]+)\}", lambda match: self.text(match[1]), text), re.IGNORECASE)
-
-    def mapping(self, name: str) -> tuple[tuple[str, re.Pattern[str]], ...]:
-        """Expressions in a mapping, each with its name."""
-        return tuple((key, self.compiled(expression(each))) for key, each in read_table(self._table)[name].items())
-
-    def text(self, name: str) -> str:
-        """Text of an expression, with the named expressions inserted."""
-        if name in self._words:
-            return self._words[name]
-        return self.compiled(expression(read_table(self._table)[name])).pattern
-
-    def with_words(self, **words: str) -> Patterns:
-        """Copies the patterns with more words that expressions may insert."""
-        return Patterns(self._table, {**self._words, **words})

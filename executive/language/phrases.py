@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Final
 
-from executive.language.lexicon import lexicon
+from executive.language.amounts import number_of_word, number_of_words
+from executive.language.lexicon import word_list
 from executive.language.nouns import NounKind
 from executive.language.tokens import Token
 from skills.api import ObjectKind
@@ -20,8 +21,6 @@ _LEFT: Final = frozenset(
 )
 _NOMINAL: Final = frozenset({"NOUN", "PROPN", "PRON", "NUM", "X"})
 _DEEPEST: Final = 6
-# They stand before a noun, too, but say nothing of it.
-_LOOSE: Final = frozenset({"then", "now", "just", "also", "please", "maybe", "again", "not", "n't", "instead"})
 _HEADLIKE: Final = frozenset({"obj", "iobj", "obl", "nsubj", "attr", "conj", "root"})
 
 
@@ -95,7 +94,7 @@ class Phrase:
     @property
     def said_count(self) -> int | None:
         """Number that was said, or None; "one" and "two" without a noun count too."""
-        said = next((_value(numeral) for numeral in self._numerals()), None)
+        said = next(map(number_of_words, self._numerals()), None)
         if said is None and self.plural and self.tokens[0].word == "both":
             said = 2
         return said if self.numbered is None else self.numbered
@@ -103,16 +102,16 @@ class Phrase:
     @property
     def odd_number(self) -> str | None:
         """Words of a number that cannot count objects: "one two three", "zero", "infinity", "2.5", "at least two"."""
-        odd = next((numeral for numeral in self._numerals() if not _value(numeral)), None)
+        odd = next((numeral for numeral in self._numerals() if not number_of_words(numeral)), None)
         left = self.tokens[:-1]
-        words = [t.text for t in odd or (t for t in left if t.word in lexicon().no_numbers)]
-        loose = any(t.word in lexicon().loose_numbers for t in left) and any(self._numerals())
+        words = odd or [t.text for t in left if t.word in word_list("no_numbers")]
+        loose = any(t.word in word_list("loose_numbers") for t in left) and any(self._numerals())
         return " ".join(t.text for t in left) if loose else " ".join(words) or None
 
     @property
     def pronoun(self) -> bool:
         """Returns whether the phrase refers to an earlier phrase ("it", "one", "two of them")."""
-        word = self.head.word in lexicon().pronouns and not self.stands_for_one
+        word = self.head.word in word_list("pronouns") and not self.stands_for_one
         return word and not self.extra and all(map(_is_determiner, self.tokens[:-1]))
 
     @property
@@ -123,22 +122,32 @@ class Phrase:
     @property
     def stands_for_somebody(self) -> bool:
         """Returns whether the phrase is a pronoun that can refer to a person."""
-        return len(self.tokens) == 1 and self.head.word in lexicon().somebody
+        return len(self.tokens) == 1 and self.head.word in word_list("somebody")
 
     @property
     def speaker(self) -> bool:
         """Returns whether the phrase means the speaker."""
-        return len(self.tokens) == 1 and self.head.word in lexicon().speaker and not self.extra
+        return len(self.tokens) == 1 and self.head.word in word_list("speaker") and not self.extra
 
     @property
     def person(self) -> bool:
         """Returns whether the phrase means a person: a noun for people, or a person's name."""
-        return self.head.lemma in lexicon().people or self.head.word in lexicon().people or self.named_person
+        return self.head.lemma in word_list("people") or self.head.word in word_list("people") or self.named_person
+
+    @property
+    def receiver(self) -> bool:
+        """Returns whether the phrase means the speaker or a person, who can be handed objects."""
+        return self.speaker or self.person
+
+    @property
+    def living(self) -> bool:
+        """Returns whether the phrase means a person, by profession too, or an animal."""
+        return self.person or self.kind is NounKind.PERSON
 
     @property
     def somebody(self) -> bool:
         """Returns whether the phrase means a person, or anybody."""
-        return self.person or self.head.word in lexicon().anyone
+        return self.person or self.head.word in word_list("anyone")
 
     @property
     def named_person(self) -> bool:
@@ -149,7 +158,7 @@ class Phrase:
             return self.head.entity == "PERSON"
         proper = all(t.pos == "PROPN" for t in self.tokens)
         somebody = proper or self.head.kind is NounKind.PERSON
-        titled = somebody and len(self.tokens) > 1 and self.tokens[0].word.rstrip(".") in lexicon().titles
+        titled = somebody and len(self.tokens) > 1 and self.tokens[0].word.rstrip(".") in word_list("titles")
         return titled or (self.head.kind is NounKind.PERSON and (proper or len(self.tokens) == 1))
 
     @property
@@ -160,7 +169,7 @@ class Phrase:
     @property
     def universal(self) -> bool:
         """Returns whether the phrase means all of a kind ("everyone", "all the men"); "all the forks" does not."""
-        words = {t.word for t in self.tokens} & lexicon().everyone
+        words = {t.word for t in self.tokens} & word_list("everyone")
         return bool(words - {_ALL}) or (bool(words) and (self.person or not self.plural))
 
     @property
@@ -168,13 +177,13 @@ class Phrase:
         """Returns whether the phrase means the robot, or something of the robot ("your phone"), which owns nothing."""
         if len(self.tokens) == 1 and self.head.word in ("you", "yourself"):
             return True
-        held = self.kind is NounKind.THING or self.head.lemma in lexicon().fixtures
+        held = self.kind is NounKind.THING or self.head.lemma in word_list("fixtures")
         return held and any(t.word == "your" and t.index < self.head.index for t in self.tokens)
 
     @property
     def indefinite(self) -> bool:
         """Returns whether the phrase means any object of its kind: it has "a" or no article, and no possessive."""
-        return not any(t.word in lexicon().definite or t.tag in ("PRP$", "POS") for t in self.tokens)
+        return not any(t.word in word_list("definite") or t.tag in ("PRP$", "POS") for t in self.tokens)
 
     @property
     def known(self) -> bool:
@@ -184,7 +193,7 @@ class Phrase:
     @property
     def kind(self) -> NounKind | None:
         """Kind of the noun; for "a piece of advice" the kind of "advice"."""
-        meant = self.head.lemma in lexicon().quantities or self.head.lemma in _ENDS
+        meant = self.head.lemma in word_list("quantities") or self.head.lemma in word_list("ends")
         return self.of_kind if meant and self.of_kind else self.head.kind
 
     @property
@@ -196,16 +205,16 @@ class Phrase:
     @property
     def counts(self) -> bool:
         """Returns whether the phrase is only a number ("two", "a couple")."""
-        return _number(self.head) is not None
+        return number_of_word(self.head.word) is not None
 
     @property
     def distributed(self) -> Phrase:
         """Phrase "all cubes" for "each cube"; the phrase itself for other words, such as "every second cube"."""
         each, *between = self.tokens[:-1] or self.tokens
-        counted = any(t.tag == "CD" or t.word in _SOME_OF_THEM for t in between)
-        objects = self.kind is None or (self.kind.within_reach and self.head.lemma not in lexicon().fixtures)
-        noun = len(self.tokens) > 1 and self.head.word not in lexicon().pronouns and not (self.person or self.plural)
-        if each.word not in _EACH or counted or not (objects and noun):
+        counted = any(t.tag == "CD" or t.word in word_list("some_of_them") for t in between)
+        objects = self.kind is None or (self.kind.within_reach and self.head.lemma not in word_list("fixtures"))
+        noun = len(self.tokens) > 1 and self.head.word not in word_list("pronouns") and not (self.person or self.plural)
+        if each.word not in ("each", "every") or counted or not (objects and noun):
             return self
         head = replace(self.head, text=plural(self.head.text), tag="NNS")
         return replace(self, tokens=(replace(each, text=_ALL, lemma=_ALL), *between, head))
@@ -222,10 +231,6 @@ class Phrase:
         """Returns the phrase with "of" and the contents after the noun; a mere number has no contents."""
         head = replace(self.head, kind=NounKind.ABSTRACT) if inner.counts else self.head
         return replace(self.with_extra("of", inner.text), tokens=(*self.tokens[:-1], head), of_kind=inner.kind)
-
-    def with_count(self, count: int) -> Phrase:
-        """Returns the phrase with another number."""
-        return replace(self, numbered=count)
 
     def replace_one(self, meant: Phrase) -> Phrase:
         """Replaces "one" by the noun of `meant`, and keeps the adjectives before "one"."""
@@ -246,31 +251,25 @@ class Phrase:
         order = [t for each in self.relations for t in each.before]
         return (*(t for n, t in enumerate(left) if n in units | mine or not (_is_determiner(t) or t in order)), head)
 
-    def _numerals(self) -> Iterator[tuple[Token, ...]]:
+    def _numerals(self) -> Iterator[tuple[str, ...]]:
         """Yields each number that counts objects, without numbers in measures ("ten inch nails")."""
         left = tuple(t for n, t in enumerate(self.tokens[:-1]) if not self._measures(n))
         for numeral, run in groupby(
             self.tokens if self.counts else left,
-            key=lambda t: _number(t) is not None or t.tag == "CD" or _DIGITS.fullmatch(t.text) is not None,
+            key=lambda t: number_of_word(t.word) is not None or t.tag == "CD" or _DIGITS.fullmatch(t.text) is not None,
         ):
             if numeral:
-                yield tuple(run)
+                yield tuple(t.word for t in run)
 
     def _measures(self, at: int) -> bool:
         """Returns whether the number at a position belongs to a unit of measure."""
-        unit = at + 2 < len(self.tokens) and self.tokens[at + 1].word in lexicon().units
-        return unit and _number(self.tokens[at]) is not None
+        unit = at + 2 < len(self.tokens) and self.tokens[at + 1].word in word_list("units")
+        return unit and number_of_word(self.tokens[at].word) is not None
 
 
-_ENDS: Final = frozenset({"end", "start", "beginning", "middle"})
-_POINTING: Final = frozenset({"that", "this", "these", "those"})
 _ALL: Final = "all"
-_EACH: Final = frozenset({"each", "every"})
-_SOME_OF_THEM: Final = frozenset({"other", "second", "third", "fourth", "fifth", "few", "next"})
 _ONE: Final = frozenset({"one", "ones"})
 _DIGITS: Final = re.compile(r"-?\d+(?:[.,]\d+)?")
-_DOZEN: Final = "dozen"
-_TENS: Final = frozenset(range(20, 100, 10))
 
 
 def _joined_text(words: Sequence[Token | str]) -> str:
@@ -283,27 +282,9 @@ def _joined_text(words: Sequence[Token | str]) -> str:
 
 
 def _is_determiner(token: Token) -> bool:
-    said_number = _number(token) is not None or token.word in lexicon().vague_numbers
-    said_number = said_number or token.word in _POINTING
+    said_number = number_of_word(token.word) is not None or token.word in word_list("vague_numbers")
+    said_number = said_number or token.word in word_list("pointing")
     return said_number or token.pos == "DET" or token.tag in ("PRP$", "DT", "PDT", "POS", "WP$") or token.text == "-"
-
-
-def _value(numeral: Sequence[Token]) -> int | None:
-    """Number that successive words express: "twenty one", "two dozen"; None for other words."""
-    first, *rest = map(_number, numeral)
-    if first is None or not rest:
-        return first
-    if len(rest) > 1 or rest[0] is None:
-        return None
-    if numeral[1].word == _DOZEN:
-        return first * rest[0]
-    return first + rest[0] if first in _TENS and 0 < rest[0] < 10 and first != rest[0] else None
-
-
-def _number(token: Token) -> int | None:
-    if token.word.isdecimal() and len(token.word) < 4:
-        return int(token.word)
-    return lexicon().numbers.get(token.word)
 
 
 def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:
@@ -329,7 +310,7 @@ def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:
 
 def _compound(before: Phrase, phrase: Phrase) -> bool:
     """Returns whether two adjacent nouns without an article form one phrase, such as "kitchen" and "counter"."""
-    if before.head.lemma in lexicon().people and phrase.named_person and phrase.proper:
+    if before.head.lemma in word_list("people") and phrase.named_person and phrase.proper:
         return before.head.pos in ("NOUN", "PROPN") and not before.plural
     nouns = before.head.pos == "NOUN" and all(t.pos == "NOUN" for t in phrase.tokens)
     return nouns and not before.plural and not before.person and before.head.kind is not NounKind.PERSON
@@ -349,7 +330,7 @@ def _is_head(token: Token, tokens: Sequence[Token]) -> bool:
 def _belongs(token: Token, head: Token, tokens: Sequence[Token]) -> bool:
     """Returns whether a word before `head` depends on it directly or through other words of the phrase."""
     for _ in range(_DEEPEST):
-        if token.relation not in _LEFT or token.word == "," or token.word in _LOOSE:
+        if token.relation not in _LEFT or token.word == "," or token.word in word_list("loose"):
             return False
         token = tokens[token.head]
         if token.index >= head.index:

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from enum import Enum
 from typing import Any, Final
 
+from executive.language.lexicon import word_list
 from executive.words.mission import QuestionPolicy
 from skills.inputs.errors import listing
 
@@ -78,7 +79,7 @@ def perhaps_question(slot: Slot, heard: str, candidates: tuple[str, ...]) -> Cla
 
 def open_question(reason: str, heard: str | None) -> ClarifyingQuestion:
     """Question about missing words: the destination, or what "it" or "there" means."""
-    slot = Slot.GOAL if heard is None else Slot.PLACE if heard in _PLACE_WORDS else Slot.THING
+    slot = Slot.GOAL if heard is None else Slot.PLACE if heard == _THERE else Slot.THING
     return ClarifyingQuestion(f"{reason[:1].upper()}{reason[1:]}", slot, heard=heard)
 
 
@@ -90,7 +91,7 @@ def chosen_candidate(question: ClarifyingQuestion, answer: str) -> str | None:
         if said in (str(number), *_ORDINALS[number - 1 : number]):
             return candidate
     agreed = set(re.findall(r"\w+", answer.lower()))
-    if len(question.candidates) == 1 and agreed & _YES and agreed <= _YES | {"please"}:
+    if len(question.candidates) == 1 and agreed & word_list("yes") and agreed <= word_list("yes") | {"please"}:
         return question.candidates[0]
     exact = [c for c in question.candidates if c.lower() == said]
     parts = [c for c in question.candidates if said and set(said.split()) <= set(c.lower().split())]
@@ -106,10 +107,9 @@ def insert_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> s
     value = chosen_candidate(question, answer) or _FILLERS.sub("", answer).strip(" ,.!?")
     if question.heard is None:
         return f"{sentence.rstrip(' .,!?')} {_whereto(value)}"
-    place_word = question.heard.lower() in _PLACE_WORDS
-    full = _whereto(value) if place_word else value
-    if not place_word:
-        full = _definite(value) if question.heard.lower() in _PRONOUNS else _LEADING.sub("", value)
+    heard, pronouns = question.heard.lower(), word_list("pronouns") | word_list("somebody")
+    full = _definite(value) if heard in pronouns else _LEADING.sub("", value)
+    full = _whereto(value) if heard == _THERE else full
     longer = tuple(c.lower() for c in question.candidates if len(c) > len(question.heard))
     for match in re.finditer(rf"\b{re.escape(question.heard)}\b", sentence, re.IGNORECASE):
         if not sentence[: match.end()].lower().endswith(longer):  # it is no part of a candidate's whole name
@@ -121,11 +121,11 @@ def _nearly(question: ClarifyingQuestion, said: str) -> list[str]:
     """Candidates whose spelling or sound is similar to the answer."""
     from rapidfuzz.distance import OSA
 
-    from executive.language.spelling import nearest_by_sound
+    from executive.language.spelling import sound_distance
 
     slips = [c for c in question.candidates if len(said) > 2 and OSA.distance(said, c.lower()) <= len(c) // 4]
-    match = nearest_by_sound(said, question.candidates)
-    return slips or ([match.phrase] if match is not None and match.distance <= ALIKE_SOUND else [])
+    near = sorted((sound_distance(said, c), n) for n, c in enumerate(question.candidates))[:1]
+    return slips or [question.candidates[n] for distance, n in near if distance <= ALIKE_SOUND]
 
 
 def _definite(value: str) -> str:
@@ -143,9 +143,7 @@ _FILLERS: Final = re.compile(
     re.IGNORECASE,
 )
 _LEADING: Final = re.compile(rf"^(?:{_PREPOSITION}\s+)?(?:(?:the|a|an|my)\s+)?(?=\w)", re.IGNORECASE)
-_PRONOUNS: Final = frozenset("it them they one ones that this those these some him her there".split())  # noqa: SIM905
-_PLACE_WORDS: Final = frozenset({"there"})
-_YES: Final = frozenset({"yes", "yeah", "yep", "sure", "ok", "okay", "right", "correct", "exactly", "y"})
+_THERE: Final = "there"
 _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth")
 
 

@@ -25,14 +25,13 @@ from executive.language.items import (
     may_begin_command,
     verb,
 )
-from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, word_list
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
-from executive.language.tokens import Token
+from executive.language.tokens import Token, longest_of
 
-_SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
+_SEPARATORS: Final = frozenset({"", ",", "and", "or", "then", ";"})
 _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
-_SHOWN: Final = frozenset({"that", "this", "those", "these"})
 _OF_ALL: Final = re.compile(r"all|none|(?:any|every|no)(?:where|one|body|thing)")
 """Words after which "but" means "except"."""
 
@@ -55,31 +54,27 @@ class Reader(Row):
         while self.at < len(self.tokens):
             if self.at in self.silent:
                 self.at += 1
-                continue
-            item = next((found for step in steps if (found := step(items)) is not None), None)
-            items.append(item if item is not None else Unknown(self.take(1)))
+            else:
+                found = next((item for step in steps if (item := step(items)) is not None), None)
+                items.append(found or Unknown(self.take(1)))
         return tuple(items)
 
     def _mark(self, items: list[Item]) -> Item | None:
         """Reads a negation or correction: "not", "no, the hammer"; "no" in "no milk" is neither."""
-        correction, negation = (self.match(lexicon().corrections), self.match(lexicon().negations))
-        if correction is not None and len(correction) >= len(negation or ()):
-            behind = self.tokens[self.at + len(correction) : self.at + len(correction) + 1]
-            noun = bool(behind) and behind[0].pos in ("NOUN", "ADJ")
-            if correction != ("no",) or not noun:
-                return Correction(self.take_words(correction), lexicon().corrections[correction])
-        return None if negation is None else Negation(self.take_words(negation))
+        correction, negation = self.match(lexicon().corrections), self.match(lexicon().negations)
+        nothing = correction == ("no",) and self.token(1).pos in ("NOUN", "ADJ")
+        if correction and len(correction) >= len(negation) and not nothing:
+            return Correction(self.take_words(correction), lexicon().corrections[correction])
+        return Negation(self.take_words(negation)) if negation else None
 
     def _verb(self, items: list[Item]) -> Item | None:
         found = self.match(lexicon().verbs) or self._gerund(items)
-        if found is not None and self._takes_preposition(found):
+        if found and self._takes_preposition(found):
             found = found[:-1]
-        if found is None:
-            return None
-        token, behind = self.tokens[self.at], self.tokens[self.at + len(found) : self.at + len(found) + 1]
+        token, behind = self.token(), self.token(len(found))
         inside = any(start < self.at < start + len(p.tokens) for start, p in self.phrases.items())
         acts = token.pos == "VERB" and token.tag in _VERB_TAGS and not inside
-        if not (acts or (may_begin_command(items) and bool(behind) and behind[0].word not in _SEPARATORS)):
+        if not found or not (acts or (may_begin_command(items) and behind.word not in _SEPARATORS)):
             return None
         self.at += len(found)
         return verb(" ".join(found))
@@ -88,36 +83,32 @@ class Reader(Row):
         """Returns whether a verb's last word begins a longer preposition instead ("go | in front of")."""
         if verb[:-1] not in lexicon().verbs:
             return False
-        start = self.at + len(verb) - 1
-        place = self.phrase_at(start + 1)
+        place = self.phrase_at(self.at + len(verb))
         if verb[-1] in ("in", "on") and place is not None and place.kind is NounKind.PLACE:
             return True
-        ahead = tuple(t.word for t in self.tokens[start : start + LONGEST])
-        return any(ahead[:n] in lexicon().prepositions for n in range(2, len(ahead) + 1))
+        return len(self.match(lexicon().prepositions, len(verb) - 1)) > 1
 
-    def _gerund(self, items: list[Item]) -> tuple[str, ...] | None:
+    def _gerund(self, items: list[Item]) -> tuple[str, ...]:
         """Verb in a form such as "bringing" or "brought" where a command begins, as after "would you mind"."""
-        first = self.tokens[self.at]
-        past = first.tag in ("VBD", "VBN") and not items
-        if not (past or (first.tag == "VBG" and may_begin_command(items))):
-            return None
-        spoken = (first.lemma, *(t.word for t in self.tokens[self.at + 1 : self.at + LONGEST]))
-        return next((spoken[:n] for n in range(len(spoken), 0, -1) if spoken[:n] in lexicon().verbs), None)
+        first = self.token()
+        if not ((first.tag in ("VBD", "VBN") and not items) or (first.tag == "VBG" and may_begin_command(items))):
+            return ()
+        rest = self.tokens[self.at + 1 : self.at + LONGEST]
+        return longest_of(lexicon().verbs, [first.lemma, *(t.word for t in rest)])
 
     def _being(self, items: list[Item]) -> Item | None:
-        token, after = self.tokens[self.at], self.ahead()
-        modal = int(token.tag == "MD" and bool(after) and after[0].word == "be")
-        if modal or (token.lemma == "be" and token.pos in ("AUX", "VERB") and self.match(lexicon().fillers) is None):
-            second = self.tokens[self.at + 1 + modal : self.at + 2 + modal]
-            existential = bool(second) and second[0].tag == "EX"
+        token, after = self.token(), self.token(1)
+        modal = token.tag == "MD" and after.word == "be"
+        if modal or (token.lemma == "be" and token.pos in ("AUX", "VERB") and not self.match(lexicon().fillers)):
+            existential = self.token(1 + modal).tag == "EX"
             return Being(self.take(1 + modal + existential), existential, asked=not modal)
-        if token.tag == "EX" or (token.word == "there" and after and after[0].lemma == "be"):
-            end = next((t.index for t in self.ahead(3) if t.lemma == "be"), self.at)
-            return Being(self.take(end + 1 - self.at), existential=True, asked=False)
+        if token.tag == "EX" or (token.word == "there" and after.lemma == "be"):
+            end = next((n for n in range(1, 4) if self.token(n).lemma == "be"), 0)
+            return Being(self.take(end + 1), existential=True, asked=False)
         return None
 
     def _chunk(self, items: list[Item]) -> Item | None:
-        preposition = self.match(self.prepositions) or ()
+        preposition = self.match(self.prepositions)
         start = self.at + len(preposition)
         phrase = self.phrase_at(start) or self._shown_at(start)
         if phrase is None:
@@ -133,11 +124,11 @@ class Reader(Row):
 
     def _level(self, items: list[Item]) -> Item | None:
         """Reads "upstairs" as a destination or a place to search; before a place, the word adds nothing."""
-        token, ahead = self.tokens[self.at], self.ahead()
-        if token.word not in lexicon().levels:
+        token, behind = self.token(), self.token(1)
+        if token.word not in word_list("levels"):
             return None
         self.at += 1
-        before = ahead and ahead[0].word != "for" and (ahead[0].pos == "ADP" or ahead[0].tag in ("TO", "IN"))
+        before = behind.word != "for" and (behind.pos == "ADP" or behind.tag in ("TO", "IN"))
         if before or (items and isinstance(items[-1], Chunk) and items[-1].role is not None):
             return Aside(token.text)
         verb = next((item for item in reversed(items) if isinstance(item, Verb | Being)), None)
@@ -146,18 +137,16 @@ class Reader(Row):
 
     def _shown_at(self, start: int) -> Phrase | None:
         """Noun phrase after a "that" that the parser did not take as its article ("hand me that cup")."""
-        points = start < len(self.tokens) and self.tokens[start].word in _SHOWN
-        phrase = self.phrase_at(start + 1) if points else None
-        if phrase is None or phrase.named_person or phrase.head.word in lexicon().subjects:
+        that, phrase = self.token(start - self.at), self.phrase_at(start + 1)
+        if that.word not in word_list("pointing") or phrase is None:
             return None
-        return Phrase((replace(self.tokens[start], tag="DT", pos="DET"), *phrase.tokens))
+        if phrase.named_person or phrase.head.word in word_list("subjects"):
+            return None
+        return Phrase((replace(that, tag="DT", pos="DET"), *phrase.tokens))
 
     def _of(self, phrase: Phrase) -> Phrase:
         """Joins "of wine" to "a bottle", and "of cups" to "two" or "a couple"."""
-        while self.at < len(self.tokens) and self.tokens[self.at].word == "of":
-            inner = self.phrase_at(self.at + 1)
-            if inner is None:
-                break
+        while self.word() == "of" and (inner := self.phrase_at(self.at + 1)) is not None:
             self.at += 1 + len(inner.tokens)
             whole = phrase.counts or phrase.head.word in ("all", "both")
             counted = replace(inner, tokens=(*phrase.tokens, *inner.tokens))
@@ -166,30 +155,24 @@ class Reader(Row):
 
     def _numbered(self, phrase: Phrase) -> Phrase:
         """Joins a number to the place before it: "room four"."""
-        token, behind = self.tokens[self.at] if self.at < len(self.tokens) else None, self.ahead()
-        counts = bool(behind) and behind[0].pos in ("NOUN", "ADJ", "PROPN")
+        counts = self.token(1).pos in ("NOUN", "ADJ", "PROPN")
         countable = phrase.kind in (NounKind.PLACE, NounKind.THING) and not (phrase.plural or phrase.pronoun)
-        if token is None or token.tag != "CD" or not countable or counts:
-            return phrase
-        return phrase.with_extra(self.take(1))
+        joins = self.token().tag == "CD" and countable and not counts
+        return phrase.with_extra(self.take(1)) if joins else phrase
 
     def _description_end(self, phrase: Phrase) -> int:
         """End of a description after a noun: of a person's activity or clothes, or of an object's contents."""
-        if self.at >= len(self.tokens):
-            return self.at
-        here = [t.word for t in (self.tokens[self.at], *self.ahead())]
-        who_is = here[0] in ("who", "that", "which") and here[1:] and here[1] in ("is", "'s", "are", "'re")
-        after = self.tokens[self.at + 2 : self.at + 3]
-        if phrase.person and who_is and after and after[0].tag in ("VBG", "IN"):
+        who_is = self.word() in ("who", "that", "which") and self.word(1) in ("is", "'s", "are", "'re")
+        if phrase.person and who_is and self.token(2).tag in ("VBG", "IN"):
             self.at += 2
-        token, inner = self.tokens[self.at], self.phrase_at(self.at + 1)
+        token, inner = self.token(), self.phrase_at(self.at + 1)
         if phrase.person and token.tag == "VBG":
             return self._doing_end()
         end = self.at + 1 + (0 if inner is None else len(inner.tokens))
         apart = PrepositionRole.BESIDE in self.prepositions.values()  # in a world, it says which one
         if inner is not None and token.word == "on" and inner.head.word in ("left", "right") and not apart:
             return end if end == len(self.tokens) or self.tokens[end].word != "of" else self.at
-        worn = inner is not None and inner.head.lemma in lexicon().worn
+        worn = inner is not None and inner.head.lemma in word_list("worn")
         joins = token.word in ("with", "containing", "holding")
         joins = joins or (phrase.person and token.word in ("in", "wearing") and worn)
         if inner is None or not joins or inner.person or inner.speaker or inner.pronoun:
@@ -212,17 +195,14 @@ class Reader(Row):
             return 1
         preposition = int(self.tokens[start].pos in ("ADP", "PART"))
         phrase = self.phrase_at(start + preposition)
-        if phrase is None or phrase.head.lemma not in lexicon().directions:
+        if phrase is None or phrase.head.lemma not in word_list("directions"):
             return 0
         return preposition + len(phrase.tokens)
 
     def _small(self, items: list[Item]) -> Item | None:
-        token, behind = self.tokens[self.at], self.ahead()
-        if self._idle(items):
-            self.at += 1
-            return Separator("")
+        token = self.token()
         before = token.pos in ("ADP", "ADV") and token.word not in ("of", "from")
-        if before and behind and behind[0].word in ("here", "there"):
+        if self._idle(items) or (before and self.word(1) in ("here", "there")):
             self.at += 1
             return Separator("")
         chunks = [item for item in items if isinstance(item, Chunk)]
@@ -230,66 +210,64 @@ class Reader(Row):
         if token.word == "inside" and named and not any(isinstance(item, Being) for item in items):  # the house itself
             self.at += 1
             return _place(token, PrepositionRole.GOAL)
-        if token.word in lexicon().here or token.word in lexicon().there:
+        if token.word in word_list("here") or token.word in word_list("there"):
             self.at += 1
-            return Adverb(here=token.word in lexicon().here)
+            return Adverb(here=token.word in word_list("here"))
         if token.word in ("if", "whether"):
             self.at += 1
             return Whether()
         if token.word == "but" and self.at > 0 and self._excepts(items):
             return None
-        if token.word in lexicon().postures and any(item.phrase.somebody for item in chunks[-1:]):
+        if token.word in word_list("postures") and any(item.phrase.somebody for item in chunks[-1:]):
             return Unknown(self.take(1))
         filler, noted = self._particle(items) or self.match(lexicon().fillers), self.match(lexicon().noted)
-        if noted is not None and len(noted) > len(filler or ()):
+        if len(noted) > len(filler):
             return Aside(self.take(len(noted)))
-        return None if filler is None else Separator(self.take_words(filler))
+        return Separator(self.take_words(filler)) if filler else None
 
     def _excepts(self, items: Sequence[Item]) -> bool:
         """Returns whether "but" means "except": after "everything", or after "all the drinks" if a noun follows."""
         last = items[-1] if items else None
         words = {token.word for token in last.phrase.tokens} if isinstance(last, Chunk) else set()
         of_all = bool(words & {"all", "any", "every", "each"}) and self.phrase_at(self.at + 1) is not None
-        return of_all or _OF_ALL.fullmatch(self.tokens[self.at - 1].word) is not None
+        return of_all or _OF_ALL.fullmatch(self.word(-1)) is not None
 
     def _idle(self, items: Sequence[Item]) -> bool:
         """Returns whether the next word adds nothing, as in "that clamp over there" or "I need like a towel"."""
-        token, behind = self.tokens[self.at], self.ahead()
-        if token.word in lexicon().there and self._points(items):
+        token, behind = self.token(), self.token(1)
+        if token.word in word_list("there") and self._points(items):
             return True
-        wants = bool(items) and (isinstance(items[-1], Verb) or self.tokens[self.at - 1].word in ("me", "us"))
+        wants = bool(items) and (isinstance(items[-1], Verb) or self.word(-1) in ("me", "us"))
         if token.word == "like" and wants and self.phrase_at(self.at + 1):
             return True
         last = next((item for item in reversed(items) if isinstance(item, Verb | Being | Outside)), None)
-        purpose = bool(behind) and behind[0].tag == "VB" and any(verb[0] == behind[0].word for verb in lexicon().verbs)
+        purpose = behind.tag == "VB" and any(verb[0] == behind.word for verb in lexicon().verbs)
         if purpose and token.tag == "TO" and isinstance(last, Verb) and VerbKind.GO in last.kinds:
             return True  # go to take the broom
-        return not items and token.word in ("after", "upon", "by") and bool(behind) and behind[0].tag == "VBG"
+        return not items and token.word in ("after", "upon", "by") and behind.tag == "VBG"
 
     def _points(self, items: Sequence[Item]) -> bool:
         """Returns whether "over there" only accompanies "that", as in "that clamp over there"."""
         named = next((item for item in reversed(items) if not isinstance(item, Separator)), None)
-        behind = self.ahead()
-        beyond = self.tokens[self.at - 1].word == "over" or (bool(behind) and behind[0].tag == "IN")
+        beyond = self.word(-1) == "over" or self.token(1).tag == "IN"
         if not isinstance(named, Chunk) or named.role is not None or not beyond:
             return False
-        return named.phrase.tokens[0].word in _SHOWN and not named.phrase.pronoun
+        return named.phrase.tokens[0].word in word_list("pointing") and not named.phrase.pronoun
 
-    def _particle(self, items: list[Item]) -> tuple[str, ...] | None:
+    def _particle(self, items: list[Item]) -> tuple[str, ...]:
         """Joins a particle to its verb: "put the cup down"."""
-        at = next((n for n in range(len(items) - 1, -1, -1) if isinstance(items[n], Verb)), None)
-        last = None if at is None else items[at]
-        particle, behind = self.tokens[self.at].word, self.ahead()
-        if at is None or not isinstance(last, Verb) or (*last.text.split(), particle) not in lexicon().verbs:
-            return None
-        if behind and behind[0].word in lexicon().here | lexicon().there:
-            return None
+        particle = self.word()
+        at, last = next(((n, item) for n, item in [*enumerate(items)][::-1] if isinstance(item, Verb)), (0, None))
+        if last is None or (*last.text.split(), particle) not in lexicon().verbs:
+            return ()
+        if self.word(1) in word_list("here") | word_list("there"):
+            return ()
         items[at] = verb(f"{last.text} {particle}")
         return (particle,)
 
     def _outside(self, items: list[Item]) -> Item | None:
         """Unknown verb at a position where a clause may begin."""
-        token = self.tokens[self.at]
+        token = self.token()
         if token.pos != "VERB" or token.tag not in _VERB_TAGS or not (may_begin_command(items) or token.tag == "VB"):
             return None
         return Outside(self.take(1))

@@ -177,7 +177,7 @@ def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:
     if phrase.head.word in ("them", "they", "these", "those") and len(memory.gathered) > len(memory.objects):
         return memory.gathered
     said = phrase.said_count
-    return memory.objects if said is None else [item.with_count(said) for item in memory.objects]
+    return memory.objects if said is None else [replace(item, numbered=said) for item in memory.objects]
 
 
 def _place(place: Location | None, memory: Memory) -> Location | None:

@@ -8,7 +8,7 @@ from functools import cache
 from typing import Final
 
 from executive.language.items import PLACES, Adverb, Being, Chunk, Item, Outside, Separator, Unknown, Verb, Whether
-from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, read_table
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, read_table, word_list
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase, SpokenRelation
 from executive.language.tokens import Token
@@ -35,7 +35,7 @@ class Location:
     @property
     def living(self) -> bool:
         """Returns whether the location is a person, by profession too, or an animal: "him" and "her" can mean them."""
-        return self.phrase is not None and (self.phrase.person or self.phrase.kind is NounKind.PERSON)
+        return self.phrase is not None and self.phrase.living
 
     @property
     def kind(self) -> NounKind | None:
@@ -113,7 +113,7 @@ class Roles:
             (self.joined_goals if joined or (one.joint and self.ats) else self.ats).append(location)
         elif role is PrepositionRole.PATH:
             self.paths.append(location)
-        elif phrase.speaker or phrase.person:
+        elif phrase.receiver:
             self.recipient, self.favour = location, True
         else:
             self.searched = phrase
@@ -122,8 +122,8 @@ class Roles:
         phrase = one.chunk.phrase
         self.listed = self.listed or (bool(one.joint) and bool(self.objects))
         last = self.objects[-1] if self.objects else None
-        distinct_objects = last is not None and not (last.speaker or last.person) and phrase.stands_for_one
-        if last is not None and distinct_objects and one.joint in _LISTING and one.within is None:
+        again = phrase.stands_for_one and one.joint in _LISTING and one.within is None
+        if again and last is not None and not last.receiver:
             self.objects[-1] = phrase.replace_one(last)
             return
         places = self.goals or self.ats
@@ -174,7 +174,7 @@ def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) ->
         row.append(one)
     roles.goals += [HERE if item.here else THERE for item in items if isinstance(item, Adverb)]
     first = roles.objects[0] if roles.objects else None
-    them = first is not None and (first.stands_for_somebody or first.somebody or first.kind is NounKind.PERSON)
+    them = first is not None and (first.stands_for_somebody or first.somebody or first.living)
     receives = first is not None and len(roles.objects) > 1 and (first.person or (them and not roles.listed))
     if first is not None and (first.speaker or receives):
         roles.objects.pop(0)  # give Robin a coke, bring me a coke
@@ -195,7 +195,8 @@ def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Placed]:
             yield _Placed(before, joint)
         elif isinstance(item, Unknown | Whether):
             roles.unknown.append(item.word if isinstance(item, Unknown) else "if")
-        relative = isinstance(item, Separator) and (item.word in lexicon().relative or (relative and item.word == ""))
+        relates = isinstance(item, Separator) and item.word in word_list("relative")
+        relative = relates or (relative and isinstance(item, Separator) and item.word == "")
         joint = "" if not isinstance(item, Separator) else item.word if item.word in _JOINTS else joint
 
 
@@ -241,7 +242,7 @@ def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
     first = len(row) - 1
     while first > 0 and row[first].joint in _LISTING:
         before, chunk = row[first - 1].chunk, row[first].chunk
-        receives = before.phrase.speaker or before.phrase.person or before.phrase.kind is NounKind.PERSON
+        receives = before.phrase.speaker or before.phrase.living
         if before.role != chunk.role or (receives and not chunk.phrase.person):
             break
         first -= 1
@@ -298,10 +299,12 @@ class _Row:
             relation = self._relation(item)
             if relation is not None and self._attach(item, relation):
                 return
-            if item.role in (None, PrepositionRole.FOR) and not _is_somebody(item):
+            if item.role in (None, PrepositionRole.FOR) and not item.phrase.receiver:
                 self.named, item = len(self.found), replace(item, phrase=self._ordered(item.phrase))
+            elif _is_placed(item):
+                self.place = len(self.found)
             elif item.role in _PLACED:
-                self.named, self.place = (None, self.place) if _is_somebody(item) else (self.named, len(self.found))
+                self.named = None
         self.found.append(item)
 
     def _ordered(self, phrase: Phrase) -> Phrase:
@@ -329,7 +332,7 @@ class _Row:
         if bare in parts or (part in parts and (beside is None or item.phrase.kind is NounKind.PLACE)):
             said = bare if bare in parts else part
             return SpokenRelation(parts[said], said)
-        if beside is None or (_is_somebody(item) and beside not in _COMPARED):
+        if beside is None or (item.phrase.receiver and beside not in _COMPARED):
             return None
         joint, other = (*self.rest, None, None)[:2]
         if beside is not RelationKind.BETWEEN:
@@ -347,15 +350,15 @@ class _Row:
         if kinds <= _GOES:
             return False
         surface, last, behind = replace(item, preposition="on", role=PrepositionRole.AT), self.found[-1], self.rest[:1]
-        apart = isinstance(last, Separator) and last.word in lexicon().relative
-        aims = [id(one) for one in (*self.found, *self.rest) if isinstance(one, Chunk) and _is_aim(one)]
-        lacks = isinstance(verb, Verb) and verb.text in lexicon().at_is_goal and not (aims or apart)
+        apart = isinstance(last, Separator) and last.word in word_list("relative")
+        aims = [id(one) for one in (*self.found, *self.rest) if _is_aim(one)]
+        lacks = isinstance(verb, Verb) and verb.text in word_list("at_is_goal") and not (aims or apart)
         if lacks and VerbKind.ROUND_TRIP in kinds:
             return False  # it could say which one, or where to
         aimed = self.place is not None and id(self.found[self.place]) in aims
         is_spot = self.named is not None and (lacks or aimed or (VerbKind.PLACE in kinds and not apart))
         if is_spot and (own or self.place is None):
-            placed = [one for one in behind if isinstance(one, Chunk) and one.role in _PLACED and not _is_somebody(one)]
+            placed = [one for one in behind if isinstance(one, Chunk) and _is_placed(one)]
             named = surface if own or relation.landmarks else replace(surface, phrase=_THERE)
             place = named if own or not placed else placed[0]
             self.rest[: place is not named] = [replace(place, phrase=place.phrase.with_relation(relation))]
@@ -370,10 +373,13 @@ class _Row:
         return True
 
 
-def _is_somebody(item: Chunk) -> bool:
-    return item.phrase.speaker or item.phrase.person
-
-
-def _is_aim(item: Chunk) -> bool:
+def _is_aim(item: Item) -> bool:
     """Returns whether a noun phrase says whereto, or to whom."""
-    return item.role is PrepositionRole.GOAL or (_is_somebody(item) and item.role in (None, PrepositionRole.FOR))
+    if not isinstance(item, Chunk):
+        return False
+    return item.role is PrepositionRole.GOAL or (item.phrase.receiver and item.role in (None, PrepositionRole.FOR))
+
+
+def _is_placed(item: Chunk) -> bool:
+    """Returns whether a noun phrase is a place of objects, or one to put them."""
+    return item.role in _PLACED and not item.phrase.receiver

@@ -8,7 +8,7 @@ from typing import Final
 
 from executive.language.addressees import AddressedText, Addressee, RobotChoice, addressees
 from executive.language.clauses import Clause, split
-from executive.language.cleaning import clean
+from executive.language.cleaning import called_stranger, clean
 from executive.language.parser import DependencyParser
 from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
@@ -58,17 +58,17 @@ def understand_for_robots(
         return replace(alone, parts=(part,)) if alone.status is Status.OK else alone
     assert knowledge is not None
     said = correct_spelling(text, knowledge, parser) if correct else CorrectedText(text)
-    forms, addressed = addressees(names).forms, True
-    stranger = forms.stranger.match(text)
+    addressed = True
     try:
         rules = read_rules(said.text, knowledge)
         assert rules.knowledge is not None
         listener, clauses = split(rules.rest, names)
         addressed = listener is not None
         found = Understanding(sentence, Status.NOT_ADDRESSED)
-        if not addressed and stranger is not None and forms.called.fullmatch(stranger["name"]) is None:
-            what = f"there is no robot called {stranger['name']}; there are {listing(names)}"
-            found = replace(found, reason=what, unknown_words=(stranger["name"],))
+        stranger = called_stranger(text)
+        if not addressed and stranger is not None and not addressees(names).find_robots(stranger):
+            what = f"there is no robot called {stranger}; there are {listing(names)}"
+            found = replace(found, reason=what, unknown_words=(stranger,))
         elif require_wake and not addressed:
             called = listing((f'"Hey {name}"' for name in names), last="or")
             found = replace(found, reason=f"no robot's name was said; begin with {called}")
@@ -200,8 +200,8 @@ class _Reader:
         named = [name for name in self.robots if re.search(rf"\b{re.escape(name)}\b", text, re.IGNORECASE)]
         named = [name for name in named if self.knowledge.person(name) is None]
         quotes = re.match(r"(?:say|announce|shout)\b(?!.* to \w+\W*$)", text, re.IGNORECASE)
-        forms = addressees(self.robots).forms
-        if named and not quotes and re.search(rf"\b{forms.one.pattern}", forms.narrated.sub("", text), re.IGNORECASE):
+        calls = addressees(self.robots)
+        if named and not quotes and calls.name.search(calls.without_descriptions(text)):
             name = display_name(named[0])
             reason = (
                 f"{name} is a robot, and not somebody to go to or to hand objects to; "

@@ -128,21 +128,12 @@ def _alikes(names: tuple[str, ...]) -> SoundAlikes:
     return SoundAlikes(names)
 
 
-def nearest_by_sound(words: str, vocabulary: Iterable[str]) -> Alike | None:
-    """Name in `vocabulary` that sounds most like `words` (one or several); the first of equally similar names.
-
-    A distance of up to about 0.2 is a likely mishearing. None for an empty vocabulary.
-    """
-    heard, names = words.lower().split(), tuple(vocabulary)
-    exact = next((name for name in names if name.lower().split() == heard), None)
-    if exact is not None:
-        return Alike(exact, 0.0, 0.0)
-    return min(_alikes(names).similarities(words), key=lambda one: one.distance, default=None)
-
-
 @lru_cache(maxsize=4096)
 def sound_distance(first: str, second: str) -> float:
-    """Distance in sound between two words or groups of words, from 0 to 1; blanks are silent."""
+    """Distance in sound between two words or groups of words, from 0 to 1; blanks are silent.
+
+    A distance of up to about 0.2 is a likely mishearing.
+    """
     return next((one.distance for one in SoundAlikes((second,)).similarities(first)), 1.0)
 
 
@@ -310,7 +301,7 @@ def _only_near(row: Sequence[str], known: _Known, facts: DependencyParser) -> st
     if any(facts.is_word(word) or facts.is_word(_singular(word)) for word in strange):
         return None
     spoken = " ".join(row)
-    names = [name for name in known.names if name.count(" ") == len(row) - 1]
+    names = (name for name in known.names if name.count(" ") == len(row) - 1)
     forms = [form for name in names for form in (name, f"{name}s")]
     near = sorted((distance, form) for form in forms if (distance := _slips(spoken, form)) <= _slips_allowed(form))
     unsure = len(near) > 1 and near[1][0] == near[0][0]

@@ -59,7 +59,7 @@ _FULL: Final = {
 
 @dataclass(frozen=True)
 class Match:
-    """Part of a text that a template matches: its positions, the next word, its slots and its rewording."""
+    """Part of a text that a template matches: its positions, the next word, its slots, its rewording, and the rest."""
 
     text: str
     start: int
@@ -67,6 +67,7 @@ class Match:
     after: int
     slots: Mapping[str, str]
     instead: str
+    rest: str
 
     def __getitem__(self, slot: str) -> str:
         """Text of a slot; empty if the template leaves it out."""
@@ -110,8 +111,8 @@ page = lru_cache(maxsize=64)(Page)
 class Template:
     """Templates of an intent, in the order of trying.
 
-    A row has `slots` besides those of its template, the words `before` which it must end ("" is the end of the text),
-    intents of the page that precede it (`unless`), and the text `instead` of a rewording.
+    A row has `slots` besides those of its template, templates `before` one of which it must end ("" is the end of the
+    text), or `not_before`, intents of the page that precede it (`unless`), and the text `instead` of a rewording.
     """
 
     def __init__(self, page: Page, rows: Iterable[Mapping[str, Any]]) -> None:
@@ -132,7 +133,15 @@ class Template:
 
     def search(self, text: str) -> Match | None:
         """Finds the first match."""
-        return next(filter(None, (self.match(text, at) for at in range(len(words_of(text).words)))), None)
+        return next(self.finditer(text), None)
+
+    def finditer(self, text: str) -> Iterator[Match]:
+        """Finds the matches that do not overlap."""
+        at = 0
+        while at < len(words_of(text).words):
+            if (found := self.match(text, at)) is not None:
+                yield found
+            at = at + 1 if found is None else found.after
 
     def reword(self, text: str, *, whole: bool = False) -> str:
         """Replaces the first match of each row, or the whole text when a row matches it."""
@@ -145,14 +154,23 @@ class Template:
     def _match(self, row: Mapping[str, Any], words: Words, at: int, whole: bool) -> Match | None:
         ends, size = self._page.part(row["template"]).ends_at(words, at), len(words.words)
         end, slots = next(((end, slots) for end, slots in ends if (end == size if whole else end > at)), (-1, ()))
-        if end < 0 or words.word(end) not in row.get("before", [words.word(end)]):
+        if end < 0 or not self._begins(row.get("before"), words, end, missing=True):
+            return None
+        if self._begins(row.get("not_before"), words, end, missing=False):
             return None
         if whole and any(self._page[one].fullmatch(words.text) for one in row.get("unless", ())):
             return None
         start, stop = (words.spans[at][0], words.spans[end - 1][1]) if end > at else (0, 0)
         filled = {**row.get("slots", {}), **dict(slots)}
         instead = " ".join(row.get("instead", "").format_map(defaultdict(str, filled)).split())
-        return Match(words.text[start:stop], start, stop, end, filled, instead)
+        return Match(words.text[start:stop], start, stop, end, filled, instead, words.text[words.start(end) :])
+
+    def _begins(self, templates: Sequence[str] | None, words: Words, at: int, *, missing: bool) -> bool:
+        """Returns whether one of the templates, or the end of the text, is at a word; `missing` without templates."""
+        if templates is None or at == len(words.words):
+            return missing if templates is None else "" in templates
+        named = [template for template in templates if template]
+        return bool(named) and next(self._page.part(named).ends_at(words, at), None) is not None
 
 
 _Ends = Iterator[tuple[int, tuple[tuple[str, str], ...]]]
@@ -173,9 +191,13 @@ class _Part(NamedTuple):
         return self.ends(words, at) if begins else iter(())
 
 
+def _next_word(words: Words, at: int) -> _Ends:
+    yield at + 1, ()
+
+
 def _word(spellings: Iterable[str]) -> _Part:
     """One of some words."""
-    return _Part(lambda words, at: iter([(at + 1, ())]), frozenset(spellings))
+    return _Part(_next_word, frozenset(spellings))
 
 
 def _sequence(parts: Sequence[_Part]) -> _Part:
@@ -196,6 +218,8 @@ def _choice(parts: Sequence[_Part]) -> _Part:
         for part in parts:
             yield from part.ends_at(words, at)
 
+    if all(part.ends is _next_word for part in parts):
+        return _word(_firsts(parts) or ())
     return _Part(ends, _firsts(parts), any(part.empty for part in parts))
 
 

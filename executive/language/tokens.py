@@ -6,7 +6,7 @@ as in Brill, "A simple rule-based part of speech tagger" (1992).
 """
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Final
@@ -48,6 +48,16 @@ class Token:
     def adjective(self) -> bool:
         """Returns whether the word can be an attribute of an object ("red", "heaviest")."""
         return is_attribute(self.text) or (self.pos in ("ADJ", "ADV") and may_be_attribute(self.text))
+
+
+NO_TOKEN: Final = Token(-1, -1, "", "", "", "", -1, "")
+"""Stands for the words before and after a sentence."""
+
+
+def longest_of(phrases: Container[tuple[str, ...]], words: Sequence[str]) -> tuple[str, ...]:
+    """Longest of the phrases with which some words begin; empty if they begin with none."""
+    beginnings = (tuple(words[:count]) for count in range(len(words), 0, -1))
+    return next((beginning for beginning in beginnings if beginning in phrases), ())
 
 
 def repair_parse(tokens: Iterable[Token]) -> tuple[Token, ...]:
@@ -118,10 +128,9 @@ def _fact(tokens: Sequence[Token], at: int, name: str) -> str:
 
 def _begins_command(tokens: Sequence[Token], at: int) -> bool:
     """Returns whether a known verb with its particles and an object begin here."""
-    words = tuple(t.word for t in tokens[at : at + 3])
-    length = next((n for n in range(len(words), 0, -1) if words[:n] in lexicon().verbs), None)
-    behind = tokens[at + length : at + length + 1] if length is not None else []
-    return bool(behind) and behind[0].tag in ("DT", "PRP", "PRP$", "CD")
+    verb = longest_of(lexicon().verbs, [t.word for t in tokens[at : at + 3]])
+    behind = at + len(verb)
+    return bool(verb) and behind < len(tokens) and tokens[behind].tag in ("DT", "PRP", "PRP$", "CD")
 
 
 _IS: Final[Mapping[str, Callable[[Sequence[Token], int], bool]]] = {
@@ -144,15 +153,8 @@ NameTable = tuple[re.Pattern[str], Mapping[str, str]]
 
 def name_table(knowledge: Knowledge) -> NameTable:
     """Table of the names of a world."""
-    objects = [
-        *(n for name, facts in knowledge.things.items() for n in (name, *facts.aliases)),
-        *knowledge.categories(),
-    ]
-    places = [n for g in (knowledge.places, knowledge.surfaces) for name, f in g.items() for n in (name, *f.aliases)]
-    people = [n for name, facts in knowledge.people.items() for n in (name, *facts.aliases)]
-    stand_ins = {name.lower(): THING for name in objects}
-    stand_ins |= {name.lower(): PLACE for name in places}
-    stand_ins |= {name.lower(): PERSON for name in people}
+    known = {THING: knowledge.object_names(), PLACE: knowledge.place_names(), PERSON: tuple(knowledge.people)}
+    stand_ins = {name.lower(): word for word, names in known.items() for name in knowledge.spellings(names)}
     return re.compile(rf"\b({any_of(stand_ins) or '(?!)'})(e?s)?\b", re.IGNORECASE), stand_ins
 
 
@@ -190,21 +192,23 @@ def rephrase(text: str) -> str:
     Hesitations and repeated words are removed. A polite form inside the sentence becomes a comma. "I would like
     something to drink" becomes "bring me a drink".
     """
-    for pattern, instead in _rules():
-        text = pattern.sub(instead, text)
-    return " ".join(text.split()).strip(" ,;:-.")
+    return _rewritten(text, None)
 
 
 def smooth(text: str) -> str:
     """Expands short forms, removes hesitations, asides and repetitions, and joins "tell me" to questions."""
-    for pattern, instead in _rules(_SMOOTHED):
+    return re.sub(r"\b([ap])\.\s?m\.?(?![\w'])", r"\1m", _rewritten(text, _SMOOTHED), flags=re.IGNORECASE)
+
+
+def _rewritten(text: str, families: tuple[str, ...] | None) -> str:
+    """Applies the rules of some families, or of all."""
+    for pattern, instead in _rules(families):
         text = pattern.sub(instead, text)
-    text = re.sub(r"\b([ap])\.\s?m\.?(?![\w'])", r"\1m", text, flags=re.IGNORECASE)
     return " ".join(text.split()).strip(" ,;:-.")
 
 
 @cache
-def _rules(families: tuple[str, ...] | None = None) -> tuple[_Rule, ...]:
+def _rules(families: tuple[str, ...] | None) -> tuple[_Rule, ...]:
     table = read_table("rephrasing.yaml")
     rules = (rule for name in families or [*table][1:] for rule in table[name])
     pairs = ((expression(rule), rule["instead"]) if isinstance(rule, dict) else rule for rule in rules)
@@ -223,9 +227,8 @@ def _phrases(name: str) -> str:
     parts = read_table("rephrasing.yaml")["parts"]
     if name in parts:
         return _filled(expression(parts[name]))
-    return any_of(
-        (first for first, *rest in lexicon().verbs if not rest) if name == "verbs" else getattr(lexicon(), name)
-    )
+    verbs = (first for first, *rest in lexicon().verbs if not rest)
+    return any_of(verbs if name == "verbs" else read_table("words.yaml")[name])
 
 
 def _break(match: re.Match[str]) -> str:

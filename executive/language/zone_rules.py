@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -11,23 +11,19 @@ from pydantic import ValidationError
 
 from executive.language.amounts import parse_number
 from executive.language.clauses import begins_action
-from executive.language.lexicon import Patterns, any_of, expression, read_table
+from executive.language.lexicon import any_of
 from executive.language.questions import RefusalError
 from executive.language.spelling import synonyms_for
-from executive.language.templates import page
+from executive.language.templates import Match, page, words_of
 from executive.words.knowledge import Knowledge
 from executive.words.step import Step
 from executive.words.steps import Group
 from executive.words.zone import ZoneFacts
 from skills.api import ZoneKind
 
-SLOWLY_M_S: Final = 0.3
-"""Speed limit of "slowly"."""
-_FORMS: Final = Patterns("zones.yaml")
 _PAGE: Final = page("zones")
-_PARTS: Final = {"half": 0.5, "quarter": 0.25, "three quarters": 0.75}
-_UNITS_M_S: Final = {"m": 1.0, "c": 0.01, "k": 1.0 / 3.6}
-_SPEEDS: Final = ("slowly", "at_most")
+_KINDS: Final = (ZoneKind.KEEP_OUT, ZoneKind.SPEED_LIMIT, ZoneKind.SILENT)
+_ENDS: Final = frozenset({"", ".", ";", "!", "?"})
 _ADDRESS: Final = re.compile(r"\W*(?:(?:hey|hi|hello|ok|okay)\W+)?\w+\W*", re.IGNORECASE)
 Zones = Mapping[str, ZoneFacts]
 
@@ -62,10 +58,8 @@ class RoomRules:
 
 def read_rules(text: str, knowledge: Knowledge | None) -> RoomRules:
     """Reads rules for rooms in a sentence. Raises RefusalError for a rule without any work or an unclear rule."""
-    if knowledge is None or _FORMS.mentions.search(text) is None:
-        return RoomRules(text, knowledge)
-    rest, zones = take_rules(text, knowledge)
-    if not zones:
+    rest, zones = (text, {}) if knowledge is None else take_rules(text, knowledge)
+    if knowledge is None or not zones:
         return RoomRules(text, knowledge)
     if not re.search(r"\w", rest):
         example = f"'{text.strip(' .!')} and bring me a drink'"
@@ -93,67 +87,73 @@ def take_rules(text: str, knowledge: Knowledge) -> tuple[str, Zones]:
         for word in (*synonyms_for(spelling), spelling)
         if knowledge.place(word) in (None, name)
     }
-    names = rf"(?:{any_of(own)})(?![\w'-])"
-    room = rf"(?:(?:the|my|our|your) )?{names}"
-    rooms = rf"(?P<rooms>{room}(?:(?:,? (?:and|or|nor)|,)(?: {_FORMS.text('into')})? {room})*)"
-    patterns, rules = _FORMS.with_words(rooms=rooms), read_table("zones.yaml")["rules"] if own else {}
-    forms = {kind: [*map(patterns.compiled, map(expression, rows))] for kind, rows in rules.items()}
-    for kind, form in ((kind, form) for kind, rows in forms.items() for form in rows if kind != "other"):
-        for match in [*form.finditer(text)][::-1]:
-            if (end := _end(text, match)) is not None:
-                for said in re.findall(names, match["rooms"], re.IGNORECASE):
+    forms = page("zones", room=tuple(sorted(own, key=len, reverse=True)))
+    for kind in _KINDS:
+        for start, first in [*_starts(text)][::-1]:
+            match = forms[kind].match(text, start)
+            rest = None if match is None else _rest(text, match, start, first)
+            if match is not None and rest is not None:
+                for said in re.findall(any_of(own), match["rooms"], re.IGNORECASE):
                     name = own[said.lower()]
                     facts = _facts(kind, match, name)
                     zones[name if name not in zones else f"{name}, {facts.kind.replace('_', ' ')}"] = facts
-                text = _joined(text[: match.start()], text[end:])
-    for left in filter(None, (form.search(text) for rows in forms.values() for form in rows)):
-        begin = text[: left.start()]
-        is_said, other = _PAGE["speaks"].search(begin) is not None, left.re not in forms["keep_out"]
-        if re.search(r"\bbut\W*$", begin, re.IGNORECASE) if is_said else other:
-            raise RefusalError(f"I do not understand '{left[0]}' here; say it in a sentence of its own", [left[0]])
+                text = rest
+    for intent in (*_KINDS, "other"):
+        left = forms[intent].search(text)
+        begin = "" if left is None else text[: left.start]
+        is_said, other = _PAGE["speaks"].search(begin) is not None, intent != ZoneKind.KEEP_OUT
+        if left is not None and (re.search(r"\bbut\W*$", begin, re.IGNORECASE) if is_said else other):
+            raise RefusalError(f"I do not understand '{left.text}' here; say it in a sentence of its own", [left.text])
     return text, zones
 
 
-def _end(text: str, match: re.Match[str]) -> int | None:
-    """End of a rule's clause; None if the rule is no separate clause, is conditional, or is quoted speech."""
-    begin, tail = text[: match.start()], _FORMS.tail.match(text, match.end())
-    end = match.end() if tail is None else tail.end()
-    sentence = re.split(r"[.;!?]", begin)[-1]
-    if _FORMS.depends.search(sentence) or _PAGE["speaks"].search(sentence):
+def _starts(text: str) -> Iterator[tuple[int, int]]:
+    """Yields the words at which the clause of a rule may begin, each with the first of the words that join it."""
+    words, at, first = words_of(text).words, 0, 0
+    yield 0, 0
+    while at < len(words):
+        if (joint := _PAGE["joint"].match(text, at)) is not None:
+            at = joint.after
+            yield at, first
+        elif words[at] == "without":
+            yield at, at
+        if joint is None:
+            at = first = at + 1
+
+
+def _rest(text: str, rule: Match, start: int, first: int) -> str | None:
+    """Text without a rule; None if the rule is no separate clause, is conditional, or is quoted speech."""
+    words = words_of(text)
+    begin = text[: words.spans[first - 1][1]] if first else ""
+    sentence = re.split(r"[.;!?]", text[: rule.start])[-1]
+    tail = _PAGE["tail"].match(text, rule.after)
+    behind = end = rule.after if tail is None else tail.after
+    while (joint := _PAGE["joint"].match(text, behind)) is not None:
+        behind = joint.after
+    rest = text[words.start(behind) :]
+    asks = words.words[behind - 1 : behind + 1] in (["and", "if"], ["but", "if"])
+    if _PAGE["depends"].search(sentence) or _PAGE["speaks"].search(sentence):
         return None
-    if not match[0].lower().startswith("without") and _FORMS.before.search(begin) is None:
+    if not (words.word(end) in _ENDS or asks or begins_action(rest)):
         return None
-    behind = text[end:]
-    after = _FORMS.joined.match(behind)
-    goes_on = after is not None and begins_action(behind[after.end() :])
-    return end if goes_on or _FORMS.ends.match(behind) else None
+    if not rest or not begin:
+        return begin or rest
+    if _ADDRESS.fullmatch(begin):
+        return f"{begin}, {rest}"
+    ends = _ENDS & {*words.words[first:start], *words.words[end:behind]}
+    return f"{begin}. {rest}" if ends else f"{begin}, and {rest}"
 
 
-def _joined(begin: str, behind: str) -> str:
-    """Joins the words before and after a rule."""
-    joint = _FORMS.text("joined")
-    begin = re.sub(rf"{joint}$", "", begin, flags=re.IGNORECASE)
-    rest = re.sub(rf"^(?:{joint}|[.;!?])*", "", behind, flags=re.IGNORECASE)
-    if not re.search(r"\w", behind):
-        return begin
-    if not begin or _ADDRESS.fullmatch(begin):
-        return f"{begin}, {rest}" if begin else rest
-    ends = re.match(r"[\s,]*[.;!?]", behind) or re.search(r"[.;!?]$", begin)
-    return f"{begin.rstrip('.;!?')}. {rest}" if ends else f"{begin}, and {rest}"
-
-
-def _facts(kind: str, match: re.Match[str], room: str) -> ZoneFacts:
+def _facts(kind: ZoneKind, match: Match, room: str) -> ZoneFacts:
     """Zone for a room's rule. Raises RefusalError for a speed that no robot can obey."""
-    if kind not in _SPEEDS:
-        return ZoneFacts(kind=ZoneKind(kind), place=room)
-    said = match.groupdict()
-    number, unit = said.get("amount") or "one", said.get("unit") or "m"
-    speed = _PARTS.get(number.lower()) or parse_number(number) or 0.0
+    speed = None
+    if kind is ZoneKind.SPEED_LIMIT:
+        speed = round((parse_number(match["amount"] or "one") or 0.0) * float(match["unit"]), 3)
     try:
-        limit = SLOWLY_M_S if kind == "slowly" else round(speed * _UNITS_M_S[unit[0].lower()], 3)
-        return ZoneFacts(kind=ZoneKind.SPEED_LIMIT, place=room, speed=limit)
+        return ZoneFacts(kind=kind, place=room, speed=speed)
     except ValidationError as error:
-        raise RefusalError(f"I cannot keep a limit of {number} {unit}; say 0.1 to 3 m/s", [number]) from error
+        what = f"I cannot keep a limit of {match['speed']}; say 0.1 to 3 m/s"
+        raise RefusalError(what, [match["amount"]]) from error
 
 
 def _without(knowledge: Knowledge, rooms: Collection[str]) -> Knowledge:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from executive.language.cleaning import SAME_NAME, Address, find_heard_wake
-from executive.language.lexicon import lexicon
+from executive.language.lexicon import lexicon, word_list
 from executive.language.parser import DependencyParser
 from executive.language.roles import HERE
 from executive.language.several_robots import understand_for_robots
@@ -107,14 +107,14 @@ def spoken_phrases(vocabulary: Vocabulary) -> SoundAlikes:
         *goals,
         *statements,
         *_BEINGS,
-        *words.pronouns,
-        *words.here,
-        *words.there,
-        *words.speaker,
+        *word_list("pronouns"),
+        *word_list("here"),
+        *word_list("there"),
+        *word_list("speaker"),
         *_ARTICLES,
         *_NUMBERS,
     ]
-    return SoundAlikes(names, [*calls, *verbs, *prepositions, *words.openers, *words.requests, *small])
+    return SoundAlikes(names, [*calls, *verbs, *prepositions, *word_list("openers"), *word_list("requests"), *small])
 
 
 def _with_pause(text: str, name: str) -> str:
@@ -139,7 +139,7 @@ def _knows(known: Collection[str], name: str) -> bool:
     words = _plain(name).split()
     while words and " ".join(words) not in known and is_attribute(words[0]):
         words = words[1:]
-    people = lexicon().people - _UNRESOLVED
+    people = word_list("people") - _UNRESOLVED
     return bool(words) and (" ".join(words) in known or set(words) <= people)
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final, TypeVar
 
 from executive.language.clauses import CLAUSES
 from executive.language.items import Adverb, Chunk, Item, Whether, verb
-from executive.language.lexicon import VerbKind, lexicon
+from executive.language.lexicon import VerbKind, lexicon, word_list
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.pipeline import Pipeline, Trace
@@ -259,9 +259,9 @@ class PlainReader:
     def is_somebody(self, who: str, state: State) -> bool:
         """Returns whether the words mean a known person, an earlier person, or anybody."""
         words = who.lower().removeprefix("a ").removeprefix("any ")
-        if words in lexicon().anyone | lexicon().any_person or words in ("guest", "they"):
+        if words in word_list("anyone") | word_list("any_person") or words in ("guest", "they"):
             return True
-        spoken_of = words in lexicon().somebody and state.memory.person is not None
+        spoken_of = words in word_list("somebody") and state.memory.person is not None
         return spoken_of or self.knowledge.person(who) is not None
 
     def _condition_of_looks(self, reading: PlainReading, state: State, before: State, text: str) -> SpokenCondition:

@@ -7,13 +7,20 @@ import pytest
 import yaml
 
 import executive.language
-from executive.language.lexicon import lexicon
+from executive.language.lexicon import word_list
 from executive.language.templates import Template, page
 
 TABLES = Path(executive.language.__file__).with_name("tables")
 PAGES = sorted(path.stem for path in (TABLES / "intents").glob("*.yaml") if path.stem != "common")
 WORLD = {"names": ("Robin", "Maya"), "around": ("office", "kitchen", "hall")}
-GIVEN = {"people": WORLD, "speech": {**WORLD, "noted": ("slowly",)}, "clauses": {"asking": tuple(lexicon().openers)}}
+GIVEN = {
+    "people": WORLD,
+    "speech": {**WORLD, "noted": ("slowly",)},
+    "clauses": {"asking": tuple(word_list("openers"))},
+    "robots": {"one": ("Alice", "Bob"), "verb": ("bring", "brings", "come", "go")},
+    "wake": {"own": ("Alice",)},
+    "zones": {"room": WORLD["around"]},
+}
 EXPRESSIONS, LOOK_AROUNDS = 0, 0
 """Regular expressions in the pages of templates, and those of them that look around."""
 LONGEST_LINE = 120
@@ -39,7 +46,8 @@ def test_each_sample_matches_its_template_and_no_other_of_its_page(name, intent,
     alone, earlier = Template(own, [rows[n]]), Template(own, rows[:n])
     assert rows[n]["samples"]
     for sample in rows[n]["samples"]:
-        assert (alone.match if "before" in rows[n] else alone.fullmatch)(sample) is not None, sample
+        ends = not {"before", "not_before"} & rows[n].keys()
+        assert (alone.fullmatch if ends else alone.match)(sample) is not None, sample
         assert earlier.fullmatch(sample) is None, sample  # the rows of an intent are tried in their order
         others = [one for one in own.table["intents"] if one != intent and own[one].fullmatch(sample)]
         assert others == [], sample

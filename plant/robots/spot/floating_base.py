@@ -53,10 +53,12 @@ class FloatingBaseLimits(LocomotionLimits):
 
 
 _AXES = ("x", "y", "yaw", "height", "pitch")
+_FALL_M_S2 = 2.0
+"""Acceleration of a body that falls onto legs without power, which brake it."""
 _GAINS = {"x": (8e3, 2e3), "y": (8e3, 2e3), "yaw": (2e3, 4e2), "height": (6e4, 3e3), "pitch": (8e3, 4e2)}
 
 
-class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
+class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture", "_drop_m_s")):
     """Floating base of one robot: drives the body to a velocity and a posture with limited force and acceleration."""
 
     def __init__(
@@ -66,38 +68,26 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
 
         Forces and gains are for a Spot; `heavier` multiplies them.
         """
-        self._plant = plant
-        self._limits, self._heavier = limits, heavier
+        self._plant, self._limits, self._heavier = plant, limits, heavier
         self.instance: ModelInstanceIndex = plant.AddModelInstance(f"{name}_floating_base")
         self._joints = self._add_joints(name, body)
         self._velocity = Velocity()
         self._target = [0.0] * 5
-        self._posture = (0.0, 0.0)
+        self._posture, self._drop_m_s = (0.0, 0.0), 0.0
 
     def _add_joints(self, name: str, body: RigidBody) -> Sequence[Joint]:
         directions = {"x": (1, 0, 0), "y": (0, 1, 0), "yaw": (0, 0, 1), "height": (0, 0, 1), "pitch": (0, 1, 0)}
         limits, heavier, inertia = self._limits, self._heavier, SpatialInertia.SolidSphereWithMass(0.05, 0.05)
-        efforts = {
-            "x": limits.force_n,
-            "y": limits.force_n,
-            "yaw": limits.torque_nm,
-            "height": limits.lift_n,
-            "pitch": limits.pitch_torque_nm,
-        }
+        efforts = (limits.force_n, limits.force_n, limits.torque_nm, limits.lift_n, limits.pitch_torque_nm)
         parent: RigidBody = self._plant.world_body()
         joints: list[Joint] = []
-        for axis in _AXES:
+        for axis, effort in zip(_AXES, efforts, strict=True):
             link = f"{name}_floating_base_{axis}"
             child = body if axis == _AXES[-1] else self._plant.AddRigidBody(link, self.instance, inertia)
-            frames = (
-                self._add_frame(f"{name}_floating_base_{axis}_F", parent),
-                self._add_frame(f"{name}_floating_base_{axis}_M", child),
-            )
+            frames = [self._add_frame(f"{link}_{end}", each) for end, each in (("F", parent), ("M", child))]
             kind = RevoluteJoint if axis in ("yaw", "pitch") else PrismaticJoint
-            direction = np.array(directions[axis], dtype=np.float64)
-            joint = self._plant.AddJoint(kind(f"{name}_floating_base_{axis}", *frames, direction))
-            effort, (p, d) = heavier * efforts[axis], _GAINS[axis]
-            actuator: JointActuator = self._plant.AddJointActuator(f"{name}_floating_base_{axis}", joint, effort)
+            joint, (p, d) = self._plant.AddJoint(kind(link, *frames, np.array(directions[axis], float))), _GAINS[axis]
+            actuator: JointActuator = self._plant.AddJointActuator(link, joint, heavier * effort)
             actuator.set_controller_gains(PdControllerGains(p=heavier * p, d=heavier * d))
             joints.append(joint)
             parent = child
@@ -118,8 +108,7 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
 
     def pose(self, positions: FloatArray) -> list[float]:
         """Pose (x, y, yaw, height, pitch) in the plant's positions."""
-        values: list[float] = positions[self._places].tolist()
-        return values
+        return list(map(float, positions[self._places]))
 
     @cached_property
     def _places(self) -> list[int]:
@@ -145,10 +134,12 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
         dt_s: float,
         *,
         stopping: bool,
+        falls: bool = False,
     ) -> None:
         """Commands the joints for the next dt_s: ramps to `wanted` (body frame) and to the posture (height, pitch).
 
-        `state` is (x, y, yaw, height, pitch). A `stopping` robot brakes harder than its usual acceleration.
+        `state` is (x, y, yaw, height, pitch). A `stopping` robot brakes harder than its usual acceleration. One
+        that `falls` drops ever faster.
         """
         limits = self._limits
         v = self._velocity = self._ramp(wanted, dt_s, stopping=stopping)
@@ -156,7 +147,8 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
         rates = (c * v.vx - s * v.vy, s * v.vx + c * v.vy, v.wz)
         planar = zip(self._target[:3], rates, state[:3], strict=True)
         ahead = [now + clip(target + rate * dt_s - now, limits.lead_m) for target, rate, now in planar]
-        most = (limits.posture_speed_m_s * dt_s, limits.pitch_rate_rad_s * dt_s)
+        self._drop_m_s = self._drop_m_s + _FALL_M_S2 * dt_s if falls else 0.0
+        most = (max(limits.posture_speed_m_s, self._drop_m_s) * dt_s, limits.pitch_rate_rad_s * dt_s)
         move = [clip(goal - now, step) for goal, now, step in zip(posture, self._posture, most, strict=True)]
         self._posture = (self._posture[0] + move[0], self._posture[1] + move[1])
         self._target = [*ahead, *self._posture]

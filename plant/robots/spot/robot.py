@@ -54,7 +54,7 @@ class SpotSensors(SensorSuite):
 _GRIPPER_TOLERANCES = GripperTolerances(arrived=0.03, stall_rate=0.03)
 
 
-class SpotRobot(CommandedRobot, saved=("_posture", "_leg_servos", "_trot", "_floating_base")):
+class SpotRobot(CommandedRobot, saved=("_posture", "_falls", "_leg_servos", "_trot", "_floating_base")):
     """One Spot: converts the commands of the lease holder to set points of the plant's servos."""
 
     _index: JointIndex
@@ -64,7 +64,7 @@ class SpotRobot(CommandedRobot, saved=("_posture", "_leg_servos", "_trot", "_flo
         joints = JointIndex(model.plant, model.instance)
         super().__init__(model, joints, SpotSensors(model, joints, options), options.context, _GRIPPER_TOLERANCES)
         self._body, self._floating_base = model.body, model.floating_base
-        self._posture = (float(spot_facts()["capabilities"]["standing_height"]), 0.0)
+        self._posture, self._falls = (float(spot_facts()["capabilities"]["standing_height"]), 0.0), False
         self._leg_servos = LegServos(self._index, self._joints()[self._index.legs])
         self._trot = Trot(nominal_footholds())
         self._trot.reset(self._motion(self._base()))
@@ -81,13 +81,21 @@ class SpotRobot(CommandedRobot, saved=("_posture", "_leg_servos", "_trot", "_flo
                 f"stand: height {height_m:.2f} m must lie in [{low}, {high}] "
                 f"and pitch {pitch_rad:.2f} rad in [{least}, {most}]"
             )
+        self._falls = False
         return self._begin(Part.POSTURE, (height_m, pitch_rad), until_s, lease)
 
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
         """Lowers the body to the floor; driving stops."""
         command = self._begin(Part.POSTURE, (spot_facts()["capabilities"]["sitting_height"], 0.0), until_s, lease)
         if self._runs(command):
+            self._falls = False
             self._commands.finish(Part.VELOCITY, CommandState.STOPPED, "the robot sits down", CommandCause.STOPPED)
+        return command
+
+    def fall(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Falls to the floor, as without power in the legs; driving stops."""
+        command = self.sit(until_s=until_s, lease=lease)
+        self._falls = self._runs(command)
         return command
 
     # -- inside ---------------------------------------------------------------------------------------------------
@@ -128,7 +136,7 @@ class SpotRobot(CommandedRobot, saved=("_posture", "_leg_servos", "_trot", "_flo
             return
         wanted = self._goal(Part.VELOCITY, Velocity)
         self._floating_base.control(
-            self._context, base, wanted or Velocity(), self._posture, dt_s, stopping=wanted is None
+            self._context, base, wanted or Velocity(), self._posture, dt_s, stopping=wanted is None, falls=self._falls
         )
 
     def _legs(self, base: Sequence[float], dt_s: float) -> tuple[FloatArray, FloatArray]:

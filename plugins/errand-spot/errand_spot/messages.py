@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from bosdyn.api import geometry_pb2
 from google.protobuf.duration_pb2 import Duration
-from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
@@ -48,17 +47,6 @@ def finite(value: float, field: str) -> float:
     if not math.isfinite(value):
         raise InvalidRequestError(f"{field} is {value}; it must be finite")
     return value
-
-
-def check_values(message: Message, field: str = "request") -> None:
-    """Raises InvalidRequestError for a value of an enumeration that the API lacks, in any part of a message."""
-    for described, value in message.ListFields():
-        name, repeated = f"{field}.{described.name}", not isinstance(value, Message | str | bytes | int | float)
-        for each in value if repeated else [value]:
-            if isinstance(each, Message):
-                check_values(each, name)
-            elif described.enum_type is not None and each not in described.enum_type.values_by_number:
-                raise InvalidRequestError(f"{name}: the API has no option {each}")
 
 
 def points_of(trajectory: Any, field: str) -> Sequence[Any]:

@@ -4,9 +4,11 @@ import gc
 import threading
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 from types import ModuleType
 
 import grpc
+from call_faults import Switchboard
 
 from errand_spot.adapter.connection import Address, Connection
 from errand_spot.adapter.robot import ApiRobot
@@ -28,12 +30,21 @@ def scripted(**options):
     return ScriptedRobot(clock, **{"capabilities": spot_capabilities(), **options}), clock
 
 
+def with_faults(robot, clock, credentials, options):
+    """Builds a server; a test sets the faults of its calls by its attribute `faults`."""
+    faults = Switchboard()
+    options = replace(options, interceptors=[faults])
+    server = SpotServer(robot, clock, arm_model(robot.capabilities()), credentials, options)
+    server.faults = faults
+    return server
+
+
 @contextmanager
 def scripted_spot(credentials, *, tablet=Tablet.TABLET, password=PASSWORD, pace=Pace.REAL, **given):
     """Serves a scripted Spot from a thread, which steps it in real time, or lets a client step it."""
     robot, clock = scripted(**given)
     options = Options({USER: password}, tablet=tablet, pace=pace)
-    server = SpotServer(robot, clock, arm_model(spot_capabilities()), credentials, options)
+    server = with_faults(robot, clock, credentials, options)
     stopping = threading.Event()
     work = server.computer.run if pace is Pace.REAL else server.computer.serve
     stepping = threading.Thread(target=work, args=(stopping,), daemon=True)
@@ -101,7 +112,7 @@ class LockStep:
         options = Options({USER: PASSWORD}, pace=Pace.CLIENT, perception=self._perception)
         try:
             robot, clock = self._build()
-            self.server = SpotServer(robot, clock, arm_model(robot.capabilities()), self._credentials, options)
+            self.server = with_faults(robot, clock, self._credentials, options)
         except Exception as error:
             self._failure = error
             self._ready.set()

@@ -17,6 +17,7 @@ from types import SimpleNamespace
 import pytest
 
 pytest.importorskip("bosdyn.client", reason="not installed: pip install errand-spot")
+from call_faults import Fault
 from lock_step import PASSWORD, USER, scripted_spot
 
 from errand_spot import backend as real_spot
@@ -26,7 +27,6 @@ from errand_spot.backend import Access, Spot, connected
 from errand_spot.server import computer, identity, keepalive
 from errand_spot.server.computer import Motors
 from errand_spot.server.estop import Tablet
-from errand_spot.server.faults import Fault
 from skills.inputs.errors import InputError
 from skills.robot import Pose2D, RobotStoppedError
 

@@ -11,11 +11,11 @@ import grpc
 from bosdyn.api.graph_nav import graph_nav_pb2, nav_pb2
 from bosdyn.client.graph_nav import GraphNavClient
 from bosdyn.client.lease import LeaseClient
+from call_faults import Fault
 from lock_step import LockStep
 
 from errand_spot.messages import timestamp
 from errand_spot.perception import SpotPerception, world_map
-from errand_spot.server.faults import Fault
 from errand_spot.server.identity import credentials
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import open_world

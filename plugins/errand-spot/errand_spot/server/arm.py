@@ -9,9 +9,9 @@ import numpy as np
 from bosdyn.api import arm_command_pb2, basic_command_pb2
 from scipy.interpolate import PchipInterpolator
 
-from errand_spot.messages import InvalidRequestError, duration, finite, points_of, seconds
+from errand_spot.messages import InvalidRequestError, duration, points_of
 from errand_spot.server.computer import Computer, Solver
-from errand_spot.server.refusals import soon
+from errand_spot.server.refusals import soon, times_of
 from skills.robot import ArmTrajectory, CommandState, FloatArray
 
 Status = basic_command_pb2.RobotCommandFeedbackStatus
@@ -125,16 +125,14 @@ class JointMove(ArmMotion):
         trajectory = request.trajectory
         points = points_of(trajectory, "arm_joint_move_command.trajectory")
         fastest = trajectory.maximum_velocity.value if trajectory.HasField("maximum_velocity") else USUAL_RAD_S
-        fastest = finite(fastest, "arm_joint_move_command.trajectory.maximum_velocity")
-        offset_s = seconds(trajectory.reference_time) - now_s if trajectory.HasField("reference_time") else 0.0
+        given_s = times_of(trajectory, now_s, "arm_joint_move_command.trajectory")
         self._times_s, self._positions, before = list[float](), list[FloatArray](), now_rad
         self._slower = False
         limited = trajectory.HasField("maximum_velocity")
         timed = any(point.HasField("time_since_reference") for point in points)
-        for point in points:
+        for point, at_s in zip(points, given_s, strict=True):
             goal = _joints(point.position, before, solver)
-            at_s = offset_s + seconds(point.time_since_reference)
-            fast_s = (self._times_s or [0.0])[-1] + 1.5 * float(np.abs(goal - before).max()) / max(1e-3, fastest)
+            fast_s = (self._times_s or [0.0])[-1] + 1.5 * float(np.abs(goal - before).max()) / fastest
             if not timed or (limited and at_s < fast_s):
                 at_s, self._slower = fast_s, timed
             self._times_s.append(soon(at_s, "arm_joint_move_command.trajectory: a point"))
@@ -168,7 +166,7 @@ def _joints(message: Any, before: FloatArray, solver: Solver) -> FloatArray:
     goal = before.copy()
     for k, (name, low, high) in enumerate(zip(JOINTS, solver.lower_rad, solver.upper_rad, strict=True)):
         if message.HasField(name):
-            angle = finite(getattr(message, name).value, f"position.{name}")
+            angle = getattr(message, name).value
             if not low - _SLACK_RAD <= angle <= high + _SLACK_RAD:
                 raise InvalidRequestError(f"position.{name} is {angle:.3f} rad; it must be {low:.3f} to {high:.3f}")
             goal[k] = min(max(angle, low), high)

@@ -19,6 +19,7 @@ from google.protobuf.message import DecodeError, Message
 from google.protobuf.message_factory import GetMessageClass
 
 from errand_spot.messages import InvalidRequestError, timestamp
+from errand_spot.server.refusals import check_values
 
 _LOG: Final = logging.getLogger(__name__)
 _MALFORMED: Final = object()
@@ -46,6 +47,8 @@ class Service:
     type: ClassVar[str]
     authority: ClassVar[str]
     needs_token: ClassVar[bool] = True
+    checks_values: ClassVar[bool] = False
+    """Whether its calls check values themselves, because the API has a status for that."""
 
 
 def handlers(services: Sequence[Service], user_of: UserOf, now: Callable[[], float]) -> list[grpc.GenericRpcHandler]:
@@ -91,7 +94,13 @@ class _ServiceHandler:
             requests = _collected(given if method.client_streaming else (given,), context)
             call = Call(user or "", requests[0].header.client_name, received_s)
             asked = requests if method.client_streaming else requests[0]
-            responses, error = self._answered(lambda: answer(asked, call), response_type, many=method.server_streaming)
+
+            def answered() -> Any:
+                if not (self._service.checks_values or method.client_streaming):
+                    check_values(asked)
+                return answer(asked, call)
+
+            responses, error = self._answered(answered, response_type, many=method.server_streaming)
             for response in responses:
                 _fill_header(response, requests[0], error, received_s, self._now())
             return iter(responses) if method.server_streaming else responses[0]
@@ -133,9 +142,11 @@ def _collected(given: Iterable[Any], context: grpc.ServicerContext) -> list[Any]
 def joined(requests: Sequence[Any], kind: Any) -> Any:
     """The message of a stream of chunks. Raises InvalidRequestError."""
     try:
-        return kind.FromString(b"".join(request.chunk.data for request in requests))
+        made = kind.FromString(b"".join(request.chunk.data for request in requests))
     except DecodeError as error:
         raise InvalidRequestError(f"chunk: the data are no {kind.DESCRIPTOR.name}") from error
+    check_values(made)
+    return made
 
 
 def chunks(message: Any) -> Iterator[Any]:

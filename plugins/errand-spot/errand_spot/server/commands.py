@@ -20,14 +20,14 @@ from bosdyn.api import (
     robot_command_pb2,
 )
 
-from errand_spot.messages import InvalidRequestError, check_values, seconds, timestamp
+from errand_spot.messages import InvalidRequestError, seconds, timestamp
 from errand_spot.server import arm, gripper, hand, mobility
 from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer, Motion, Motors, Snapshot
 from errand_spot.server.identity import DOMAIN, TimeSyncService
 from errand_spot.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
 from errand_spot.server.posture import Posture
-from errand_spot.server.refusals import LONGEST_S, RefusedError, end_of, unsupported
+from errand_spot.server.refusals import LONGEST_S, RefusedError, check_values, end_of, unsupported
 
 Status = robot_command_pb2.RobotCommandResponse
 Progress = basic_command_pb2.RobotCommandFeedbackStatus
@@ -85,8 +85,8 @@ class PowerService(Service):
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Response(lease_use_result=used, status=Response.STATUS_UNKNOWN)
         lasts_s = seconds(request.duration)
-        if not 0 <= request.percent_power <= 100 or not 0.0 < lasts_s <= LONGEST_S:
-            raise InvalidRequestError(f"percent_power must be 0 to 100, and duration at most {LONGEST_S:.0f} s")
+        if not 0.0 < lasts_s <= LONGEST_S:
+            raise InvalidRequestError(f"duration must be above 0, and at most {LONGEST_S:.0f} s")
         number, end_s = next(self._ids), self._computer.now_s() + lasts_s
         self._fan_ends_s[number] = end_s
         return Response(
@@ -132,6 +132,7 @@ class RobotCommandService(Service):
     """Takes commands for the whole robot or its parts, and tells how far they have come."""
 
     name, type, authority = "robot-command", "bosdyn.api.RobotCommandService", f"command.{DOMAIN}"
+    checks_values = True
 
     def __init__(self, computer: Computer, leases: LeaseService, clocks: TimeSyncService) -> None:
         self._computer, self._leases, self._clocks = computer, leases, clocks
@@ -300,8 +301,11 @@ class _Whole:
 class _PowerOff(_Whole):
     """Sits down and switches the motors off."""
 
+    _computer: Computer
+
     def begin_alone(self, computer: Computer) -> None:
         """Starts to settle."""
+        self._computer = computer
         computer.stop_parts(_ALL)
         computer.settle()
         computer.move({MOBILITY: self})
@@ -309,17 +313,15 @@ class _PowerOff(_Whole):
     def begin(self, computer: Computer) -> None:
         """Does nothing more."""
 
-    def tick(self, computer: Computer) -> None:
+    def tick(self, _computer: Computer) -> None:
         """Reports whether the motors are off."""
-        self._report(off=computer.motors is Motors.OFF)
+        self.end(Progress.STATUS_PROCESSING)
 
-    def end(self, _status: int) -> None:
-        """Ends with the motors: they end all motions when they are switched off."""
-        self._report(off=True)
-
-    def _report(self, *, off: bool) -> None:
+    def end(self, status: int) -> None:
+        """Ends with the motors, or before for another command."""
         made, part = full_body_command_pb2.FullBodyCommand.Feedback(), basic_command_pb2.SafePowerOffCommand.Feedback
-        made.status = Progress.STATUS_PROCESSING
+        off = self._computer.motors is Motors.OFF
+        made.status = Progress.STATUS_PROCESSING if off else status
         made.safe_power_off_feedback.status = part.STATUS_POWERED_OFF if off else part.STATUS_IN_PROGRESS
         self.feedback = made
 

@@ -285,15 +285,15 @@ class Computer:
 
     def switch_off(self) -> None:
         """Switches the motors off: all motions end, and a robot that does not sit falls, which is a behaviour fault."""
-        if self.motors is not Motors.OFF and not self.snapshot.sitting:
+        falls = self.motors is not Motors.OFF and not self.snapshot.sitting
+        if falls:
             Fault = robot_state_pb2.BehaviorFault
             kind = {"cause": Fault.CAUSE_FALL, "status": Fault.STATUS_CLEARABLE}
             onset = timestamp(self.now_s())
             self.fault = Fault(behavior_fault_id=next(self._falls), onset_timestamp=onset, **kind)
+        self.motors, self.settling, self.estop.motors_on = Motors.OFF, False, False
         self.stop_parts((MOBILITY, ARM, GRIPPER))
-        self.motors, self.settling = Motors.OFF, False
-        self.estop.motors_on = False
-        self.sit()
+        self.sit(falls=falls)
 
     @property
     def able(self) -> bool:
@@ -356,10 +356,11 @@ class Computer:
             if self.settling:  # it goes on sitting down
                 self.sit()
 
-    def sit(self) -> None:
-        """Sits down."""
-        self._still_since_s = self.clock.now()
-        self._sit_command = self.robot.sit(until_s=self.forever(), lease=self.lease)
+    def sit(self, *, falls: bool = False) -> None:
+        """Sits down, or falls if the robot can."""
+        self._still_since_s, sit = self.clock.now(), self.robot.sit
+        verb = getattr(self.robot, "fall", sit) if falls else sit
+        self._sit_command = verb(until_s=self.forever(), lease=self.lease)
 
     @property
     def sits(self) -> bool:
@@ -367,9 +368,24 @@ class Computer:
         return self._sit_command is not None
 
     def stand(self, height_m: float, pitch_rad: float) -> CommandId:
-        """Stands up, or changes height and pitch of the body."""
-        self._sit_command, self._still_since_s = None, self.clock.now()
+        """Stands up, or changes height and pitch of the body; no longer settles."""
+        self._sit_command, self._still_since_s, self.settling = None, self.clock.now(), False
         return self.robot.stand(height_m, pitch_rad, until_s=self.forever(), lease=self.lease)
+
+    @property
+    def upright(self) -> bool:
+        """Returns whether the robot stands: it has not been told to sit, and its body is not below the range."""
+        low_m = self.capabilities.height_range_m[0] - _NEAR_M
+        return not self.sits and float(self.snapshot.odometry.X_OB.translation()[2]) > low_m
+
+    def stand_first(self, posture: tuple[float, float] | None = None) -> Callable[[], bool]:
+        """Stands up unless the robot stands, or in a posture; returns a function that tells whether it may walk."""
+        height_m, pitch_rad = posture or (self.capabilities.standing_height_m, 0.0)
+        stood = self.upright
+        if stood and posture is None:
+            return lambda: True
+        command = self.stand(height_m, pitch_rad)
+        return lambda: stood or self.stands(command, height_m)
 
     def stands(self, command: CommandId, height_m: float) -> bool:
         """Returns whether a height is reached: exactly, or nearly, when a load lets the body go no further."""

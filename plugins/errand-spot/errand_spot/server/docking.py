@@ -11,7 +11,7 @@ from bosdyn.api import lease_pb2
 from bosdyn.api.docking import docking_pb2
 from pydrake.math import RigidTransform
 
-from errand_spot.messages import InvalidRequestError, check_values, seconds
+from errand_spot.messages import InvalidRequestError, seconds
 from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer
 from errand_spot.server.identity import DOMAIN, TimeSyncService
@@ -101,7 +101,6 @@ class DockingService(Service):
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Response(lease_use_result=used, status=Response.STATUS_ERROR_LEASE)
         behaviour = request.prep_pose_behavior or Api.PREP_POSE_USE_POSE
-        check_values(request)
         refused = self._refused(request, behaviour)
         if refused is not None or dock_O is None:
             return Response(lease_use_result=used, status=refused or Response.STATUS_ERROR_DOCK_NOT_FOUND)

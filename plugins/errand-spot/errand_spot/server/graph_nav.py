@@ -14,12 +14,13 @@ from bosdyn.api import estop_pb2, lease_pb2, robot_command_pb2, robot_state_pb2
 from bosdyn.api.graph_nav import graph_nav_pb2, map_pb2, nav_pb2
 from pydrake.math import RigidTransform
 
-from errand_spot.messages import InvalidRequestError, check_values, finite, pose, timestamp, transform, vector
+from errand_spot.messages import InvalidRequestError, pose, timestamp, transform, vector
 from errand_spot.server.calls import Call, Service, chunks, joined
 from errand_spot.server.computer import Computer, MapLocaliser, Motors, Perception, Snapshot
 from errand_spot.server.graph_map import GraphMap, InvalidGraphError, Poses
 from errand_spot.server.identity import DOMAIN, TimeSyncService
 from errand_spot.server.leases import MOBILITY, LeaseService
+from errand_spot.server.mobility import planar
 from errand_spot.server.pictures import LocalGridService, PointCloudService
 from errand_spot.server.refusals import RefusedError, end_of
 from errand_spot.server.route import Course, Feedback, FollowRoute, Place
@@ -203,8 +204,8 @@ class GraphNavService(Service):
         localiser, points = None, known.points(poses)
         if self._perception is not None and len(points):
             localiser = self._perception.localiser(points)
-            reach_m, reach_rad = finite(request.max_distance, "max_distance"), finite(request.max_yaw, "max_yaw")
-            X_SO = _exact(localiser, X_SO, snapshot, reach_m or _REACH_M, reach_rad or _REACH_RAD)
+            reach_m, reach_rad = request.max_distance or _REACH_M, request.max_yaw or _REACH_RAD
+            X_SO = _exact(localiser, X_SO, snapshot, reach_m, reach_rad)
             if X_SO is None:
                 return _Set(status=_Set.STATUS_FAILED, error_report="the scan fits nowhere near the first guess")
         waypoint = guess.waypoint_id or _nearest(X_SO.transform() @ snapshot.odometry.X_OB, poses, poses)
@@ -323,7 +324,6 @@ class GraphNavService(Service):
         return self._navigate(request, graph_nav_pb2.NavigateToAnchorResponse, plan)
 
     def _navigate(self, request: Any, Response: Any, plan: Plan) -> Any:
-        check_values(request)
         used = [self._leases.use(lease, (MOBILITY,)) for lease in request.leases or [lease_pb2.Lease()]]
         made, held = Response(lease_use_results=used), [each.attempted_lease for each in used if each.status == _OK]
         if not held:
@@ -426,9 +426,7 @@ def _route(known: GraphMap, place: Place, goals: Sequence[str]) -> Sequence[str]
 def _goal(request: Any, place: Place, waypoint: str) -> Pose2D:
     """Goal in frame S at a waypoint, with the offset of the request."""
     given = request.destination_waypoint_tform_body_goal
-    x, y = finite(given.position.x, "goal.position.x"), finite(given.position.y, "goal.position.y")
-    X_WG = Pose2D(x, y, finite(given.angle, "goal.angle")).transform()
-    return Pose2D.from_transform(place.poses[waypoint] @ X_WG)
+    return Pose2D.from_transform(place.poses[waypoint] @ planar(given))
 
 
 def _impaired(computer: Computer) -> Any:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from bosdyn.api import basic_command_pb2, gripper_command_pb2, robot_state_pb2
 
-from errand_spot.messages import InvalidRequestError, finite, points_of
+from errand_spot.messages import InvalidRequestError, points_of
 from plant.robots.spot.description import spot_facts
 from skills.robot import CommandState, Gripper
 
@@ -47,14 +47,14 @@ class Claw:
     def __init__(self, request: Any, widest: float, most_force_n: float) -> None:
         """Takes a trajectory of angles, of which the last is the goal: 0 closed, negative open (rad)."""
         points = points_of(request.trajectory, "claw_gripper_command.trajectory")
-        goal = finite(points[-1].point, "claw_gripper_command.trajectory.point")
+        goal = points[-1].point
         if not -widest - _SLACK_RAD <= goal <= _SLACK_RAD:
             raise InvalidRequestError(
                 f"claw_gripper_command.trajectory.point is {goal:.3f}; it must be {-widest:.3f} to 0"
             )
         self._opening = min(max(-goal, 0.0), widest)
         torque = request.maximum_torque.value if request.HasField("maximum_torque") else 5.5
-        force = finite(torque, "claw_gripper_command.maximum_torque") / float(spot_facts()["gripper"]["tip_radius"])
+        force = torque / float(spot_facts()["gripper"]["tip_radius"])
         self._force_n = min(max(force, 1.0), most_force_n)
         self.status: int = Status.STATUS_PROCESSING
         self._command: Any = None

@@ -12,7 +12,7 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from errand_spot.messages import finite, points_of, transform, vector
+from errand_spot.messages import points_of, transform, vector
 from errand_spot.server.arm import USUAL_RAD_S, ArmMotion, Named, Status
 from errand_spot.server.computer import HAND_X_M, Computer, Snapshot, Solver
 from errand_spot.server.leases import ARM
@@ -20,7 +20,7 @@ from errand_spot.server.mobility import BaseMotion, Trajectory, way_to
 from errand_spot.server.refusals import known_frame, times_of, unsupported
 from skills.robot import ArmTrajectory, FloatArray, Pose2D
 
-_USUAL_M_S, _SLOWEST_M_S = 0.4, 0.02
+_USUAL_M_S, _CYLINDRICAL_M_S = 0.4, 0.5
 _TRACK_S: Final = 0.1
 _MOVED_M, _MOVED_RAD = 0.02, 0.04
 _BEHIND_M: Final = 0.75
@@ -56,8 +56,8 @@ class Cartesian(ArmMotion):
         axes = ("x_axis", "y_axis", "z_axis", "rx_axis", "ry_axis", "rz_axis")
         if any(getattr(request, axis) != request.AXIS_MODE_POSITION for axis in axes):
             raise unsupported("arm_cartesian_command with an axis in force mode")
-        given_m_s = request.max_linear_velocity.value if request.HasField("max_linear_velocity") else _USUAL_M_S
-        self._fastest_m_s = max(finite(given_m_s, "max_linear_velocity"), _SLOWEST_M_S)
+        limited = request.HasField("max_linear_velocity")
+        self._fastest_m_s = request.max_linear_velocity.value if limited else _USUAL_M_S
         self._out_of_reach = self._tracks = False
         self._tracked_s, self._stays = 0.0, frame in ("odom", "vision")
         given, field = request.pose_trajectory_in_task, "arm_cartesian_command.pose_trajectory_in_task"
@@ -302,8 +302,8 @@ class Moving(ArmMotion):
         self._angular = vector(request.angular_velocity_of_hand_rt_odom_in_hand, "angular_velocity")
         self._cylindrical = request.HasField("cylindrical_velocity")
         if self._cylindrical:
-            v = request.cylindrical_velocity.linear_velocity
-            self._linear = tuple(finite(getattr(v, name), name) * 0.5 for name in ("r", "theta", "z"))
+            v, fastest = request.cylindrical_velocity.linear_velocity, request.cylindrical_velocity.max_linear_velocity
+            self._linear = tuple((fastest.value or _CYLINDRICAL_M_S) * value for value in (v.r, v.theta, v.z))
         else:
             self._frame = known_frame(request.cartesian_velocity.frame_name, snapshot.frames)
             self._linear = vector(request.cartesian_velocity.velocity_in_frame_name, "velocity_in_frame_name")

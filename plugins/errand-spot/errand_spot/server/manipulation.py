@@ -18,8 +18,6 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from errand_spot.messages import (
     InvalidRequestError,
-    check_values,
-    finite,
     frame_tree,
     frames_of,
     pose_between,
@@ -142,7 +140,6 @@ class ManipulationService(Service):
         used = self._leases.use(request.lease, WHOLE)
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Api.ManipulationApiResponse(lease_use_result=used)
-        check_values(request)
         if not self._computer.able:
             raise InvalidRequestError("the motors are off, or the robot has fallen")
         if self._computer.docked():
@@ -198,8 +195,8 @@ class ManipulationService(Service):
             raise InvalidRequestError(f"manipulation_cmd: {which or 'no command'} is not simulated")
         aim = aims[which](given, snapshot)
         if which.startswith("walk_to"):
-            offset_m = finite(given.offset_distance.value, "offset_distance")
-            return _ObjectTask(aim, offset_m if given.HasField("offset_distance") else None, None, _any, walks=True)
+            offset_m = given.offset_distance.value if given.HasField("offset_distance") else None
+            return _ObjectTask(aim, offset_m, None, _any, walks=True)
         if self._picker is None or self._computer.capabilities.gripper is None:
             raise InvalidRequestError(f"manipulation_cmd: {which} needs an arm that plans grasps")
         mode = getattr(given, "walk_gaze_mode", Api.PICK_AUTO_WALK_AND_GAZE)
@@ -238,14 +235,13 @@ def _only_from_above(allows: Allows) -> bool:
 
 
 def _rotation_test(given: Any, R_OF: RotationMatrix) -> Allows:
-    most_rad = finite(given.threshold_radians, "threshold_radians")
     wanted = geometry_pb2.SE3Pose(rotation=given.rotation_ewrt_frame)
     R_OW = R_OF @ transform(wanted, "rotation_ewrt_frame").rotation()
-    return lambda R_OH: R_OW.InvertAndCompose(R_OH).ToAngleAxis().angle() <= most_rad
+    return lambda R_OH: R_OW.InvertAndCompose(R_OH).ToAngleAxis().angle() <= given.threshold_radians
 
 
 def _alignment_test(given: Any, R_OF: RotationMatrix) -> Allows:
-    least = math.cos(min(max(finite(given.threshold_radians, "threshold_radians"), 0.0), math.pi))
+    least = math.cos(given.threshold_radians)
     axis_H = _unit(vector(given.axis_on_gripper_ewrt_gripper, "axis_on_gripper"), "axis_on_gripper")
     axis_O = R_OF @ _unit(vector(given.axis_to_align_with_ewrt_frame, "axis_to_align_with"), "axis_to_align_with")
     return lambda R_OH: float((R_OH @ axis_H) @ axis_O) >= least
@@ -261,7 +257,7 @@ def _unit(values: Sequence[float], field: str) -> FloatArray:
 def _pixel_aim(given: Any, _snapshot: Snapshot) -> Aim:
     """Aim of a pixel from the camera's pose in the frames of the request. Raises InvalidRequestError."""
     k, sensor = given.camera_model.intrinsics, given.frame_name_image_sensor
-    fx, fy = (finite(getattr(k.focal_length, axis), f"camera_model.focal_length.{axis}") for axis in "xy")
+    fx, fy, u, v = k.focal_length.x, k.focal_length.y, given.pixel_xy.x, given.pixel_xy.y
     if min(fx, fy) <= 0.0:
         raise InvalidRequestError("camera_model.intrinsics.focal_length must be positive")
     frames = frames_of(given.transforms_snapshot_for_camera)
@@ -269,7 +265,6 @@ def _pixel_aim(given: Any, _snapshot: Snapshot) -> Aim:
         X_OC = pose_between(frames, "odom" if "odom" in frames else "vision", sensor)
     except KeyError as error:
         raise InvalidRequestError(f"transforms_snapshot_for_camera: there is no frame {error}") from error
-    u, v = (finite(getattr(given.pixel_xy, axis), f"pixel_xy.{axis}") for axis in "xy")
     x, y = (u - k.principal_point.x) / fx, (v - k.principal_point.y) / fy
     direction_O = X_OC.rotation() @ _unit((x, y, 1.0), "pixel_xy")
     return _along(np.asarray(X_OC.translation()), np.asarray(direction_O))

@@ -12,11 +12,11 @@ from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 
-from errand_spot.messages import InvalidRequestError, check_values, finite, points_of
+from errand_spot.messages import InvalidRequestError, points_of
 from errand_spot.server.computer import PERIOD_S, Computer, Snapshot
 from errand_spot.server.obstacles import Clearance
 from errand_spot.server.posture import Posture
-from errand_spot.server.refusals import known_frame, times_of
+from errand_spot.server.refusals import check_values, known_frame, times_of
 from skills.geometry import compose, relative_pose
 from skills.robot import FloatArray, Pose2D
 
@@ -174,30 +174,40 @@ class Halt(BaseMotion):
 
 
 class _Driving(BaseMotion):
-    """Drives until its end; then it has timed out."""
+    """Stands up if need be, then drives until its end; then it has timed out."""
 
     end_s: float
     posture: Held
+    _stands = False
+    _ready: Callable[[], bool]
 
     @property
     def moving(self) -> bool:
         """Returns whether it drives."""
         return bool(self.status == Status.STATUS_PROCESSING)
 
+    def begin(self, computer: Computer) -> None:
+        """Stands up if the robot does not stand, and in the posture of the command."""
+        self._ready = computer.stand_first(self.posture)
+        self.tick(computer)
+
     def tick(self, computer: Computer) -> None:
-        """Drives on."""
+        """Drives on, from the time at which the robot stands."""
         if self.status == Status.STATUS_PROCESSING and computer.left_s(self.end_s) <= 0.0:
             self.end(Status.STATUS_COMMAND_TIMED_OUT)
-        if self.status == Status.STATUS_PROCESSING:
-            self._drive(computer)
+        if self.status != Status.STATUS_PROCESSING or not (self._stands or self._ready()):
+            return
+        if not self._stands:
+            self._stands = True
+            self._start(computer)
+        self._drive(computer)
+
+    def _start(self, computer: Computer) -> None:
+        """Prepares to drive."""
+        raise NotImplementedError
 
     def _drive(self, computer: Computer) -> None:
         raise NotImplementedError
-
-    def _stand(self, computer: Computer) -> None:
-        """Stands up if the robot sits, or in the posture of the command."""
-        if computer.sits or self.posture is not None:
-            computer.stand(*(self.posture or (computer.capabilities.standing_height_m, 0.0)))
 
 
 class Velocity(_Driving):
@@ -206,8 +216,8 @@ class Velocity(_Driving):
     field = "se2_velocity_feedback"
 
     def __init__(self, request: Any, params: Any, end_s: float, posture: Held = None) -> None:
-        self._velocity = _velocity(request.velocity, "se2_velocity_request.velocity")
-        slew = _velocity(request.slew_rate_limit, "se2_velocity_request.slew_rate_limit")
+        self._velocity = _velocity(request.velocity)
+        slew = _velocity(request.slew_rate_limit)
         if slew.min() < 0.0:
             raise InvalidRequestError("se2_velocity_request.slew_rate_limit must not be negative")
         self._step, self._now = np.where(slew > 0.0, slew, math.inf) * PERIOD_S, np.zeros(3)
@@ -215,11 +225,9 @@ class Velocity(_Driving):
         self._limit, self._clearance = speed_limit(params), Clearance(params.obstacle_params)
         super().__init__()
 
-    def begin(self, computer: Computer) -> None:
-        """Starts to drive, from the velocity that the robot has."""
+    def _start(self, computer: Computer) -> None:
+        """Begins with the velocity that the robot has."""
         self._now = self._turn(computer).T @ computer.snapshot.odometry.velocity
-        self._stand(computer)
-        self._drive(computer)
 
     def _drive(self, computer: Computer) -> None:
         self._now = self._now + np.clip(self._velocity - self._now, -self._step, self._step)
@@ -241,7 +249,7 @@ class Trajectory(_Driving):
     def __init__(self, request: Any, params: Any, end_s: float, snapshot: Snapshot, posture: Held = None) -> None:
         """Takes the poses over into `odom`, in which they stay. Raises RefusedError or InvalidRequestError."""
         field, X_OF = "se2_trajectory_request.trajectory", snapshot.X_OF(request.se2_frame_name, FLAT_FRAMES)
-        poses = [Pose2D.from_transform(X_OF @ _planar(point.pose)) for point in points_of(request.trajectory, field)]
+        poses = [Pose2D.from_transform(X_OF @ planar(point.pose)) for point in points_of(request.trajectory, field)]
         self._times_s, self._goal = times_of(request.trajectory, snapshot.time_s, field), poses[-1]
         self._rows = np.array([[pose.x_m, pose.y_m, pose.yaw_rad] for pose in poses])
         self._cubic = request.trajectory.interpolation == trajectory_pb2.POS_INTERP_CUBIC
@@ -249,9 +257,12 @@ class Trajectory(_Driving):
         self._clearance = Clearance(params.obstacle_params)
         self._begun_s, self._moved_s, self._moved_from = 0.0, 0.0, snapshot.odometry.pose
         super().__init__()
+        part, begun = self.Part, self._part()
+        begun.status, begun.body_movement_status = part.STATUS_IN_PROGRESS, part.BODY_STATUS_MOVING
+        begun.final_goal_status = part.FINAL_GOAL_STATUS_IN_PROGRESS
 
-    def begin(self, computer: Computer) -> None:
-        """Starts to drive."""
+    def _start(self, computer: Computer) -> None:
+        """Starts the clock of the path, here."""
         pose, self._begun_s = computer.snapshot.odometry.pose, computer.now_s()
         self._moved_s, self._moved_from = self._begun_s, pose
         ahead = [k for k, time_s in enumerate(self._times_s) if time_s > 0.0] or [len(self._times_s) - 1]
@@ -260,8 +271,6 @@ class Trajectory(_Driving):
         rows[:, 2] = np.unwrap(rows[:, 2])
         self._path = PchipInterpolator(times_s, rows) if self._cubic else make_interp_spline(times_s, rows, k=1)
         self._lasts_s = float(times_s[-1])
-        self._stand(computer)
-        self._drive(computer)
 
     def _drive(self, computer: Computer) -> None:
         odometry, now_s = computer.snapshot.odometry, computer.now_s()
@@ -335,7 +344,7 @@ class Stance(BaseMotion):
             raise InvalidRequestError(f"{field}.foot_positions: {', '.join(FEET_M)} are needed")
         pose_O = Pose2D.from_transform(snapshot.X_OF(stance.se2_frame_name, FLAT_FRAMES))
         places = [stance.foot_positions[foot] for foot in FEET_M]
-        wanted = np.array([[finite(p.x, field), finite(p.y, field)] for p in places])
+        wanted = np.array([[p.x, p.y] for p in places])
         x, y = wanted.mean(axis=0)
         yaw = math.atan2(*(wanted[:2].mean(axis=0) - [x, y])[::-1])
         c, s = math.cos(yaw), math.sin(yaw)
@@ -344,7 +353,7 @@ class Stance(BaseMotion):
         goal_O = compose(pose_O, Pose2D(float(x), float(y), yaw))
         away = error_to(snapshot.odometry.pose, goal_O)
         near = math.hypot(*away[:2]) < _STANCE_M and abs(away[2]) < _STANCE_RAD
-        fits = near and off_m < min(max(finite(stance.accuracy, field) or 0.05, 0.02), 0.1)
+        fits = near and off_m < (stance.accuracy or 0.05)
         self._way = way_to(goal_O, end_s, snapshot) if fits else None
         super().__init__()
         self._report()
@@ -382,14 +391,13 @@ def drive(computer: Computer, velocity: FloatArray, end_s: float) -> None:
     computer.robot.drive(vx, vy, wz, until_s=until_s, lease=computer.lease)
 
 
-def _planar(message: Any) -> RigidTransform:
-    x, y = (finite(getattr(message.position, axis), f"pose.position.{axis}") for axis in "xy")
-    return Pose2D(x, y, finite(message.angle, "pose.angle")).transform()
+def planar(message: Any) -> RigidTransform:
+    """Transform of a planar pose."""
+    return Pose2D(message.position.x, message.position.y, message.angle).transform()
 
 
-def _velocity(message: Any, field: str) -> FloatArray:
-    values = (("linear.x", message.linear.x), ("linear.y", message.linear.y), ("angular", message.angular))
-    return np.array([finite(value, f"{field}.{name}") for name, value in values])
+def _velocity(message: Any) -> FloatArray:
+    return np.array([message.linear.x, message.linear.y, message.angular])
 
 
 def mobility_params(request: Any) -> Any:
@@ -407,7 +415,7 @@ def speed_limit(params: Any) -> Callable[[FloatArray], FloatArray]:
     for name, limits in (("max_vel", most), ("min_vel", least)):
         if params.HasField("vel_limit") and params.vel_limit.HasField(name):
             given = getattr(params.vel_limit, name)
-            limits[:] = given.linear.x, given.linear.y, given.angular
-    if not (np.isfinite([least, most]).all() and (least <= 0.0).all() and (most >= 0.0).all()):
-        raise InvalidRequestError("params.vel_limit: max_vel is finite and at least 0, min_vel at most 0")
+            limits[:] = _velocity(given)
+    if most.min() < 0.0 or least.max() > 0.0:
+        raise InvalidRequestError("params.vel_limit: max_vel must be at least 0, min_vel at most 0")
     return lambda velocity: np.clip(velocity, least, most)

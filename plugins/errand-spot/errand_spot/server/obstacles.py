@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from errand_spot.messages import InvalidRequestError, finite, transform
+from errand_spot.messages import InvalidRequestError, transform
 from skills.robot import FloatArray, Pose2D, Scan
 
 if TYPE_CHECKING:
@@ -68,11 +68,7 @@ class Clearance:
     """Slows a walk down in front of obstacles, by the obstacle parameters of its command."""
 
     def __init__(self, params: Any) -> None:
-        """Raises InvalidRequestError for a padding that is negative or not finite."""
-        given_m = finite(params.obstacle_avoidance_padding, "obstacle_params.obstacle_avoidance_padding")
-        if given_m < 0.0:
-            raise InvalidRequestError(f"obstacle_params.obstacle_avoidance_padding is {given_m}; it must be >= 0")
-        self._padding_m = given_m or _PADDING_M
+        self._padding_m = params.obstacle_avoidance_padding or _PADDING_M
         self._sees = not params.disable_vision_body_obstacle_avoidance
 
     def limit(self, computer: Computer, velocity: FloatArray) -> FloatArray:
@@ -140,14 +136,14 @@ def region_of(message: Any, until_s: float, snapshot: Snapshot) -> Region | None
     else:
         angles, middle = np.linspace(0.0, math.tau, 37), placed.circle.center_pt
         around = _size(placed.circle.radius, field) * np.column_stack([np.cos(angles), np.sin(angles)])
-        corners = around + [finite(middle.x, field), finite(middle.y, field)]
+        corners = around + [middle.x, middle.y]
     sides = [np.linspace(a, b, 2 + math.ceil(math.dist(a, b) / _SPACING_M)) for a, b in pairwise(corners)]
     outline = np.concatenate(sides)
     return Region((X_OR @ np.column_stack([outline, np.zeros(len(outline))]).T).T[:, :2], until_s)
 
 
 def _size(value: float, field: str) -> float:
-    if not 0.0 < finite(value, field) <= _LARGEST_M:
+    if not 0.0 < value <= _LARGEST_M:
         raise InvalidRequestError(f"{field}: a size is {value} m; it must be positive and at most {_LARGEST_M:.0f} m")
     return value
 

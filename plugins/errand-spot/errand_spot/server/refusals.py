@@ -1,17 +1,36 @@
-"""Refusals of motion commands with the API's statuses, and the checks of times that several commands share."""
+"""Refusals of commands with the API's statuses, and the checks of values and times that all commands share."""
 
 from __future__ import annotations
 
-from collections.abc import Container
+import math
+from collections.abc import Container, Mapping
 from itertools import pairwise
 from typing import Any, Final
 
 from bosdyn.api import robot_command_pb2
+from google.protobuf.message import Message
 
 from errand_spot.messages import InvalidRequestError, seconds
 
 LONGEST_S: Final = 600.0
 _Answer = robot_command_pb2.RobotCommandResponse
+_MOST, _LEAST, _YEARS_S, _SLACK = 1e7, 1e-3, 3.15576e11, 1e-6
+"""Largest value of a number, least value of a limit, longest duration of a message, and tolerance of ranges."""
+RANGES: Final[Mapping[str, tuple[float, float]]] = {
+    "ImageRequest.quality_percent": (0.0, 100.0),
+    "FanPowerCommandRequest.percent_power": (0.0, 100.0),
+    "CylindricalCoordinate.r": (-1.0, 1.0),
+    "CylindricalCoordinate.theta": (-1.0, 1.0),
+    "CylindricalCoordinate.z": (-1.0, 1.0),
+    "CylindricalVelocity.max_linear_velocity": (0.0, _MOST),
+    "ObstacleParams.obstacle_avoidance_padding": (0.0, 10.0),
+    "RotationWithTolerance.threshold_radians": (0.0, math.pi),
+    "VectorAlignmentWithTolerance.threshold_radians": (0.0, math.pi),
+    "WalkToObjectInImage.offset_distance": (0.0, 10.0),
+    "WalkToObjectRayInWorld.offset_distance": (0.0, 10.0),
+    "Stance.accuracy": (0.02, 0.1),
+}
+"""Ranges of fields by message and name. A limit (`max...`) is positive, and each other number at most 1e7."""
 
 
 class RefusedError(Exception):
@@ -53,9 +72,47 @@ def soon(ahead_s: float, name: str) -> float:
 
 
 def times_of(trajectory: Any, now_s: float, name: str) -> list[float]:
-    """Times of a trajectory's points from now on (s), 0 for past ones. Raises RefusedError or InvalidRequestError."""
+    """Times of a trajectory's points from now on (s), 0 for past ones. Raises RefusedError."""
     offset_s = seconds(trajectory.reference_time) - now_s if trajectory.HasField("reference_time") else 0.0
-    times_s = [soon(offset_s + seconds(point.time_since_reference), name) for point in trajectory.points]
-    if any(later < earlier for earlier, later in pairwise(times_s)):
-        raise InvalidRequestError(f"{name}: the times of its points must increase")
-    return times_s
+    return [soon(offset_s + seconds(point.time_since_reference), name) for point in trajectory.points]
+
+
+def check_values(message: Message, field: str = "request") -> None:
+    """Raises InvalidRequestError for a value that the API does not allow, in any part of a message.
+
+    That is a number out of its range, a rotation of zeros, an option that the API lacks, or a path against time.
+    """
+    given = message.ListFields()
+    if message.DESCRIPTOR.name == "Quaternion" and not given:
+        raise InvalidRequestError(f"{field} is zero; a rotation has at least one value that is not")
+    for described, value in given:
+        name = f"{field}.{described.name}"
+        if isinstance(value, Message | str | bytes | int | float):
+            _check(described, value, name)
+            continue
+        for key, each in value.items() if isinstance(value, Mapping) else enumerate(value):
+            _check(described, each, f"{name}[{key}]")
+        if described.name == "points":
+            times_s = [seconds(each.time_since_reference) for each in value if hasattr(each, "time_since_reference")]
+            for k, (before_s, after_s) in enumerate(pairwise(times_s), start=1):
+                if after_s < before_s:
+                    said = f"{name}[{k}].time_since_reference is {after_s:g} s; it must be at least {before_s:g} s"
+                    raise InvalidRequestError(said)
+
+
+def _check(described: Any, value: Any, name: str) -> None:
+    """Checks one value of a field: a message, an option or a number."""
+    kind = described.message_type.full_name if described.message_type is not None else ""
+    low, high = _LEAST if described.name.startswith("max") else -_MOST, _MOST
+    if kind == "google.protobuf.Duration":
+        value, low, high = seconds(value), 0.0, _YEARS_S
+    elif kind.startswith("google.protobuf.") and hasattr(value, "value"):
+        value = value.value
+    elif isinstance(value, Message):
+        check_values(value, name)
+    elif described.enum_type is not None and value not in described.enum_type.values_by_number:
+        raise InvalidRequestError(f"{name}: the API has no option {value}")
+    key = f"{described.containing_type.name}.{described.name}"
+    low, high = RANGES.get(key, (low, high))
+    if (isinstance(value, float) or key in RANGES) and not low - _SLACK <= value <= high + _SLACK:
+        raise InvalidRequestError(f"{name} is {value:g}; it must be {low:g} to {high:g}")

@@ -14,12 +14,12 @@ from bosdyn.api.graph_nav import graph_nav_pb2
 from bosdyn.api.spot import robot_command_pb2
 from pydrake.math import RigidTransform
 
-from errand_spot.messages import finite, pose
+from errand_spot.messages import pose
 from errand_spot.server.computer import Computer
 from errand_spot.server.graph_map import GraphMap, Poses
 from errand_spot.server.mobility import drive, error_to, speed_limit
 from errand_spot.server.obstacles import Clearance
-from skills.robot import CommandId, FloatArray, Pose2D
+from skills.robot import FloatArray, Pose2D
 
 Feedback = graph_nav_pb2.NavigationFeedbackResponse
 _NEXT_M: Final = 0.25
@@ -63,8 +63,8 @@ class Course:
 
     @staticmethod
     def of(waypoints: Sequence[str], goal: Pose2D, poses: Poses, params: Any) -> Course:
-        """Returns the course by travel parameters. Raises InvalidRequestError."""
-        near_m, near_rad = finite(params.max_distance, "max_distance"), finite(params.max_yaw, "max_yaw")
+        """Returns the course by travel parameters. Raises InvalidRequestError for limits of velocity that reverse."""
+        near_m, near_rad = params.max_distance, params.max_yaw
         wait_s = params.blocked_path_wait_time.ToNanoseconds() * 1e-9
         return Course(
             waypoints,
@@ -80,6 +80,8 @@ class Course:
 class FollowRoute:
     """Drives along a course until its end time, which a client may extend by setting `end_s` (robot time)."""
 
+    _ready: Callable[[], bool]
+
     def __init__(
         self,
         course: Course,
@@ -94,13 +96,12 @@ class FollowRoute:
         self.status: int = Feedback.STATUS_FOLLOWING_ROUTE
         self._clearance = Clearance(robot_command_pb2.ObstacleParams())
         self._next, self._blocked, self._ko_tform_goal = 0, False, RigidTransform()
-        self._standing: CommandId | None = None
+        self._stands = False
         self._moved_s, self._moved_from = -math.inf, Pose2D(math.inf, 0.0, 0.0)
 
     def begin(self, computer: Computer) -> None:
         """Stands up if the robot sits, and starts to drive."""
-        if computer.sits:
-            self._standing = computer.stand(computer.capabilities.standing_height_m, 0.0)
+        self._ready = computer.stand_first()
         self.tick(computer)
 
     def tick(self, computer: Computer) -> None:
@@ -114,8 +115,8 @@ class FollowRoute:
             self.status = Feedback.STATUS_NO_LOCALIZATION
         elif place.lost:
             self.status = Feedback.STATUS_LOST
-        elif self._standing is None or computer.stands(self._standing, computer.capabilities.standing_height_m):
-            self._standing = None
+        elif self._stands or self._ready():
+            self._stands = True
             self._drive(computer, place)
         if self.status != Feedback.STATUS_FOLLOWING_ROUTE:
             drive(computer, np.zeros(3), math.inf)

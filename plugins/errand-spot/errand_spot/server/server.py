@@ -16,7 +16,6 @@ from errand_spot.server.calls import Service, handlers
 from errand_spot.server.commands import PowerService, RobotCommandService
 from errand_spot.server.computer import Computer, Pace, Perception, Solver
 from errand_spot.server.estop import EstopService, Tablet
-from errand_spot.server.faults import Switchboard
 from errand_spot.server.graph_nav import GraphNavService, Live
 from errand_spot.server.identity import DOMAIN, Credentials
 from errand_spot.server.keepalive import KeepaliveService
@@ -69,6 +68,7 @@ class Options:
 
     `picker` picks up objects for the manipulation service, which otherwise refuses picks. `dock_O` is the robot's pose
     on its dock, in `odom`. Without `perception` only odometry localises the robot, and no tags are detected.
+    `interceptors` see each call.
     """
 
     passwords: Mapping[str, str]
@@ -78,6 +78,7 @@ class Options:
     picker: manipulation.Picker | None = None
     dock_O: Pose2D | None = None
     perception: Perception | None = None
+    interceptors: Sequence[grpc.ServerInterceptor] = ()
 
 
 class SpotServer:
@@ -97,10 +98,9 @@ class SpotServer:
         self.certificate = credentials.certificate
         auth = identity.AuthService(options.passwords, credentials.token_key.read_bytes())
         self.services = self._services(leases, estop, auth, robot.name, options)
-        self.faults = Switchboard()
         self._grpc = grpc.server(
             ThreadPoolExecutor(_THREADS, thread_name_prefix="spot-api"),
-            interceptors=[self.faults],
+            interceptors=list(options.interceptors),
             options=[
                 ("grpc.max_receive_message_length", _MOST_BYTES),
                 ("grpc.max_send_message_length", _MOST_BYTES),

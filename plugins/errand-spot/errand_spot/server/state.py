@@ -42,7 +42,7 @@ from errand_spot.server.obstacles import Region, region_of
 from skills.robot import Mount, NoImageError
 
 RUNTIME_S: Final = 5400.0
-_LOOK_S, _PICTURES_S, _LOW_M = 0.5, 5.0, 0.05
+_LOOK_S, _PICTURES_S = 0.5, 5.0
 _FIRST_TAG: Final = 1_000_000
 """Id of the object of tag 0; those of clients' objects are smaller."""
 _Kinds = world_object_pb2.WorldObjectType
@@ -91,10 +91,9 @@ class RobotStateService(Service):
     def _behaviour(self, snapshot: Snapshot) -> int:
         """State of the body: a robot that cannot move, or sits, is not ready."""
         State, computer = robot_state_pb2.BehaviorState, self._computer
-        low = snapshot.odometry.X_OB.translation()[2] < computer.capabilities.height_range_m[0] - _LOW_M
         if not computer.able or (computer.sits and snapshot.sitting):
             return int(State.STATE_NOT_READY)
-        if computer.sits or low:
+        if not computer.upright:
             return int(State.STATE_TRANSITION)
         steps = computer.feet_O is None and computer.base_moves(shifted=True)
         return int(State.STATE_STEPPING if steps else State.STATE_STANDING)
@@ -172,7 +171,7 @@ class RobotStateService(Service):
         can, State = self._computer.capabilities, robot_state_pb2.ManipulatorState
         assert can.gripper is not None and can.arm is not None
         made = state.manipulator_state
-        made.gripper_open_percentage = 100.0 * snapshot.gripper.opening / can.gripper.widest
+        made.gripper_open_percentage = 100.0 * min(max(snapshot.gripper.opening / can.gripper.widest, 0.0), 1.0)
         made.is_gripper_holding_item = self._computer.grip.holds(snapshot.gripper)
         made.estimated_end_effector_force_in_hand.CopyFrom(vec3((0.0, 0.0, 0.0)))
         stowed = np.abs(self._computer.arm_rad(snapshot.joints) - np.array(can.arm.stowed_rad)).max() < 0.1

@@ -14,13 +14,13 @@ from bosdyn.api import (
     robot_state_pb2,
     time_sync_pb2,
 )
+from call_faults import Fault
 from lock_step import PASSWORD, USER, LockStep, scripted
 from proxy import Proxy
 
 from errand_spot.adapter.connection import Address, Connection, LostError
 from errand_spot.adapter.robot import ApiRobot
 from errand_spot.adapter.statuses import trouble
-from errand_spot.server.faults import Fault
 from plant.robots.spot.kind import spot_capabilities
 from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError, NoImageError
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from bosdyn.api import estop_pb2, header_pb2, lease_pb2, power_pb2, robot_command_pb2
 from bosdyn.api.keepalive import keepalive_pb2
+from call_faults import Fault
 from lock_step import LockStep, scripted
 
 from errand_spot.adapter.connection import LostError
 from errand_spot.adapter.statuses import CODES, GOOD, MEANINGS
-from errand_spot.server.faults import Fault
 from plant.robots.spot.kind import spot_capabilities
 from skills.robot import ArmTrajectory, CommandCause, CommandState
 

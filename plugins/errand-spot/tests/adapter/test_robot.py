@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from bosdyn.api import gripper_camera_param_pb2, image_pb2, manipulation_api_pb2, robot_command_pb2, robot_state_pb2
 from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
+from call_faults import Fault
 from lock_step import FailedCall, LockStep, scripted
 
 from errand_spot.adapter import connection
 from errand_spot.adapter.connection import Address, Connection
 from errand_spot.adapter.readings import picture
 from errand_spot.adapter.robot import ApiRobot
-from errand_spot.server.faults import Fault
 from plant.robots.spot.kind import spot_capabilities
 from skills.inputs.errors import InputError
 from skills.robot import ArmTrajectory, CommandCause, CommandState, FrameTree, LeaseError, NoImageError

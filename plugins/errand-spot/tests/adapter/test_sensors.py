@@ -2,9 +2,9 @@
 
 import pytest
 from bosdyn.api.graph_nav import graph_nav_pb2, map_pb2
+from call_faults import Fault
 
 from errand_spot.messages import pose
-from errand_spot.server.faults import Fault
 from skills.robot import Pose2D
 
 STATE = "bosdyn.api.graph_nav.GraphNavService/GetLocalizationState"

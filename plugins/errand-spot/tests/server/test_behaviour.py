@@ -4,24 +4,28 @@ motors off, fallen, or sitting      STATE_NOT_READY
 sits down, stands up                STATE_TRANSITION
 stands, also with a turned body     STATE_STANDING
 walks                               STATE_STEPPING
-power cut from standing             sinks to the floor; no motion until a client clears the fault of the fall
+power cut from standing             falls to the floor; no motion until a client clears the fault of the fall
+walks while it does not stand       stands up first
 """
 
 import time
 
 import bosdyn.client.robot_command as rc
 import pytest
-from bosdyn.api import estop_pb2, manipulation_api_pb2, robot_command_pb2, robot_state_pb2
+from bosdyn.api import basic_command_pb2, estop_pb2, manipulation_api_pb2, robot_command_pb2, robot_state_pb2
 from bosdyn.client.docking import blocking_undock
 from bosdyn.client.exceptions import InvalidRequestError, ResponseError
 from bosdyn.client.robot_command import RobotCommandBuilder as Build
 from bosdyn.geometry import EulerZXY
+from bosdyn.util import seconds_to_duration
 
 from errand_spot.server.computer import Pace
 from errand_spot.server.graph_nav import _impaired
 
 PACE = Pace.CLIENT
 Fault = robot_state_pb2.BehaviorFault
+Progress = basic_command_pb2.RobotCommandFeedbackStatus
+Walk = basic_command_pb2.SE2TrajectoryCommand.Feedback
 Clear = robot_command_pb2.ClearBehaviorFaultResponse
 
 
@@ -144,3 +148,70 @@ def test_an_estop_that_cuts_the_power_lets_the_robot_fall(spot):
     spot.served.server.computer.estop._held["tablet"].level = estop_pb2.ESTOP_LEVEL_CUT
     time.sleep(0.2)
     assert [fault.cause for fault in faults(spot)] == [Fault.CAUSE_FALL]
+
+
+def test_a_cut_from_standing_is_a_fall_for_a_robot_that_can_fall(spot, monkeypatch):
+    computer, fallen_at = spot.served.server.computer, []
+    monkeypatch.setattr(computer.robot, "fall", lambda **named: fallen_at.append(named) or 0, raising=False)
+    monkeypatch.setattr(computer, "_sits", lambda _height_m: False)
+    power_off(spot, cut=True)
+    assert len(fallen_at) == 1
+
+
+def walks(ahead_s):
+    """Commands that walk 0.5 m ahead in ahead_s, and how far they walk."""
+    path = Build.synchro_se2_trajectory_point_command(0.5, 0.0, 0.0, "odom")
+    point = path.synchronized_command.mobility_command.se2_trajectory_request.trajectory.points[0]
+    point.time_since_reference.CopyFrom(seconds_to_duration(ahead_s))
+    velocity = Build.synchro_velocity_command(0.5, 0.0, 0.0)
+    return [pytest.param(path, 0.5, id="path"), pytest.param(velocity, None, id="velocity")]
+
+
+def sit(spot):
+    rc.blocking_sit(spot.commands, timeout_sec=5.0, update_frequency=20.0)
+
+
+def sit_half(spot):
+    sent(spot, Build.synchro_sit_command())
+    time.sleep(0.5)
+
+
+def stand_half(spot):
+    sit(spot)
+    sent(spot, Build.synchro_stand_command())
+    time.sleep(0.2)
+
+
+def settle_half(spot):
+    spot.commands.robot_command(Build.safe_power_off_command())
+    time.sleep(0.3)
+
+
+@pytest.mark.parametrize("before", [sit, sit_half, stand_half, settle_half])
+@pytest.mark.parametrize(("command", "far_m"), walks(2.0))
+def test_a_robot_that_does_not_stand_stands_up_before_it_walks(spot, before, command, far_m):
+    before(spot)
+    scripted, seen, told = spot.served.scripted, [], set()
+    number = sent(spot, command, ahead_s=9.0)
+    for _ in range(80):
+        time.sleep(0.05)
+        seen.append((scripted.height_m, abs(scripted.pose.x_m), abs(scripted.velocity[0])))
+        both = spot.commands.robot_command_feedback(number).feedback.synchronized_feedback
+        told.add(both.mobility_command_feedback.se2_trajectory_feedback.final_goal_status)
+    low = [(x, v) for height, x, v in seen if height < 0.5]
+    assert low and all(x < 0.01 and v < 0.01 for x, v in low)
+    assert all(v < 0.6 for _, _, v in seen)  # the path's clock has waited: there is nothing to make up for
+    assert scripted.pose.x_m == pytest.approx(far_m, abs=0.03) if far_m else scripted.pose.x_m > 0.5
+    assert Walk.FINAL_GOAL_STATUS_BLOCKED not in told
+    assert state(spot) in ("STANDING", "STEPPING")
+
+
+def test_a_safe_power_off_that_a_stand_replaces_is_not_reported_as_done(spot):
+    number = spot.commands.robot_command(Build.safe_power_off_command())
+    time.sleep(0.3)
+    rc.blocking_stand(spot.commands, timeout_sec=5.0, update_frequency=20.0)
+    told = spot.commands.robot_command_feedback(number).feedback.full_body_feedback
+    assert told.safe_power_off_feedback.status == told.safe_power_off_feedback.STATUS_IN_PROGRESS
+    assert told.status == Progress.STATUS_COMMAND_OVERRIDDEN
+    time.sleep(3.0)
+    assert spot.robot.is_powered_on() and state(spot) == "STANDING"

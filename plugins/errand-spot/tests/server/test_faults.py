@@ -8,8 +8,7 @@ import grpc
 import pytest
 from bosdyn.api import lease_pb2
 from bosdyn.client.exceptions import InternalServerError, TimedOutError, UnableToConnectToRobotError
-
-from errand_spot.server.faults import Fault
+from call_faults import Fault
 
 INVALID = lease_pb2.TakeLeaseResponse.STATUS_INVALID_RESOURCE
 TAKE, STATE = "bosdyn.api.LeaseService/TakeLease", "bosdyn.api.RobotStateService/GetRobotState"

@@ -168,6 +168,21 @@ def test_stand_changes_height_and_pitch_and_sit_refuses_to_drive(engine, spot, l
     assert "sits" in spot.command_status(spot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=lease)).reason
 
 
+def test_a_fall_reaches_the_floor_in_half_a_second(engine, spot, lease):
+    fall = spot.fall(until_s=9.0, lease=lease)
+    heights = [truth(engine)[3]]
+    while spot.command_status(fall).state is CommandState.RUNNING and engine.now() < 3.0:
+        engine.advance(0.01)
+        heights.append(truth(engine)[3])
+    lies = next(k for k, height in enumerate(heights) if height < 0.21)
+    assert 40 < lies < 60
+    assert heights[0] - heights[lies // 2] < 0.35 * (heights[0] - heights[lies])  # it falls ever faster
+    assert min(heights) > 0.1
+    stand = spot.stand(0.52, 0.0, until_s=9.0, lease=lease)
+    engine.advance(2.0)
+    assert spot.command_status(stand).state is CommandState.DONE
+
+
 def test_a_command_that_has_expired_already_is_refused(engine, spot, lease):
     engine.advance(1.0)
     assert "expires" in spot.command_status(spot.drive(0.5, 0.0, 0.0, until_s=0.5, lease=lease)).reason

@@ -11,14 +11,7 @@ from itertools import count
 from threading import Lock
 from typing import Any, Final
 
-from bosdyn.api import (
-    basic_command_pb2,
-    estop_pb2,
-    full_body_command_pb2,
-    lease_pb2,
-    power_pb2,
-    robot_command_pb2,
-)
+from bosdyn.api import basic_command_pb2, estop_pb2, full_body_command_pb2, lease_pb2, power_pb2, robot_command_pb2
 
 from errand_spot.messages import InvalidRequestError, seconds, timestamp
 from errand_spot.server import arm, gripper, hand, mobility
@@ -32,7 +25,8 @@ from errand_spot.server.refusals import LONGEST_S, RefusedError, check_values, e
 Status = robot_command_pb2.RobotCommandResponse
 Progress = basic_command_pb2.RobotCommandFeedbackStatus
 _LOG: Final = logging.getLogger(__name__)
-_ALL: Final = (MOBILITY, ARM, GRIPPER)
+_FIELDS: Final = {MOBILITY: "mobility_command", ARM: "arm_command", GRIPPER: "gripper_command"}
+_ALL: Final = tuple(_FIELDS)
 _REMEMBERED: Final = 1000
 
 
@@ -118,13 +112,8 @@ class _Commanded:
             made.full_body_feedback.CopyFrom(self.whole.feedback)
             return made
         made.synchronized_feedback.SetInParent()
-        for part, field in (
-            (MOBILITY, "mobility_command_feedback"),
-            (ARM, "arm_command_feedback"),
-            (GRIPPER, "gripper_command_feedback"),
-        ):
-            if part in self.parts:
-                getattr(made.synchronized_feedback, field).CopyFrom(self.parts[part].feedback)
+        for part, motion in self.parts.items():
+            getattr(made.synchronized_feedback, f"{_FIELDS[part]}_feedback").CopyFrom(motion.feedback)
         return made
 
 
@@ -229,8 +218,7 @@ def _parts_of(command: Any) -> tuple[str, ...]:
     if command.HasField("full_body_command"):
         return _ALL
     named = command.synchronized_command
-    fields = {MOBILITY: "mobility_command", ARM: "arm_command", GRIPPER: "gripper_command"}
-    return tuple(part for part, field in fields.items() if named.HasField(field)) or _ALL
+    return tuple(part for part, field in _FIELDS.items() if named.HasField(field)) or _ALL
 
 
 def _has_end_time(command: Any) -> bool:

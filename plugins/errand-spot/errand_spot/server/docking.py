@@ -16,17 +16,19 @@ from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer
 from errand_spot.server.identity import DOMAIN, TimeSyncService
 from errand_spot.server.leases import LeaseService
-from errand_spot.server.obstacles import room_m
+from errand_spot.server.obstacles import SeenSpace
 from errand_spot.server.refusals import LONGEST_S
 from errand_spot.server.task import WHOLE, Steps, Task, stow, walk
-from skills.geometry import compose
+from skills.api import PlanningError
+from skills.navigate.footprint import Footprint
+from skills.navigate.planner import plan_path
 from skills.robot import Pose2D
 
 DOCK_ID: Final = 520
 """Number of the dock: that of a real Spot's first fiducial."""
 _PREP_M: Final = 0.9
 _NEAR_M: Final = 4.0
-_FARTHER_M: Final = (0.0, 0.4, 0.8, 1.2, 1.6)
+_TRIES, _MOST_POSES, _PADDING_M = 3, 120, 0.02
 _REMEMBERED: Final = 20
 Api: Final = docking_pb2
 Progress: Final = docking_pb2.DockingCommandFeedbackResponse
@@ -55,8 +57,14 @@ class _Docking(Task):
             return int(Progress.STATUS_DOCKED)
         if self.behaviour != Api.PREP_POSE_UNDOCK:
             yield from stow(computer)
-        for pose_O in self._way(computer):
-            if not (yield from walk(computer, pose_O)):
+        if self.behaviour not in (Api.PREP_POSE_UNDOCK, Api.PREP_POSE_SKIP_POSE):
+            for _ in range(_TRIES):
+                if (path := self._path(computer)) is None or (yield from walk(computer, *path, padding_m=_PADDING_M)):
+                    break
+            if path is None or not computer.near(self._prep_O):
+                return int(Progress.STATUS_ERROR_STUCK)
+        for pose_O in self._straight(computer):
+            if not (yield from walk(computer, pose_O, padding_m=_PADDING_M)):
                 return int(Progress.STATUS_ERROR_STUCK)
         if self.behaviour in (Api.PREP_POSE_ONLY_POSE, Api.PREP_POSE_UNDOCK):
             return int(Progress.STATUS_AT_PREP_POSE)
@@ -68,21 +76,22 @@ class _Docking(Task):
         computer.do(computer.switch_off)
         return int(Progress.STATUS_DOCKED)
 
-    def _way(self, computer: Computer) -> Sequence[Pose2D]:
-        """Poses on the way: to the prep pose, from farther out if the LiDAR shows more room there, then to the dock."""
-        here, yaw_rad, ways = computer.snapshot.odometry.pose, self._dock_O.yaw_rad, list[list[Pose2D]]()
+    def _path(self, computer: Computer) -> Sequence[Pose2D] | None:
+        """Path to the place before the dock, clear of what the LiDAR has shown and of no-go regions; None without."""
+        here, footprint = computer.snapshot.odometry.pose, Footprint.of(computer.capabilities)
+        try:
+            rows = plan_path(SeenSpace(computer), footprint, here, self._prep_O).poses
+        except PlanningError:
+            return None
+        return [Pose2D(*row) for row in rows[:: -math.ceil(len(rows) / _MOST_POSES)][::-1].tolist()]
+
+    def _straight(self, computer: Computer) -> Sequence[Pose2D]:
+        """Poses straight onto the dock from the place before it, or off the dock."""
+        here = computer.snapshot.odometry.pose
         if self.behaviour == Api.PREP_POSE_SKIP_POSE:
-            return [Pose2D(here.x_m, here.y_m, yaw_rad), self._dock_O]
-        if self.behaviour == Api.PREP_POSE_UNDOCK:
-            return [self._prep_O]
-        for out_m in _FARTHER_M:
-            via = compose(self._prep_O, Pose2D(out_m, 0.0, 0.0))
-            ahead_rad = math.atan2(via.y_m - here.y_m, via.x_m - here.x_m)
-            for turn in (yaw_rad, ahead_rad, ahead_rad + math.pi):
-                turned = [Pose2D(at.x_m, at.y_m, math.remainder(turn, math.tau)) for at in (here, via)]
-                ways.append([*turned, via, self._prep_O])
-        way = max(ways, key=lambda way: room_m(computer, [here, *way]))
-        return way if self.behaviour == Api.PREP_POSE_ONLY_POSE else [*way, self._dock_O]
+            return [Pose2D(here.x_m, here.y_m, self._dock_O.yaw_rad), self._dock_O]
+        ways = {Api.PREP_POSE_ONLY_POSE: [], Api.PREP_POSE_UNDOCK: [self._prep_O]}
+        return ways.get(self.behaviour, [self._dock_O])
 
 
 class DockingService(Service):

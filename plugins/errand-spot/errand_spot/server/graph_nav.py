@@ -22,7 +22,7 @@ from errand_spot.server.identity import DOMAIN, TimeSyncService
 from errand_spot.server.leases import MOBILITY, LeaseService
 from errand_spot.server.mobility import planar
 from errand_spot.server.pictures import LocalGridService, PointCloudService
-from errand_spot.server.refusals import RefusedError, end_of
+from errand_spot.server.refusals import RefusedError, check_values, end_of
 from errand_spot.server.route import Course, Feedback, FollowRoute, Place
 from errand_spot.server.state import RobotStateService, WorldObjectService, kinematic_state
 from skills.robot import Pose2D
@@ -65,6 +65,7 @@ class GraphNavService(Service):
     """Stores one map. Scans localise the robot on the snapshots' points, or odometry on a map without points."""
 
     name, type, authority = "graph-nav-service", "bosdyn.api.graph_nav.GraphNavService", f"api.{DOMAIN}"
+    checks_values = True
 
     def __init__(
         self,
@@ -182,6 +183,7 @@ class GraphNavService(Service):
 
     def SetLocalization(self, request: Any, _call: Call) -> Any:
         """Localises the robot by a tag of the map, or near a waypoint; then a scan places it exactly."""
+        check_values(request)
         known, snapshot, guess = self._map, self._computer.snapshot, request.initial_guess
         by_tag = request.fiducial_init > _Request.FIDUCIAL_INIT_NO_FIDUCIAL
         if not known.waypoints:
@@ -324,6 +326,7 @@ class GraphNavService(Service):
         return self._navigate(request, graph_nav_pb2.NavigateToAnchorResponse, plan)
 
     def _navigate(self, request: Any, Response: Any, plan: Plan) -> Any:
+        check_values(request)
         used = [self._leases.use(lease, (MOBILITY,)) for lease in request.leases or [lease_pb2.Lease()]]
         made, held = Response(lease_use_results=used), [each.attempted_lease for each in used if each.status == _OK]
         if not held:

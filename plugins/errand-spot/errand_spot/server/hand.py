@@ -23,6 +23,8 @@ from skills.robot import ArmTrajectory, FloatArray, Pose2D
 _USUAL_M_S, _CYLINDRICAL_M_S = 0.4, 0.5
 _TRACK_S: Final = 0.1
 _MOVED_M, _MOVED_RAD = 0.02, 0.04
+_LOST_M, _LOST_RAD = 0.1, 0.3
+"""Distance and turn from a goal in the world at which it no longer holds."""
 _BEHIND_M: Final = 0.75
 _FOLLOWING_S: Final = 60.0
 _PER_SEGMENT: Final = 6
@@ -64,7 +66,7 @@ class Cartesian(ArmMotion):
         points, self._times_s = points_of(given, field), times_of(given, now_s, field)
         X_OR = snapshot.X_AB("odom", frame)
         self._X_OW = [X_OR @ X_RT @ transform(point.pose, "pose") @ X_WT.inverse() for point in points]
-        self._X_WT = X_WT
+        self._X_WT, self._X_BGoal = X_WT, snapshot.X_AB("body", "odom") @ self._X_OW[-1]
         super().__init__()
 
     @property
@@ -144,8 +146,12 @@ class Cartesian(ArmMotion):
         """Goes on along the path, and reports how far the hand is from its goal."""
         if self._unfolds(computer):
             return
-        done = self.feedback.arm_cartesian_feedback.status == self.complete
+        frame, X_FGoal = ("odom", self._X_OW[-1]) if self._stays else ("body", self._X_BGoal)
+        X_WG = computer.snapshot.X_AB("link_wr1", frame) @ X_FGoal
+        off_m, off_rad = float(np.linalg.norm(X_WG.translation())), X_WG.rotation().ToAngleAxis().angle()
         live = self._stays and self.status == Status.STATUS_PROCESSING
+        done = self.feedback.arm_cartesian_feedback.status == self.complete
+        done &= not live or (off_m < _LOST_M and off_rad < _LOST_RAD)
         off = self._X_OB.InvertAndCompose(computer.snapshot.X_AB("odom", "body"))
         moved = float(np.linalg.norm(off.translation())) > _MOVED_M or off.rotation().ToAngleAxis().angle() > _MOVED_RAD
         moves = computer.base_moves(shifted=moved)
@@ -159,11 +165,10 @@ class Cartesian(ArmMotion):
             self.feedback = self._made(self.stalled)
         elif not done:
             super().tick(computer)
-        X_WG = computer.snapshot.X_AB("link_wr1", "odom") @ self._X_OW[-1]
         made = arm_command_pb2.ArmCommand.Feedback()
         made.CopyFrom(self.feedback)
-        made.arm_cartesian_feedback.measured_pos_distance_to_goal = float(np.linalg.norm(X_WG.translation()))
-        made.arm_cartesian_feedback.measured_rot_distance_to_goal = X_WG.rotation().ToAngleAxis().angle()
+        made.arm_cartesian_feedback.measured_pos_distance_to_goal = off_m
+        made.arm_cartesian_feedback.measured_rot_distance_to_goal = off_rad
         self.feedback = made
 
     def _unfolds(self, computer: Computer) -> bool:
@@ -198,7 +203,7 @@ class FollowArm(BaseMotion):
             pose = computer.snapshot.odometry.pose
             goal_O = arm.goal_O - pose.transform().rotation() @ self._ahead
             goal = Pose2D(float(goal_O[0]), float(goal_O[1]), pose.yaw_rad)
-            self._way = way_to(goal, computer.now_s() + _FOLLOWING_S, computer.snapshot)
+            self._way = way_to([goal], computer.now_s() + _FOLLOWING_S, computer.snapshot)
             self._way.begin(computer)
 
     def tick(self, computer: Computer) -> None:

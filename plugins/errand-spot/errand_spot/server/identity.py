@@ -173,16 +173,12 @@ class DirectoryService(Service):
         for entry in self._entries.values():
             entry.last_update.CopyFrom(timestamp(now()))
 
-    def ListServiceEntries(
-        self, _request: directory_pb2.ListServiceEntriesRequest, _call: Call
-    ) -> directory_pb2.ListServiceEntriesResponse:
+    def ListServiceEntries(self, _request: Any, _call: Call) -> Any:
         """Lists all services."""
         with self._lock:
             return directory_pb2.ListServiceEntriesResponse(service_entries=self._entries.values())
 
-    def GetServiceEntry(
-        self, request: directory_pb2.GetServiceEntryRequest, _call: Call
-    ) -> directory_pb2.GetServiceEntryResponse:
+    def GetServiceEntry(self, request: Any, _call: Call) -> Any:
         """Returns the entry of one service."""
         Response = directory_pb2.GetServiceEntryResponse
         with self._lock:
@@ -208,10 +204,9 @@ class DirectoryService(Service):
     def silent(self) -> list[str]:
         """Names of the clients' services that have not updated their entries in time."""
         with self._lock:
-            limits = {
-                name: self._entries[name].liveness_timeout_secs for name in self._heard_s if name in self._entries
-            }
-            return [name for name, most_s in limits.items() if 0.0 < most_s < time.monotonic() - self._heard_s[name]]
+            heard = [(self._entries[name], at_s) for name, at_s in self._heard_s.items() if name in self._entries]
+            now_s = time.monotonic()
+            return [each.name for each, at_s in heard if 0.0 < each.liveness_timeout_secs < now_s - at_s]
 
     def remove(self, name: str) -> bool:
         """Removes the entry of a client's service; returns False if there is none."""
@@ -222,11 +217,7 @@ class DirectoryService(Service):
 class DirectoryRegistrationService(Service):
     """Registers services of clients in the directory."""
 
-    name, type, authority = (
-        "directory-registration",
-        "bosdyn.api.DirectoryRegistrationService",
-        f"api.{DOMAIN}",
-    )
+    name, type, authority = "directory-registration", "bosdyn.api.DirectoryRegistrationService", f"api.{DOMAIN}"
 
     def __init__(self, directory: DirectoryService) -> None:
         self._directory = directory

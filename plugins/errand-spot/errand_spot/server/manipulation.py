@@ -3,27 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import count
 from typing import Any, Final, Protocol
 
 import numpy as np
-from bosdyn.api import (
-    geometry_pb2,
-    lease_pb2,
-    manipulation_api_pb2,
-    robot_state_pb2,
-)
+from bosdyn.api import geometry_pb2, lease_pb2, manipulation_api_pb2, robot_state_pb2
 from pydrake.math import RigidTransform, RotationMatrix
 
-from errand_spot.messages import (
-    InvalidRequestError,
-    frame_tree,
-    frames_of,
-    pose_between,
-    transform,
-    vector,
-)
+from errand_spot.messages import InvalidRequestError, frame_tree, frames_of, pose_between, transform, vector
 from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer, Snapshot
 from errand_spot.server.identity import DOMAIN
@@ -39,6 +27,8 @@ _REACHING_M, _GRASPING_M = 0.3, 0.12
 _REMEMBERED: Final = 100
 Aim = Callable[[FloatArray], FloatArray | None]
 """Returns the point that a request means, among points (N, 3); all in `odom`. None when nothing is there."""
+Sizes = Mapping[tuple[str, float], tuple[int, int]]
+"""Columns and rows of pictures, by the frame of the camera and the focal length (pixels)."""
 Allows = Callable[[RotationMatrix], bool]
 """Returns whether the hand may grasp with a rotation in `odom`."""
 
@@ -131,8 +121,9 @@ class ManipulationService(Service):
 
     name, type, authority = "manipulation", "bosdyn.api.ManipulationApiService", f"manipulation.{DOMAIN}"
 
-    def __init__(self, computer: Computer, leases: LeaseService, picker: Picker | None) -> None:
-        self._computer, self._leases, self._picker = computer, leases, picker
+    def __init__(self, computer: Computer, leases: LeaseService, picker: Picker | None, sizes: Sizes) -> None:
+        """`sizes` are those of the pictures that clients have seen."""
+        self._computer, self._leases, self._picker, self._sizes = computer, leases, picker, sizes
         self._ids, self._tasks = count(1), dict[int, _ObjectTask]()
 
     def ManipulationApi(self, request: Any, _call: Call) -> Any:
@@ -185,9 +176,9 @@ class ManipulationService(Service):
         which, snapshot = request.WhichOneof("manipulation_cmd"), self._computer.snapshot
         given = getattr(request, which or "pick_object_execute_plan")
         aims: dict[str | None, Callable[[Any, Snapshot], Aim]] = {
-            "walk_to_object_in_image": _pixel_aim,
+            "walk_to_object_in_image": self._pixel_aim,
             "walk_to_object_ray_in_world": _ray_aim,
-            "pick_object_in_image": _pixel_aim,
+            "pick_object_in_image": self._pixel_aim,
             "pick_object_ray_in_world": _ray_aim,
             "pick_object": _point_aim,
         }
@@ -204,6 +195,25 @@ class ManipulationService(Service):
             raise InvalidRequestError("walk_gaze_mode: PICK_PLAN_ONLY is not simulated")
         walks = mode in (Api.PICK_WALK_GAZE_UNKNOWN, Api.PICK_AUTO_WALK_AND_GAZE)
         return _ObjectTask(aim, None, self._picker, _allows(given.grasp_params, snapshot), walks=walks)
+
+    def _pixel_aim(self, given: Any, _snapshot: Snapshot) -> Aim:
+        """Aim of a pixel from the camera's pose in the frames of the request. Raises InvalidRequestError."""
+        k, sensor = given.camera_model.intrinsics, given.frame_name_image_sensor
+        fx, fy, u, v = k.focal_length.x, k.focal_length.y, given.pixel_xy.x, given.pixel_xy.y
+        if min(fx, fy) <= 0.0:
+            raise InvalidRequestError("camera_model.intrinsics.focal_length must be positive")
+        middle = 2.0 * k.principal_point.x, 2.0 * k.principal_point.y
+        for name, at, most in zip("xy", (u, v), self._sizes.get((sensor, round(fx, 3)), middle), strict=True):
+            if not 0.0 <= at <= most:
+                raise InvalidRequestError(f"pixel_xy.{name} is {at:g}; it must be 0 to {most:g}, within the picture")
+        frames = frames_of(given.transforms_snapshot_for_camera)
+        try:
+            X_OC = pose_between(frames, "odom" if "odom" in frames else "vision", sensor)
+        except KeyError as error:
+            raise InvalidRequestError(f"transforms_snapshot_for_camera: there is no frame {error}") from error
+        x, y = (u - k.principal_point.x) / fx, (v - k.principal_point.y) / fy
+        direction_O = X_OC.rotation() @ _unit((x, y, 1.0), "pixel_xy")
+        return _along(np.asarray(X_OC.translation()), np.asarray(direction_O))
 
 
 def _any(_rotation: RotationMatrix) -> bool:
@@ -252,22 +262,6 @@ def _unit(values: Sequence[float], field: str) -> FloatArray:
     if length < 1e-6:
         raise InvalidRequestError(f"{field} has no length")
     return np.array(values) / length
-
-
-def _pixel_aim(given: Any, _snapshot: Snapshot) -> Aim:
-    """Aim of a pixel from the camera's pose in the frames of the request. Raises InvalidRequestError."""
-    k, sensor = given.camera_model.intrinsics, given.frame_name_image_sensor
-    fx, fy, u, v = k.focal_length.x, k.focal_length.y, given.pixel_xy.x, given.pixel_xy.y
-    if min(fx, fy) <= 0.0:
-        raise InvalidRequestError("camera_model.intrinsics.focal_length must be positive")
-    frames = frames_of(given.transforms_snapshot_for_camera)
-    try:
-        X_OC = pose_between(frames, "odom" if "odom" in frames else "vision", sensor)
-    except KeyError as error:
-        raise InvalidRequestError(f"transforms_snapshot_for_camera: there is no frame {error}") from error
-    x, y = (u - k.principal_point.x) / fx, (v - k.principal_point.y) / fy
-    direction_O = X_OC.rotation() @ _unit((x, y, 1.0), "pixel_xy")
-    return _along(np.asarray(X_OC.translation()), np.asarray(direction_O))
 
 
 def _ray_aim(given: Any, snapshot: Snapshot) -> Aim:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -12,12 +12,13 @@ from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 
-from errand_spot.messages import InvalidRequestError, points_of
+from errand_spot.messages import InvalidRequestError, duration, points_of
 from errand_spot.server.computer import PERIOD_S, Computer, Snapshot
 from errand_spot.server.obstacles import Clearance
 from errand_spot.server.posture import Posture
 from errand_spot.server.refusals import check_values, known_frame, times_of
 from skills.geometry import compose, relative_pose
+from skills.navigate.path import progress_m
 from skills.robot import FloatArray, Pose2D
 
 Status = basic_command_pb2.RobotCommandFeedbackStatus
@@ -27,7 +28,7 @@ Held = tuple[float, float] | None
 _GAIN_1_S: Final = 1.5
 _NEAR_M, _NEAR_RAD = 0.02, 0.03
 _STILL_M_S, _STILL_RAD_S = 0.02, 0.04
-_USUAL_M_S, _USUAL_RAD_S = 0.8, 1.0
+_USUAL_M_S, _USUAL_RAD_S, _PATH_M_S = 0.8, 1.0, 0.5
 _SET_M, _SET_RAD, _MOVES = 0.006, 0.01, 0.05
 """Tolerances of a body over its feet, and the least velocity (m/s, rad/s) of a body that moves."""
 _SHIFT_GAIN_1_S, _SHIFT_MOST = 2.0, 0.3
@@ -321,13 +322,20 @@ class Trajectory(_Driving):
         return Pose2D(*here.tolist()), np.array([c * vx + s * vy, c * vy - s * vx, wz])
 
 
-def way_to(goal_O: Pose2D, end_s: float, snapshot: Snapshot, *, avoids: bool = True) -> Trajectory:
-    """Returns a motion straight to a pose in `odom`, until a robot time; it stops in front of obstacles or not."""
+def way_to(poses_O: Sequence[Pose2D], end_s: float, snapshot: Snapshot, *, padding_m: float | None = 0.0) -> Trajectory:
+    """Returns a motion straight to a pose in `odom`, or slowly along several, until a robot time.
+
+    It stops in front of obstacles, at the usual distance or at `padding_m`; with None only before no-go regions.
+    """
     request = basic_command_pb2.SE2TrajectoryCommand.Request(se2_frame_name="odom")
     params = spot_command_pb2.MobilityParams()
-    goal = request.trajectory.points.add().pose
-    goal.position.x, goal.position.y, goal.angle = goal_O.x_m, goal_O.y_m, goal_O.yaw_rad
-    params.obstacle_params.disable_vision_body_obstacle_avoidance = not avoids
+    rows = np.array([[each.x_m, each.y_m, each.yaw_rad] for each in poses_O])
+    rows[:, 2] = np.unwrap(rows[:, 2])
+    for (x, y, yaw), at_m in zip(rows.tolist(), progress_m(rows).tolist(), strict=True):
+        point = request.trajectory.points.add(time_since_reference=duration(at_m / _PATH_M_S))
+        point.pose.position.x, point.pose.position.y, point.pose.angle = x, y, yaw
+    params.obstacle_params.disable_vision_body_obstacle_avoidance = padding_m is None
+    params.obstacle_params.obstacle_avoidance_padding = padding_m or 0.0
     return Trajectory(request, params, end_s, snapshot)
 
 
@@ -354,7 +362,7 @@ class Stance(BaseMotion):
         away = error_to(snapshot.odometry.pose, goal_O)
         near = math.hypot(*away[:2]) < _STANCE_M and abs(away[2]) < _STANCE_RAD
         fits = near and off_m < (stance.accuracy or 0.05)
-        self._way = way_to(goal_O, end_s, snapshot) if fits else None
+        self._way = way_to([goal_O], end_s, snapshot) if fits else None
         super().__init__()
         self._report()
 

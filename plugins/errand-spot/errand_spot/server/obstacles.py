@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from errand_spot.messages import InvalidRequestError, transform
 from skills.robot import FloatArray, Pose2D, Scan
@@ -19,17 +18,19 @@ if TYPE_CHECKING:
 HEIGHTS_M: Final = (0.15, 1.0)
 _PADDING_M, _NEAR_M, _CARRIED_M = 0.05, 2.0, 0.35
 _REMEMBERED_S, _CELL_M, _SEEN_M, _THIN_M, _AROUND_M = 15.0, 0.05, 0.01, 0.12, 0.2
-_SPACING_M, _LARGEST_M, _FAR_M, _ENOUGH_M, _PER_LEG = 0.05, 100.0, 5.0, 0.15, 12
+_LARGEST_M, _FAR_M = 100.0, 5.0
 _BRAKING_S, _WAITS_S = 0.5, 0.04
 """Time to a collision from which on the robot slows down, and at which it waits."""
+_SLIP_M, _ALONG, _LEVEL = 0.005, 0.3, 0.5
+"""Tolerance of a walk beside a region, the share of its speed that may point inwards, least share of level ground."""
 _AHEAD_S: Final = np.linspace(0.05, _BRAKING_S, 14)
 
 
 @dataclass(frozen=True)
 class Region:
-    """No-go region of a client: points on its outline (N, 2) in `odom`, until a robot time."""
+    """No-go region of a client: corners (N, 2) of its convex outline in `odom`, counter-clockwise; its end."""
 
-    outline_O: FloatArray
+    corners_O: FloatArray
     until_s: float
 
 
@@ -72,31 +73,43 @@ class Clearance:
         self._sees = not params.disable_vision_body_obstacle_avoidance
 
     def limit(self, computer: Computer, velocity: FloatArray) -> FloatArray:
-        """Returns a velocity (3,) of the body that stops before it touches an obstacle."""
+        """Returns a velocity (3,) of the body that stops before it touches an obstacle or enters a region."""
+        snapshot, corners = computer.snapshot, np.array(computer.capabilities.footprint_m)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        outline_B = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+        for region in computer.regions:
+            if region.until_s > snapshot.time_s:
+                velocity = self._outside(outline_B, seen_from(snapshot.odometry.pose, region.corners_O), velocity)
         points_B = self._points_B(computer)
         if not len(points_B) or not np.any(velocity):
             return velocity
-        corners = np.array(computer.capabilities.footprint_m)
-        low, high = corners.min(axis=0), corners.max(axis=0)
         away_m = np.maximum(low - points_B, points_B - high).max(axis=1)
         points_B, away_m = points_B[away_m > 0.0], away_m[away_m > 0.0]  # the others are the robot's own
         margin = np.minimum(away_m, self._padding_m)[:, None]
-        turned = velocity[2] * _AHEAD_S
-        c, s = np.cos(turned)[:, None], np.sin(turned)[:, None]
+        c, s = np.cos(velocity[2] * _AHEAD_S)[:, None], np.sin(velocity[2] * _AHEAD_S)[:, None]
         x, y = (points_B[:, k] - (velocity[k] * _AHEAD_S)[:, None] for k in (0, 1))
         ahead = np.stack([c * x + s * y, c * y - s * x], axis=2)
         touched = ((ahead > low - margin) & (ahead < high + margin)).all(axis=2).any(axis=1)
-        if not touched.any():
+        return _slowed(velocity, touched)
+
+    def _outside(self, outline_B: FloatArray, region_B: FloatArray, velocity: FloatArray) -> FloatArray:
+        """Returns a velocity (3,) with which the body enters a region no deeper, and walks along its side."""
+        now_m, towards = _gap_m(outline_B, region_B)
+        if now_m > _NEAR_M:
             return velocity
-        free_s = float(_AHEAD_S[touched][0]) - float(_AHEAD_S[0])
-        return velocity * (free_s / _BRAKING_S if free_s > _WAITS_S else 0.0)
+        inwards = float(velocity[:2] @ towards)
+        if now_m < self._padding_m + _SLIP_M and 0.0 < inwards < _ALONG * float(np.hypot(*velocity[:2])):
+            velocity = velocity - np.array([*(inwards * towards), 0.0])
+        least_m, entered = min(now_m, self._padding_m) - _SLIP_M, list[bool]()
+        for x, y, turn in np.outer(_AHEAD_S, velocity).tolist():
+            c, s = math.cos(turn), math.sin(turn)
+            entered.append(_gap_m(outline_B @ np.array([[c, s], [-s, c]]) + [x, y], region_B)[0] < least_m)
+        return _slowed(velocity, np.array(entered))
 
     def _points_B(self, computer: Computer) -> FloatArray:
         """Points (N, 2) near the body, without those at what the hand carries."""
         snapshot = computer.snapshot
-        points_O = [computer.scan_points.points_O[: None if self._sees else 0]]
-        points_O += [region.outline_O for region in computer.regions if region.until_s > snapshot.time_s]
-        points_B = seen_from(snapshot.odometry.pose, np.concatenate(points_O))
+        points_B = seen_from(snapshot.odometry.pose, computer.scan_points.points_O[: None if self._sees else 0])
         points_B = points_B[(np.abs(points_B) < _NEAR_M).all(axis=1)]
         if snapshot.gripper.holding and "hand" in snapshot.frames:
             hand_B = snapshot.X_AB("body", "hand").translation()[:2]
@@ -104,19 +117,23 @@ class Clearance:
         return points_B
 
 
-def room_m(computer: Computer, poses: Sequence[Pose2D]) -> float:
-    """Least distance of the body from what the LiDAR shows on a way through poses in `odom`, at most 0.15 m."""
-    points_O = computer.scan_points.points_O
-    points_O = points_O[(np.abs(points_O - [poses[0].x_m, poses[0].y_m]) < _FAR_M).all(axis=1)]
-    corners, least_m = np.array(computer.capabilities.footprint_m), _ENOUGH_M
-    for a, b in pairwise(poses):
-        turn = math.remainder(b.yaw_rad - a.yaw_rad, math.tau)
-        for share in np.linspace(0.0, 1.0, _PER_LEG).tolist() if len(points_O) else ():
-            x, y = a.x_m + share * (b.x_m - a.x_m), a.y_m + share * (b.y_m - a.y_m)
-            points_B = seen_from(Pose2D(x, y, a.yaw_rad + share * turn), points_O)
-            off_m = np.maximum(corners.min(axis=0) - points_B, points_B - corners.max(axis=0)).max(axis=1)
-            least_m = min(least_m, float(off_m.min()))
-    return least_m
+class SeenSpace:
+    """Free space, for planners: away from what the LiDAR has shown, and outside of no-go regions."""
+
+    def __init__(self, computer: Computer) -> None:
+        snapshot, corners = computer.snapshot, np.array(computer.capabilities.footprint_m)
+        points_O, low, high = computer.scan_points.points_O, corners.min(axis=0), corners.max(axis=0)
+        points_B = seen_from(snapshot.odometry.pose, points_O)
+        self._tree = KDTree(points_O[((points_B < low) | (points_B > high)).any(axis=1)])  # the others are its own
+        self._regions = [each for each in computer.regions if each.until_s > snapshot.time_s]
+
+    def clearance_m(self, points_W: FloatArray) -> FloatArray:
+        """Distance (N,) of points (N, 2) of `odom` from the nearest obstacle."""
+        away_m = np.minimum(self._tree.query(points_W)[0], _FAR_M)
+        for region in self._regions:
+            normals, starts = _sides(region.corners_O)
+            away_m = np.minimum(away_m, (points_W @ normals.T - starts).max(axis=1))
+        return np.asarray(away_m)
 
 
 def region_of(message: Any, until_s: float, snapshot: Snapshot) -> Region | None:
@@ -132,14 +149,37 @@ def region_of(message: Any, until_s: float, snapshot: Snapshot) -> Region | None
     X_OR = snapshot.X_AB("odom", placed.frame_name) @ transform(getattr(placed, f"frame_name_tform_{kind}"), field)
     if kind == "box":
         x, y = 0.5 * _size(placed.box.size.x, field), 0.5 * _size(placed.box.size.y, field)
-        corners = np.array([(-x, -y), (x, -y), (x, y), (-x, y), (-x, -y)])
+        corners = np.array([(-x, -y), (x, -y), (x, y), (-x, y)])
     else:
-        angles, middle = np.linspace(0.0, math.tau, 37), placed.circle.center_pt
+        angles, middle = np.linspace(0.0, math.tau, 37)[1:], placed.circle.center_pt
         around = _size(placed.circle.radius, field) * np.column_stack([np.cos(angles), np.sin(angles)])
         corners = around + [middle.x, middle.y]
-    sides = [np.linspace(a, b, 2 + math.ceil(math.dist(a, b) / _SPACING_M)) for a, b in pairwise(corners)]
-    outline = np.concatenate(sides)
-    return Region((X_OR @ np.column_stack([outline, np.zeros(len(outline))]).T).T[:, :2], until_s)
+    corners_O = (X_OR @ np.column_stack([corners, np.zeros(len(corners))]).T).T[:, :2]
+    if abs(level := float(X_OR.rotation().matrix()[2, 2])) < _LEVEL:
+        raise InvalidRequestError(f"{field}: the region must lie level on the floor")
+    return Region(corners_O if level > 0.0 else corners_O[::-1], until_s)
+
+
+def _slowed(velocity: FloatArray, touched: FloatArray) -> FloatArray:
+    """Velocity (3,) slowed down by the first of the times ahead at which the body touches something."""
+    if not touched.any():
+        return velocity
+    free_s = float(_AHEAD_S[touched][0]) - float(_AHEAD_S[0])
+    return velocity * (free_s / _BRAKING_S if free_s > _WAITS_S else 0.0)
+
+
+def _gap_m(a: FloatArray, b: FloatArray) -> tuple[float, FloatArray]:
+    """Gap between convex outlines (N, 2), negative by the depth of an overlap, and its direction from the first on.
+
+    The axis of separation is normal to an edge of either outline.
+    """
+    best_m, towards = -math.inf, np.zeros(2)
+    for one, other, sign in ((a, b, 1.0), (b, a, -1.0)):
+        normals, starts = _sides(one)
+        gaps_m = (other @ normals.T).min(axis=0) - starts
+        if gaps_m.max() > best_m:
+            best_m, towards = float(gaps_m.max()), sign * normals[gaps_m.argmax()]
+    return best_m, towards
 
 
 def _size(value: float, field: str) -> float:
@@ -152,3 +192,10 @@ def seen_from(pose: Pose2D, points_O: FloatArray) -> FloatArray:
     """Points (N, 2) of `odom` in the frame of a body at a pose."""
     c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     return np.asarray((points_O - [pose.x_m, pose.y_m]) @ np.array([[c, -s], [s, c]]))
+
+
+def _sides(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Outer normals (N, 2) of a convex outline's sides, and how far along them each side lies (N,)."""
+    along = np.roll(corners, -1, axis=0) - corners
+    normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+    return normals, (corners * normals).sum(axis=1)

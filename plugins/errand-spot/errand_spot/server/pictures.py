@@ -111,6 +111,8 @@ class ImageService(Service):
 
     def __init__(self, computer: Computer, gripper_camera: GripperCameraParamService) -> None:
         self._computer, self._sources = computer, _sources(computer.capabilities.cameras)
+        self.sizes = dict[tuple[str, float], tuple[int, int]]()
+        """Columns and rows of the pictures that clients have seen, by the frame and focal length (pixels)."""
         self._gripper_camera = gripper_camera
 
     def ListImageSources(self, _request: Any, _call: Call) -> Any:
@@ -180,6 +182,7 @@ class ImageService(Service):
         made.depth_scale = 1000.0 if source.depth else 0.0
         made.pixel_formats.extend(source.pixel_formats)
         made.image_formats.extend(source.image_formats)
+        self.sizes[source.frame, round(k.focal_length.x, 3)] = made.cols, made.rows
         return made
 
 

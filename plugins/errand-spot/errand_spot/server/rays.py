@@ -50,6 +50,7 @@ class RayCastService(Service):
     """Casts rays against the floor and the present depth pictures; the robot keeps no map of terrain or voxels."""
 
     name, type, authority = "ray-cast", "bosdyn.api.RayCastService", f"api.{DOMAIN}"
+    checks_values = True
 
     def __init__(self, computer: Computer) -> None:
         self._computer = computer

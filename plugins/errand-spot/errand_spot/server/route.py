@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
-from bosdyn.api import basic_command_pb2
+from bosdyn.api.basic_command_pb2 import SE2TrajectoryCommand
 from bosdyn.api.graph_nav import graph_nav_pb2
 from bosdyn.api.spot import robot_command_pb2
 from pydrake.math import RigidTransform
@@ -83,12 +83,7 @@ class FollowRoute:
     _ready: Callable[[], bool]
 
     def __init__(
-        self,
-        course: Course,
-        end_s: float,
-        graph: GraphMap,
-        place: Callable[[], Place | None],
-        cause: Callable[[], int],
+        self, course: Course, end_s: float, graph: GraphMap, place: Callable[[], Place | None], cause: Callable[[], int]
     ) -> None:
         """`place` returns the robot's place on the map, `cause` the status of an interrupted motion."""
         self.course, self.end_s = course, end_s
@@ -150,10 +145,7 @@ class FollowRoute:
 
     def feedback(self, number: int) -> Any:
         """The message of how far the robot has come."""
-        made, Movement = (
-            Feedback(status=self.status, command_id=number),
-            basic_command_pb2.SE2TrajectoryCommand.Feedback,
-        )
+        made, Movement = Feedback(status=self.status, command_id=number), SE2TrajectoryCommand.Feedback
         going, left = self.status == Feedback.STATUS_FOLLOWING_ROUTE, self.course.waypoints[self._next :]
         made.last_ko_tform_goal.CopyFrom(pose(self._ko_tform_goal))
         made.remaining_route.waypoint_id.extend(left if going else ())

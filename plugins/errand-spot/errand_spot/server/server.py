@@ -119,12 +119,7 @@ class SpotServer:
             raise OSError(f"port {options.port} of 127.0.0.1 cannot be opened") from error
 
     def _services(
-        self,
-        leases: LeaseService,
-        estop: EstopService,
-        auth: identity.AuthService,
-        robot_name: str,
-        options: Options,
+        self, leases: LeaseService, estop: EstopService, auth: identity.AuthService, robot_name: str, options: Options
     ) -> Sequence[Service]:
         """All implemented services; the directory lists them and the others."""
         computer, clocks = self.computer, identity.TimeSyncService()
@@ -143,6 +138,7 @@ class SpotServer:
             state.WorldObjectService(computer, options.perception),
         )
         gripper_camera = pictures.GripperCameraParamService()
+        images = pictures.ImageService(computer, gripper_camera)
         made: list[Service] = [
             auth,
             identity.RobotIdService(robot_name),
@@ -155,10 +151,10 @@ class SpotServer:
             KeepaliveService(computer),
             PowerService(computer, leases),
             RobotCommandService(computer, leases, clocks),
-            pictures.ImageService(computer, gripper_camera),
+            images,
             gripper_camera,
             rays.RayCastService(computer),
-            manipulation.ManipulationService(computer, leases, options.picker),
+            manipulation.ManipulationService(computer, leases, options.picker, images.sizes),
             docking.DockingService(computer, leases, clocks),
             state.InverseKinematicsService(computer),
             *vars(live).values(),

@@ -10,14 +10,7 @@ from threading import Lock
 from typing import Any, Final
 
 import numpy as np
-from bosdyn.api import (
-    data_buffer_pb2,
-    estop_pb2,
-    payload_pb2,
-    robot_state_pb2,
-    service_fault_pb2,
-    world_object_pb2,
-)
+from bosdyn.api import data_buffer_pb2, estop_pb2, payload_pb2, robot_state_pb2, service_fault_pb2, world_object_pb2
 from bosdyn.api.log_status import log_status_pb2
 from bosdyn.api.spot import inverse_kinematics_pb2
 
@@ -74,9 +67,8 @@ class RobotStateService(Service):
         state.kinematic_state.CopyFrom(kinematic_state(snapshot))
         state.system_fault_state.SetInParent()
         for number, fault in enumerate(snapshot.faults):
-            state.system_fault_state.faults.add(name=fault, uid=number, error_message=fault).onset_timestamp.CopyFrom(
-                stamp
-            )
+            made_fault = state.system_fault_state.faults.add(name=fault, uid=number, error_message=fault)
+            made_fault.onset_timestamp.CopyFrom(stamp)
         state.behavior_fault_state.faults.extend([] if self._computer.fault is None else [self._computer.fault])
         state.behavior_state.state = self._behaviour(snapshot)
         state.service_fault_state.SetInParent()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Generator
+from itertools import pairwise
 from typing import Final
 
 from bosdyn.api import arm_command_pb2
@@ -73,12 +74,15 @@ def stow(computer: Computer) -> Generator[None, None, None]:
         motion.tick(computer)
 
 
-def walk(computer: Computer, goal_O: Pose2D) -> Generator[None, None, bool]:
-    """Walks straight to a pose in `odom`, standing up before; returns whether the robot came there in time."""
-    pose = computer.snapshot.odometry.pose
-    far_m = math.hypot(goal_O.x_m - pose.x_m, goal_O.y_m - pose.y_m)
+def walk(computer: Computer, *poses_O: Pose2D, padding_m: float | None = None) -> Generator[None, None, bool]:
+    """Walks straight to each pose in `odom`, standing up before; returns whether the robot came there in time.
+
+    It stops in front of obstacles, at `padding_m`; with None only before no-go regions.
+    """
+    legs = pairwise([computer.snapshot.odometry.pose, *poses_O])
+    far_m = sum(math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in legs)
     end_s = computer.now_s() + _LEAST_WALK_S + _WALK_S_PER_M * far_m
-    motion = way_to(goal_O, end_s, computer.snapshot, avoids=False)
+    motion = way_to(poses_O, end_s, computer.snapshot, padding_m=padding_m)
     motion.begin(computer)
     while motion.status == Status.STATUS_PROCESSING:
         yield

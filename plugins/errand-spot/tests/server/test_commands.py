@@ -367,6 +367,35 @@ def test_a_hand_whose_goal_is_in_the_world_stays_there_while_the_body_walks_on(s
     assert arm_feedback(spot, number).arm_cartesian_feedback.status == Cartesian.STATUS_TRAJECTORY_COMPLETE
 
 
+def test_a_goal_in_the_world_that_the_body_carries_the_hand_away_from_is_no_longer_complete(spot):
+    number = sent(spot, pose_of_hand(0.75, 0.0, 0.72, "odom"))
+    block(spot, number)
+    walk, seen = sent(spot, Build.synchro_se2_trajectory_point_command(-1.2, 0.0, 0.0, "odom"), 9.0), set()
+    while base_feedback(spot, walk).se2_trajectory_feedback.status != 1:
+        time.sleep(0.1)
+        told = arm_feedback(spot, number).arm_cartesian_feedback
+        seen.add(told.status)
+        assert told.status != Cartesian.STATUS_TRAJECTORY_COMPLETE or told.measured_pos_distance_to_goal < 0.11
+    assert Cartesian.STATUS_IN_PROGRESS in seen
+    time.sleep(0.5)
+    told = arm_feedback(spot, number).arm_cartesian_feedback
+    assert (told.status, told.measured_pos_distance_to_goal > 0.3) == (Cartesian.STATUS_TRAJECTORY_STALLED, True)
+    sent(spot, Build.synchro_se2_trajectory_point_command(0.0, 0.0, 0.0, "odom"), 9.0)
+    time.sleep(5.0)
+    assert arm_feedback(spot, number).arm_cartesian_feedback.status == Cartesian.STATUS_TRAJECTORY_COMPLETE
+    assert hand_in(spot, "odom") == pytest.approx((0.75, 0.0, 0.72), abs=0.03)
+
+
+def test_the_distance_of_the_hand_from_a_goal_in_the_body_does_not_grow_with_a_walk(spot):
+    number = sent(spot, pose_of_hand(0.75, 0.0, 0.2, "body"))
+    block(spot, number)
+    sent(spot, Build.synchro_se2_trajectory_point_command(-0.5, 0.0, 0.0, "odom"), 9.0)
+    time.sleep(3.0)
+    told = arm_feedback(spot, number).arm_cartesian_feedback
+    assert told.status == Cartesian.STATUS_TRAJECTORY_COMPLETE
+    assert told.measured_pos_distance_to_goal < 0.03
+
+
 def test_a_gaze_follows_its_target(spot):
     ready(spot)
     command = Build.arm_gaze_command(3.0, 1.0, 0.3, "odom")

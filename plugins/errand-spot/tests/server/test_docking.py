@@ -16,8 +16,10 @@ from errand_spot.messages import timestamp
 from errand_spot.server import docking
 from errand_spot.server.computer import Pace
 from errand_spot.server.docking import DOCK_ID
-from errand_spot.server.obstacles import room_m
+from errand_spot.server.obstacles import Region, SeenSpace
+from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.robot import Pose2D
+from skills.testing.blocks import Block
 from tests.tables import table
 
 PACE = Pace.CLIENT
@@ -83,20 +85,41 @@ def test_the_prep_pose_is_before_the_dock(at_home):
     assert (body.x, abs(body.rot.to_yaw())) == (pytest.approx(-0.1, abs=0.05), pytest.approx(3.14, abs=0.06))
 
 
-WALL = [(x, -1.0) for x in np.arange(0.5, 2.0, 0.05)]
-"""Points of a wall beside the dock; the body strafes into it on the straight way to the place before the dock."""
+WALL = [(x, y) for x in np.arange(0.5, 2.0, 0.05) for y in (-1.0, -0.2)]
+"""Points of two walls beside the dock and before it; the body does not fit through on a straight line."""
 
 
-@pytest.mark.parametrize(("points", "out_m"), [([], 0.0), (WALL, 0.8)], ids=["free", "wall"])
-def test_the_robot_comes_from_farther_out_where_the_body_has_no_room(spot, points, out_m):
+@pytest.mark.parametrize("points", [[], WALL], ids=["free", "walls"])
+def test_the_path_to_the_dock_keeps_clear_of_obstacles(spot, points):
     computer, dock_O = spot.served.server.computer, Pose2D(1.5, -1.5, 3.1416)
     computer.scan_points.points_O = np.array(points).reshape(-1, 2)
-    way, here = docking._Docking(Api.PREP_POSE_USE_POSE, dock_O, 0.0)._way(computer), computer.snapshot.odometry.pose
-    *_, via, prep, last = way
-    assert room_m(computer, [here, *way[:-1]]) > 0.05
-    assert (prep.x_m, prep.y_m, last) == (pytest.approx(0.6, abs=0.01), pytest.approx(-1.5, abs=0.01), dock_O)
-    assert out_m - 0.01 < prep.x_m - via.x_m < out_m + 0.5
-    assert (room_m(computer, [here, Pose2D(0.0, 0.0, 3.1416), prep]) < 0.0) is bool(points)
+    path = docking._Docking(Api.PREP_POSE_USE_POSE, dock_O, 0.0)._path(computer)
+    assert (path[-1].x_m, path[-1].y_m) == pytest.approx((0.6, -1.5), abs=0.01)
+    clearance = footprint_clearance_m(SeenSpace(computer), Footprint.of(computer.capabilities), pose_array(path))
+    assert clearance.min() > 0.04
+
+
+def test_a_robot_whose_dock_no_path_reaches_is_stuck_and_stays(at_home):
+    spot = at_home
+    sides = [
+        ((-0.7, -0.9), (0.7, -0.7)),
+        ((-0.7, 0.7), (0.7, 0.9)),
+        ((-1.0, -0.9), (-0.8, 0.9)),
+        ((0.7, -0.9), (0.9, 0.9)),
+    ]
+    spot.served.scripted.blocks += [Block(*low, *high) for low, high in sides]
+    spot.served.server.computer.dock_O = Pose2D(2.0, 0.0, 3.1416)
+    time.sleep(0.5)
+    assert ended(spot, command(spot)) == Progress.STATUS_ERROR_STUCK
+    assert get_odom_tform_body(spot.tree).x == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_no_go_region_before_the_dock_keeps_the_robot_away(at_home):
+    computer = at_home.served.server.computer
+    corners = np.array([(-0.4, -3.0), (-0.2, -3.0), (-0.2, 3.0), (-0.4, 3.0)])
+    computer.regions = [Region(corners + [0.0, 4.0], float("inf")), Region(corners, float("inf"))]
+    computer.dock_O = Pose2D(-1.5, 0.0, 0.0)
+    assert ended(at_home, command(at_home)) == Progress.STATUS_ERROR_STUCK
 
 
 def far_away(spot):

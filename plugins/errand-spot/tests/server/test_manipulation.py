@@ -12,6 +12,7 @@ import pytest
 from bosdyn.api import geometry_pb2, manipulation_api_pb2, robot_state_pb2
 from bosdyn.client.exceptions import InvalidRequestError
 from bosdyn.client.frame_helpers import get_a_tform_b, get_odom_tform_body
+from bosdyn.client.image import build_image_request
 from bosdyn.client.robot_command import RobotCommandBuilder as Build
 from bosdyn.client.robot_command import block_until_arm_arrives
 from google.protobuf.wrappers_pb2 import FloatValue
@@ -87,9 +88,10 @@ def outcome(spot, number, states=ENDS, seconds=10.0):
     raise AssertionError(f"still {Api.ManipulationFeedbackState.Name(seen[-1])}")
 
 
-def pixel(spot, source="frontleft_fisheye_image"):
+def pixel(spot, source="frontleft_fisheye_image", resized=None):
     """The middle of a picture."""
-    image = spot.robot.ensure_client("image").get_image_from_sources([source])[0]
+    request = build_image_request(source, resize_ratio=resized)
+    image = spot.robot.ensure_client("image").get_image([request])[0]
     return {
         "pixel_xy": geometry_pb2.Vec2(x=image.source.cols / 2, y=image.source.rows / 2),
         "transforms_snapshot_for_camera": image.shot.transforms_snapshot,
@@ -189,6 +191,27 @@ def test_another_command_stops_a_pick(spot, picker):
 
 def oriented(**constraint):
     return Api.GraspParams(allowable_orientation=[Api.AllowableOrientation(**constraint)])
+
+
+# source, share of its size -> pixels beyond the picture
+@pytest.mark.parametrize(("source", "resized"), [("frontleft_fisheye_image", None), ("hand_color_image", 0.5)])
+@pytest.mark.parametrize("beyond", [(-1.0, 10.0), (10.0, -0.5), (1.0, 10.0), (10.0, 1.0)])
+def test_a_pixel_outside_of_its_picture_is_an_invalid_request(spot, picker, source, resized, beyond):
+    request = pixel(spot, source, resized)
+    cols, rows = 2.0 * request["pixel_xy"].x, 2.0 * request["pixel_xy"].y
+    x, y = beyond[0] + cols * (beyond[0] == 1.0), beyond[1] + rows * (beyond[1] == 1.0)
+    with pytest.raises(InvalidRequestError, match=r"pixel_xy.[xy] is .* it must be 0 to (640|480|320|240), within"):
+        started(spot, pick_object_in_image={**request, "pixel_xy": geometry_pb2.Vec2(x=x, y=y)})
+    assert not picker.begun
+    corner = geometry_pb2.Vec2(x=cols, y=rows)
+    assert started(spot, walk_to_object_in_image={**request, "pixel_xy": corner})
+
+
+def test_a_pixel_outside_of_a_picture_of_another_camera_is_an_invalid_request(spot):
+    request = pixel(spot)
+    request["camera_model"].intrinsics.focal_length.x *= 1.5
+    with pytest.raises(InvalidRequestError, match=r"pixel_xy\.x is 1000"):
+        started(spot, walk_to_object_in_image={**request, "pixel_xy": geometry_pb2.Vec2(x=1000.0, y=10.0)})
 
 
 @pytest.mark.parametrize(*table(__file__, "refused"))

@@ -164,7 +164,7 @@ def inverse_kinematics(robot, frame, **pose):
     return robot.ensure_client("inverse-kinematics").inverse_kinematics(request)
 
 
-@pytest.mark.parametrize(("x_m", "joints"), [(0.75, 6), (2.5, 0), (1e300, 0)])
+@pytest.mark.parametrize(("x_m", "joints"), [(0.75, 6), (2.5, 0), (1e6, 0)])
 def test_inverse_kinematics_says_what_is_in_reach(robot, x_m, joints):
     answer = inverse_kinematics(robot, "body", position={"x": x_m, "z": 0.3}, rotation={"w": 1.0})
     reached = answer.status == inverse_kinematics_pb2.InverseKinematicsResponse.STATUS_OK

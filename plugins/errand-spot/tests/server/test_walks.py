@@ -12,7 +12,7 @@ from bosdyn.client.robot_command import RobotCommandBuilder as Build
 from bosdyn.util import seconds_to_duration
 
 from errand_spot.server.computer import Pace
-from errand_spot.server.obstacles import Clearance, Region
+from errand_spot.server.obstacles import Clearance
 from tests.tables import table
 
 PACE = Pace.CLIENT
@@ -236,11 +236,33 @@ def test_a_region_that_cannot_be_used_is_an_invalid_request(spot, box, frame, sa
 
 def test_a_robot_that_touches_an_obstacle_may_leave_it(spot):
     computer = spot.served.server.computer
-    computer.regions = [Region(np.array([[0.58, 0.0]]), float("inf"))]
-    clearance = Clearance(spot_command_pb2.ObstacleParams(disable_vision_body_obstacle_avoidance=True))
+    computer.scan_points.points_O = np.array([[0.58, 0.0]])
+    clearance = Clearance(spot_command_pb2.ObstacleParams())
     back, ahead = np.array([-0.5, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])
     assert clearance.limit(computer, back) == pytest.approx(back)
     assert clearance.limit(computer, ahead) == pytest.approx(0.0)
+
+
+# region: x, y, length, width (m) -> walk (m/s) for 2 s, and how far it gets ahead and to the left; the body is 1.06 m
+# long and 0.5 m wide
+@pytest.mark.parametrize(*table(__file__, "inside"))
+def test_a_region_is_left_or_passed_but_not_entered(spot, box, walk, ends):
+    made = region()
+    placed = made.nogo_region_properties.box
+    placed.frame_name_tform_box.position.x, placed.frame_name_tform_box.position.y = box[:2]
+    placed.box.size.x, placed.box.size.y = box[2:]
+    mutate(spot, action=Mutation.ACTION_ADD, object=made)
+    sent(spot, Build.synchro_velocity_command(*walk, 0.0), ahead_s=2.0)
+    time.sleep(2.3)
+    pose = spot.served.scripted.pose
+    assert (pose.x_m, pose.y_m) == pytest.approx(ends, abs=0.06)
+
+
+def test_a_region_that_lies_on_its_side_is_an_invalid_request(spot):
+    made = region()
+    made.nogo_region_properties.box.frame_name_tform_box.rotation.y = 1.0
+    with pytest.raises(InvalidRequestError, match="level"):
+        mutate(spot, action=Mutation.ACTION_ADD, object=made)
 
 
 def stance(spot, x=0.32, y=0.17, dx=0.0, **changes):

@@ -9,8 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from errand_spot.server.computer import SeenTag
-from errand_spot.server.graph_map import GraphMap, map_of
+from errand_spot.server.graph_map import GraphMap, SeenTag, map_of
 from executive.app.prepare.worlds import knowledge_of
 from executive.words.slug import slug
 from plant.robots.spot.kind import spot_capabilities
@@ -36,7 +35,7 @@ _UNSURE: Final = np.diag([0.1**2, 0.1**2, 0.05**2])
 
 
 class SpotPerception:
-    """Implements `errand_spot.server.computer.Perception`."""
+    """Implements `errand_spot.server.graph_map.Perception`."""
 
     def __init__(self, sizes_m: Mapping[int, float]) -> None:
         """Takes the sizes (m) of the known tags by number."""

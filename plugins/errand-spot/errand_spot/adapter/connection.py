@@ -29,13 +29,9 @@ _ROUND_TRIPS: Final = 5
 _FILES: Final[Mapping[str, str]] = {
     **{name: name.replace("-", "_") for name in ("estop", "image", "lease", "power", "robot-command")},
     **{name: name.replace("-", "_") for name in ("robot-state", "time-sync", "gripper-camera-param")},
-    **{
-        "docking": "docking.docking",
-        "door": "spot.door",
-        "keepalive": "keepalive.keepalive",
-        "manipulation": "manipulation_api",
-    },
+    **{"docking": "docking.docking", "door": "spot.door", "keepalive": "keepalive.keepalive"},
     **{"velodyne-point-cloud": "point_cloud", "graph-nav-service": "graph_nav.graph_nav"},
+    "manipulation": "manipulation_api",
 }
 """Files of the SDK that describe the called services, by the names of the services."""
 
@@ -148,11 +144,8 @@ class Connection:
 
     def acquire(self, *, take: bool = False) -> None:
         """Acquires the body's lease, or takes it. Raises LostError that names its owner."""
-        if take:
-            answer = self.call("lease", "TakeLease", lease_pb2.TakeLeaseRequest(resource="body"))
-        else:
-            answer = self.call("lease", "AcquireLease", lease_pb2.AcquireLeaseRequest(resource="body"))
-        self.lease = answer.lease
+        verb, Request = ("Take", lease_pb2.TakeLeaseRequest) if take else ("Acquire", lease_pb2.AcquireLeaseRequest)
+        self.lease = self.call("lease", f"{verb}Lease", Request(resource="body")).lease
 
     def retain(self) -> None:
         """Retains the lease. Raises LostError."""
@@ -195,9 +188,8 @@ class Connection:
 
     def command(self, command: Any) -> Any:
         """Sends a command with the lease; returns the answer. Raises LostError."""
-        request = robot_command_pb2.RobotCommandRequest(
-            lease=self.lease, command=command, clock_identifier=self.clock_identifier
-        )
+        request = robot_command_pb2.RobotCommandRequest(lease=self.lease, command=command)
+        request.clock_identifier = self.clock_identifier
         return self.call("robot-command", "RobotCommand", request)
 
     def feedback(self, number: int) -> Any:

@@ -57,10 +57,8 @@ class Heartbeat:
         endpoint = estop_pb2.EstopEndpoint(role=_ROLE, name=CLIENT)
         endpoint.timeout.CopyFrom(duration(ESTOP_S))
         endpoint.cut_power_timeout.CopyFrom(duration(CUT_S))
-        known = self._connection.call(
-            "estop", "GetEstopConfig", estop_pb2.GetEstopConfigRequest()
-        ).active_config.unique_id
-        request = estop_pb2.SetEstopConfigRequest(target_config_id=known)
+        known = self._connection.call("estop", "GetEstopConfig", estop_pb2.GetEstopConfigRequest()).active_config
+        request = estop_pb2.SetEstopConfigRequest(target_config_id=known.unique_id)
         request.config.endpoints.append(endpoint)
         config = self._connection.call("estop", "SetEstopConfig", request).active_config
         self._config_id = config.unique_id
@@ -73,9 +71,8 @@ class Heartbeat:
         """Removes our E-stop, which then stops the robot. Raises LostError."""
         endpoint, self._endpoint = self._endpoint, None
         if endpoint is not None:
-            request = estop_pb2.DeregisterEstopEndpointRequest(
-                target_endpoint=endpoint, target_config_id=self._config_id
-            )
+            request = estop_pb2.DeregisterEstopEndpointRequest(target_config_id=self._config_id)
+            request.target_endpoint.CopyFrom(endpoint)
             self._connection.call("estop", "DeregisterEstopEndpoint", request)
 
     def _release(self) -> None:

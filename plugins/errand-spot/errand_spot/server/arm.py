@@ -40,7 +40,7 @@ class ArmMotion:
 
     def __init__(self) -> None:
         self.status: int = Status.STATUS_PROCESSING
-        self._command: Any = None
+        self.command: Any = None
         self._joints: Sequence[str] = ()
         self._goal_rad, self._ends_s = np.zeros(0), 0.0
         self.feedback = self._made(self.going)
@@ -50,12 +50,12 @@ class ArmMotion:
 
     def tick(self, computer: Computer) -> None:
         """Reports whether the arm is at its goal, nearly there and held back by its load, or stalled."""
-        if self._command is not None and self.status == Status.STATUS_PROCESSING:
+        if self.command is not None and self.status == Status.STATUS_PROCESSING:
             self.feedback = self._made(self._progress(computer))
 
     def _progress(self, computer: Computer) -> int:
         """Status within the field, by the robot's command status and its joints."""
-        state, joints = computer.robot.command_status(self._command).state, computer.snapshot.joints
+        state, joints = computer.robot.command_status(self.command).state, computer.snapshot.joints
         if state is CommandState.DONE:
             return self.complete
         if state is not CommandState.RUNNING:
@@ -89,7 +89,7 @@ class ArmMotion:
         self._joints, self._goal_rad = computer.capabilities.arm.joint_names, trajectory.positions_rad[-1]
         self._ends_s = computer.clock.now() + float(trajectory.times_s[-1])
         until_s = computer.forever()
-        self._command = computer.robot.move_arm(trajectory, until_s=until_s, lease=computer.lease)
+        self.command = computer.robot.move_arm(trajectory, until_s=until_s, lease=computer.lease)
 
 
 def smooth(start_rad: FloatArray, times_s: Sequence[float], positions_rad: Sequence[FloatArray]) -> ArmTrajectory:

@@ -83,9 +83,9 @@ class PowerService(Service):
             raise InvalidRequestError(f"duration must be above 0, and at most {LONGEST_S:.0f} s")
         number, end_s = next(self._ids), self._computer.now_s() + lasts_s
         self._fan_ends_s[number] = end_s
-        return Response(
-            lease_use_result=used, status=Response.STATUS_OK, desired_end_time=timestamp(end_s), command_id=number
-        )
+        made = Response(lease_use_result=used, status=Response.STATUS_OK, command_id=number)
+        made.desired_end_time.CopyFrom(timestamp(end_s))
+        return made
 
     def FanPowerCommandFeedback(self, request: Any, _call: Call) -> Any:
         """Returns whether a command's time is over, or a later command has replaced it."""
@@ -201,7 +201,7 @@ class RobotCommandService(Service):
             if can is None:
                 raise unsupported("gripper_command of a robot without a gripper")
             request = command.gripper_command.claw_gripper_command
-            made[GRIPPER] = gripper.Claw(request, can.widest, can.max_force_n)
+            made[GRIPPER] = gripper.Claw(request, can.widest, can.max_force_n, now_s)
         if not made:
             raise InvalidRequestError("command: it names no part of the robot")
         return made

@@ -35,7 +35,6 @@ from skills.robot import (
     CommandState,
     FloatArray,
     Gripper,
-    Image,
     Joints,
     Lease,
     Mount,
@@ -75,35 +74,6 @@ class Solver(Protocol):
 
     def inverse(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> Sequence[FloatArray]:
         """Joint angles (J,) that put the last link at a pose."""
-
-
-@dataclass(frozen=True)
-class SeenTag:
-    """AprilTag in a picture: its number, the side of its black square, and its pose."""
-
-    number: int
-    size_m: float
-    X_OT: RigidTransform
-
-
-class MapLocaliser(Protocol):
-    """Localiser on the points of a map, in whose frame S poses are."""
-
-    def start(self, X_SO: Pose2D, scan: Scan, reach_m: float) -> Pose2D | None:
-        """Believes the pose of `odom` at which a scan fits, within reach_m of a guess; returns None when none does."""
-
-    def update(self, robot: Robot) -> tuple[Pose2D, bool]:
-        """Takes in the newest scan; returns the pose of `odom`, and whether it is sure."""
-
-
-class Perception(Protocol):
-    """Localisers for maps, and tags in pictures."""
-
-    def localiser(self, points_S: FloatArray) -> MapLocaliser:
-        """Creates a localiser on points (N, 3) of a map: x, y, and the height above the floor."""
-
-    def tags(self, image: Image) -> Sequence[SeenTag]:
-        """Finds the known tags in a picture."""
 
 
 class Motors(Enum):
@@ -348,11 +318,14 @@ class Computer:
 
     def stop_parts(self, parts: Sequence[str]) -> None:
         """Ends the motions of parts; the base stops, and the arm holds its position."""
-        for part in parts:
-            if (motion := self._motions.pop(part, None)) is not None:
-                motion.end(OVERRIDDEN)
-        if MOBILITY in parts or ARM in parts:
+        ended = {part: self._motions.pop(part) for part in parts if part in self._motions}
+        for motion in dict.fromkeys(ended.values()):
+            motion.end(OVERRIDDEN)
+        arm: Any = ended.get(ARM)
+        if MOBILITY in parts or (arm is not None and not hasattr(arm, "command")):
             self.robot.stop(lease=self.lease)
+        elif arm is not None and arm.command is not None:  # of the arm alone; what the base does goes on
+            self.robot.stop(lease=self.lease, only=arm.command)
             if self.settling:  # it goes on sitting down
                 self.sit()
 
@@ -422,19 +395,11 @@ class Computer:
     # -- sensing -----------------------------------------------------------------------------------------------------
 
     def _sensed(self) -> Snapshot:
-        odometry, joints = self.robot.odometry(), self.robot.joints()
-        return Snapshot(
-            self.now_s(),
-            odometry,
-            joints,
-            self.robot.gripper(),
-            self.robot.battery(),
-            self.robot.scan(),
-            self.robot.faults(),
-            self.motors,
-            self._sits(float(odometry.X_OB.translation()[2])),
-            self._frames(odometry, joints),
-        )
+        read, now_s = self.robot, self.now_s()
+        odometry, joints = read.odometry(), read.joints()
+        sits, frames = self._sits(float(odometry.X_OB.translation()[2])), self._frames(odometry, joints)
+        others = read.gripper(), read.battery(), read.scan(), read.faults()
+        return Snapshot(now_s, odometry, joints, *others, self.motors, sits, frames)
 
     def _frames(self, odometry: Odometry, joints: Joints) -> Frames:
         """The frame tree in the form of a real Spot: the root is `body`; `odom` and `vision` are equal here."""

@@ -43,9 +43,8 @@ class _Held:
         if self.own or silent_s <= timeout_s:
             return self.level
         cut_s = seconds(self.endpoint.cut_power_timeout) or timeout_s + _SETTLE_S
-        return min(
-            self.level, estop_pb2.ESTOP_LEVEL_SETTLE_THEN_CUT if silent_s <= cut_s else estop_pb2.ESTOP_LEVEL_CUT
-        )
+        settles = silent_s <= cut_s
+        return min(self.level, estop_pb2.ESTOP_LEVEL_SETTLE_THEN_CUT if settles else estop_pb2.ESTOP_LEVEL_CUT)
 
 
 class EstopService(Service):

@@ -1,4 +1,4 @@
-"""Map of GraphNav: the waypoints, edges, anchors and snapshots that clients upload, and routes along them.
+"""Map of GraphNav: waypoints, edges, anchors and snapshots that clients upload, routes, and what localises on it.
 
 Frame S is the map's frame: the seed frame of its anchors, or without anchors the frame of one waypoint.
 """
@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 from bosdyn.api import point_cloud_pb2
@@ -20,7 +20,7 @@ from bosdyn.api.graph_nav import graph_nav_pb2, map_pb2
 from pydrake.math import RigidTransform
 
 from errand_spot.messages import InvalidRequestError, frame_tree, frames_of, pose, pose_between, transform
-from skills.robot import FloatArray, Pose2D
+from skills.robot import FloatArray, Image, Pose2D, Robot, Scan
 
 Poses = Mapping[str, RigidTransform]
 """Poses X_SW of waypoints by their ids."""
@@ -36,6 +36,35 @@ class InvalidGraphError(ValueError):
     def __init__(self, report: Any) -> None:
         self.report = report
         super().__init__("the graph is not valid")
+
+
+@dataclass(frozen=True)
+class SeenTag:
+    """AprilTag in a picture: its number, the side of its black square, and its pose."""
+
+    number: int
+    size_m: float
+    X_OT: RigidTransform
+
+
+class MapLocaliser(Protocol):
+    """Localiser on the points of a map, in whose frame S poses are."""
+
+    def start(self, X_SO: Pose2D, scan: Scan, reach_m: float) -> Pose2D | None:
+        """Believes the pose of `odom` at which a scan fits, within reach_m of a guess; returns None when none does."""
+
+    def update(self, robot: Robot) -> tuple[Pose2D, bool]:
+        """Takes in the newest scan; returns the pose of `odom`, and whether it is sure."""
+
+
+class Perception(Protocol):
+    """Localisers for maps, and tags in pictures."""
+
+    def localiser(self, points_S: FloatArray) -> MapLocaliser:
+        """Creates a localiser on points (N, 3) of a map: x, y, and the height above the floor."""
+
+    def tags(self, image: Image) -> Sequence[SeenTag]:
+        """Finds the known tags in a picture."""
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from pydrake.math import RigidTransform
 
 from errand_spot.messages import InvalidRequestError, pose, timestamp, transform, vector
 from errand_spot.server.calls import Call, Service, chunks, joined
-from errand_spot.server.computer import Computer, MapLocaliser, Motors, Perception, Snapshot
-from errand_spot.server.graph_map import GraphMap, InvalidGraphError, Poses
+from errand_spot.server.computer import Computer, Motors, Snapshot
+from errand_spot.server.graph_map import GraphMap, InvalidGraphError, MapLocaliser, Perception, Poses
 from errand_spot.server.identity import DOMAIN, TimeSyncService
 from errand_spot.server.leases import MOBILITY, LeaseService
 from errand_spot.server.mobility import planar

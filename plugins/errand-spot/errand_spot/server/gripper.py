@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
 from bosdyn.api import basic_command_pb2, gripper_command_pb2, robot_state_pb2
 
 from errand_spot.messages import InvalidRequestError, points_of
+from errand_spot.server.refusals import times_of
 from plant.robots.spot.description import spot_facts
 from skills.robot import CommandState, Gripper
 
@@ -44,32 +46,43 @@ class Grip:
 class Claw:
     """Opens or closes the gripper. Its feedback is replaced whole."""
 
-    def __init__(self, request: Any, widest: float, most_force_n: float) -> None:
-        """Takes a trajectory of angles, of which the last is the goal: 0 closed, negative open (rad)."""
-        points = points_of(request.trajectory, "claw_gripper_command.trajectory")
-        goal = points[-1].point
-        if not -widest - _SLACK_RAD <= goal <= _SLACK_RAD:
-            raise InvalidRequestError(
-                f"claw_gripper_command.trajectory.point is {goal:.3f}; it must be {-widest:.3f} to 0"
-            )
-        self._opening = min(max(-goal, 0.0), widest)
+    _command: Any
+
+    def __init__(self, request: Any, widest: float, most_force_n: float, now_s: float) -> None:
+        """Takes a trajectory of angles at times: 0 closed, negative open (rad)."""
+        field = "claw_gripper_command.trajectory"
+        angles = [each.point for each in points_of(request.trajectory, field)]
+        for angle in angles:
+            if not -widest - _SLACK_RAD <= angle <= _SLACK_RAD:
+                raise InvalidRequestError(f"{field}.point is {angle:.3f}; it must be {-widest:.3f} to 0")
+        self._times_s, self._begun_s = [0.0, *times_of(request.trajectory, now_s, field)], 0.0
+        self._openings = [0.0, *(min(max(-angle, 0.0), widest) for angle in angles)]
         torque = request.maximum_torque.value if request.HasField("maximum_torque") else 5.5
         force = torque / float(spot_facts()["gripper"]["tip_radius"])
         self._force_n = min(max(force, 1.0), most_force_n)
         self.status: int = Status.STATUS_PROCESSING
-        self._command: Any = None
+        self._command, self._given = None, -1.0
         self.feedback = self._made(gripper_command_pb2.ClawGripperCommand.Feedback.STATUS_IN_PROGRESS)
 
     def begin(self, computer: Computer) -> None:
         """Starts to move. A gripper that opens holds nothing, whatever clients have said."""
-        if self._opening > computer.snapshot.gripper.opening + _OPENS:
+        self._openings[0], self._begun_s = computer.snapshot.gripper.opening, computer.clock.now()
+        if max(self._openings) > self._openings[0] + _OPENS:
             computer.grip.holding = None
-        until_s = computer.forever()
-        self._command = computer.robot.set_gripper(self._opening, self._force_n, until_s=until_s, lease=computer.lease)
+        self._move(computer)
+
+    def _move(self, computer: Computer) -> bool:
+        """Moves on in time; returns whether it moves to the last angle."""
+        since_s, until_s = computer.clock.now() - self._begun_s, computer.forever()
+        goal = self._openings[-1] if since_s >= self._times_s[-1] else np.interp(since_s, self._times_s, self._openings)
+        if goal != self._given:
+            self._given, force_n = float(goal), self._force_n
+            self._command = computer.robot.set_gripper(self._given, force_n, until_s=until_s, lease=computer.lease)
+        return since_s >= self._times_s[-1]
 
     def tick(self, computer: Computer) -> None:
         """Reports whether the gripper is at its goal, or presses on an object."""
-        if self._command is None or self.status != Status.STATUS_PROCESSING:
+        if self._command is None or self.status != Status.STATUS_PROCESSING or not self._move(computer):
             return
         part = gripper_command_pb2.ClawGripperCommand.Feedback
         status = computer.robot.command_status(self._command)

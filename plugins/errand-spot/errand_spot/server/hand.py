@@ -20,7 +20,7 @@ from errand_spot.server.mobility import BaseMotion, Trajectory, way_to
 from errand_spot.server.refusals import known_frame, times_of, unsupported
 from skills.robot import ArmTrajectory, FloatArray, Pose2D
 
-_USUAL_M_S, _CYLINDRICAL_M_S = 0.4, 0.5
+_USUAL_M_S, _CYLINDRICAL_M_S, _FASTEST_HAND_M_S, _FASTEST_TURN_RAD_S, _LEAP_RAD = 0.4, 0.5, 1.0, 3.0, 0.4
 _TRACK_S: Final = 0.1
 _MOVED_M, _MOVED_RAD = 0.02, 0.04
 _LOST_M, _LOST_RAD = 0.1, 0.3
@@ -30,7 +30,7 @@ _FOLLOWING_S: Final = 60.0
 _PER_SEGMENT: Final = 6
 _FARTHEST_M: Final = 2.0
 _FOLDED_RAD, _CLOSE_M, _GAZE_STEP_S = 0.3, 0.05, 0.25
-_TRIES, _SMALL_RAD, _DAMPING, _TURN_WEIGHT, _MOST_OFF_M = 15, 1e-4, 1e-3, 0.05, 0.2
+_TRIES, _SMALL_RAD, _DAMPING, _TURN_WEIGHT, _MOST_OFF_M, _NEAR_M = 15, 1e-4, 1e-3, 0.05, 0.2, 0.02
 """Steps, finite difference, damping and weight of turns for a goal that the hand reaches only turned otherwise."""
 _Positions: Final = arm_command_pb2.NamedArmPositionsCommand
 X_HAND: Final = RigidTransform([HAND_X_M, 0.0, 0.0])
@@ -257,10 +257,10 @@ class Gaze(ArmMotion):
         for at_B in places:
             postures = [now]
             for target_B, hand in zip(targets_B, at_B, strict=True):
-                away = target_B - hand
+                if np.linalg.norm(away := target_B - hand) < _CLOSE_M:
+                    break
                 X_BW = RigidTransform(_looking(away), hand) @ X_HAND.inverse()
-                posture = _posture_at(computer, X_BW, postures[-1]) if np.linalg.norm(away) > _CLOSE_M else None
-                if posture is None:
+                if (posture := _posture_at(computer, X_BW, postures[-1])) is None:
                     break
                 postures.append(posture)
             if len(postures) > len(times_s):
@@ -287,6 +287,11 @@ def _between(X_AB: RigidTransform, X_AC: RigidTransform, share: float) -> RigidT
 def _at(time_s: float, times_s: Sequence[float], points: Sequence[FloatArray]) -> FloatArray:
     """Point (3,) of a path at a time."""
     return np.array([np.interp(time_s, times_s, column) for column in np.array(points).T])
+
+
+def _at_most(vector_: Sequence[float] | FloatArray, most: float) -> FloatArray:
+    """The vector, shortened if it is longer than `most`."""
+    return np.asarray(vector_) * min(1.0, most / max(float(np.linalg.norm(vector_)), 1e-9))
 
 
 def _looking(away: FloatArray) -> RotationMatrix:
@@ -325,17 +330,18 @@ class Moving(ArmMotion):
         if computer.left_s(self._end_s) <= 0.0:
             self.end(Status.STATUS_COMMAND_TIMED_OUT)
             return
-        step_s, X_BW = 0.1, computer.solver.X_BH(self._q) if computer.solver else RigidTransform()
-        X_BHand = X_BW @ X_HAND
-        moved = RigidTransform(
-            X_BHand.rotation() @ RotationMatrix(Rotation.from_rotvec(np.array(self._angular) * step_s).as_matrix()),
-            X_BHand.translation() + step_s * self._velocity_B(computer, X_BHand),
-        )
-        posture = _posture_at(computer, moved @ X_HAND.inverse(), self._q)
-        if posture is None or np.abs(posture - self._q).max() > 0.4:
+        assert computer.solver is not None
+        step_s, share, X_BHand = 0.1, 0.25, computer.solver.X_BH(self._q) @ X_HAND
+        turn = Rotation.from_rotvec(step_s * _at_most(self._angular, _FASTEST_TURN_RAD_S))
+        moved_m = step_s * _at_most(self._velocity_B(computer, X_BHand), _FASTEST_HAND_M_S)
+        X_BGoal = RigidTransform(X_BHand.rotation() @ RotationMatrix(turn.as_matrix()), X_BHand.translation() + moved_m)
+        X_BW = X_BGoal @ X_HAND.inverse()
+        posture = _posture_at(computer, X_BW, self._q)
+        if posture is None or np.abs(posture - self._q).max() > _LEAP_RAD:
+            posture = _turned_posture(computer.solver, X_BW, self._q, _NEAR_M)
+        if posture is None:
             return
-        share = 0.25
-        begun, self._q = self._q, self._q + share * (posture - self._q)
+        begun, self._q = self._q, self._q + share * np.clip(posture - self._q, -_LEAP_RAD, _LEAP_RAD)
         trajectory = ArmTrajectory(np.array([0.0, 2 * share * step_s]), np.array([begun, self._q]))
         computer.robot.move_arm(trajectory, until_s=computer.until_s(self._end_s), lease=computer.lease)
 
@@ -368,7 +374,9 @@ def _posture_at(computer: Computer, X_BW: RigidTransform, near_rad: FloatArray) 
     return min(found, key=lambda q: float(np.abs(q - near_rad).max()), default=None)
 
 
-def _turned_posture(solver: Solver, X_BW: RigidTransform, near_rad: FloatArray) -> FloatArray | None:
+def _turned_posture(
+    solver: Solver, X_BW: RigidTransform, near_rad: FloatArray, most_off_m: float = _MOST_OFF_M
+) -> FloatArray | None:
     """Joint angles that put the hand at the place of a pose, turned otherwise if need be; None out of reach.
 
     Damped least squares (Wampler, 1986) from a posture, in which turns weigh less than places.
@@ -379,7 +387,7 @@ def _turned_posture(solver: Solver, X_BW: RigidTransform, near_rad: FloatArray) 
         steps = _SMALL_RAD * np.eye(len(q))
         J = np.column_stack([off - _off(solver.X_BH(q + step) @ X_HAND, goal) for step in steps]) / _SMALL_RAD
         q = np.clip(q + J.T @ np.linalg.solve(J @ J.T + _DAMPING * np.eye(6), off), solver.lower_rad, solver.upper_rad)
-    return q if np.linalg.norm(_off(solver.X_BH(q) @ X_HAND, goal)[:3]) < _MOST_OFF_M else None
+    return q if np.linalg.norm(_off(solver.X_BH(q) @ X_HAND, goal)[:3]) < most_off_m else None
 
 
 def _off(X_BH: RigidTransform, X_BG: RigidTransform) -> FloatArray:

@@ -13,14 +13,7 @@ from threading import Lock
 from typing import Any, Final
 
 import jwt
-from bosdyn.api import (
-    auth_pb2,
-    directory_pb2,
-    directory_registration_pb2,
-    license_pb2,
-    robot_id_pb2,
-    time_sync_pb2,
-)
+from bosdyn.api import auth_pb2, directory_pb2, directory_registration_pb2, license_pb2, robot_id_pb2, time_sync_pb2
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec

@@ -26,8 +26,8 @@ RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "ObstacleParams.obstacle_avoidance_padding": (0.0, 10.0),
     "RotationWithTolerance.threshold_radians": (0.0, math.pi),
     "VectorAlignmentWithTolerance.threshold_radians": (0.0, math.pi),
-    "WalkToObjectInImage.offset_distance": (0.0, 10.0),
-    "WalkToObjectRayInWorld.offset_distance": (0.0, 10.0),
+    "WalkToObjectInImage.offset_distance": (0.6, 10.0),
+    "WalkToObjectRayInWorld.offset_distance": (0.6, 10.0),
     "Stance.accuracy": (0.02, 0.1),
 }
 """Ranges of fields by message and name. A limit (`max...`) is positive, and each other number at most 1e7."""

@@ -14,8 +14,9 @@ import grpc
 from errand_spot.server import docking, identity, manipulation, pictures, rays, state
 from errand_spot.server.calls import Service, handlers
 from errand_spot.server.commands import PowerService, RobotCommandService
-from errand_spot.server.computer import Computer, Pace, Perception, Solver
+from errand_spot.server.computer import Computer, Pace, Solver
 from errand_spot.server.estop import EstopService, Tablet
+from errand_spot.server.graph_map import Perception
 from errand_spot.server.graph_nav import GraphNavService, Live
 from errand_spot.server.identity import DOMAIN, Credentials
 from errand_spot.server.keepalive import KeepaliveService

@@ -27,7 +27,8 @@ from errand_spot.messages import (
 )
 from errand_spot.server.arm import JOINTS, READY_RAD
 from errand_spot.server.calls import Call, Service
-from errand_spot.server.computer import Computer, Motors, Perception, SeenTag, Snapshot
+from errand_spot.server.computer import Computer, Motors, Snapshot
+from errand_spot.server.graph_map import Perception, SeenTag
 from errand_spot.server.hand import X_HAND, solutions
 from errand_spot.server.identity import DOMAIN
 from errand_spot.server.mobility import FEET_M
@@ -294,10 +295,8 @@ class InverseKinematicsService(Service):
         X_WT = X_HAND
         if request.HasField("wrist_mounted_tool"):
             X_WT = transform(request.wrist_mounted_tool.wrist_tform_tool, "wrist_tform_tool")
-        X_RT = transform(request.root_tform_scene, "root_tform_scene") @ transform(
-            request.scene_tform_task, "scene_tform_task"
-        )
-        X_RTool = X_RT @ transform(request.tool_pose_task.task_tform_desired_tool, "task_tform_desired_tool")
+        X_RS, X_ST = (transform(getattr(request, name), name) for name in ("root_tform_scene", "scene_tform_task"))
+        X_RTool = X_RS @ X_ST @ transform(request.tool_pose_task.task_tform_desired_tool, "task_tform_desired_tool")
         X_BW = snapshot.X_AB("body", request.root_frame_name) @ X_RTool @ X_WT.inverse()
         found = solutions(solver, X_BW)
         if not found:

@@ -215,3 +215,12 @@ def test_a_safe_power_off_that_a_stand_replaces_is_not_reported_as_done(spot):
     assert told.status == Progress.STATUS_COMMAND_OVERRIDDEN
     time.sleep(3.0)
     assert spot.robot.is_powered_on() and state(spot) == "STANDING"
+
+
+def test_a_client_that_takes_the_arm_does_not_keep_the_body_from_standing_up(spot):
+    sit(spot)
+    sent(spot, walks(2.0)[0].values[0], ahead_s=9.0)
+    time.sleep(0.2)
+    spot.served.login().ensure_client("lease").take("arm")
+    time.sleep(5.0)
+    assert spot.served.scripted.pose.x_m == pytest.approx(0.5, abs=0.03)

@@ -302,6 +302,43 @@ def test_the_hand_moves_at_a_velocity_until_its_end(spot):
     assert after.rot.to_roll() - before.rot.to_roll() == pytest.approx(0.2, abs=0.1)
 
 
+# velocity of the hand -> the least way in 1 s, of a hand that is fast, stowed, or both
+@pytest.mark.parametrize("stowed", [False, True])
+@pytest.mark.parametrize(
+    ("given", "least_m"),
+    [
+        ({"cartesian_velocity": {"frame_name": "body", "velocity_in_frame_name": {"z": 5.0}}}, 0.35),
+        ({"cylindrical_velocity": {"linear_velocity": {"r": 1.0}}}, 0.15),
+        ({"cylindrical_velocity": {"linear_velocity": {"z": 1.0}, "max_linear_velocity": {"value": 3.0}}}, 0.35),
+        ({"cylindrical_velocity": {"linear_velocity": {"z": 1.0}, "max_linear_velocity": {"value": 0.2}}}, 0.15),
+    ],
+)
+def test_a_velocity_of_the_hand_moves_it_as_fast_as_it_can(spot, stowed, given, least_m):
+    if not stowed:
+        ready(spot)
+    before, command = hand_in(spot, "body"), robot_command_pb2.RobotCommand()
+    request = arm_command_pb2.ArmVelocityCommand.Request(**given)
+    command.synchronized_command.arm_command.arm_velocity_command.CopyFrom(request)
+    sent(spot, command, ahead_s=1.0)
+    time.sleep(1.2)
+    assert least_m < math.dist(hand_in(spot, "body"), before) < 1.0
+
+
+def test_the_gripper_passes_its_angles_at_their_times(spot):
+    command, seen = Build.claw_gripper_close_command(), []
+    points = command.synchronized_command.gripper_command.claw_gripper_command.trajectory.points
+    del points[:]
+    for at_s, angle in ((1, -1.0), (3, -0.2)):
+        points.add(point=angle).time_since_reference.FromSeconds(at_s)
+    number = sent(spot, command)
+    for _ in range(7):
+        time.sleep(0.5)
+        seen.append(spot.served.scripted.opening)
+    assert (seen[1], seen[3], seen[6]) == pytest.approx((1.0, 0.6, 0.2), abs=0.1)
+    told = parts_feedback(spot, number).gripper_command_feedback.claw_gripper_feedback
+    assert told.status == told.STATUS_AT_GOAL
+
+
 def test_fans_run_for_their_time_or_until_a_later_command(spot):
     power = spot.robot.ensure_client("power")
     first = power.fan_power_command(percent_power=100, duration=60).command_id

@@ -16,7 +16,8 @@ from bosdyn.client.lease import LeaseClient
 from bosdyn.client.robot_command import RobotCommandBuilder as Build
 
 from errand_spot.messages import pose
-from errand_spot.server.computer import Pace, SeenTag
+from errand_spot.server.computer import Pace
+from errand_spot.server.graph_map import SeenTag
 from errand_spot.server.state import WorldObjectService
 from skills.robot import Pose2D
 from tests.tables import table

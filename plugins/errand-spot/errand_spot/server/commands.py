@@ -167,8 +167,8 @@ class RobotCommandService(Service):
         check_values(command, "command")
         whole = _whole_motion(command.full_body_command) if command.HasField("full_body_command") else None
         if not computer.able and (whole is None or command.full_body_command.HasField("selfright_request")):
-            if snapshot.motors is not Motors.ON:
-                raise RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off")
+            if snapshot.motors is not Motors.ON or computer.fault is None:
+                raise RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off, or an E-stop is pressed")
             raise RefusedError(Status.STATUS_BEHAVIOR_FAULT, "the robot has fallen: clear its behaviour fault")
         if whole is None and computer.docked() and _leaves_dock(command.synchronized_command):
             raise RefusedError(Status.STATUS_DOCKED, "the robot is docked: undock it first")
@@ -188,8 +188,7 @@ class RobotCommandService(Service):
 
     def _motions(self, command: Any, snapshot: Snapshot) -> Mapping[str, Motion]:
         """Motions of a synchronised command by part."""
-        made: dict[str, Motion] = {}
-        now_s = self._computer.now_s()
+        made, now_s = dict[str, Motion](), self._computer.now_s()
         if command.HasField("mobility_command"):
             made[MOBILITY] = _base_motion(command.mobility_command, self._computer, snapshot, now_s)
         if command.HasField("arm_command"):
@@ -224,8 +223,7 @@ def _parts_of(command: Any) -> tuple[str, ...]:
 def _has_end_time(command: Any) -> bool:
     """Returns whether a command says a time on the robot's clock."""
     named = command.synchronized_command
-    base = named.mobility_command
-    which = base.WhichOneof("command")
+    which = named.mobility_command.WhichOneof("command")
     ends = ("se2_velocity_request", "se2_trajectory_request", "stance_request")
     return which in ends or named.arm_command.HasField("arm_velocity_command")
 
@@ -317,11 +315,9 @@ class _PowerOff(_Whole):
 def _whole_motion(request: Any) -> _Whole:
     """Motion of the whole body. Raises RefusedError."""
     made, which = full_body_command_pb2.FullBodyCommand.Feedback(), request.WhichOneof("command")
-    if which in ("stop_request", "freeze_request"):
-        getattr(made, which.replace("request", "feedback")).SetInParent()
-        return _Whole(made)
-    if which == "selfright_request":
+    if which in ("stop_request", "freeze_request", "selfright_request"):
         made.selfright_feedback.status = basic_command_pb2.SelfRightCommand.Feedback.STATUS_COMPLETED
+        getattr(made, which.replace("request", "feedback")).SetInParent()
         return _Whole(made)
     if which == "safe_power_off_request":
         made.safe_power_off_feedback.status = basic_command_pb2.SafePowerOffCommand.Feedback.STATUS_IN_PROGRESS

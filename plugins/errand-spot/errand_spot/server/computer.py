@@ -267,8 +267,9 @@ class Computer:
 
     @property
     def able(self) -> bool:
-        """Returns whether motions may begin: the motors are on, and no fault of a fall is left."""
-        return self.snapshot.motors is Motors.ON and self.fault is None
+        """Returns whether motions may begin: the motors are on, no fault of a fall is left, no E-stop is pressed."""
+        released = self.estop.level() == estop_pb2.ESTOP_LEVEL_NONE
+        return self.snapshot.motors is Motors.ON and self.fault is None and released
 
     def settle(self) -> None:
         """Sits down, and then switches the motors off."""

@@ -21,7 +21,7 @@ from errand_spot.server.refusals import LONGEST_S
 from errand_spot.server.task import WHOLE, Steps, Task, stow, walk
 from skills.api import PlanningError
 from skills.navigate.footprint import Footprint
-from skills.navigate.planner import plan_path
+from skills.navigate.planner import LatticePlanner, plan_path
 from skills.robot import Pose2D
 
 DOCK_ID: Final = 520
@@ -29,6 +29,7 @@ DOCK_ID: Final = 520
 _PREP_M: Final = 0.9
 _NEAR_M: Final = 4.0
 _TRIES, _MOST_POSES, _PADDING_M = 3, 120, 0.02
+_PLANNER: Final = LatticePlanner(least_margin_m=0.03)
 _REMEMBERED: Final = 20
 Api: Final = docking_pb2
 Progress: Final = docking_pb2.DockingCommandFeedbackResponse
@@ -80,7 +81,7 @@ class _Docking(Task):
         """Path to the place before the dock, clear of what the LiDAR has shown and of no-go regions; None without."""
         here, footprint = computer.snapshot.odometry.pose, Footprint.of(computer.capabilities)
         try:
-            rows = plan_path(SeenSpace(computer), footprint, here, self._prep_O).poses
+            rows = plan_path(SeenSpace(computer), footprint, here, self._prep_O, _PLANNER).poses
         except PlanningError:
             return None
         return [Pose2D(*row) for row in rows[:: -math.ceil(len(rows) / _MOST_POSES)][::-1].tolist()]

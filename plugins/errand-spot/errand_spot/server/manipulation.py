@@ -62,6 +62,9 @@ class _ObjectTask(Task):
         super().__init__(Api.MANIP_STATE_ATTEMPTING_RAYCASTING)
 
     def _run(self, computer: Computer) -> Steps:
+        stands = computer.stand_first()
+        while not stands():
+            yield
         self._points_O = np.vstack([self._points_O, depth_points_O(computer)])
         self.found_O = point_O = self._aim(self._points_O) if self.found_O is None else self.found_O
         if point_O is None:
@@ -132,7 +135,7 @@ class ManipulationService(Service):
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Api.ManipulationApiResponse(lease_use_result=used)
         if not self._computer.able:
-            raise InvalidRequestError("the motors are off, or the robot has fallen")
+            raise InvalidRequestError("the motors are off, the robot has fallen, or an E-stop is pressed")
         if self._computer.docked():
             raise InvalidRequestError("the robot is docked: undock it first")
         task, number = self._task(request), next(self._ids)

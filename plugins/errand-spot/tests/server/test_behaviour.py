@@ -224,3 +224,12 @@ def test_a_client_that_takes_the_arm_does_not_keep_the_body_from_standing_up(spo
     spot.served.login().ensure_client("lease").take("arm")
     time.sleep(5.0)
     assert spot.served.scripted.pose.x_m == pytest.approx(0.5, abs=0.03)
+
+
+def test_a_command_during_an_estop_that_settles_the_robot_is_refused(spot):
+    spot.served.server.computer.estop._held["tablet"].level = estop_pb2.ESTOP_LEVEL_SETTLE_THEN_CUT
+    time.sleep(0.2)
+    with pytest.raises(rc.NotPoweredOnError):
+        sent(spot, Build.synchro_stand_command())
+    time.sleep(4.0)
+    assert not spot.robot.is_powered_on() and not faults(spot)

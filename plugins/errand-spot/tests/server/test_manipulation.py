@@ -14,7 +14,7 @@ from bosdyn.client.exceptions import InvalidRequestError
 from bosdyn.client.frame_helpers import get_a_tform_b, get_odom_tform_body
 from bosdyn.client.image import build_image_request
 from bosdyn.client.robot_command import RobotCommandBuilder as Build
-from bosdyn.client.robot_command import block_until_arm_arrives
+from bosdyn.client.robot_command import block_until_arm_arrives, blocking_sit
 from google.protobuf.wrappers_pb2 import FloatValue
 from pydrake.math import RotationMatrix
 
@@ -205,6 +205,16 @@ def test_a_pixel_outside_of_its_picture_is_an_invalid_request(spot, picker, sour
     assert not picker.begun
     corner = geometry_pb2.Vec2(x=cols, y=rows)
     assert started(spot, walk_to_object_in_image={**request, "pixel_xy": corner})
+
+
+def test_a_robot_that_sits_stands_up_before_it_picks(spot, picker):
+    blocking_sit(spot.commands, timeout_sec=5.0, update_frequency=20.0)
+    request = {**ray(1.0, 0.0, 0.0, "odom"), "walk_gaze_mode": Api.PICK_NO_AUTO_WALK_OR_GAZE}
+    started(spot, pick_object_ray_in_world=request)
+    time.sleep(0.3)
+    assert not picker.begun
+    time.sleep(2.0)
+    assert picker.begun and spot.served.scripted.height_m > 0.5
 
 
 def test_a_pixel_outside_of_a_picture_of_another_camera_is_an_invalid_request(spot):

@@ -50,6 +50,8 @@ class BaseMotion:
     """Field of the feedback."""
     keeps_feet: ClassVar[bool] = False
     """Whether the feet stay where they are."""
+    first: ClassVar[Any] = None
+    """Part of the feedback before it begins."""
 
     def __init__(self) -> None:
         self.status: int = Status.STATUS_PROCESSING
@@ -78,7 +80,7 @@ class BaseMotion:
     def _made(self, part: Any = None) -> Any:
         made = Feedback(status=self.status)
         getattr(made, self.field).SetInParent()
-        if part is not None:
+        if (part := part or self.first) is not None:
             getattr(made, self.field).CopyFrom(part)
         return made
 
@@ -87,6 +89,7 @@ class Stand(BaseMotion):
     """Stands in a posture; the feet stay where they are."""
 
     field, keeps_feet = "stand_feedback", True
+    first = basic_command_pb2.StandCommand.Feedback(status=basic_command_pb2.StandCommand.Feedback.STATUS_IN_PROGRESS)
 
     def __init__(self, posture: Posture) -> None:
         self._posture = posture
@@ -123,12 +126,9 @@ class Stand(BaseMotion):
         ended = self._rows is not None and since_s >= self._posture.ends_s and not self._shifts
         done = ended and computer.stands(self._command, posture[0])
         part = basic_command_pb2.StandCommand.Feedback
-        self.feedback = self._made(
-            part(
-                status=part.STATUS_IS_STANDING if done else part.STATUS_IN_PROGRESS,
-                standing_state=part.STANDING_CONTROLLED if done else part.STANDING_UNKNOWN,
-            )
-        )
+        status = part.STATUS_IS_STANDING if done else part.STATUS_IN_PROGRESS
+        state = part.STANDING_CONTROLLED if done else part.STANDING_UNKNOWN
+        self.feedback = self._made(part(status=status, standing_state=state))
 
     def _shift(self, computer: Computer, goal: FloatArray, *, over: bool) -> None:
         """Moves the body towards a pose over its feet, until it is there and its time is `over`."""
@@ -148,6 +148,7 @@ class Sit(BaseMotion):
     """Sits down."""
 
     field, keeps_feet = "sit_feedback", True
+    first = basic_command_pb2.SitCommand.Feedback(status=basic_command_pb2.SitCommand.Feedback.STATUS_IN_PROGRESS)
 
     def begin(self, computer: Computer) -> None:
         """Starts to sit down."""
@@ -246,6 +247,8 @@ class Trajectory(_Driving):
 
     field = "se2_trajectory_feedback"
     Part: Final = basic_command_pb2.SE2TrajectoryCommand.Feedback
+    _Going: Final = {"status": Part.STATUS_IN_PROGRESS, "body_movement_status": Part.BODY_STATUS_MOVING}
+    first = Part(final_goal_status=Part.FINAL_GOAL_STATUS_IN_PROGRESS, **_Going)
 
     def __init__(self, request: Any, params: Any, end_s: float, snapshot: Snapshot, posture: Held = None) -> None:
         """Takes the poses over into `odom`, in which they stay. Raises RefusedError or InvalidRequestError."""
@@ -258,9 +261,6 @@ class Trajectory(_Driving):
         self._clearance = Clearance(params.obstacle_params)
         self._begun_s, self._moved_s, self._moved_from = 0.0, 0.0, snapshot.odometry.pose
         super().__init__()
-        part, begun = self.Part, self._part()
-        begun.status, begun.body_movement_status = part.STATUS_IN_PROGRESS, part.BODY_STATUS_MOVING
-        begun.final_goal_status = part.FINAL_GOAL_STATUS_IN_PROGRESS
 
     def _start(self, computer: Computer) -> None:
         """Starts the clock of the path, here."""

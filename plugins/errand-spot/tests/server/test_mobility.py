@@ -1,4 +1,4 @@
-"""Motions of the base by a plant that is late."""
+"""Motions of the base by a plant that is late, and their feedback before they begin."""
 
 import time
 
@@ -7,7 +7,7 @@ import pytest
 from bosdyn.api import basic_command_pb2
 from bosdyn.api.spot.robot_command_pb2 import MobilityParams
 
-from errand_spot.server.mobility import Trajectory, Velocity
+from errand_spot.server.mobility import Sit, Trajectory, Velocity
 from errand_spot.server.server import Options, SpotServer
 from plant.robots.spot.kind import spot_capabilities
 from skills.testing.clock import VirtualClock
@@ -41,3 +41,12 @@ def test_a_plant_that_is_late_does_not_drive_past_the_end(credentials, motion_of
     for _ in range(8):
         computer.step()
     assert not np.any(robot.velocity)
+
+
+def test_a_motion_is_in_progress_before_the_robot_begins_it(credentials):
+    clock = VirtualClock()
+    robot = ScriptedRobot(clock, capabilities=spot_capabilities())
+    computer = SpotServer(robot, clock, None, credentials, Options({})).computer
+    assert Sit().feedback.sit_feedback.status == basic_command_pb2.SitCommand.Feedback.STATUS_IN_PROGRESS
+    walk = trajectory(9.0, computer.snapshot).feedback.se2_trajectory_feedback
+    assert (walk.status, walk.final_goal_status) == (walk.STATUS_IN_PROGRESS, walk.FINAL_GOAL_STATUS_IN_PROGRESS)

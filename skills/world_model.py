@@ -59,13 +59,14 @@ class ObjectKind:
 class Surface:
     """Flat top on which objects lie: outline in the world frame as (x, y) corners, height above the floor.
 
-    Left and right on it are as seen from the pose `viewer` (None: from the robot).
+    Left and right on it are as seen from the pose `viewer` (None: from the robot). A bin is open at this height.
     """
 
     name: str
     polygon_W: tuple[tuple[Coordinate, Coordinate], ...]
     height_m: Height
     viewer: Pose2D | None = None
+    is_bin: bool = False
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE, THERE, Location, Roles, read_roles
+from executive.language.spelling import synonyms_for
 from executive.language.tokens import Token
 from executive.words.command import TIME_UNITS_S
 
@@ -286,6 +287,10 @@ def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
         to_place = bool(goals) and not goals[0].person
         rest = [] if to_place and roles.favour else [roles.recipient]
         goals = [*goals, *rest] if to_place else [roles.recipient, *goals]
+    bins = [n for n, each in enumerate(ats) if each.phrase and each.phrase.singular in ("bin", *synonyms_for("bin"))]
+    if bins and not goals and blank.kind is VerbKind.PLACE:
+        bin_at, around = ats.pop(bins[-1]), ats[bins[-1] :]
+        ats, goals = ats[: bins[-1]], [replace(bin_at, within=next(iter(around), bin_at.within))]
     discards, hurls = blank.verb in word_list("discards"), blank.verb in word_list("hurls")
     lies_there = discards or (hurls and bool(ats) and ats[-1].preposition not in ("in", "inside"))
     puts = blank.kind is VerbKind.PLACE and not lies_there

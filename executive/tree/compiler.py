@@ -104,7 +104,7 @@ def compile_mission(
     root = watch_plan(builder, replace(whole_mission(mission, builder, steps.nodes), step=True))
     check_wiring(root)
     doors = tuple(doorway(knowledge, door) for door in knowledge.doors)
-    tags, surfaces = knowledge.known_tags(), tuple(map(builder.surface, knowledge.surfaces))
+    tags, surfaces = knowledge.known_tags(), tuple(map(builder.surface, knowledge.tops))
     own = (mission.robot_name, mission.name, mission.commands, root, steps.parts, mission.steps)
     zones = knowledge.with_zones(mission.whole_zones).known_zones()
     return CompiledTree(*own, doors, tags, surfaces, zones)

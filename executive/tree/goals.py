@@ -52,16 +52,16 @@ def surfaces_to_search(knowledge: Knowledge, item: str, place: str | None) -> tu
 
     The surfaces of a room that is a usual place count as usual.
     """
-    inside = tuple(knowledge.surfaces) if place is None else knowledge.surfaces_in(place)
+    inside = knowledge.tops if place is None else knowledge.surfaces_in(place)
     usual = (name for spot in knowledge.usual_surfaces(item) for name in knowledge.surfaces_in(spot))
     return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
 
 
 def surface_region(knowledge: Knowledge, surface: str) -> Region:
-    """Region above a surface that contains the origin of each object at rest on the surface."""
+    """Region that contains the origin of each object at rest on a surface, or in a bin."""
     facts = knowledge.surfaces[surface]
-    heights_m = facts.height - BELOW_TOP_M, facts.height + ABOVE_TOP_M
-    return Region(surface, facts.polygon, *heights_m, facts.viewpoints[0].pose_2d())
+    heights_m = (0.0, facts.height) if facts.bin else (facts.height - BELOW_TOP_M, facts.height + ABOVE_TOP_M)
+    return Region(surface, facts.polygon, *heights_m, facts.viewpoints[0].pose_2d(), facts.bin)
 
 
 def _classes(item: ObjectKind | None, knowledge: Knowledge) -> tuple[str, ...]:

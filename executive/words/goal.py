@@ -41,7 +41,8 @@ class Region:
     """Part of the world: an outline seen from above, (x, y) corners in order, and a range of heights (m).
 
     An object or a robot is in a region when the origin of its body frame is: for a table 0.75 m high, on which origins
-    are up to 0.25 m above an object's base, the range is 0.70 to 1.00. `viewer` sees left and right.
+    are up to 0.25 m above an object's base, the range is 0.70 to 1.00. `viewer` sees left and right. What is thrown
+    into a bin falls.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Region:
     z_min_m: float = -0.1
     z_max_m: float = 3.0
     viewer: Pose2D | None = None
+    is_bin: bool = False
 
     def __post_init__(self) -> None:
         if len(self.polygon_W) < 3 or not self.z_min_m < self.z_max_m:

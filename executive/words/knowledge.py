@@ -101,11 +101,14 @@ class SurfaceFacts(Strict):
     polygon: Polygon = Field(description="outline of the top, corners (x, y)")
     viewpoints: Annotated[tuple[Pose, ...], Field(min_length=1, description="poses from which it is seen whole")]
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
-    bin: bool = Field(default=False, description="whether what is thrown away goes there")
+    bin: bool = Field(
+        default=False,
+        description="whether it is a bin, open at the top with its rim at `height`, for what is thrown away",
+    )
 
     def surface(self, name: str) -> Surface:
         """Surface as the skills' own data type; left and right are as seen from the first viewpoint."""
-        return Surface(name, self.polygon, self.height, self.viewpoints[0].pose_2d())
+        return Surface(name, self.polygon, self.height, self.viewpoints[0].pose_2d(), self.bin)
 
 
 class ObjectFacts(Strict):
@@ -202,12 +205,17 @@ class Knowledge(Strict):
 
     @property
     def bins(self) -> tuple[str, ...]:
-        """Names of the surfaces where objects are thrown away, in the file's order."""
+        """Names of the bins, where objects are thrown away, in the file's order."""
         return tuple(name for name, surface in self.surfaces.items() if surface.bin)
 
+    @property
+    def tops(self) -> tuple[str, ...]:
+        """Names of the surfaces on which objects lie, all but the bins, in the file's order."""
+        return tuple(name for name, surface in self.surfaces.items() if not surface.bin)
+
     def surfaces_in(self, place: str) -> tuple[str, ...]:
-        """Surfaces in a room, in the file's order; for a surface, only the surface itself."""
-        return tuple(name for name, surface in self.surfaces.items() if place in (name, surface.place))
+        """Surfaces in a room but its bins, in the file's order; for a surface or bin, only this itself."""
+        return tuple(n for n, one in self.surfaces.items() if place == n or (place == one.place and not one.bin))
 
     def place_pose(self, place: str) -> Pose:
         """Pose of a robot at a known room or named pose, or at a surface (its first viewpoint)."""

@@ -33,7 +33,9 @@ def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: Sequ
     since_s = min((condition.since_s for condition in conditions), default=0.0)
     collisions = [each for each in collisions if each.time_s >= since_s]
     own = [each for each in collisions if not each.walked_in]
-    drops = sum(when_s >= since_s for history in truth.histories for when_s in history.dropped_s)
+    bins = [each for one in conditions if one.kind is GoalKind.PLACED for each in one.goal if each.is_bin]
+    fell = [(one, when_s) for one in truth.histories for when_s in one.dropped_s if when_s >= since_s]
+    drops = sum(region_at(bins, next(iter(one.own_rests_W(when_s)), one.last.p_WO)) is None for one, when_s in fell)
     return RefereeReport(
         success,
         " ".join(dict.fromkeys(each.sentence[0].upper() + each.sentence[1:] for each in findings)),
@@ -152,28 +154,34 @@ def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
     done = {one: p_W for one, p_W in put.items() if has_relations(one, p_W, until_s, condition, truth)}
     if len(done) >= condition.needed:
         verb = "was put" if is_past(condition) else "rests"
-        ons = (f"{definite(history.name)} {verb} on {region_at(condition.goal, p)}" for history, p in done.items())
+        rests = ((one, [each for each in condition.goal if each.contains(p)]) for one, p in done.items())
+        ons = (f"{definite(one.name)} {verb} {_on(regions[:1])}" for one, regions in rests)
         return Finding(True, f"{' and '.join(ons)}.")
     if not objects:
         return Finding(False, f"No {_wanted(condition)} was brought{_out_of(condition.source)}.")
     elsewhere = [history for history in objects if history not in done]
     if not elsewhere:
-        return Finding(False, f"{_tally(done, condition)} put on {where(condition.goal)}.")
+        return Finding(False, f"{_tally(done, condition)} put {_on(condition.goal)}.")
     missed = _where_it_is(elsewhere[0], condition, truth)
     if elsewhere[0] in put:
         meant = " and ".join(map(str, condition.relations))
-        missed = f"{definite(elsewhere[0].name)} was put on {where(condition.goal)}, but not {meant}"
+        missed = f"{definite(elsewhere[0].name)} was put {_on(condition.goal)}, but not {meant}"
     return Finding(False, f"{_tally(done, condition)} put there; {missed}." if done else f"{missed}.")
+
+
+def _on(goal: Sequence[Region]) -> str:
+    """Phrase for objects at rest in a goal: "on the desk", "in the bin"."""
+    return f"{'in' if any(region.is_bin for region in goal) else 'on'} {where(goal)}"
 
 
 def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> str:
     """Clause that says where an object is that did not rest in the goal in time."""
     now = _rest_in(history, condition.goal)
     if now is not None and not history.placed_by_person:
-        return f"{definite(history.name)} was not on {where(condition.goal)} at the end of its step"
+        return f"{definite(history.name)} was not {_on(condition.goal)} at the end of its step"
     x, y, z = history.last.p_WO
     state = "is in a gripper" if history.holder else "is" if history.resting else "moves"
-    return f"{definite(history.name)} {state} at ({x:.2f}, {y:.2f}, {z:.2f}), not resting on {where(condition.goal)}"
+    return f"{definite(history.name)} {state} at ({x:.2f}, {y:.2f}, {z:.2f}), not resting {_on(condition.goal)}"
 
 
 def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> FloatArray | None:

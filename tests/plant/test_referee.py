@@ -392,6 +392,16 @@ def test_an_object_that_falls_from_the_gripper_is_dropped(act, drops, event):
     assert (referee.drops, any(event in each for each in (*referee.events, ""))) == (drops, True), referee.events
 
 
+def test_an_object_thrown_into_the_bin_is_placed_and_not_dropped():
+    low, over = (-1.5, 1.0, HALF - TOUCH), (-1.5, 1.0, 0.6)
+    inside = replace(PLACED, goal=(square("bin", -1.5, 1.0, z_min_m=0.0, z_max_m=0.4, is_bin=True),))
+    verdict = Stage().lift().carry("coke", OVER_TABLE, over).let_go().fall("coke", over, low).referee.judge([inside])
+    assert (verdict.success, verdict.drops) == (True, 0), verdict.why
+    assert "The coke rests in the bin." in verdict.why
+    missed = Stage().lift().let_go().fall("coke", OVER_TABLE, (1.5, 1.0, HALF - TOUCH)).referee.judge([inside])
+    assert (missed.success, missed.drops, "not resting in the bin" in missed.why) == (False, 1, True)
+
+
 def test_flickering_contact_of_a_held_object_is_no_drop():
     stage = Stage().lift()
     for _ in range(5):

@@ -186,7 +186,7 @@ class _Slots(dict[str, str]):
     def surface(self, names: Iterable[str] = ()) -> str:
         """Returns a surface where objects of these classes do not usually stand."""
         usual = self.usual_surfaces(names)
-        return self.placed(self.choice("surface", [name for name in self._known.surfaces if name not in usual]))
+        return self.placed(self.choice("surface", [name for name in self._known.tops if name not in usual]))
 
     def furnished(self, names: Iterable[str] = ()) -> str:
         """Returns a room that has surfaces, and where objects of these classes are not usually found."""
@@ -210,14 +210,14 @@ class _Slots(dict[str, str]):
         """Returns a surface such that the robot can carry every object that usually stands there."""
         usual = {
             surface: [name for name in self._known.things if surface in self.usual_surfaces([name])]
-            for surface in self._known.surfaces
+            for surface in self._known.tops
         }
         clearable = (surface for surface, names in usual.items() if names and self._carried.issuperset(names))
         return self.choice("cleared", clearable)
 
     def cleared_onto(self) -> str:
         """Returns a surface to which the objects go, other than the surface to clear."""
-        return self.placed(self.choice("onto", [name for name in self._known.surfaces if name != self.to_clear()]))
+        return self.placed(self.choice("onto", [name for name in self._known.tops if name != self.to_clear()]))
 
 
 def _with_article(article: str, name: str) -> str:

@@ -116,7 +116,7 @@ def move_aside_plan(
         surface_key=surface,
         clear_key=clear,
         pose_key=pose,
-        surfaces=tuple(map(below.surface, below.knowledge.surfaces)),
+        surfaces=tuple(map(below.surface, below.knowledge.tops)),
     )
     seen = {"observation": FromBoard(obstacle), "surfaces": surfaces}
     before = below.skill("approach", seen, {"observation": obstacle})

@@ -87,7 +87,7 @@ def _put_on_plan(builder: PlanBuilder, item: ObjectKind, surface: str, to: str) 
     inputs = {"surface": builder.surface(surface), **builder.relations(builder.command.goal_relations)}
     place = builder.skill("place", inputs, _released(builder, "place"))
     return builder.sequence(
-        f"put it on the {surface}",
+        f"put it {place_phrase(builder.knowledge, surface)}",
         _holding(carry, item, to, go_near_plan(carry, view, f"the {surface}")),
         _holding(builder.at("put"), item, to, place, until_put_down=True),
     )
@@ -315,7 +315,7 @@ def _pick_up_again_plan(builder: PlanBuilder, item: ObjectKind, to: str) -> Node
         floor_key=keys["floor"],
         around_key=keys["around"],
         set_down_key=keys["set-down"],
-        surfaces=tuple(map(builder.surface, builder.knowledge.surfaces)),
+        surfaces=tuple(map(builder.surface, builder.knowledge.tops)),
         within_m=LOST_WITHIN_M,
         ahead_m=AHEAD_M,
         half_m=HALF_M,
@@ -366,7 +366,7 @@ def _near_plan(builder: PlanBuilder, item: ObjectKind, detection: str) -> NodeSp
         "surfaces near",
         "which surfaces are near?",
         part="surfaces-near",
-        surfaces=tuple(map(builder.surface, facts.surfaces)),
+        surfaces=tuple(map(builder.surface, facts.tops)),
         rooms={name: facts.rooms[surface.place] for name, surface in facts.surfaces.items()},
         within_m=LOST_WITHIN_M,
         key=near,

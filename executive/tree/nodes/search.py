@@ -150,7 +150,7 @@ def surfaces_elsewhere(
     near = knowledge.surfaces_in(knowledge.room(place))
     inside = knowledge.surfaces_in(place)
     here = knowledge.place_pose(place)
-    poses = {name: knowledge.place_pose(name) for name in knowledge.surfaces}
+    poses = {name: knowledge.place_pose(name) for name in knowledge.tops}
     far = sorted(poses, key=lambda name: math.hypot(here.x - poses[name].x, here.y - poses[name].y))
     others = dict.fromkeys(name for name in (*usual, *near, *far) if name not in {*inside, *avoided})
     return tuple(others)[:MOST_ELSEWHERE]
@@ -314,6 +314,10 @@ def surfaces_first_known(builder: PlanBuilder, item: ObjectKind, place: str | No
 def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
     """Returns the surfaces to search. Raises InputError when the place has no surfaces."""
     surfaces = surfaces_to_search(builder.knowledge, item.name, place)
+    if place in builder.knowledge.bins:
+        raise builder.error(
+            f"the robot neither looks into the {place} nor takes anything out of it", "name a surface or a room"
+        )
     if not surfaces:
         raise builder.error(f"'{place}' has no surface to look at", "add one under 'surfaces' in the knowledge file")
     return surfaces
@@ -323,7 +327,7 @@ def place_phrase(knowledge: Knowledge, place: str | None) -> str:
     """Text of a place at the end of a sentence: "in the kitchen", "on the desk"."""
     if place is None:
         return "anywhere"
-    return f"{'on' if place in knowledge.surfaces else 'in'} the {place}"
+    return f"{'on' if place in knowledge.tops else 'in'} the {place}"
 
 
 def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:

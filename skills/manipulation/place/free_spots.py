@@ -212,7 +212,9 @@ class SpotSearch:
     _tried: list[FloatArray] = field(default_factory=list)
 
     def spots(self) -> FloatArray:
-        """Spots (N, 2) on the surface, free or not."""
+        """Spots (N, 2) on the surface, free or not; of a bin its middle."""
+        if self.surface.is_bin:
+            return np.asarray([np.mean(self.surface.polygon_W, axis=0)])
         edge_m = min(EDGE_M, self.held.half_width_m + BESIDE_M) if self.tight else EDGE_M
         found = clear_spots(spots(self.surface, edge_m), self.clear_of)
         if not self.relations or self.missing():

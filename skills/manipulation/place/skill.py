@@ -22,6 +22,7 @@ from skills.manipulation.arm.looking_skill import PICTURE_LATENCY_S
 from skills.manipulation.arm.poses import UP_B, tucked_configuration
 from skills.manipulation.arm.solid_cells import cell_centres
 from skills.manipulation.grasp.reach import body_heights_m
+from skills.manipulation.place.bin import BinPlacement
 from skills.manipulation.place.free_spots import (
     PrePlacePose,
     SpotSearch,
@@ -35,7 +36,6 @@ from skills.manipulation.place.free_spots import (
     spaced_spots,
     unseen_view,
 )
-from skills.manipulation.place.verification import PlaceVerification
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.surroundings import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
@@ -106,8 +106,10 @@ class PlaceOptions:
     moves: Tries = 5
 
 
-class Place(PlaceVerification[PlaceInputs]):
-    """Puts the held object down on a surface and stows the arm. Drives nearer when no free spot is within reach.
+class Place(BinPlacement[PlaceInputs]):
+    """Puts the held object down on a surface, or lets it fall into a bin, and stows the arm.
+
+    It drives nearer when no free spot is within reach.
 
     The output `released_W` is the point of the release, also after a later failure; a failure before it has none.
     """
@@ -140,12 +142,12 @@ class Place(PlaceVerification[PlaceInputs]):
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} has no spot out of the way")
         yield from self._go_near(search)
         try:
-            yield from self._put_down(search, carried)
+            yield from (self.throw_in(search) if surface.is_bin else self._put_down(search, carried))
         except SkillFailure:
             yield from self.stand_as_usual()
             raise
         yield from self.stand_as_usual()
-        return Succeeded(f"put the object down on the {surface.name}")
+        return Succeeded(f"put the object {'in' if surface.is_bin else 'down on'} the {surface.name}")
 
     def _put_down(self, search: SpotSearch, carried: RotationMatrix) -> Routine[None]:
         """Finds a spot, lowers and releases the object, checks, and stows the arm."""
@@ -177,10 +179,13 @@ class Place(PlaceVerification[PlaceInputs]):
         self.checkpoint = {"released_W": spot_W.tolist(), **self.checkpoint}
         if over_spot:
             yield from self.let_go(None)
-        yield from self.check(surface, spot_W[:2], within_m=self.options.seen_again_m)
+        if surface.is_bin:
+            yield from self.check_inside(surface, {})
+        else:
+            yield from self.check(surface, spot_W[:2], within_m=self.options.seen_again_m)
         yield from self.stow()
         yield from self.stand_as_usual()
-        return Succeeded(f"the object stood on the {surface.name} already")
+        return Succeeded(f"the object was {'in' if surface.is_bin else 'on'} the {surface.name} already")
 
     def _carried(self) -> RotationMatrix:
         """Rotation of the hand while it carried the object, from the checkpoint of an interrupted attempt."""

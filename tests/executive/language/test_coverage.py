@@ -48,7 +48,13 @@ def test_fillers_and_words_of_the_meaning_make_no_note(understood, sentence):
 
 @pytest.mark.parametrize(
     "sentence",
-    ["throw away the beer on the kitchen table", "put the beer from the kitchen table in the bin", "dump the beer"],
+    [
+        "throw away the beer on the kitchen table",
+        "put the beer from the kitchen table in the bin",
+        "put the beer from the kitchen table in the bin in the bedroom",
+        "dump the beer",
+        "dump the beer in the trash can",
+    ],
 )
 def test_robot_throws_things_away_into_the_bin(understood, with_bin, sentence):
     answer = understood(sentence, knowledge=with_bin)

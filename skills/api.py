@@ -230,6 +230,8 @@ class Publish(Protocol):
 
 PICTURES: Final = "pictures"
 """Topic of the messages that `SkillContext.show_picture` publishes."""
+TOUCHES: Final = "touches"
+"""Topic of the messages that `SkillContext.expect_touch` publishes."""
 
 
 @dataclass
@@ -330,6 +332,10 @@ class SkillContext:
     def show_picture(self, picture: Picture, caption: str) -> None:
         """Puts a picture (RGB or grey, uint8) with its caption into the log and into the report."""
         self.publish(PICTURES, {"caption": caption, "image": picture})
+
+    def expect_touch(self, span_s: float) -> None:
+        """Says that the fingertips may touch a surface within a time (s); 0 takes that back."""
+        self.publish(TOUCHES, {"until_s": round(self.clock.now() + span_s, 6)})
 
     def pose(self) -> Pose2D:
         """Returns the planar part of X_WB; caches it until the estimate or the odometry changes."""

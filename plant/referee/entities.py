@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -194,12 +194,19 @@ class CollisionCounter(Stateful, saved=("_last_touched_s", "collisions")):
         self._last_touched_s: dict[Pair, float] | None = None
         self.collisions: list[Collision] = []
 
-    def update(self, time_s: float, pairs: Mapping[Pair, float], speeds_m_s: Mapping[str, float]) -> None:
+    def update(
+        self,
+        time_s: float,
+        pairs: Mapping[Pair, float],
+        speeds_m_s: Mapping[str, float],
+        touches: Collection[Pair] = (),
+    ) -> None:
         """Records the pairs in contact at time_s, with the heights of their lowest contacts.
 
-        `speeds_m_s` are the speeds of the robots just before the contact.
+        `speeds_m_s` are the speeds of the robots just before the contact. The `touches` are no collisions.
         """
-        touching = {self._counted_as(pair): pair for pair, z in pairs.items() if self._counts(pair, z)}
+        hits = ((pair, z) for pair, z in pairs.items() if pair not in touches)
+        touching = {self._counted_as(pair): pair for pair, z in hits if self._counts(pair, z)}
         if self._last_touched_s is None:
             self._last_touched_s = dict.fromkeys(touching, time_s)
         for counted, pair in touching.items():

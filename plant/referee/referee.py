@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.geometry import GeometryId
+from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
 
 from executive.words.goal import GoalCondition, RefereeReport
@@ -38,6 +40,8 @@ PATH_VALUES = 4
 MOST_COLUMNS = 64
 """Columns of the depth of a picture that is kept."""
 BEFORE_SAMPLES = 3
+TOUCH_M_S, TOUCH_N, TIPS_M = 0.05, 20.0, 0.04
+"""Most speed and force of an expected touch, and the length of the fingertips, which alone may touch."""
 MOST_POINTS = 20_000
 """Most points of a person's path, to bound the memory of a long run with a crowd."""
 
@@ -82,6 +86,14 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         self._now_s = 0.0
         self._pictures: tuple[TakenPicture, ...] = ()
         self._speeds_m_s: deque[Mapping[str, float]] = deque(maxlen=BEFORE_SAMPLES)
+        grippers = ((name, kind.capabilities().gripper) for name, kind in robots.items())
+        self._tips_m = {name: each.fixed_tip_x_m - TIPS_M for name, each in grippers if each is not None}
+        self._touches_until_s: dict[str, float] = {}
+        links = [number for number, entity in self._entities.all.items() if entity.kind is Kind.GRIPPER]
+        self._gripper_links = {number: plant.get_body(BodyIndex(number)) for number in links}
+        self._before: dict[int, SpatialVelocity] = {}
+        """Velocities of the grippers' links at the last sample, while a touch was expected."""
+        self._touching: set[Pair] = set()
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
@@ -118,7 +130,12 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         penetrations = self._geometry.Eval(plant_context).ComputePointPairPenetration()
         self.contact_points += len(penetrations)
         pairs = contact_heights(penetrations, self._entities.of_geometry)
-        self._counter.update(time_s, pairs, self._speeds_before())
+        expects = any(until_s >= time_s for until_s in self._touches_until_s.values())
+        gentle = self._touches(plant_context, pairs, time_s) if expects else set[Pair]()
+        links = self._gripper_links.items() if expects else ()
+        self._before = {n: self._plant.EvalBodySpatialVelocityInWorld(plant_context, link) for n, link in links}
+        self._touching = set(pairs)
+        self._counter.update(time_s, pairs, self._speeds_before(), gentle)
         self._speeds_m_s.append(self._speeds(plant_context))
         self._bases = {name: self._position(plant_context, body) for name, body in self._entities.bases.items()}
         self._persons = {name: self._position(plant_context, body) for name, body in self._entities.persons.items()}
@@ -137,6 +154,45 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         for history in self._histories.values():
             if history.on_tray_of is not None:
                 extend_stays(self._given.setdefault((history.name, history.on_tray_of), []), time_s)
+
+    def expect_touch(self, robot: str, until_s: float) -> None:
+        """Records that a robot says that its fingertips may touch a surface until a time."""
+        self._touches_until_s[robot] = until_s
+
+    def _touches(self, plant_context: Context, pairs: Mapping[Pair, float], time_s: float) -> set[Pair]:
+        """Pairs that touch as a robot expects it: only with its fingertips, slowly, and with little force."""
+        entities, speeds_m_s, forces_n = self._entities, dict[Pair, float](), dict[Pair, float]()
+        expecting = {name for name, until_s in self._touches_until_s.items() if until_s >= time_s}
+        for pair in pairs:
+            kinds = {entities.all[number].kind: entities.all[number] for number in pair}
+            if kinds.keys() == {Kind.GRIPPER, Kind.SCENERY} and kinds[Kind.GRIPPER].owner in expecting:
+                forces_n[pair] = speeds_m_s[pair] = 0.0
+        if not forces_n:
+            return set()
+        results = self._plant.get_contact_results_output_port().Eval(plant_context)
+        for each in map(results.point_pair_contact_info, range(results.num_point_pair_contacts())):
+            a, b = (entities.of_geometry[number] for number in (each.point_pair().id_A, each.point_pair().id_B))
+            pair = (a, b) if a < b else (b, a)
+            if pair not in forces_n:
+                continue
+            link = next(number for number in pair if entities.all[number].kind is Kind.GRIPPER)
+            speed_m_s, ahead_m = self._motion(plant_context, link, each.contact_point(), pair in self._touching)
+            beyond = ahead_m < self._tips_m[entities.all[link].owner]
+            speeds_m_s[pair] = math.inf if beyond else max(speeds_m_s[pair], speed_m_s)
+            forces_n[pair] += float(np.linalg.norm(each.contact_force()))
+        return {pair for pair in forces_n if speeds_m_s[pair] < TOUCH_M_S and forces_n[pair] < TOUCH_N}
+
+    def _motion(self, plant_context: Context, link: int, p_W: FloatArray, touched: bool) -> tuple[float, float]:
+        """Speed (m/s) of a gripper's link at a point, and how far the point is ahead of the hand's origin (m).
+
+        A link that had not `touched` at the last sample may have been faster then than after the contact.
+        """
+        body, hand = self._gripper_links[link], self._entities.hands[self._entities.all[link].owner]
+        now = self._plant.EvalBodySpatialVelocityInWorld(plant_context, body)
+        off_W = p_W - self._plant.EvalBodyPoseInWorld(plant_context, body).translation()
+        p_H = self._plant.EvalBodyPoseInWorld(plant_context, hand).inverse() @ p_W
+        moved = [now] if touched else [now, self._before.get(link, now)]
+        return max(float(np.linalg.norm(V_WB.Shift(off_W).translational())) for V_WB in moved), float(p_H[0])
 
     def judge(self, conditions: Sequence[GoalCondition]) -> RefereeReport:
         """Judges all conditions at the times at which they must hold. Raises ValueError before the first sample."""

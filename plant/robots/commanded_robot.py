@@ -207,11 +207,15 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
             )
         command = self._begin(Part.GRIPPER, GripperGoal(opening, force_n), until_s, lease)
         if self._runs(command):
+            if opening > self._sensors.gripper.opening:
+                self._sensors.tell_held(False)
             self._gripper.begin(GripperGoal(opening, force_n))
         return command
 
     def carry(self, holding: bool, *, lease: Lease) -> None:
-        """Does nothing: the gripper keeps its force also when communication is lost."""
+        """Tells the gripper's sensor; the gripper keeps its force also when communication is lost."""
+        if self._leases.refusal(lease) is None:
+            self._sensors.tell_held(holding)
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stops all motion, or only the given command if it still runs."""

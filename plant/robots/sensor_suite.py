@@ -197,6 +197,10 @@ class SensorSuite(
             self._scanned_s = now_s
             self._revolution = self._lidar.revolution(self._context, now_s, self.odometry.X_OB, self._X_BL())
 
+    def tell_held(self, holding: bool) -> None:
+        """Tells the gripper's sensor whether it holds an object that it does not feel."""
+        self._gripper_model.tell(holding)
+
     @property
     def scan(self) -> Scan | None:
         """Latest LiDAR revolution, computed when it is first read; the plant may have stepped since."""

@@ -241,19 +241,22 @@ class GripperNoise:
     """Noise of the measurements, and thresholds for reporting that the gripper holds an object.
 
     `holding_force_n`, `closed` and `holding_after_s`: the report becomes True once the force is at least the first and
-    the opening above the second for this time without a break, and False once one of both fails for this time. The
-    defaults are for a hinged gripper (rad).
+    the opening above the second for this time without a break, and False once one of both fails for this time. Empty
+    jaws close to an opening of 0, where they feel nothing; `closed` is five standard deviations of the noise. Up to
+    `thin`, an object may slip behind the fingertips, where shut jaws do not feel it. The defaults are for a hinged
+    gripper (rad).
     """
 
     opening: float = 0.003
     force_n: float = 0.8
     force_share: float = 0.03
     holding_force_n: float = 4.0
-    closed: float = 0.04
+    closed: float = 0.015
+    thin: float = 0.04
     holding_after_s: float = 0.15
 
 
-class GripperModel(NoisySensor, saved=("_holding", "_changing_since_s")):
+class GripperModel(NoisySensor, saved=("_holding", "_told", "_opening", "_changing_since_s")):
     """Gripper sensors of one robot."""
 
     def __init__(self, rng: np.random.Generator, noise: GripperNoise | None = None) -> None:
@@ -261,8 +264,13 @@ class GripperModel(NoisySensor, saved=("_holding", "_changing_since_s")):
         super().__init__(rng)
         self._noise = noise or GripperNoise()
         self._force_scale = 1.0 + float(rng.normal(0.0, self._noise.force_share))
-        self._holding = False
+        self._holding = self._told = False
+        self._opening = math.inf
         self._changing_since_s: float | None = None
+
+    def tell(self, holding: bool) -> None:
+        """Takes a client's word that shut jaws hold a thin object; it counts until the client takes it back."""
+        self._told = holding and self._opening <= self._noise.thin
 
     def update(self, stamp_s: float, opening: float, force_n: float) -> Gripper:
         """Measures the gripper at stamp_s from the true opening (0 closed) and the force at its tip.
@@ -273,7 +281,8 @@ class GripperModel(NoisySensor, saved=("_holding", "_changing_since_s")):
         force = max(0.0, force_n * self._force_scale + float(self._rng.normal(0.0, self._noise.force_n)))
         gripped = force >= self._noise.holding_force_n and read > self._noise.closed
         self._settle(stamp_s, gripped)
-        return Gripper(stamp_s, max(0.0, read), force, self._holding)
+        self._opening = read
+        return Gripper(stamp_s, max(0.0, read), force, self._holding or self._told)
 
     def _settle(self, stamp_s: float, gripped: bool) -> None:
         """Changes the report once the measurements contradict it for long enough."""

@@ -54,7 +54,7 @@ class Stow(ArmSkill[StowInputs]):
             with PlanningAttempt():
                 yield from self._come_near()
         yield from self.stand_at(usual_m, "standing as usual")
-        holding = self.context.robot.gripper().holding
+        holding = yield from self.holds("feeling what the gripper holds")
         yield from self._come_near()
         yield from self.feel_arm("stowing the arm")
         return Succeeded("the object is held near the body" if holding else "the arm is stowed")

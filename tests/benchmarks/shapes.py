@@ -1,14 +1,18 @@
-"""Boxes, cylinders and blocks of random size and proportion, as imported objects of a class that no detector knows."""
+"""Random boxes, cylinders and blocks, and thin tools, as imported objects of a class that no detector knows."""
 
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 
 from errand_make.objects import ImportOptions, import_object
+from tests.benchmarks.own_objects import made_part
+from tests.tables import yaml_beside
 
 KINDS = ("box", "cylinder", "block")
 WIDTH_M, LENGTH_M, DENSITY_KG_M3 = (0.02, 0.10), (0.02, 0.30), (300.0, 900.0)
 SLENDER, SIDES = 4.0, 32
+TOOLS = yaml_beside(__file__, "thin_tools.yaml")
 
 
 @dataclass(frozen=True)
@@ -53,4 +57,13 @@ def written_shape(seed, folder):
     mesh.write_text("\n".join(lines) + "\n", encoding="utf-8")
     (folder / name).mkdir()
     import_object(mesh, ImportOptions(name, round(area_m2 * z * shape.density_kg_m3, 4)), folder / name)
+    return folder / name
+
+
+def written_tool(name, folder):
+    """Writes a thin tool as an imported object into a folder of its own within a folder; returns the former."""
+    tool, mesh = TOOLS[name], folder / f"{name}_mesh.ply"
+    trimesh.util.concatenate([made_part(**part) for part in tool["parts"]]).export(mesh)
+    (folder / name).mkdir()
+    import_object(mesh, ImportOptions(name, tool["mass_kg"], None, 0.001, "z"), folder / name)
     return folder / name

@@ -32,7 +32,7 @@ from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from plant.snapshot_file import SnapshotError
 from plant.worlds.world import World, WorldError
-from skills.api import PICTURES, Publish
+from skills.api import PICTURES, TOUCHES, Publish
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from skills.manipulation.arm.solid_cells import wall_columns
@@ -263,7 +263,10 @@ class Bystanders(RunVisitor):
         self._told = len(pipeline.words)
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Passes a robot's speech to the people near it, and its picture of something to the referee."""
+        """Passes a robot's speech to the people near it; its pictures and expected touches to the referee."""
+        if topic == TOUCHES:
+            self._pipeline.settle()
+            self._simulation.referee.expect_touch(str(message["robot"]), float(message["until_s"]))
         if topic == PICTURES and "of" in message:
             self._pipeline.settle()
             robot, camera, stamp_s = message["robot"], message["camera"], message["stamp_s"]

@@ -41,7 +41,10 @@ _TOLERANCES = {
     GripperKind.PARALLEL: GripperTolerances(arrived=0.002, stall_rate=0.004),
     GripperKind.HINGED: GripperTolerances(arrived=0.03, stall_rate=0.03),
 }
-_NOISES = {GripperKind.PARALLEL: GripperNoise(opening=0.0003, closed=0.004), GripperKind.HINGED: GripperNoise()}
+_NOISES = {
+    GripperKind.PARALLEL: GripperNoise(opening=0.0003, closed=0.002, thin=0.006),
+    GripperKind.HINGED: GripperNoise(),
+}
 _MOVES = {GripperKind.PARALLEL: 0.004, GripperKind.HINGED: 0.05}
 """Rates of fingers (m/s, rad/s) beyond which they feel no force."""
 _FINGER_GAINS = {GripperKind.PARALLEL: (2e4, 200.0), GripperKind.HINGED: (60.0, 0.8)}

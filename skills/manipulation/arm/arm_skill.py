@@ -1,5 +1,6 @@
 """Base of the skills that move the arm: planned motions, contact, weighing, carrying, stowing."""
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, TypeVar
@@ -24,13 +25,18 @@ PlannedT = TypeVar("PlannedT")
 PLANNING_LATENCY_S = 0.3
 LINE_SPEED_RAD_S = 0.6
 CARRY_SPEED_RAD_S = 0.9
-GRIPPER_EXPIRY_S = 4.0
-GRIPPER_FORCE_N = 20.0
-"""Force with which an empty gripper opens and closes."""
-CONTACT_LAG_M = 0.006
+GRIPPER_EXPIRY_S, GRIPPER_FORCE_N = 4.0, 20.0
+"""Expiry of a gripper's command; force with which an empty gripper opens and closes."""
+CONTACT_LAG_M = 0.004
 """Lag of a slow hand that means contact; a free hand lags by at most 2 mm (measured in the plant)."""
-WEIGHING_S = 0.3
-"""Time over which weighing averages the noise of the readings."""
+WEIGHING_S, FEELING_S = 0.3, (0.5, 4.0)
+"""Time over which weighing averages the noise of the readings; least and most time to feel a thin object's weight."""
+_FEELING_KG = 0.0045
+"""Standard error of the mean at which the arm has felt long enough."""
+LEAST_FELT_KG = 0.015
+"""Mass from which on shut jaws hold something; an empty arm weighs up to 9 g more or less than computed."""
+SHUT_RAD = 0.02
+"""Opening below which the fingers may meet each other before an object that is in the hollow behind their tips."""
 _PADDING_M = 0.01
 """Distance that the arm keeps from boxes."""
 _GRIPPER_TURN_S = 1.6
@@ -387,17 +393,38 @@ class ArmSkill(RoutineSkill[InputsT]):
 
         return guard
 
-    def weigh(self, p_HO: FloatArray, message: str) -> Routine[float]:
-        """Measures the mass (kg) of the object that a resting hand holds at p_HO (3,), with the body level."""
+    def holds(self, message: str) -> Routine[bool]:
+        """Returns whether the gripper holds something, and tells the robot: shut jaws by the weight on the resting arm.
+
+        A gripper that has opened since the last grasp holds what it reports.
+        """
+        reading, payload = self.context.robot.gripper(), self.context.payload
+        if payload.kind is None or reading.opening > self.gripper.like_turn(SHUT_RAD):
+            return reading.holding
+        held = (yield from self.weigh(self.p_HT, message, FEELING_S)) > LEAST_FELT_KG
+        self.context.robot.carry(held, lease=self.context.lease)
+        payload.kind = payload.kind if held else None
+        yield Running(message)
+        return held
+
+    def weigh(
+        self, p_HO: FloatArray, message: str, span_s: tuple[float, float] = (WEIGHING_S, WEIGHING_S)
+    ) -> Routine[float]:
+        """Measures the mass (kg) of the object that a resting hand holds at p_HO (3,), with the body level.
+
+        It averages over the shorter time `span_s`, and up to the longer while the standard error is too large.
+        """
         scene = yield from self.compute(self.scene_now(), latency_s=0.05, name="prepare weighing", message=message)
-        end_s, found = self.context.clock.now() + WEIGHING_S, []
-        while self.context.clock.now() < end_s:
+        begun_s, found = self.context.clock.now(), list[float]()
+        while (spent_s := self.context.clock.now() - begun_s) < span_s[1]:
+            if spent_s > span_s[0] and np.std(found) < _FEELING_KG * math.sqrt(len(found)):
+                break
             efforts = self.context.robot.joints().effort_nm
             q = self.q_rad()
             extra = np.array([efforts[name] for name in self.model.names]) - scene.gravity_efforts(q)
             found.append(held_mass_kg(self.model, q, p_HO, extra))
             yield Running(message)
-        return float(np.median(found))
+        return float(np.mean(found))
 
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
         """Closes the empty gripper, if there is one, and folds the arm onto the body, unless it is folded already."""

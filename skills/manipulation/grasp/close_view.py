@@ -9,13 +9,16 @@ from functools import reduce
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import LocalisationEstimate, ObjectKind, ObjectObservation, Surface
+from skills.api import Cause, InputsT, LocalisationEstimate, ObjectKind, ObjectObservation, Surface
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
 from skills.manipulation.arm.collision import Box
+from skills.manipulation.arm.looking_skill import LookingSkill
+from skills.manipulation.arm.poses import TALL_M, close_viewpoints, overview_viewpoints, sees_closely
 from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.planning import Obstacle
 from skills.perception.class_forms import ANY_OBJECT
-from skills.perception.detection_3d import Detection3D
+from skills.perception.detection_3d import Detection3D, detections_3d
+from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
 from skills.perception.point_cloud import camera_pose_W
 from skills.perception.surface_segmentation import (
     HIGHEST_M,
@@ -28,6 +31,7 @@ from skills.perception.surface_segmentation import (
     split_touching,
 )
 from skills.robot import FloatArray, Image
+from skills.routine import Routine, SkillFailure
 
 LOOK_HALF_SIDE_M = 0.4
 """Half side of the patch of surface that is viewed."""
@@ -40,6 +44,18 @@ _NEIGHBOUR_GROWN_M = 0.005
 
 _TALLER_M = 0.05
 """Height that an observation from afar may miss."""
+WIDE = 0.9
+"""Opening of a hinged gripper for the approach, as a fraction of the maximum; it does not occlude the view."""
+OWN_M = 0.05
+"""Margin around an object within which cells are its own."""
+_SURFACE_BAND_M = 0.06
+"""Depth below the object's base down to which cells are the surface's own."""
+_KNOWN_ABOVE_M = 0.34
+"""Height above the object's base up to which the space around it is known."""
+_ASIDE_RAD = (0.0, 0.8, -0.8)
+"""Angles of the viewpoints about a partly hidden object."""
+_MOST_OF_LENGTH = 0.7
+"""A view that shows this part of the object's length is enough."""
 
 
 @dataclass(frozen=True)
@@ -177,3 +193,81 @@ def _target(cluster: Cluster, X_WB: RigidTransform) -> Target:
         base_m=float(centre_B[2]),
         round=shape.round,
     )
+
+
+def space_about(
+    seen: ObjectObservation, half_m: float = SURFACE_AROUND_M
+) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+    """Lowest and highest corners (world, m) of the space around an object on its surface, and of its own space.
+
+    A tall object's own space is taller than the known space: the cells at its top are no obstacle.
+    """
+    x, y, z = seen.position_W
+    length_m, width_m, height_m = seen.size_m
+    low_m, own_m = z - 0.5 * height_m - _SURFACE_BAND_M, 0.5 * max(length_m, width_m) + OWN_M
+    corners = ((half_m, low_m + _SURFACE_BAND_M + _KNOWN_ABOVE_M), (own_m, z + 0.5 * height_m + OWN_M))
+    about, own = (
+        (np.array([x - side_m, y - side_m, low_m]), np.array([x + side_m, y + side_m, top_m]))
+        for side_m, top_m in corners
+    )
+    return about, own
+
+
+class CloseLookingSkill(LookingSkill[InputsT]):
+    """Routine that views an object closely before it is grasped."""
+
+    def look_closely(self, seen: ObjectObservation, same_object_m: float) -> Routine[CloseView]:
+        """Views the object and its neighbours from 0.4 m, and also from aside if a part of the object is occluded.
+
+        `same_object_m` is the search radius around the object's last position.
+        Raises SkillFailure with cause PRECONDITION when the object is not in view.
+        """
+        base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
+        best: CloseView | None = None
+        for aside_rad in _ASIDE_RAD if self.object_camera.on_hand else _ASIDE_RAD[:1]:
+            self.boxes = surface_boxes([square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
+            self.known_W = space_about(seen)
+            try:
+                view = yield from self._view_from(seen, base_m, aside_rad, same_object_m)
+            except SkillFailure as failure:
+                if best is None or failure.cause is not Cause.PLANNING:
+                    raise
+                continue
+            if view is not None and (best is None or view.target.length_m > best.target.length_m):
+                best = view
+            if best is not None and (best.target.upright or best.target.length_m > _MOST_OF_LENGTH * seen.size_m[0]):
+                break
+        if best is None:
+            raise SkillFailure(Cause.PRECONDITION, f"the {seen.kind} is no longer where it was seen")
+        self.known_W = space_about(seen, LOOK_HALF_SIDE_M)
+        return best
+
+    def _view_from(
+        self, seen: ObjectObservation, base_m: float, aside_rad: float, same_object_m: float
+    ) -> Routine[CloseView | None]:
+        """Views the object with the camera rotated about it by an angle; None when the object is not there."""
+        message = f"looking closely at the {seen.kind}"
+        surface = square(seen.position_W, base_m, seen.surface or "surface")
+        p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
+        if aside_rad != 0.0 or not self._looks_closely(p_BT):
+            height_m = seen.size_m[2]
+            near = close_viewpoints(self.model.p_BS, p_BT, aside_rad) if height_m < TALL_M else []
+            far = overview_viewpoints(self.model.p_BS, p_BT, aside_rad, height_m)
+            yield from self.look_at(p_BT, [*near, *far], message)
+        image = yield from self.picture(message)
+        place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
+
+        def look() -> CloseView | None:
+            found = detect_in_image(detector, image)
+            named = [each for each in found if seen.kind.name in (ANY_OBJECT, each.class_name)]
+            rest = [each for each in found if each not in named]
+            placed = tuple(one for some in (named, rest) for one in detections_3d(image, place, some, [surface]))
+            return examine(image, X_WB, surface, seen, place, placed, same_object_m)
+
+        return (yield from self.compute(look, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message))
+
+    def _looks_closely(self, p_BT: FloatArray) -> bool:
+        """Returns whether the hand camera views a point closely already, past an open gripper."""
+        camera = self.object_camera
+        open_wide = self.context.robot.gripper().opening > WIDE * self.gripper.widest
+        return camera.on_hand and open_wide and sees_closely(self.model.X_BH(self.q_rad()) @ camera.X_FC, p_BT)

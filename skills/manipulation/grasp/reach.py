@@ -22,7 +22,7 @@ from skills.manipulation.arm.kinematics import ArmModel
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.solid_cells import boxes_around, never_seen
 from skills.manipulation.grasp.candidates import GraspCandidate
-from skills.manipulation.grasp.close_view import SURFACE_AROUND_M, square
+from skills.manipulation.grasp.close_view import OWN_M, SURFACE_AROUND_M, WIDE, space_about, square
 from skills.manipulation.grasp.placements import UPRIGHT_M, Target
 from skills.manipulation.grasp.planning import PREGRASPS_M, lifts, within_reach
 from skills.robot import Capabilities, FloatArray, GripperCapabilities, GripperKind
@@ -51,20 +51,10 @@ _ABOVE_ARM_M = 0.1
 """Height of the space above the arm that a picture must have shown."""
 _BESIDE_COST = 0.8
 """Cost of a grasp that touches cells of a neighbour."""
-_OWN_M = 0.05
-"""Margin around an object within which cells are its own."""
 _LOW_M = 0.05
 """Least height above the surface of a neighbour's cells."""
 _LESS_M = 0.01
 """Margin by which a neighbour's boxes are smaller than its cells."""
-_SURFACE_AROUND_M = 0.2
-"""Half side of the square around an object in which the surface is known."""
-_SURFACE_BAND_M = 0.06
-"""Depth below the object's base down to which cells are the surface's own."""
-_KNOWN_ABOVE_M = 0.34
-"""Height above the object's base up to which the space around it is known."""
-WIDE: Final = 0.9
-"""Opening of a hinged gripper for the approach, as a fraction of the maximum opening."""
 _NARROW: Final = 0.6
 """The same among neighbours."""
 _WIDE_PARALLEL: Final = 0.98
@@ -268,24 +258,6 @@ def raise_onto_surface(seen: ObjectObservation, surfaces: Sequence[Surface]) -> 
     return replace(seen, position_W=(x, y, max(z, float(top_m) + 0.5 * seen.size_m[2])))
 
 
-def space_about(
-    seen: ObjectObservation, half_m: float = _SURFACE_AROUND_M
-) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
-    """Lowest and highest corners (world, m) of the space around an object on its surface, and of its own space.
-
-    A tall object's own space is taller than the known space: the cells at its top are no obstacle.
-    """
-    x, y, z = seen.position_W
-    length_m, width_m, height_m = seen.size_m
-    low_m, own_m = z - 0.5 * height_m - _SURFACE_BAND_M, 0.5 * max(length_m, width_m) + _OWN_M
-    corners = ((half_m, low_m + _SURFACE_BAND_M + _KNOWN_ABOVE_M), (own_m, z + 0.5 * height_m + _OWN_M))
-    about, own = (
-        (np.array([x - side_m, y - side_m, low_m]), np.array([x + side_m, y + side_m, top_m]))
-        for side_m, top_m in corners
-    )
-    return about, own
-
-
 def _beside(seen: ObjectObservation, p_W: FloatArray) -> NDArray[np.bool_]:
     """Mask (N,) of the points around an object, without its own points and those just above its surface."""
     base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
@@ -293,7 +265,7 @@ def _beside(seen: ObjectObservation, p_W: FloatArray) -> NDArray[np.bool_]:
     inside = np.all((p_W > low) & (p_W < high), axis=1) & (p_W[:, 2] > base_m + _LOW_M)
     turn = RotationMatrix.MakeZRotation(-seen.yaw_rad).matrix()
     off = np.abs((p_W - np.array(seen.position_W)) @ turn.T)[:, :2]
-    return np.asarray(inside & np.any(off > 0.5 * np.array(seen.size_m[:2]) + _OWN_M, axis=1))
+    return np.asarray(inside & np.any(off > 0.5 * np.array(seen.size_m[:2]) + OWN_M, axis=1))
 
 
 def _less(box: Box) -> Box:

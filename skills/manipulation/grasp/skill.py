@@ -10,12 +10,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, ObjectObservation, PlanningError, Succeeded
-from skills.detect.viewpoints import surface_boxes
-from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, GRIPPER_FORCE_N
+from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, GRIPPER_FORCE_N, SHUT_RAD
 from skills.manipulation.arm.collision import ArmScene, box_corners
 from skills.manipulation.arm.held_object import held_box, square_hand_pose
-from skills.manipulation.arm.looking_skill import LookingSkill
-from skills.manipulation.arm.poses import TALL_M, close_viewpoints, overview_viewpoints, sees_closely
 from skills.manipulation.grasp.candidates import (
     THIN_M,
     GraspCandidate,
@@ -26,13 +23,10 @@ from skills.manipulation.grasp.candidates import (
     why_no_candidates,
     why_too_heavy,
 )
-from skills.manipulation.grasp.close_view import LOOK_HALF_SIDE_M, CloseView, examine, square
+from skills.manipulation.grasp.close_view import WIDE, CloseLookingSkill, CloseView
 from skills.manipulation.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, pull_back_B
-from skills.manipulation.grasp.reach import WIDE, heights_to_grasp, openings, passing, space_about, up_B
+from skills.manipulation.grasp.reach import heights_to_grasp, openings, passing, up_B
 from skills.manipulation.grasp.servo import Aim, aim_approach, measure_shift
-from skills.perception.class_forms import ANY_OBJECT
-from skills.perception.detection_3d import detections_3d
-from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
 from skills.quantities import Force, Length, Margin, Turn
 from skills.robot import FloatArray, GripperKind
 from skills.routine import Routine, SkillFailure
@@ -52,13 +46,11 @@ _SHORT_M = 0.025
 """Distance from the grasp beyond which a contact of the hand is not with the surface below the object."""
 _FEEL_M = 0.014
 """Additional depth of the fingers, to feel the surface."""
-_FEEL_RAD_S = 0.12
+_FEEL_RAD_S = 0.08
+_TOUCH_S = 15.0
+"""Longest time from the last bit of the approach to the lift, in which fingertips may touch the surface."""
 _DOWN = 0.8
 """Vertical component of a direction that counts as down."""
-_ASIDE_RAD = (0.0, 0.8, -0.8)
-"""Angles of the viewpoints about a partly hidden object."""
-_MOST_OF_LENGTH = 0.7
-"""A view that shows this part of the object's length is enough."""
 _FEEL_S = 0.4
 """Pause for the gripper's readings of the held object."""
 _AIM_LATENCY_S = 0.1
@@ -95,7 +87,7 @@ class GraspOptions:
     pull_back_m: Margin = 0.12
 
 
-class Grasp(LookingSkill[GraspInputs]):
+class Grasp(CloseLookingSkill[GraspInputs]):
     """Grasps an object and holds it near the body. On failure it opens the gripper and stows the arm.
 
     The output `tried` is `avoid` plus the grasp of this attempt, also after a failure. When no grasp can be planned,
@@ -146,12 +138,16 @@ class Grasp(LookingSkill[GraspInputs]):
         try:
             view, plan = yield from self._take_where_it_is(inputs)
         except SkillFailure as failure:
+            if (yield from self._still_held(failure)):
+                return (yield from self._secured(inputs))
             yield from self._let_go(draw_back=len(self._tried) > len(inputs.avoid))
             raise self._with_outputs(failure) from failure
         try:
             yield from self._carry(plan.candidate, name, view.target.height_m < THIN_M)
             yield from self.stand_as_usual(f"carrying the {name}")
         except SkillFailure as failure:
+            if (yield from self._still_held(failure)):
+                return (yield from self._secured(inputs))
             raise self._with_outputs(failure) from failure
         return Succeeded(f"holding the {name}", self._outputs())
 
@@ -167,18 +163,28 @@ class Grasp(LookingSkill[GraspInputs]):
         yield from self._keep_held(seen, at_object)
         return Succeeded(f"the {seen.kind} was in the gripper already; holding it", self._outputs())
 
+    def _still_held(self, failure: SkillFailure) -> Routine[bool]:
+        """Returns whether the gripper still holds the object that a failure calls lost."""
+        lost = failure.cause is Cause.POSTCONDITION
+        return lost and (yield from self.holds("feeling whether the gripper is empty"))
+
+    def _secured(self, inputs: GraspInputs) -> Routine[Succeeded]:
+        """Carries an object that seemed to be lost while the arm still feels its weight."""
+        yield from self._keep_held(inputs.observation, True)
+        return Succeeded(f"holding the {inputs.observation.kind}, which slipped in the gripper", self._outputs())
+
     def _keep_held(self, seen: ObjectObservation, at_object: bool) -> Routine[None]:
         """Clamps, lifts and draws back the gripped object, carries it near the body, and checks that it is held."""
         yield from self.move_gripper(0.0, self.options.force_n, f"closing on the {seen.kind}")
         yield from self.pause(_FEEL_S, f"closing on the {seen.kind}")
-        message, opening = f"carrying the {seen.kind}", self._check_held(str(seen.kind), None)
+        message, opening = f"carrying the {seen.kind}", (yield from self._check_held(str(seen.kind), None))
         R_BH = self.model.X_BH(self.q_rad()).rotation()
         if at_object:
             yield from self._lift((), f"lifting the {seen.kind}")
             yield from self.try_shift_hand(-self.options.pull_back_m * R_BH.matrix()[:, 0] * [1.0, 1.0, 0.0], message)
         yield from self.carry(R_BH, message)
         yield from self.pause(0.2, message)
-        self._check_held(str(seen.kind), opening)
+        yield from self._check_held(str(seen.kind), opening)
         yield from self.stand_as_usual(message)
 
     def _with_outputs(self, failure: SkillFailure) -> SkillFailure:
@@ -245,61 +251,8 @@ class Grasp(LookingSkill[GraspInputs]):
         self, seen: ObjectObservation, avoid: tuple[TriedGrasp, ...]
     ) -> Routine[tuple[CloseView, GraspPlan]]:
         """Views the object from the body's present height, and plans its grasp."""
-        view = yield from self._look_closely(seen)
+        view = yield from self.look_closely(seen, self.options.same_object_m)
         return view, (yield from self._plan(view, str(seen.kind), avoid))
-
-    def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
-        """Views the object and its neighbours from 0.4 m, and also from aside if a part of the object is occluded.
-
-        Raises SkillFailure with cause PRECONDITION when the object is not in view.
-        """
-        base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
-        best: CloseView | None = None
-        for aside_rad in _ASIDE_RAD if self.object_camera.on_hand else _ASIDE_RAD[:1]:
-            self.boxes = surface_boxes([square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
-            self.known_W = space_about(seen)
-            try:
-                view = yield from self._view_from(seen, base_m, aside_rad)
-            except SkillFailure as failure:
-                if best is None or failure.cause is not Cause.PLANNING:
-                    raise
-                continue
-            if view is not None and (best is None or view.target.length_m > best.target.length_m):
-                best = view
-            if best is not None and (best.target.upright or best.target.length_m > _MOST_OF_LENGTH * seen.size_m[0]):
-                break
-        if best is None:
-            raise SkillFailure(Cause.PRECONDITION, f"the {seen.kind} is no longer where it was seen")
-        self.known_W = space_about(seen, LOOK_HALF_SIDE_M)
-        return best
-
-    def _view_from(self, seen: ObjectObservation, base_m: float, aside_rad: float) -> Routine[CloseView | None]:
-        """Views the object with the camera rotated about it by an angle; None when the object is not there."""
-        message = f"looking closely at the {seen.kind}"
-        surface = square(seen.position_W, base_m, seen.surface or "surface")
-        p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
-        if aside_rad != 0.0 or not self._looks_closely(p_BT):
-            height_m = seen.size_m[2]
-            near = close_viewpoints(self.model.p_BS, p_BT, aside_rad) if height_m < TALL_M else []
-            far = overview_viewpoints(self.model.p_BS, p_BT, aside_rad, height_m)
-            yield from self.look_at(p_BT, [*near, *far], message)
-        image = yield from self.picture(message)
-        place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
-
-        def look() -> CloseView | None:
-            found = detect_in_image(detector, image)
-            named = [each for each in found if seen.kind.name in (ANY_OBJECT, each.class_name)]
-            rest = [each for each in found if each not in named]
-            placed = tuple(one for some in (named, rest) for one in detections_3d(image, place, some, [surface]))
-            return examine(image, X_WB, surface, seen, place, placed, self.options.same_object_m)
-
-        return (yield from self.compute(look, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message))
-
-    def _looks_closely(self, p_BT: FloatArray) -> bool:
-        """Returns whether the hand camera views a point closely already, past an open gripper."""
-        camera = self.object_camera
-        open_wide = self.context.robot.gripper().opening > WIDE * self.gripper.widest
-        return camera.on_hand and open_wide and sees_closely(self.model.X_BH(self.q_rad()) @ camera.X_FC, p_BT)
 
     def _plan(self, view: CloseView, name: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
         """Plans a grasp and opens the gripper for it. Raises SkillFailure with cause PLANNING when none is feasible."""
@@ -341,6 +294,7 @@ class Grasp(LookingSkill[GraspInputs]):
         name, least_kg = str(seen.kind), least_mass_kg(seen.kind)
         yield from self.follow(plan.to_grasp, f"reaching for the {name}")
         ahead = plan.candidate.X_BH.rotation().matrix()[:, 0]
+        self.context.expect_touch(_TOUCH_S)
         touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", self.contact_guard(ahead))
         if touched:
             self._check_reached(plan.candidate.X_BH, name)
@@ -352,7 +306,9 @@ class Grasp(LookingSkill[GraspInputs]):
         force_n = self.options.force_n + _PER_LEVER_N_M * lever_m
         yield from self.move_gripper(0.0, self._grip_n(force_n, least_kg), f"closing on the {name}")
         yield from self.pause(_FEEL_S, f"closing on the {name}")
-        opening = self._check_held(name, None)
+        felt = self.context.robot.gripper()
+        if felt.opening > self.gripper.like_turn(SHUT_RAD):
+            yield from self._check_held(name, None)
         turns = view.target.upright and self.gripper.kind is GripperKind.HINGED
         X_BH = square_hand_pose(X_BH, self.p_HT) if turns else X_BH
         self.held = [held_box(X_BH.inverse(), view.target_box)]
@@ -361,9 +317,10 @@ class Grasp(LookingSkill[GraspInputs]):
         self._watch = self.hold_watch()
         if not (yield from self._lift([plan.lift_B], f"lifting the {name}")):
             raise SkillFailure(Cause.PLANNING, "the arm cannot lift the object from where it has hold of it")
+        self.context.expect_touch(0.0)
         self._watch = None
+        yield from self._check_held(name, felt.opening)
         mass_kg = yield from self.weigh(self.held[0].X_FG.translation(), f"lifting the {name}")
-        self._check_held(name, opening)
         yield from self._refuse_heavy(mass_kg, plan.lift_B, name)
         yield from self.move_gripper(0.0, self._grip_n(force_n, max(mass_kg, least_kg)), f"lifting the {name}")
 
@@ -401,13 +358,13 @@ class Grasp(LookingSkill[GraspInputs]):
         others_B = lifts(self.model, self.model.X_BH(self.q_rad()), up_B(self.X_WB()))
         return (yield from self.shift_by_first([*planned_B, *others_B], message))
 
-    def _check_held(self, name: str, opening_before: float | None) -> float:
+    def _check_held(self, name: str, opening_before: float | None) -> Routine[float]:
         """Returns the gripper's opening, and tells the robot that it carries the object.
 
         Raises SkillFailure with cause POSTCONDITION when the object is not held.
         """
-        gripper = self.context.robot.gripper()
-        if not gripper.holding:
+        held, gripper = (yield from self.holds(f"feeling for the {name}")), self.context.robot.gripper()
+        if not held:
             raise SkillFailure(Cause.POSTCONDITION, f"the gripper closed on nothing where the {name} was seen")
         if opening_before is None:
             self.context.robot.carry(True, lease=self.context.lease)
@@ -418,14 +375,14 @@ class Grasp(LookingSkill[GraspInputs]):
 
     def _carry(self, grasp: GraspCandidate, name: str, gently: bool) -> Routine[None]:
         """Draws back from the surface, brings the object near the body, and checks once more that it is held."""
-        opening, self._watch = self._check_held(name, None), self.hold_watch()
+        opening, self._watch = self.context.robot.gripper().opening, self.hold_watch()
         message, back_B = f"carrying the {name}", self.options.pull_back_m * pull_back_B(grasp.X_BH, self.model.p_BS)
         offsets_B = (back_B + up_m * up_B(self.X_WB()) for up_m in _PULL_BACK_UP_M)
         yield from self.shift_by_first(offsets_B, message, clear_of_boxes=True)
         speed_rad_s = _GENTLY_RAD_S if gently or grasp.lever_m > _LONG_LEVER_M else CARRY_SPEED_RAD_S
         yield from self.carry(self.model.X_BH(self.q_rad()).rotation(), message, speed_rad_s)
         yield from self.pause(0.2, message)
-        self._check_held(name, opening)
+        yield from self._check_held(name, opening)
 
     def _let_go(self, draw_back: bool = True) -> Routine[None]:
         """After a failure: opens the gripper, draws back from the object and stows; skips steps that fail."""

@@ -97,7 +97,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
 
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
         """Finds the person, goes there, holds the object out and releases it; tries again when that fails."""
-        if not self.context.robot.gripper().holding:
+        if not (yield from self.holds("feeling what the gripper holds")):
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to hand over")
         for _ in range(_TRIES):
             seen = yield from self._give(inputs)

@@ -48,6 +48,8 @@ _SURELY_FREE_M = 0.03
 """Height down to which the object moves fast, because it cannot touch the surface there."""
 _PRESS_M = 0.03
 """Largest depth of the hand below the height of the surface while it feels for contact."""
+_TOUCH_S = 25.0
+"""Longest time from the lowering to the retreat, in which fingertips may touch the surface."""
 _LAG_IN_CONTACT_M = 0.02
 """Lag of a fast hand in contact: the held object hangs lower than was thought."""
 _LIFT_AGAIN_M = 0.135
@@ -133,7 +135,7 @@ class Place(BinPlacement[PlaceInputs]):
     def run(self, inputs: PlaceInputs) -> Routine[Succeeded]:
         """Drives near, views the surface, puts the object down, and checks."""
         surface = inputs.surface
-        if not self.context.robot.gripper().holding:
+        if not (yield from self.holds("feeling what the gripper holds")):
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
         carried = self._carried()
         held, pose = held_object(self.context.payload, self.gripper, carried), self.context.pose()
@@ -157,9 +159,11 @@ class Place(BinPlacement[PlaceInputs]):
         kind = self.context.payload.kind
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist(), "kind": None if kind is None else kind.name}
         held_kg = yield from self.weigh(self.p_HT, f"weighing the object over the {surface.name}")
+        self.context.expect_touch(_TOUCH_S)
         yield from self._lower(surface, above)
         put_down = held.box(self.model.X_BH(self.q_rad()))
         yield from self.let_go(held_kg)
+        self.context.expect_touch(0.0)
         yield from self.check(surface, spot_W, [put_down], objects_W(search.seen()), self.options.seen_again_m)
         yield from self.stow()
 

@@ -77,6 +77,30 @@ def test_gripper_pressing_on_itself_holds_nothing():
     assert not feel(GripperModel(rng()), 0.0, 40.0, 0.0)[-1].holding
 
 
+# opening (rad) and force (N) of what is between the fingertips: the thinnest, in empty jaws, against them
+@pytest.mark.parametrize(
+    ("opening_rad", "force_n", "holds"), [(0.03, 15.0, True), (0.0, 0.0, False), (0.004, 2.0, False)]
+)
+def test_gripper_feels_thin_objects_and_not_its_own_fingers(opening_rad, force_n, holds):
+    assert feel(GripperModel(rng()), opening_rad, force_n, 0.0)[-1].holding is holds
+
+
+def test_shut_gripper_takes_a_clients_word_until_it_is_taken_back():
+    gripper = GripperModel(rng())
+    feel(gripper, 0.0, 0.0, 0.0)
+    gripper.tell(True)
+    assert feel(gripper, 0.0, 0.0, 1.0)[-1].holding
+    gripper.tell(False)
+    assert not feel(gripper, 0.0, 0.0, 2.0)[-1].holding
+
+
+def test_word_of_a_client_does_not_hide_the_loss_of_a_wide_object():
+    gripper = GripperModel(rng())
+    feel(gripper, 0.6, 30.0, 0.0)
+    gripper.tell(True)
+    assert not feel(gripper, 0.0, 0.0, 1.0)[-1].holding
+
+
 def test_gripper_moving_freely_holds_nothing_and_reads_no_negative_force():
     readings = feel(GripperModel(rng()), 1.0, 0.0, 0.0)
     assert not any(r.holding for r in readings) and min(r.force_n for r in readings) >= 0.0

@@ -235,3 +235,14 @@ def test_efforts_of_joints_are_those_that_the_solver_applies(monkeypatch):
     assert np.abs(solved[1]).max() > 5.0
     np.testing.assert_allclose(sensed[0], solved[1], atol=2.0)  # noise of 0.3 Nm
     np.testing.assert_allclose(sensed[0], sensed[1])
+
+
+def test_shut_gripper_holds_what_the_lease_holder_says_until_it_opens(engine, spot, lease):
+    spot.set_gripper(0.0, 30.0, until_s=engine.now() + 4.0, lease=lease)
+    engine.advance(2.0)
+    spot.carry(True, lease=lease)
+    engine.advance(0.1)
+    told = spot.gripper().holding
+    spot.set_gripper(1.0, 30.0, until_s=engine.now() + 4.0, lease=lease)
+    engine.advance(2.0)
+    assert (told, spot.gripper().holding) == (True, False)

@@ -1,9 +1,14 @@
 """Tests of weighing a held object by the arm's efforts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from table_robot import TableRobot, context_of, outcome
 
 from plant.robots.spot.kind import spot_capabilities
+from skills.api import ObjectKind, Succeeded
+from skills.manipulation.arm.arm_skill import ArmSkill
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.forces import held_mass_kg
 from skills.manipulation.arm.kinematics import arm_model
@@ -36,3 +41,43 @@ def test_an_arm_held_out_ahead_needs_efforts_against_its_own_weight():
     assert efforts[0] == pytest.approx(0.0, abs=1e-6)
     assert -20.0 < efforts[1] < -5.0
     assert -20.0 < efforts[2] < -5.0
+
+
+class Weighted(TableRobot):
+    """Has something in its gripper, shut or not, of a mass that the arm's joints feel."""
+
+    def __init__(self, mass_kg, **more):
+        super().__init__(AHEAD, **more)
+        self._efforts = ArmScene(CAPABILITIES, MODEL, {}).gravity_efforts(AHEAD) + _efforts_of(mass_kg, AHEAD)
+
+    def joints(self):
+        return replace(super().joints(), effort_nm=dict(zip(MODEL.names, self._efforts, strict=True)))
+
+
+class Feels(ArmSkill):
+    """Feels what the gripper holds."""
+
+    name, default_timeout_s, causes = "feels", 10.0, {}
+
+    def run(self, inputs):
+        return Succeeded(str((yield from self.holds("feeling"))))
+
+
+# mass (kg), whether something was grasped, opening (rad) -> what it feels, and what the robot is told
+@pytest.mark.parametrize(
+    ("mass_kg", "grasped", "opening_rad", "feels", "told"),
+    [(0.06, True, 0.0, True, True), (0.0, True, 0.0, False, False), (0.06, False, 0.0, False, None)],
+)
+def test_shut_jaws_hold_what_the_arm_feels_after_a_grasp(mass_kg, grasped, opening_rad, feels, told):
+    robot = Weighted(mass_kg, opening=opening_rad)
+    robot.carries = None
+    context = context_of(robot)
+    context.payload.kind = ObjectKind("wrench") if grasped else None
+    step = outcome(Feels(context), None)
+    assert (step.message, robot.carries) == (str(feels), told)
+
+
+def test_a_gripper_that_is_not_shut_holds_what_it_reports():
+    context = context_of(robot := Weighted(0.06, opening=0.3, holding=False))
+    context.payload.kind = ObjectKind("wrench")
+    assert (outcome(Feels(context), None).message, "carry" in robot.calls) == ("False", False)

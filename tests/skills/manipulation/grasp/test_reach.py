@@ -13,6 +13,7 @@ from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.held_object import square_hand_pose
 from skills.manipulation.arm.poses import hand_rotation
 from skills.manipulation.grasp.candidates import GraspCandidate
+from skills.manipulation.grasp.close_view import space_about
 from skills.manipulation.grasp.planning import GeometricGraspPlanner
 from skills.manipulation.grasp.reach import (
     ReachCheck,
@@ -20,7 +21,6 @@ from skills.manipulation.grasp.reach import (
     openings,
     passing,
     raise_onto_surface,
-    space_about,
 )
 from skills.robot import Pose2D
 

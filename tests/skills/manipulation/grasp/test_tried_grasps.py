@@ -60,7 +60,7 @@ def test_a_gripper_turned_over_makes_the_same_grasp():
 class Slippery(Grasp):
     """Sees and plans as scripted; what it takes slips."""
 
-    def _look_closely(self, seen):
+    def look_closely(self, seen, same_object_m):
         yield from self.pause(0.1, "looking")
         s, t = np.meshgrid(np.linspace(-0.5, 0.5, 30), np.linspace(-0.5, 0.5, 10))
         points = np.column_stack([s.ravel() * 0.2 + CENTRE[0], t.ravel() * 0.03, np.full(s.size, 0.23)])

@@ -46,3 +46,12 @@ def log_file(tmp_path):
         entry = RunEntry(tree, robot, KnownPlace(START), BlockCostmap())
         run([entry], clock=clock, worker=LockStepWorker(clock), visitors=[log])
     return tmp_path / "log.mcap"
+
+
+@pytest.fixture(scope="session")
+def message_files(tmp_path_factory):
+    """A folder with the message files of a distribution."""
+    from ros_client import write_messages
+
+    write_messages(folder := tmp_path_factory.mktemp("messages"))
+    return folder

@@ -1,0 +1,190 @@
+"""Nodes of ROS 2: publishers, subscriptions, services and clients over a Zenoh session.
+
+Zenoh calls handlers in threads of its own. A message that cannot be decoded is dropped and counted.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from itertools import count
+from typing import Any, Final
+
+import zenoh
+from zenoh import ext
+
+from errand_ros2.wire.keys import Attachment, EntityKind, Qos, TypeKey, gid_of, topic_name
+from errand_ros2.wire.session import Session
+from errand_ros2.wire.types import MalformedError, MessageType, ServiceType, ros_types
+
+_LOG: Final = logging.getLogger(__name__)
+_CDR: Final = "application/cdr"
+MOST_BYTES: Final = 1 << 26
+"""Longer messages are dropped."""
+
+Answer = Callable[[Any], Any]
+"""Function from a request to its response."""
+
+
+class Publisher:
+    """Publisher of one topic. Late subscribers get the last messages if its quality of service says so."""
+
+    def __init__(self, node: Node, topic: str, kind: MessageType, qos: Qos) -> None:
+        self.kind, self.topic = kind, topic
+        self._key = node.key.data_key(topic, kind.key)
+        self._gid = node.declare(EntityKind.PUBLISHER, topic, kind.key, qos)
+        self._numbers = count(1)
+        session, reliability = node.session.inner, zenoh.Reliability.RELIABLE
+        self._plain: zenoh.Publisher | None = None
+        self._cached: ext.AdvancedPublisher | None = None
+        if qos.transient_local:
+            cache = ext.CacheConfig(max_samples=qos.depth)
+            self._cached = ext.declare_advanced_publisher(
+                session, self._key, encoding=_CDR, reliability=reliability, cache=cache, publisher_detection=True
+            )
+        else:
+            self._plain = session.declare_publisher(self._key, encoding=_CDR, reliability=reliability)
+
+    @property
+    def is_heard(self) -> bool:
+        """Returns whether a subscription exists now, or one may come for the cached messages."""
+        if self._plain is None:
+            return True
+        status: Any = self._plain.matching_status  # an object with `matching`, other than its stub says
+        return bool(getattr(status, "matching", status))
+
+    def put(self, message: Any) -> None:
+        """Publishes a message."""
+        data = self.kind.encode(message)
+        attachment = Attachment(next(self._numbers), time.time_ns(), self._gid).encoded()
+        to = self._plain or self._cached
+        assert to is not None
+        to.put(data, attachment=attachment)
+
+
+class Request:
+    """Request of a client, which is answered at once or later, and only once."""
+
+    def __init__(self, message: Any, query: zenoh.Query, key: str, head: Attachment, kind: MessageType) -> None:
+        self.message = message
+        self._query: zenoh.Query | None = query
+        self._key, self._head, self._kind = key, head, kind
+        self._lock = threading.Lock()
+
+    def reply(self, response: Any) -> None:
+        """Sends the response; a second one is dropped."""
+        with self._lock:
+            query, self._query = self._query, None
+        if query is None:
+            return
+        attachment = Attachment(self._head.number, time.time_ns(), self._head.gid).encoded()
+        with query:
+            query.reply(self._key, self._kind.encode(response), encoding=_CDR, attachment=attachment)
+
+
+class Client:
+    """Client of a service."""
+
+    def __init__(self, node: Node, name: str, kind: ServiceType) -> None:
+        self._kind, self._key = kind, node.key.data_key(name, kind.key)
+        self._gid, self._numbers = node.declare(EntityKind.CLIENT, name, kind.key, Qos()), count(1)
+        self._session = node.session.inner
+
+    def call(self, request: Any, *, limit_s: float) -> Any:
+        """Returns the service's response; None when no service answers within the limit (s)."""
+        attachment = Attachment(next(self._numbers), time.time_ns(), self._gid).encoded()
+        data, target = self._kind.request.encode(request), zenoh.QueryTarget.ALL_COMPLETE
+        for reply in self._session.get(
+            self._key, target=target, timeout=limit_s, payload=data, encoding=_CDR, attachment=attachment
+        ):
+            if (sample := reply.ok) is not None:
+                return self._kind.response.decode(sample.payload.to_bytes())
+        return None
+
+
+class Node:
+    """Node in the graph of ROS 2. Names that begin with `/` are absolute, others stand below its namespace."""
+
+    def __init__(self, session: Session, name: str, namespace: str = "/") -> None:
+        """Declares the node. Raises InputError for a namespace that ROS 2 does not allow."""
+        self.session, self.namespace = session, "/" if namespace == "/" else topic_name(namespace)
+        self.key = session.node_key(name, self.namespace)
+        self.dropped = 0
+        """Messages that could not be decoded."""
+        self._declared: list[Any] = [session.liveliness.declare_token(self.key.token())]
+
+    def absolute(self, name: str) -> str:
+        """Returns the absolute name of a topic or service. Raises InputError."""
+        return topic_name(name if name.startswith("/") else f"{self.namespace.rstrip('/')}/{name}")
+
+    def declare(self, kind: EntityKind, name: str, type_key: TypeKey, qos: Qos) -> bytes:
+        """Declares an entity of the node; returns its identity."""
+        token = self.key.entity_token(kind, next(self.session.numbers), name, type_key, qos)
+        self._declared.append(self.session.liveliness.declare_token(token))
+        return gid_of(token)
+
+    def publisher(self, topic: str, type_name: str, qos: Qos | None = None) -> Publisher:
+        """Returns a publisher of a topic."""
+        return Publisher(self, self.absolute(topic), ros_types().message(type_name), qos or Qos())
+
+    def subscribe(self, topic: str, type_name: str, handle: Callable[[Any], None], qos: Qos | None = None) -> None:
+        """Calls `handle` with each message of a topic."""
+        name, kind, qos = self.absolute(topic), ros_types().message(type_name), qos or Qos()
+        self.declare(EntityKind.SUBSCRIPTION, name, kind.key, qos)
+
+        def received(sample: zenoh.Sample) -> None:
+            if (message := self._decoded(kind, sample.payload)) is not None:
+                self.guarded(lambda: handle(message), name)
+
+        key, session = self.key.data_key(name, kind.key), self.session.inner
+        if qos.transient_local:
+            history = ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth)
+            self._declared.append(ext.declare_advanced_subscriber(session, key, received, history=history))
+        else:
+            self._declared.append(session.declare_subscriber(key, received))
+
+    def serve(self, name: str, kind: ServiceType, handle: Callable[[Request], None]) -> None:
+        """Calls `handle` with each request for a service; it may answer later."""
+        name = self.absolute(name)
+        key = self.key.data_key(name, kind.key)
+        self.declare(EntityKind.SERVICE, name, kind.key, Qos())
+
+        def asked(query: zenoh.Query) -> None:
+            try:
+                head = Attachment.decoded(query.attachment.to_bytes() if query.attachment else b"")
+                message = self._decoded(kind.request, query.payload)
+            except ValueError:
+                self.dropped, message = self.dropped + 1, None
+            if message is None:
+                with query:  # which ends the query without an answer
+                    return
+            self.guarded(lambda: handle(Request(message, query, key, head, kind.response)), name)
+
+        self._declared.append(self.session.inner.declare_queryable(key, asked, complete=True))
+
+    def answer(self, name: str, type_name: str, answer: Answer) -> None:
+        """Serves a service by a function that answers at once."""
+        self.serve(name, ros_types().service(type_name), lambda request: request.reply(answer(request.message)))
+
+    def client(self, name: str, type_name: str) -> Client:
+        """Returns a client of a service."""
+        return Client(self, self.absolute(name), ros_types().service(type_name))
+
+    def _decoded(self, kind: MessageType, payload: zenoh.ZBytes | None) -> Any:
+        """Decodes a message; counts it and returns None if it is malformed."""
+        try:
+            if payload is None or len(payload) > MOST_BYTES:
+                raise MalformedError("no message, or one that is too long")
+            return kind.decode(payload.to_bytes())
+        except MalformedError:
+            self.dropped += 1
+            return None
+
+    def guarded(self, handle: Callable[[], None], name: str) -> None:
+        """Calls a handler; a defect of it becomes one line in the log."""
+        try:
+            handle()
+        except Exception as error:
+            _LOG.warning("errand: %s could not be handled (%s: %s)", name, type(error).__name__, error)

@@ -1,0 +1,183 @@
+"""Message and service types of ROS 2 with their RIHS01 hashes: those of rosbags, and those of `interfaces`.
+
+rosbags has messages only. Services and actions are written there as messages, as `rosidl` expands them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from errand_ros2.wire.keys import TypeKey, dds_name
+
+if TYPE_CHECKING:
+    from rosbags.interfaces.typing import Typesdict
+
+INTERFACES: Final = Path(__file__).parents[1] / "interfaces"
+"""Folder of the interface files that rosbags lacks, as PACKAGE/KIND/NAME.KIND."""
+_PARTS: Final = re.compile(r"^---$", re.MULTILINE)
+_EVENT: Final = "service_msgs/msg/ServiceEventInfo info\n{0}_Request[<=1] request\n{0}_Response[<=1] response"
+_SERVICE: Final = "{0}_Request request_message\n{0}_Response response_message\n{0}_Event event_message"
+_UUID: Final = "unique_identifier_msgs/UUID goal_id"
+
+
+class MalformedError(ValueError):
+    """Bytes that are no message of the expected type."""
+
+
+@dataclass(frozen=True)
+class MessageType:
+    """Message type: its class, its name, its key, and how its messages are encoded."""
+
+    name: str
+    key: TypeKey
+    make: Any
+    _store: Typestore
+
+    def encode(self, message: Any) -> bytes:
+        """Returns a message as CDR, in little-endian order with its header."""
+        return bytes(self._store.serialize_cdr(message, self.name))
+
+    def decode(self, data: bytes) -> Any:
+        """Reads a message. Raises MalformedError when the bytes are no message of this type."""
+        try:
+            return self._store.deserialize_cdr(data, self.name)
+        except Exception as error:  # generated code: struct.error, IndexError, UnicodeDecodeError and others
+            raise MalformedError(f"{len(data)} bytes are no {self.name} ({type(error).__name__})") from error
+
+
+@dataclass(frozen=True)
+class ServiceType:
+    """Service type: its key, and the types of its request and response."""
+
+    name: str
+    key: TypeKey
+    request: MessageType
+    response: MessageType
+
+
+@dataclass(frozen=True)
+class ActionType:
+    """Action type: the services and messages of which `rosidl` makes it."""
+
+    name: str
+    send_goal: ServiceType
+    get_result: ServiceType
+    cancel_goal: ServiceType
+    feedback_message: MessageType
+    status: MessageType
+    result: MessageType
+    feedback: MessageType
+
+
+class Types:
+    """All known types by name; `ros_types()` returns the shared ones."""
+
+    def __init__(self, folder: Path = INTERFACES) -> None:
+        """Reads the interface files of a folder."""
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        for name, (constants, fields) in [*self._store.fielddefs.items()]:
+            self._store.fielddefs[name] = (constants, _without_char(fields))
+        for file in sorted(folder.glob("*/*/*.*"), key=lambda path: path.suffix != ".msg"):
+            self._register(file)
+
+    def message(self, name: str) -> MessageType:
+        """Returns a message type. Raises KeyError when it is unknown."""
+        return MessageType(name, self._key(name), self._store.types[name], self._store)
+
+    def service(self, name: str) -> ServiceType:
+        """Returns a service type. Raises KeyError when it is unknown."""
+        request, response = (self.message(f"{name}_{part}") for part in ("Request", "Response"))
+        return ServiceType(name, self._key(name), request, response)
+
+    def action(self, name: str) -> ActionType:
+        """Returns an action type. Raises KeyError when it is unknown."""
+        return ActionType(
+            name,
+            self.service(f"{name}_SendGoal"),
+            self.service(f"{name}_GetResult"),
+            self.service("action_msgs/srv/CancelGoal"),
+            self.message(f"{name}_FeedbackMessage"),
+            self.message("action_msgs/msg/GoalStatusArray"),
+            self.message(f"{name}_Result"),
+            self.message(f"{name}_Feedback"),
+        )
+
+    def blank(self, name: str) -> Any:
+        """Returns a message whose fields are zero or empty. Raises KeyError for an unknown type."""
+        _, fields = self._store.fielddefs[name]
+        return self._store.types[name](**{field: self._blank_value(kind) for field, kind in fields})
+
+    def _blank_value(self, kind: Any) -> Any:
+        """Returns the zero of a field's type, as rosbags describes it."""
+        node, what = kind
+        if node == Nodetype.NAME:
+            return self.blank(what)
+        if node == Nodetype.BASE:
+            return {"string": "", "wstring": "", "bool": False}.get(what[0], 0.0 if "float" in what[0] else 0)
+        of, length = what
+        length = length if node == Nodetype.ARRAY else 0
+        if of[0] == Nodetype.NAME or of[1][0] in ("string", "wstring"):
+            return [self._blank_value(of) for _ in range(length)]
+        return np.zeros(length, of[1][0].replace("byte", "uint8"))
+
+    def _key(self, name: str) -> TypeKey:
+        return TypeKey(dds_name(name), self._store.hash_rihs01(name))
+
+    def _register(self, file: Path) -> None:
+        """Registers the types of an interface file."""
+        name = f"{file.parts[-3]}/{file.parts[-2]}/{file.stem}"
+        parts = [part.strip() for part in _PARTS.split(file.read_text(encoding="utf-8"))]
+        if file.suffix == ".msg":
+            self._store.register(get_types_from_msg(parts[0], name))
+        elif file.suffix == ".srv":
+            self._register_service(name, *parts)
+        else:
+            self._register_action(name, *parts)
+
+    def _register_service(self, name: str, request: str, response: str) -> None:
+        types: Typesdict = get_types_from_msg(request, f"{name}_Request")
+        types |= get_types_from_msg(response, f"{name}_Response")
+        types |= get_types_from_msg(_EVENT.format(name), f"{name}_Event")
+        types |= get_types_from_msg(_SERVICE.format(name), name)
+        self._store.register(_as_service(types))
+
+    def _register_action(self, name: str, goal: str, result: str, feedback: str) -> None:
+        for suffix, text in (("Goal", goal), ("Result", result), ("Feedback", feedback)):
+            self._store.register(get_types_from_msg(text, f"{name}_{suffix}"))
+        message = f"{_UUID}\n{name}_Feedback feedback"
+        self._store.register(get_types_from_msg(message, f"{name}_FeedbackMessage"))
+        accepted = "bool accepted\nbuiltin_interfaces/Time stamp"
+        self._register_service(f"{name}_SendGoal", f"{_UUID}\n{name}_Goal goal", accepted)
+        self._register_service(f"{name}_GetResult", _UUID, f"int8 status\n{name}_Result result")
+
+
+def _without_char(value: Any) -> Any:
+    """Replaces `char` by `uint8`, as which ROS 2 hashes and encodes it."""
+    if value == (Nodetype.BASE, ("char", 0)):
+        return (Nodetype.BASE, ("uint8", 0))
+    return type(value)(map(_without_char, value)) if isinstance(value, tuple | list) else value
+
+
+def _as_service(value: Any) -> Any:
+    """Corrects the names of services in parsed types, which rosbags takes for messages."""
+    if isinstance(value, str):
+        return value.replace("/srv/msg/", "/srv/")
+    if isinstance(value, Mapping):
+        return {_as_service(name): _as_service(each) for name, each in value.items()}
+    return type(value)(map(_as_service, value)) if type(value) in (tuple, list) else value
+
+
+@cache
+def ros_types() -> Types:
+    """Returns the types that all nodes of this process share."""
+    return Types()

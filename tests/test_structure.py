@@ -22,8 +22,8 @@ LINES = {
     "executive/conversation": 597,
     "executive/view": 1922,
     "executive/testing": 860,
-    "executive/app": 8254,
-    "executive/cli": 3925,
+    "executive/app": 8272,
+    "executive/cli": 3937,
     "skills": 28572,
     "plant": 11424,
 }

@@ -98,6 +98,7 @@ PLUGIN_COMMANDS: Final[Mapping[str, _PluginCommand]] = {
     "new.robot": _PluginCommand("errand-make", "Write a package with a robot from a URDF."),
     "dataset": _PluginCommand("errand-train", "Labelled pictures for the detector; training and scores."),
     "ros2": _PluginCommand("errand-ros2", "Logs as ROS 2 bags."),
+    "serve-ros2": _PluginCommand("errand-ros2", "Serve a simulated robot in ROS 2, without ROS installed."),
     "teleop": _PluginCommand("errand-teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
 }
 """Commands of this project's plug-ins by name, listed by the help also where they are not installed."""

@@ -86,6 +86,7 @@ FOXGLOVE = Annotated[
         help=f"Serve what the log gets live for Foxglove; by default at {_FOXGLOVE_ADDRESS}.",
     ),
 ]
+OBSERVE = Annotated[list[str] | None, grouped(Group.PAGE, "--observe", "--ros2", help="A plug-in joins: NAME[=VALUE].")]
 
 
 class StartCommand(TyperCommand):
@@ -121,7 +122,7 @@ class StartCommand(TyperCommand):
 
 
 def join_values(arguments: Sequence[str]) -> list[str]:
-    """Joins three numbers after `--start` into one argument, and what may follow `--foxglove` and `--view`."""
+    """Joins three numbers after `--start` into one argument, and the values that an option may have or lack."""
     words, rest = list[str](), list(arguments)
     while rest:
         word = rest.pop(0)
@@ -134,6 +135,8 @@ def join_values(arguments: Sequence[str]) -> list[str]:
         elif word == _VIEW:
             given = rest and _NUMERIC.fullmatch(rest[0])
             word = f"{_VIEW}={rest.pop(0) if given else _UNTIL_CTRL_C_S}"
+        elif word == "--ros2":
+            word = f"--observe=ros2={rest.pop(0) if rest and rest[0][:1] in '0123456789@' else ''}"
         words.append(word)
     return words
 

@@ -13,6 +13,7 @@ from typing import Annotated, Final
 
 import typer
 
+from executive.app.runs.backend import OBSERVERS
 from executive.cli.entry import COMMANDS, COMMANDS_GROUP, PLUGIN_COMMANDS, as_command, shipped_command
 from executive.cli.number_options import quantity_option
 from executive.cli.options import AS_JSON, takes_request
@@ -99,7 +100,7 @@ def _rows(found: Sequence[Plugin]) -> Iterator[tuple[str, ...]]:
 
 def groups() -> Sequence[str]:
     """Returns the entry-point groups that Errand reads."""
-    own = (kinds.GROUP, BACKENDS, trigger_source.GROUP, CLASSES, COMMANDS_GROUP, KERNELS)
+    own = (kinds.GROUP, BACKENDS, trigger_source.GROUP, CLASSES, COMMANDS_GROUP, KERNELS, OBSERVERS)
     return (registry.GROUP, *SLOTS.values(), DOORS, *own)
 
 

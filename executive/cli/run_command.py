@@ -16,6 +16,7 @@ from executive.cli.options import (
     AS_JSON,
     FOXGLOVE,
     HOST,
+    OBSERVE,
     PORT,
     QUIET,
     ROBOT,
@@ -55,11 +56,13 @@ def run(
     view_port: PORT = 0,
     view_host: HOST = "127.0.0.1",
     foxglove: FOXGLOVE = None,
+    observe: OBSERVE = None,
     robot: ROBOT = None,
 ) -> None:
     """Runs a sentence or a mission file in the simulated world, or with a real robot."""
     refuse_unaddressed(request)
     from executive.app.prepare.from_request import prepare_checked
+    from executive.app.runs.backend import observer
     from executive.app.runs.queue import MissionRuns
     from executive.app.runs.real_robot import real_runner
     from executive.cli.screen import ConsoleScreen, page_of, voice_for
@@ -69,7 +72,7 @@ def run(
 
     console = console_for(as_json)
     kept_in = store or store_in(request.out)
-    timing = Profile() if profile else None
+    timing, observing = Profile() if profile else None, [*map(observer, observe or ())]
 
     with voice_for(aloud) as voice, serve_live(foxglove, plain_lines(console)) as live:
         if listen_to is not None:
@@ -78,7 +81,7 @@ def run(
             request = replace(request, sentence=hear_request(listen_to, request, console=console))
         prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
         page = None if view is None else page_of(console, (view_host, view_port), kept_in, request.out)
-        screen = ConsoleScreen(console, quiet, whole_tree, voice, page, live, timing)
+        screen = ConsoleScreen(console, quiet, whole_tree, voice, page, live, timing, observing)
         connection = real_runner(prepared, robot) if robot is not None else nullcontext()
         with writing(request.out, "name another --out"):
             request.out.mkdir(parents=True, exist_ok=True)

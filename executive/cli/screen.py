@@ -18,6 +18,7 @@ from rich.live import Live
 from rich.text import Text
 
 from executive.app.prepare.prepared import Prepared
+from executive.app.runs.backend import Observe
 from executive.app.runs.one_run import FinishedRun
 from executive.app.runs.queue import RunOptions
 from executive.cli.options import stay_s
@@ -103,7 +104,8 @@ class ConsoleScreen:
     """Display and control of runs on the console.
 
     `page` builds the live page of a run, and `shown_page` is the last page; `live` sends the messages that runs log.
-    With `whole_tree` the console shows all nodes of the tree at the end. `profile` times the subsystems.
+    With `whole_tree` the console shows all nodes of the tree at the end. `profile` times the subsystems. `observing`
+    adds visitors to each run.
     """
 
     console: Console
@@ -113,6 +115,7 @@ class ConsoleScreen:
     page: Callable[[Prepared], PageView] | None = None
     live: LiveServer | None = None
     profile: Profile | None = None
+    observing: Sequence[Observe] = ()
     shown_page: PageView | None = field(default=None, init=False)
 
     def tell(self, line: str, *, title: bool = False) -> None:
@@ -136,9 +139,10 @@ class ConsoleScreen:
         attended = self.console.is_terminal and sys.stdin.isatty() and not self.quiet
         control = Control(attended=attended, pace=1.0 if attended else None) if page is None else page.control
         speech = SpeechOutput(self.console, self.voice, self.quiet)
+        joining = [observe(prepared, control) for observe in self.observing]
         if self.quiet and page is None:  # no user can speak to the run
             load_parser().release()
-            yield RunOptions(control, (speech,), page, self.live, self.profile)
+            yield RunOptions(control, (speech, *joining), page, self.live, self.profile)
             return
         from executive.app.runs.conversations import Conversations, load_ahead  # the grammar of sentences
 
@@ -150,7 +154,7 @@ class ConsoleScreen:
             if control.attended and page is None:
                 load_ahead()
             visitors = (speech, conversations) if view is None else (view, speech, conversations)
-            yield RunOptions(control, visitors, page, self.live, self.profile)
+            yield RunOptions(control, (*visitors, *joining), page, self.live, self.profile)
 
     def conclude(self, finished: FinishedRun) -> None:
         """Shows verdicts and figures, after the whole tree if `whole_tree`."""

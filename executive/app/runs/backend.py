@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from executive.app.report.artifacts import Artifacts
 from executive.record.work import Profile
@@ -16,11 +16,29 @@ from executive.store.journal import StoreJournal
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
 from skills.api import Publish
+from skills.inputs.errors import InputError
+from skills.inputs.plugins import PluginDefect, installed_plugins, run_plugin
 from skills.robot import Clock, Pose2D
 
 if TYPE_CHECKING:
+    from executive.app.prepare.prepared import Prepared
     from executive.app.runs.goal_conditions import Share
     from executive.view.server import Scene
+
+OBSERVERS: Final = "errand.observers"  # of `--observe NAME[=VALUE]`: functions from VALUE to an `Observe`
+Observe = Callable[["Prepared", Control], RunVisitor]
+"""Function that returns the visitor for one run, which may use the run's control."""
+
+
+def observer(text: str) -> Observe:
+    """Loads an observer by NAME[=VALUE]. Raises InputError unless one plug-in registers it and takes the value."""
+    name, _, value = text.partition("=")
+    try:
+        (entry,) = (each for each in installed_plugins(OBSERVERS) if each.name == name)
+        made: Callable[[str], Observe] = run_plugin(entry, entry.load)
+    except (ValueError, PluginDefect) as error:
+        raise InputError(f"cannot observe by '{name[:60]}'", hint="errand plugins says why") from error
+    return made(value)
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""ROS 2 bags of Errand's logs."""
+"""ROS 2 for Errand: runs and robots on its network, and bags of logs."""

@@ -1,16 +1,23 @@
-"""`errand ros2 bag` converts the log of a run to a ROS 2 bag."""
+"""`errand ros2 bag` converts the log of a run to a ROS 2 bag; `errand serve-ros2` serves a simulated robot."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from threading import Event
 from typing import Annotated, Final
 
 import typer
 
-from executive.cli.output import new_folder
+from executive.cli.number_options import quantity_option
+from executive.cli.options import START, start_pose
+from executive.cli.output import console_for, new_folder
 from executive.record.history import History, read_history
+from skills.inputs.errors import InputError
+from skills.quantities import Delay, Seed
 
 _FILE_SUFFIX: Final = ".mcap"
+_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 
 ros2 = typer.Typer(name="ros2", help="Logs as ROS 2 bags.", no_args_is_help=True, rich_markup_mode=None)
 
@@ -40,3 +47,57 @@ def _write(history: History, out: Path) -> int:
         return write_bag_file(history.events, out)
     with new_folder(out) as folder:
         return write_bag(history.events, folder, out.resolve().name)
+
+
+def serve_ros2(
+    place: Annotated[
+        str, typer.Argument(metavar="[DOMAIN][@HOST[:PORT]]", help="ROS domain, and address of the Zenoh router.")
+    ] = "",
+    world: Annotated[str, typer.Option("--world", help="A world by name or folder.")] = "flat",
+    robot: Annotated[str, typer.Option("--robot", help="Name of the robot; in lower case its namespace.")] = "Alice",
+    kind: Annotated[str, typer.Option("--kind", help="Kind of the robot.")] = "spot",
+    start: START = None,
+    seed: Annotated[int, quantity_option(Seed, help="Seed of the objects and of all noise.")] = 1,
+    with_map: Annotated[bool, typer.Option("--map", help="Publish the world's map as /map, too.")] = False,
+    truth: Annotated[bool, typer.Option("--ground-truth", help="Publish the true pose under /ground_truth.")] = False,
+    limit: Annotated[
+        float | None, quantity_option(Delay, "--for", help="End after this time (s) on the robot's clock.")
+    ] = None,
+) -> None:
+    """Serves a simulated robot in ROS 2, without navigation, until Ctrl-C."""
+    from errand_ros2.server import RobotServer
+    from errand_ros2.wire.session import Place, open_session
+    from executive.app.prepare.placed_robots import only_robot, refuse_blocked
+    from executive.app.prepare.worlds import open_world
+    from executive.app.runs.simulated import compile_first, simulate
+    from executive.record.other_tools import ros_name
+    from plant.robots.robot_kind import robot_kinds
+    from skills.estimate.grid_map import load_grid_map
+
+    at, opened = Place.parse(place), open_world(world)
+    if not _NAME.fullmatch(robot):
+        raise InputError(f"'{robot[:60]}' is not a name for a robot", hint="use letters and digits, as in Alice")
+    if kind not in (known := robot_kinds()):
+        raise InputError(f"there is no kind of robot '{kind[:60]}'", hint=f"known: {', '.join(sorted(known))}")
+    placed = only_robot(robot, opened, seed=seed, start=start_pose(start), kind=kind)
+    if start is not None:
+        refuse_blocked(opened, placed.start)
+    console = console_for(False)
+    with open_session(at) as session:
+        compile_first()
+        simulation = simulate(opened, {robot: placed}, seed=seed, record=False)
+        server = RobotServer(
+            session,
+            simulation.robots[robot],
+            simulation.clock,
+            grid=load_grid_map(opened.scan_map_path) if with_map else None,
+            truth=(lambda: simulation.engine.poses_W()[robot]) if truth else None,
+        )
+        router = "the router is here" if session.is_router else "by its router"
+        console.print(f"ROS 2: /{ros_name(robot)}, domain {at.domain}, {at.endpoint} ({router}; Ctrl-C ends it)")
+        try:
+            server.run(Event(), limit)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            server.close()

@@ -22,7 +22,7 @@ from tests.tables import yaml_beside
 GOLDEN: dict[str, Any] = yaml_beside(__file__, "request_options.yaml")
 NOT_OF_THE_REQUEST = {
     *("--listen", "--json", "--quiet", "--tree", "--profile", "--store", "--anyway", "--voice"),
-    *("--view", "--view-port", "--view-host", "--foxglove", "--help"),
+    *("--view", "--view-port", "--view-host", "--foxglove", "--observe", "--ros2", "--help"),
     "--robot",
 }
 
@@ -99,3 +99,17 @@ def test_three_numbers_after_start_are_one_value():
 def test_foxglove_takes_an_address_or_the_usual_one(words, address):
     given = words[1:2] == [address]
     assert join_values(words) == [f"--foxglove={address}", *words[2 if given else 1 :]]
+
+
+@pytest.mark.parametrize(
+    ("words", "joined"),
+    [
+        (["--ros2"], ["--observe=ros2="]),
+        (["--ros2", "7", "patrol"], ["--observe=ros2=7", "patrol"]),
+        (["--ros2", "@:7448"], ["--observe=ros2=@:7448"]),
+        (["--ros2", "patrol"], ["--observe=ros2=", "patrol"]),
+        (["--ros2", "--quiet"], ["--observe=ros2=", "--quiet"]),
+    ],
+)
+def test_ros2_is_short_for_its_observer(words, joined):
+    assert join_values(words) == joined

@@ -127,7 +127,9 @@ class Node:
 
     def publisher(self, topic: str, type_name: str, qos: Qos | None = None) -> Publisher:
         """Returns a publisher of a topic."""
-        return Publisher(self, self.absolute(topic), ros_types().message(type_name), qos or Qos())
+        made = Publisher(self, self.absolute(topic), ros_types().message(type_name), qos or Qos())
+        self._declared.append(made)  # Zenoh ends what nobody refers to
+        return made
 
     def subscribe(self, topic: str, type_name: str, handle: Callable[[Any], None], qos: Qos | None = None) -> None:
         """Calls `handle` with each message of a topic."""

@@ -14,7 +14,7 @@ from typing import Final
 import zenoh
 
 from errand_ros2.wire.keys import MOST_DOMAIN, NodeKey
-from skills.inputs.errors import InputError, one_line
+from skills.inputs.errors import InputError
 
 HOST: Final = "127.0.0.1"
 PORT: Final = 7447
@@ -75,7 +75,7 @@ def open_session(place: Place) -> Iterator[Session]:
     try:
         opened = zenoh.open(zenoh.Config.from_json5(json.dumps(_configuration(place, client=client))))
     except zenoh.ZError as error:
-        what = f"cannot open a Zenoh session at {place.host}:{place.port} ({one_line(str(error))[:80]})"
+        what = f"cannot open a Zenoh session at {place.host}:{place.port} ({str(error).partition(chr(10))[0][:80]})"
         raise InputError(what, hint="name another port, or end the program that uses it") from error
     with opened as inner:
         yield Session(inner, place, is_router=not client)

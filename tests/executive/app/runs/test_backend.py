@@ -1,12 +1,15 @@
 """A run on a backend without plant, referee and recorder: nothing but the backend knows that it is not simulated."""
 
 import json
+import sys
 from dataclasses import replace
+from importlib.metadata import entry_points
 
 import pytest
 
 from executive.app.prepare.from_request import prepare
 from executive.app.report.run_report import RunReport
+from executive.app.runs.backend import observer
 from executive.app.runs.one_run import entry_for, run_request
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
@@ -16,7 +19,10 @@ from executive.run.outcome import Outcome
 from executive.run.worker import ThreadWorker
 from executive.words.zone import ZoneFacts
 from skills.api import ZoneKind
+from skills.inputs.errors import InputError
 from tests.executive.app.runs.scripted_backend import ScriptedBackend
+from tests.executive.cli.calls import refusal
+from tests.executive.distribution import write_distribution
 
 
 @pytest.fixture
@@ -155,3 +161,50 @@ def test_a_run_whose_tree_fails_is_not_achieved(prepared):
     tree = replace(prepared.tree, root=replace(root, children=(*root.children[:-1], short)))
     report = run_request(replace(prepared, tree=tree), ScriptedBackend()).report
     assert (report.outcome, report.cause, report.achieved) == ("failure", "TIMEOUT", False)
+
+
+OBSERVERS = """
+from executive.run.visitor import RunVisitor
+from skills.inputs.errors import InputError
+
+class Watcher(RunVisitor):
+    def __init__(self, path):
+        self.path = path
+    def end(self, result):
+        self.path.write_text(f"{result.worst.outcome.value} after {result.ticks} ticks")
+
+def watch(value):
+    if not value:
+        raise InputError("a watcher needs a name")
+    return lambda prepared, control: Watcher(prepared.request.out.with_name(value))
+"""
+
+
+@pytest.fixture
+def observers(tmp_path, monkeypatch):
+    """A distribution that registers an observer that works, and one that cannot be loaded."""
+    (tmp_path / "watchers.py").write_text(OBSERVERS)
+    lines = ("watch = watchers:watch", "gone = watchers:Gone")
+    write_distribution(tmp_path, "watchers", "errand.observers", *lines)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr("skills.inputs.plugins._all_installed", entry_points)
+    yield
+    sys.modules.pop("watchers", None)
+
+
+def test_an_observer_of_a_plug_in_joins_a_run(prepared, observers):
+    seen = observer("watch=seen")(prepared, None)
+    run_request(prepared, ScriptedBackend(), visitors=[seen])
+    assert seen.path.read_text().startswith("success after")
+
+
+@pytest.mark.parametrize("text", ["absent", "gone", "gone=3", ""])
+def test_an_observer_that_cannot_be_loaded_is_refused(observers, text):
+    with pytest.raises(InputError, match="cannot observe"):
+        observer(text)
+
+
+def test_an_observer_that_takes_no_such_value_says_why(observers):
+    with pytest.raises(InputError, match="needs a name"):
+        observer("watch")
+    assert "a watcher needs a name" in refusal("run", "patrol", "--observe", "watch")

@@ -1,0 +1,267 @@
+"""Bridge between a run and ROS 2: `errand run ... --ros2 [DOMAIN]`.
+
+Publishes what the robots sense, where they are and what they do; takes goals, velocities, sentences and services. The
+run goes at the pace of the wall clock.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from errand_ros2 import messages
+from errand_ros2.driving import TOPIC, Driving
+from errand_ros2.goals import Goals
+from errand_ros2.inputs import FRAMES, planar_pose
+from errand_ros2.robot_topics import Frames, RobotTopics
+from errand_ros2.wire.keys import LATCHED
+from errand_ros2.wire.node import Node, Publisher
+from errand_ros2.wire.session import Place, open_session
+from errand_ros2.wire.types import ros_types
+from executive.app.prepare.prepared import Prepared
+from executive.app.runs.backend import Observe
+from executive.app.runs.conversations import Conversations
+from executive.record.event_log import plain_values
+from executive.record.other_tools import ros_name
+from executive.run.control import Control
+from executive.run.outcome import RunResult
+from executive.run.visitor import Progress, RunVisitor
+from skills.api import LocalisationEstimate, SearchingLocaliser, SkillContext
+from skills.estimate.grid_map import load_grid_map
+from skills.inputs.errors import InputError
+
+NAME: Final = "errand"
+"""Name of all nodes."""
+_PATH, _OUTCOME = "path", "outcome"
+_TRIGGER: Final = "std_srvs/srv/Trigger"
+_EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "taskChannel", "object_to_detect"})
+"""Topics of the log whose messages are published as events."""
+_DIAGNOSTICS_PERIOD_S, _POSE_PERIOD_S = 1.0, 0.5
+_LATE_S: Final = 0.5
+"""Delay that a run does not catch up with."""
+
+
+def observe(value: str) -> Observe:
+    """Returns the observer for `--ros2 [DOMAIN][@HOST[:PORT]]`. Raises InputError for another value."""
+    place = Place.parse(value)
+    return lambda prepared, control: Bridge(prepared, control, place)
+
+
+@dataclass
+class _RobotBridge:
+    """Publishers and inputs of one robot; `context` is that of its present mission."""
+
+    node: Node
+    driving: Driving
+    goals: Goals
+    events: Publisher
+    plan: Publisher
+    pose: Publisher
+    context: SkillContext | None = None
+    topics: RobotTopics | None = None
+    pose_due_s: float = 0.0
+    initial: list[Any] = field(default_factory=list)
+
+
+class Bridge(RunVisitor):
+    """Visitor of one run that is a system of ROS 2."""
+
+    def __init__(self, prepared: Prepared, control: Control, place: Place, *, pace: float | None = 1.0) -> None:
+        """Opens the session. The run goes at most `pace` times as fast as the wall clock (None: without a limit).
+
+        Raises InputError when no session can be opened.
+        """
+        self._open, self._pace, self._control = ExitStack(), pace, control
+        self.session = self._open.enter_context(open_session(place))
+        self._pool = self._open.enter_context(ThreadPoolExecutor(1, thread_name_prefix="errand-ros2"))
+        self._node = Node(self.session, NAME)
+        self._clock = self._node.publisher("/clock", "rosgraph_msgs/msg/Clock")
+        self._map = self._node.publisher("/map", "nav_msgs/msg/OccupancyGrid", LATCHED)
+        self._diagnostics = self._node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+        self._frames = Frames(self._node)
+        self._grid = load_grid_map(prepared.world.scan_map_path)
+        self._map.put(messages.occupancy_grid(self._grid))
+        self._conversations = Conversations(prepared, control)
+        self._robots = {each.mission.robot_name: self._robot(each) for each in prepared.all}
+        first = next(iter(self._robots.values()))  # RViz's buttons and teleoperation send without a namespace
+        self._node.subscribe("/goal_pose", "geometry_msgs/msg/PoseStamped", self._later(first.goals.hear_pose))
+        self._node.subscribe("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", first.initial.append)
+        self._node.subscribe(f"/{TOPIC}", "geometry_msgs/msg/Twist", first.driving.hear)
+        self._diagnostics_due_s = 0.0
+        self._begun: tuple[float, float] | None = None
+        self.late_s = 0.0
+        """Longest delay behind the wall clock (s)."""
+
+    def _later(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Returns a handler that works in the bridge's own thread, because it may take long."""
+
+        def work(message: Any) -> None:
+            self._pool.submit(self._node.guarded, lambda: handle(message), "a message")
+
+        return work
+
+    def _robot(self, prepared: Prepared) -> _RobotBridge:
+        name = prepared.mission.robot_name
+        node = Node(self.session, NAME, f"/{ros_name(name)}")
+        events, replies = (node.publisher(topic, "std_msgs/msg/String") for topic in ("events", "reply"))
+        plan = node.publisher("plan", "nav_msgs/msg/Path")
+        pose = node.publisher("amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped")
+
+        def refuse(why: str) -> None:
+            events.put(_event("refused", {"message": why}))
+
+        def hear(said: Any) -> None:
+            replies.put(messages.text(self._conversations.hear(said.data, name).text))
+
+        driving = Driving(name, self._control)
+        goals = Goals(node, prepared, self._control, self._grid, self._pool, refuse)
+        own = _RobotBridge(node, driving, goals, events, plan, pose)
+        node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", self._later(goals.hear_pose))
+        node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
+        node.subscribe(TOPIC, "geometry_msgs/msg/Twist", driving.hear)
+        node.subscribe("say", "std_msgs/msg/String", self._later(hear))
+        for what, call in self._commands(name).items():
+            node.answer(what, _TRIGGER, partial(_answer, what, call))
+        return own
+
+    def _commands(self, name: str) -> Mapping[str, Callable[[], None]]:
+        """Returns the robot's services, which take and return std_srvs/Trigger."""
+        control = self._control
+
+        def resume() -> None:
+            control.resume(robot=name)
+            control.resume()
+
+        return {
+            "pause": partial(control.pause, "paused by ROS 2", robot=name),
+            "resume": resume,
+            "cancel": partial(control.cancel, "cancelled by ROS 2", robot=name),
+            "step": control.step,
+        }
+
+    def mission_begun(self, nodes: Sequence[Behaviour], context: SkillContext) -> None:
+        """Takes the context of a robot's new mission; publishes the robot's description and cameras at the first."""
+        own = self._robots[context.robot.name]
+        own.context = context
+        if own.topics is None:
+            own.topics = RobotTopics(own.node, context.robot, self._frames)
+
+    def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Publishes paths and events; ends the goal whose mission has ended."""
+        own = self._robots.get(str(message.get("robot") or message.get("robot_name") or ""))
+        own = own or (next(iter(self._robots.values())) if len(self._robots) == 1 else None)
+        if own is None:
+            return message
+        if topic == _PATH and own.context is not None:
+            own.plan.put(messages.path(own.context.clock.now(), message["poses"]))
+        elif topic in _EVENTS:
+            own.events.put(_event(topic, message))
+        if topic == _OUTCOME:
+            own.goals.message(message)
+        return message
+
+    def tick(self, progress: Progress) -> None:
+        """Publishes what is due, sends commands of `/cmd_vel`, and waits for the wall clock."""
+        now_s = progress.now_s
+        self._clock.put(messages.clock(now_s))
+        for name, own in self._robots.items():
+            if own.context is not None and own.topics is not None:
+                step = _step(progress, name) if own.goals.are_any else ("", "")
+                self._tick_robot(own, own.context, own.topics, step)
+        if now_s >= self._diagnostics_due_s:
+            self._diagnostics_due_s = now_s + _DIAGNOSTICS_PERIOD_S
+            for name, own in self._robots.items():
+                if own.context is not None:
+                    self._diagnostics.put(_diagnostics(now_s, name, own.context, progress))
+        self._keep_pace(now_s)
+
+    def _tick_robot(self, own: _RobotBridge, context: SkillContext, topics: RobotTopics, step: tuple[str, str]) -> None:
+        now_s = context.clock.now()
+        while own.initial:
+            _set_pose(context, own.initial.pop(0))
+        estimate = context.localiser.estimate()
+        topics.publish(now_s, estimate.X_WO if estimate.localised else None)
+        if estimate.localised and now_s >= own.pose_due_s:
+            own.pose_due_s = now_s + _POSE_PERIOD_S
+            own.pose.put(messages.pose_with_covariance(now_s, context.X_WB(), estimate.covariance))
+        own.driving.tick(context)
+        own.goals.tick(context, now_s, step)
+
+    def _keep_pace(self, now_s: float) -> None:
+        """Waits until the wall clock has come as far as the robot's clock; forgets a delay that is too long."""
+        if self._pace is None:
+            return
+        wall_s = time.monotonic()
+        begun_s, begun_wall_s = self._begun = self._begun or (now_s, wall_s)
+        ahead_s = (now_s - begun_s) / self._pace - (wall_s - begun_wall_s)
+        self.late_s = max(self.late_s, -ahead_s)
+        if ahead_s > 0.0:
+            time.sleep(ahead_s)
+        elif ahead_s < -_LATE_S:
+            self._begun = (now_s, wall_s)
+
+    def end(self, result: RunResult) -> None:
+        """Ends all goals and leaves the graph."""
+        for own in self._robots.values():
+            own.goals.end()
+        self._open.close()
+
+
+def _answer(what: str, call: Callable[[], None], _: Any) -> Any:
+    """Calls a command of a service; returns the response, with the reason when it is refused."""
+    response = ros_types().service(_TRIGGER).response.make
+    try:
+        call()
+    except ValueError as error:
+        return response(False, str(error))
+    return response(True, what)
+
+
+def _event(topic: str, message: Mapping[str, Any]) -> Any:
+    """Returns an event as text: its topic in the log, and its message in JSON."""
+    values = {key: value for key, value in message.items() if key != "image"}
+    return messages.text(json.dumps({"topic": topic, **plain_values(values)}, ensure_ascii=False))
+
+
+def _step(progress: Progress, robot: str) -> tuple[str, str]:
+    """Returns the path id of the robot's running skill, and what it says."""
+    running = [(path, each.message) for path, each in progress.states[robot].items() if each.status is Status.RUNNING]
+    return running[-1] if running else ("", "")
+
+
+def _diagnostics(now_s: float, name: str, context: SkillContext, progress: Progress) -> Any:
+    estimate, robot = context.localiser.estimate(), context.robot
+    values = {
+        "battery": f"{robot.battery().charge:.3f}",
+        "localised": str(estimate.localised),
+        "localisation health": f"{estimate.health:.3f}",
+        "overruns": str(progress.overruns),
+        "tick (ms)": f"{progress.tick_wall_s * 1e3:.1f}",
+    }
+    return messages.diagnostics(now_s, name, robot.faults(), [*values.items()])
+
+
+def _set_pose(context: SkillContext, stamped: Any) -> None:
+    """Gives the localiser the pose of `initialpose`, if it can take one; ignores what is no pose on the map."""
+    localiser, X_OB = context.localiser, context.robot.odometry().X_OB
+    try:
+        pose = planar_pose(stamped.pose.pose)
+    except InputError:
+        return
+    if stamped.header.frame_id.strip("/") not in FRAMES or not isinstance(localiser, SearchingLocaliser):
+        return
+    X_WO = pose.transform(float(X_OB.translation()[2])) @ X_OB.inverse()
+    covariance = np.asarray(stamped.pose.covariance).reshape(6, 6)[np.ix_([0, 1, 5], [0, 1, 5])]
+    usable = np.all(np.isfinite(covariance)) and np.all(np.diag(covariance) > 0.0)
+    shape = covariance if usable else np.diag([0.25, 0.25, 0.07])
+    localiser.accept(LocalisationEstimate(context.clock.now(), X_WO, shape, localised=True))

@@ -1,0 +1,54 @@
+"""What ROS 2 sends, as plain values: poses on the map and velocities. Refuses what is not finite or lies elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from errand_ros2.messages import MAP_FRAME
+from skills.estimate.grid_map import GridMap
+from skills.geometry import compose
+from skills.inputs.errors import InputError
+from skills.robot import Pose2D
+
+FRAMES: Final = frozenset({MAP_FRAME, "world"})
+"""Names of the map's frame."""
+_SHORTEST_QUATERNION: Final = 0.1
+
+
+def planar_pose(pose: Any) -> Pose2D:
+    """Reads geometry_msgs/Pose. Raises InputError for numbers that are not finite, and for no rotation."""
+    at, turn = pose.position, pose.orientation
+    values = (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
+    if not all(math.isfinite(value) for value in values):
+        raise InputError("the pose has a number that is not finite", hint="send finite numbers")
+    if math.hypot(turn.x, turn.y, turn.z, turn.w) < _SHORTEST_QUATERNION:
+        raise InputError("the pose's quaternion is zero", hint="send w = 1 for no rotation")
+    yaw = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
+    return Pose2D(at.x, at.y, yaw)
+
+
+def pose_on_map(stamped: Any, grid: GridMap, frames: Mapping[str, Pose2D]) -> Pose2D:
+    """Reads geometry_msgs/PoseStamped as a pose on the map; `frames` are the poses of other frames on it.
+
+    Raises InputError for an unknown frame, a pose off the map, and what `planar_pose` refuses.
+    """
+    frame, pose = stamped.header.frame_id.strip("/"), planar_pose(stamped.pose)
+    if frame not in FRAMES and frame not in frames:
+        raise InputError(f"there is no frame '{frame[:60]}'", hint=f"known: {', '.join(sorted({*FRAMES, *frames}))}")
+    placed = pose if frame in FRAMES else compose(frames[frame], pose)
+    least = np.array(grid.origin_m)
+    if not (np.all(least <= (placed.x_m, placed.y_m)) and np.all((placed.x_m, placed.y_m) <= least + grid.size_m)):
+        raise InputError(f"({placed.x_m:.6g}, {placed.y_m:.6g}) is not on the map", hint="name a pose on it")
+    return placed
+
+
+def velocity(twist: Any) -> tuple[float, float, float]:
+    """Reads geometry_msgs/Twist as vx, vy (m/s), wz (rad/s). Raises InputError for numbers that are not finite."""
+    values = (twist.linear.x, twist.linear.y, twist.angular.z)
+    if not all(math.isfinite(value) for value in values):
+        raise InputError("the velocity has a number that is not finite", hint="send finite numbers")
+    return values

@@ -1,0 +1,124 @@
+"""Topics of one robot, at their usual names, types and rates, below the robot's namespace."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from errand_ros2 import messages
+from errand_ros2.wire.keys import LATCHED, SENSOR, Qos
+from errand_ros2.wire.node import Node, Publisher
+from skills.robot import CameraCapabilities, Mount, NoImageError, Robot
+
+if TYPE_CHECKING:
+    from pydrake.math import RigidTransform
+
+IMAGE_PERIOD_S: Final = 0.2
+BATTERY_PERIOD_S: Final = 1.0
+_EPSILON_S: Final = 1e-6
+_TF: Final = "tf2_msgs/msg/TFMessage"
+
+
+class Frames:
+    """Publisher of `/tf`, and of `/tf_static`, whose one message has the static transforms of all robots."""
+
+    def __init__(self, node: Node) -> None:
+        self._moving = node.publisher("/tf", _TF, Qos(depth=100))
+        self._static = node.publisher("/tf_static", _TF, LATCHED)
+        self._fixed: dict[str, Any] = {}
+
+    def move(self, every: Sequence[Any]) -> None:
+        """Publishes transforms that change."""
+        self._moving.put(messages.transforms(every))
+
+    def fix(self, *every: Any) -> None:
+        """Publishes static transforms, unless they have been published."""
+        if any(each.child_frame_id not in self._fixed for each in every):
+            self._fixed |= {each.child_frame_id: each for each in every}
+            self._static.put(messages.transforms(self._fixed.values()))
+
+
+class _Camera:
+    """Publishers of one camera; the plant renders only what a subscription asks for."""
+
+    def __init__(self, node: Node, camera: CameraCapabilities, space: str) -> None:
+        self.camera, self.frame, base = camera, f"{space}/{camera.source}_camera", camera.source
+        self.image = node.publisher(f"{base}/image", "sensor_msgs/msg/Image", SENSOR)
+        self.info = node.publisher(f"{base}/camera_info", "sensor_msgs/msg/CameraInfo", SENSOR)
+        self.depth = node.publisher(f"{base}/depth", "sensor_msgs/msg/Image", SENSOR)
+        self.due_s = 0.0
+
+
+class RobotTopics:
+    """Publishers of one robot's readings. `publish` reads the robot, and must be called where its verbs may be."""
+
+    def __init__(self, node: Node, robot: Robot, frames: Frames) -> None:
+        """The last part of the node's namespace names the robot's frames."""
+        self._robot, self._frames = robot, frames
+        space = node.namespace.strip("/")
+        self._space, self.odom, self.body = space, f"{space}/odom", f"{space}/body"
+        self._lidar = f"{space}/lidar"
+        self._odom = node.publisher("odom", "nav_msgs/msg/Odometry")
+        self._joints = node.publisher("joint_states", "sensor_msgs/msg/JointState")
+        self._imu = node.publisher("imu", "sensor_msgs/msg/Imu", SENSOR)
+        self._scan = node.publisher("scan", "sensor_msgs/msg/LaserScan", SENSOR)
+        self._battery = node.publisher("battery_state", "sensor_msgs/msg/BatteryState")
+        description = node.publisher("robot_description", "std_msgs/msg/String", LATCHED)
+        abilities = robot.capabilities()
+        description.put(messages.text(abilities.description))
+        self._cameras = [_Camera(node, each, space) for each in abilities.cameras]
+        on_body = [each for each in self._cameras if each.camera.mount is Mount.BODY]
+        frames.fix(*(messages.transform(0.0, self.body, each.frame, each.camera.X_FC) for each in on_body))
+        self._last: dict[str, float] = {}
+        self._battery_due_s = 0.0
+
+    def publish(self, now_s: float, X_WO: RigidTransform | None) -> None:
+        """Publishes the readings that are new, and with `X_WO` where the odometry's frame lies on the map."""
+        odometry = self._robot.odometry()
+        moving = [messages.transform(odometry.stamp_s, self.odom, self.body, odometry.X_OB)]
+        if X_WO is not None:
+            moving.append(messages.transform(odometry.stamp_s, messages.MAP_FRAME, self.odom, X_WO))
+        self._odom.put(messages.odometry(odometry, self.odom, self.body))
+        self._joints.put(messages.joint_state(self._robot.joints()))
+        if (imu := self._robot.imu()) is not None:
+            self._imu.put(messages.imu(imu, self.body))
+        self._publish_scan()
+        if now_s >= self._battery_due_s - _EPSILON_S:
+            self._battery_due_s = now_s + BATTERY_PERIOD_S
+            self._battery.put(messages.battery(self._robot.battery()))
+        for camera in self._cameras:
+            moving += self._publish_camera(camera, now_s)
+        self._frames.move(moving)
+
+    def _publish_scan(self) -> None:
+        scan = self._robot.scan()
+        if scan is None or scan.stamp_s == self._last.get("scan"):
+            return
+        period_s = scan.stamp_s - self._last.get("scan", scan.stamp_s)
+        self._last["scan"] = scan.stamp_s
+        self._frames.fix(messages.transform(scan.stamp_s, self.body, self._lidar, scan.X_BL))
+        self._scan.put(messages.laser_scan(scan, self._lidar, max(0.0, period_s)))
+
+    def _publish_camera(self, at: _Camera, now_s: float) -> list[Any]:
+        """Publishes what subscriptions ask for; returns the transform of a camera that moves on the body."""
+        visual, depth = _heard(at.image, at.info), _heard(at.depth)
+        if now_s < at.due_s - _EPSILON_S or not (visual or depth):
+            return []
+        at.due_s = now_s + IMAGE_PERIOD_S
+        try:
+            reading = self._robot.image(at.camera.source, visual=visual, depth=depth)
+        except NoImageError:
+            return []
+        if visual:
+            at.image.put(messages.picture(reading, at.frame))
+            at.info.put(messages.camera_info(reading, at.frame))
+        if depth:
+            at.depth.put(messages.depth(reading, at.frame))
+        if at.camera.mount is Mount.BODY:
+            return []
+        X_OC = reading.frames.pose(reading.camera_frame)
+        return [messages.transform(reading.stamp_s, self.odom, at.frame, X_OC)]
+
+
+def _heard(*publishers: Publisher) -> bool:
+    return any(each.is_heard for each in publishers)

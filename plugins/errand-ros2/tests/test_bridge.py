@@ -1,0 +1,360 @@
+"""A run of a scripted robot as a system of ROS 2: goals, cancelling, velocities, sentences, services, odd input.
+
+The run is in the test's own thread, and what a client does in another, which ends the run.
+"""
+
+import json
+import math
+import threading
+import time
+import uuid
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
+
+from ros_client import free_port
+
+from errand_ros2.bridge import Bridge, observe
+from errand_ros2.wire.actions import GoalStatus
+from errand_ros2.wire.keys import LATCHED
+from errand_ros2.wire.node import Client, Node
+from errand_ros2.wire.session import Place, open_session
+from errand_ros2.wire.types import ros_types
+from executive.app.prepare.from_request import prepare
+from executive.app.runs.one_run import run_request
+from executive.mission.request import Request
+from executive.run.control import Control
+from executive.run.visitor import RunEntry
+from executive.testing.bench import write_small_room
+from skills.inputs.errors import InputError
+from skills.testing.blocks import ROOM
+from skills.testing.estimators import BlockCostmap, KnownPlace
+from tests.executive.app.runs.scripted_backend import ScriptedBackend
+
+TWIST, POSE, STRING, TRIGGER = (
+    *("geometry_msgs/msg/Twist", "geometry_msgs/msg/PoseStamped"),
+    *("std_msgs/msg/String", "std_srvs/srv/Trigger"),
+)
+NAVIGATE, RUN = "nav2_msgs/action/NavigateToPose", "errand_msgs/action/RunMission"
+HEARD = {
+    "/clock": "rosgraph_msgs/msg/Clock",
+    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+    "/alice/amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "/alice/plan": "nav_msgs/msg/Path",
+    "/alice/events": STRING,
+    "/alice/reply": STRING,
+    "/alice/odom": "nav_msgs/msg/Odometry",
+}
+
+
+class RoomBackend(ScriptedBackend):
+    """A scripted robot that knows the small room's walls."""
+
+    def entry(self, tree, durable):
+        return RunEntry(tree, self.robot, KnownPlace(), BlockCostmap(ROOM))
+
+
+class RosClient:
+    """Another program: what it hears by topic, and goals that it sends."""
+
+    def __init__(self, session, robot):
+        self.node, self.robot, self.heard = Node(session, "client"), robot, defaultdict(list)
+        for topic, kind in HEARD.items():
+            self.node.subscribe(topic, kind, self.heard[topic].append)
+
+    def soon(self, condition, limit_s=20.0):
+        until_s = time.monotonic() + limit_s
+        while not condition() and time.monotonic() < until_s:
+            time.sleep(0.01)
+        assert condition(), "it did not come about"
+
+    def events(self, topic):
+        said = [json.loads(each.data) for each in self.heard["/alice/events"]]
+        return [each for each in said if each["topic"] == topic]
+
+    def call(self, name):
+        request = ros_types().service(TRIGGER).request.make()
+        return self.node.client(f"/alice/{name}", TRIGGER).call(request, limit_s=5.0)
+
+    def publisher(self, topic, kind):
+        made = self.node.publisher(topic, kind)
+        self.soon(lambda: made.is_heard)
+        return made
+
+    def still(self):
+        return float(np.max(np.abs(self.robot.velocity))) < 0.02
+
+
+class ActionClient:
+    """Client of an action, which sends one goal."""
+
+    def __init__(self, client, name, kind):
+        self.kind, node = ros_types().action(kind), client.node
+        base = f"/alice/{name}/_action"
+        self._send = Client(node, f"{base}/send_goal", self.kind.send_goal)
+        self._result = Client(node, f"{base}/get_result", self.kind.get_result)
+        self._cancel = Client(node, f"{base}/cancel_goal", self.kind.cancel_goal)
+        self.feedback = []
+        node.subscribe(f"{base}/feedback", self.kind.feedback_message.name, self.feedback.append)
+        made = ros_types().message("unique_identifier_msgs/msg/UUID").make
+        self.identity = made(np.frombuffer(uuid.uuid4().bytes, np.uint8))
+        self.goal = ros_types().blank(f"{kind}_Goal")
+
+    def send(self):
+        return self._send.call(self.kind.send_goal.request.make(self.identity, self.goal), limit_s=20.0).accepted
+
+    def result(self):
+        return self._result.call(self.kind.get_result.request.make(self.identity), limit_s=60.0)
+
+    def cancel(self):
+        info = ros_types().blank("action_msgs/msg/GoalInfo")
+        info.goal_id = self.identity
+        return self._cancel.call(self.kind.cancel_goal.request.make(info), limit_s=5.0).return_code
+
+
+def stamped(x, y, frame="map", w=1.0):
+    message = ros_types().blank(POSE)
+    message.header.frame_id, message.pose.position.x, message.pose.position.y = frame, x, y
+    message.pose.orientation.w = w
+    return message
+
+
+def twist(x, wz=0.0):
+    message = ros_types().blank(TWIST)
+    message.linear.x, message.angular.z = x, wz
+    return message
+
+
+def text(value):
+    return ros_types().message(STRING).make(value)
+
+
+@pytest.fixture
+def talk(tmp_path):
+    """Runs a mission that waits, while a function talks to it as a client; then cancels it, and returns the report."""
+    room, mission = write_small_room(tmp_path / "room"), tmp_path / "wait.yaml"
+    mission.write_text("name: wait\nsteps:\n  - wait: {seconds: 600}\n")
+    prepared = prepare(Request(file=mission, world=str(room), out=tmp_path / "out", seed=1))
+
+    def run(says):
+        place, control, backend, errors = Place(port=free_port()), Control(pace=None), RoomBackend(), []
+        bridge = Bridge(prepared, control, place)
+
+        def client():
+            try:
+                with open_session(place) as session:
+                    ros = RosClient(session, backend.robot)
+                    ros.soon(lambda: ros.heard["/alice/odom"])
+                    says(ros)
+            except BaseException as error:
+                errors.append(error)
+            finally:
+                control.cancel("the test is over")
+
+        thread = threading.Thread(target=client)
+        thread.start()
+        try:
+            report = run_request(prepared, backend, visitors=[bridge], control=control).report
+        finally:
+            thread.join()
+        if errors:
+            raise errors[0]
+        return report
+
+    return run
+
+
+def test_a_run_publishes_clock_pose_plan_map_events_and_diagnostics(talk):
+    def says(ros):
+        late = defaultdict(list)
+        for topic, kind in (("/map", "nav_msgs/msg/OccupancyGrid"), ("/alice/robot_description", STRING)):
+            ros.node.subscribe(topic, kind, late[topic].append, LATCHED)
+        ros.publisher("/goal_pose", POSE).put(stamped(0.6, -1.2))
+        ros.soon(lambda: ros.events("outcome"))
+        ros.soon(lambda: all(ros.heard[topic] for topic in HEARD if topic != "/alice/reply"))
+        first, last = ros.heard["/clock"][0].clock, ros.heard["/clock"][-1].clock
+        assert (last.sec, last.nanosec) > (first.sec, first.nanosec)
+        assert ros.heard["/diagnostics"][-1].status[0].hardware_id == "Alice"
+        assert ros.heard["/alice/plan"][-1].poses[-1].pose.position.y == pytest.approx(-1.2, abs=0.1)
+        assert ros.heard["/alice/amcl_pose"][-1].pose.pose.position.y == pytest.approx(-1.2, abs=0.1)
+        assert late["/map"][0].info.resolution == pytest.approx(0.025)
+        assert "<robot" in late["/alice/robot_description"][0].data
+
+    report = talk(says)
+    assert (report.outcome, report.message) == ("cancelled", "the test is over")
+
+
+def test_a_goal_of_navigate_to_pose_is_reached(talk):
+    def says(ros):
+        action = ActionClient(ros, "navigate_to_pose", NAVIGATE)
+        action.goal.pose = stamped(0.6, -1.2)
+        assert action.send()
+        result = action.result()
+        assert (result.status, result.result.error_code) == (GoalStatus.SUCCEEDED, 0)
+        assert math.hypot(ros.robot.pose.x_m - 0.6, ros.robot.pose.y_m + 1.2) < 0.15
+        assert action.feedback[0].feedback.distance_remaining > 0.5
+        assert action.cancel() == 3  # it has ended
+
+    talk(says)
+
+
+def test_a_cancelled_goal_stops_the_robot(talk):
+    def says(ros):
+        action = ActionClient(ros, "navigate_to_pose", NAVIGATE)
+        action.goal.pose = stamped(0.6, -1.2)
+        assert action.send()
+        ros.soon(lambda: abs(ros.robot.velocity[0]) > 0.3)
+        assert action.cancel() == 0
+        begun_s = time.monotonic()
+        result = action.result()
+        assert result.status == GoalStatus.CANCELED
+        assert "cancelled by its client" in result.result.error_msg
+        ros.soon(ros.still, 1.0)
+        assert time.monotonic() - begun_s < 0.4
+
+    talk(says)
+
+
+def test_a_new_goal_takes_the_place_of_the_one_before(talk):
+    def says(ros):
+        first, second = (ActionClient(ros, "navigate_to_pose", NAVIGATE) for _ in range(2))
+        first.goal.pose, second.goal.pose = stamped(0.6, -1.2), stamped(-0.6, 1.2)
+        assert first.send()
+        assert second.send()
+        assert first.result().status == GoalStatus.ABORTED
+        assert second.result().status == GoalStatus.SUCCEEDED
+        assert ros.robot.pose.y_m == pytest.approx(1.2, abs=0.15)
+
+    talk(says)
+
+
+def test_a_goal_in_an_obstacle_fails_with_its_cause_and_no_motion(talk):
+    def says(ros):
+        action = ActionClient(ros, "navigate_to_pose", NAVIGATE)
+        action.goal.pose = stamped(1.5, 0.0)  # under the table
+        assert action.send()
+        result = action.result()
+        assert result.status == GoalStatus.ABORTED
+        assert result.result.error_msg.startswith("PLANNING: ")
+        assert ros.robot.pose.x_m == pytest.approx(0.0, abs=0.01)
+
+    talk(says)
+
+
+@pytest.mark.parametrize(
+    ("goal", "why"),
+    [
+        (stamped(math.nan, 0.0), "not finite"),
+        (stamped(1e9, 0.0), "not on the map"),
+        (stamped(0.0, 0.0, frame="mars"), "no frame 'mars'"),
+        (stamped(0.0, 0.0, w=0.0), "quaternion"),
+    ],
+)
+def test_a_goal_that_is_none_is_rejected_with_a_reason(talk, goal, why):
+    def says(ros):
+        action = ActionClient(ros, "navigate_to_pose", NAVIGATE)
+        action.goal.pose = goal
+        assert not action.send()
+        assert action.result().status == GoalStatus.UNKNOWN
+        ros.publisher("/goal_pose", POSE).put(goal)
+        ros.soon(lambda: len(ros.events("refused")) == 2)
+        assert all(why in each["message"] for each in ros.events("refused"))
+        assert ros.still()
+
+    talk(says)
+
+
+def test_a_mission_of_a_sentence_runs_with_feedback(talk):
+    def says(ros):
+        action = ActionClient(ros, "run_mission", RUN)
+        action.goal.sentence = "wait for two seconds"
+        assert action.send()
+        result = action.result()
+        assert (result.status, result.result.outcome) == (GoalStatus.SUCCEEDED, "success")
+        assert action.feedback[-1].feedback.step.startswith("alice/ros2-goal-1")
+
+    talk(says)
+
+
+@pytest.mark.parametrize(
+    ("sentence", "file"), [("", ""), ("go", "x.yaml"), ("colourless ideas", ""), ("", "absent.yaml")]
+)
+def test_a_mission_that_is_none_is_rejected(talk, sentence, file):
+    def says(ros):
+        action = ActionClient(ros, "run_mission", RUN)
+        action.goal.sentence, action.goal.file = sentence, file
+        assert not action.send()
+        ros.soon(lambda: ros.events("refused"))
+
+    talk(says)
+
+
+def test_velocities_pause_the_mission_and_their_end_resumes_it(talk):
+    def says(ros):
+        command = ros.publisher("/cmd_vel", TWIST)
+        for _ in range(20):
+            command.put(twist(0.0, 0.5))
+            time.sleep(0.05)
+        assert ros.robot.velocity[2] == pytest.approx(0.5, abs=0.05)
+        silent_s = time.monotonic()
+        ros.soon(ros.still, 2.0)
+        assert time.monotonic() - silent_s < 0.6
+        ros.soon(lambda: [each["what"] for each in ros.events("control")] == ["pause", "resume"], 5.0)
+
+    talk(says)
+
+
+def test_velocities_do_not_drive_the_robot_into_a_wall(talk):
+    def says(ros):
+        command = ros.publisher("/alice/cmd_vel", TWIST)
+        for _ in range(80):
+            command.put(twist(0.6))  # the table stands 1.2 m ahead
+            time.sleep(0.05)
+        assert 0.05 < ros.robot.pose.x_m < 0.65
+
+    talk(says)
+
+
+def test_a_sentence_is_answered(talk):
+    def says(ros):
+        ros.publisher("/alice/say", STRING).put(text("what do you do?"))
+        ros.soon(lambda: ros.heard["/alice/reply"])
+        assert ros.heard["/alice/reply"][0].data
+
+    talk(says)
+
+
+def test_services_pause_resume_and_cancel(talk):
+    def says(ros):
+        for name in ("pause", "resume", "step", "resume", "cancel"):
+            assert ros.call(name).success, name
+        ros.soon(lambda: ros.events("outcome"))
+        told = [each["what"] for each in ros.events("control")]
+        assert [told[0], told[-1]] == ["pause", "cancel"]
+
+    assert talk(says).message == "cancelled by ROS 2"
+
+
+def test_random_bytes_on_every_input_move_nothing(talk, capfd):
+    def says(ros):
+        types, chance = ros_types(), np.random.default_rng(1)
+        kinds = {"/goal_pose": POSE, "/cmd_vel": TWIST, "/alice/say": STRING}
+        kinds["/initialpose"] = "geometry_msgs/msg/PoseWithCovarianceStamped"
+        keys = [ros.node.key.data_key(topic, types.message(kind).key) for topic, kind in kinds.items()]
+        for _ in range(500):
+            for key in keys:
+                ros.node.session.inner.put(key, chance.bytes(int(chance.integers(0, 47))))
+        time.sleep(0.5)
+        assert ros.still()
+
+    talk(says)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("value", ["x", "300", "0@:99999"])
+def test_a_domain_that_is_none_is_refused_at_once(value):
+    with pytest.raises(InputError):
+        observe(value)

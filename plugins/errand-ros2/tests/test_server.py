@@ -1,0 +1,165 @@
+"""A scripted robot served in ROS 2: every topic decoded by others, driving, the watchdog, and hostile input."""
+
+import threading
+import time
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
+
+from mcap_ros2._dynamic import generate_dynamic
+from ros_client import connected, free_port
+from rosbags.typesys import Stores, get_typestore
+from zenoh import ext
+from zenoh_ros2_sdk import ROS2Subscriber
+
+from errand_ros2.server import PERIOD_S, RobotServer
+from errand_ros2.wire.keys import LATCHED
+from errand_ros2.wire.node import Node
+from errand_ros2.wire.session import Place, open_session
+from errand_ros2.wire.types import ros_types
+from plant.robots.spot.kind import spot_capabilities
+from skills.estimate.grid_map import GridMap
+from skills.testing.blocks import ROOM
+from skills.testing.clock import VirtualClock
+from skills.testing.robot import ScriptedRobot
+
+TWIST = "geometry_msgs/msg/Twist"
+IMAGE, INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
+TOPICS = {
+    "/clock": "rosgraph_msgs/msg/Clock",
+    "/tf": "tf2_msgs/msg/TFMessage",
+    "/alice/odom": "nav_msgs/msg/Odometry",
+    "/alice/joint_states": "sensor_msgs/msg/JointState",
+    "/alice/imu": "sensor_msgs/msg/Imu",
+    "/alice/scan": "sensor_msgs/msg/LaserScan",
+    "/alice/battery_state": "sensor_msgs/msg/BatteryState",
+    "/ground_truth/alice/pose": "geometry_msgs/msg/PoseStamped",
+    **{f"/alice/{each.source}/image": IMAGE for each in spot_capabilities().cameras},
+    **{f"/alice/{each.source}/depth": IMAGE for each in spot_capabilities().cameras},
+    **{f"/alice/{each.source}/camera_info": INFO for each in spot_capabilities().cameras},
+}
+STORED = {
+    "/map": "nav_msgs/msg/OccupancyGrid",
+    "/tf_static": "tf2_msgs/msg/TFMessage",
+    "/alice/robot_description": "std_msgs/msg/String",
+}
+"""Topics of which a late subscription gets the last message."""
+
+
+@pytest.fixture
+def served():
+    """A server at real pace in a thread, and a node of another session."""
+    clock, ended = VirtualClock(), threading.Event()
+    robot = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=ROOM)
+    place, grid = Place(port=free_port()), GridMap(np.zeros((30, 30), bool), 0.1, (-1.0, -1.0))
+    with open_session(place) as session, open_session(place) as other:
+        server = RobotServer(session, robot, clock, grid=grid, truth=robot.pose.transform)
+        thread = threading.Thread(target=server.run, args=(ended,))
+        thread.start()
+        yield SimpleNamespace(server=server, robot=robot, node=Node(other, "other"), place=place)
+        ended.set()
+        thread.join()
+        server.close()
+
+
+def soon(condition, limit_s=5.0):
+    until_s = time.monotonic() + limit_s
+    while not condition() and time.monotonic() < until_s:
+        time.sleep(0.01)
+    return condition()
+
+
+def twist(x, wz=0.0):
+    message = ros_types().blank(TWIST)
+    message.linear.x, message.angular.z = x, wz
+    return message
+
+
+def test_the_independent_client_hears_every_topic(served, message_files):
+    heard, port = {}, served.place.port
+    # of the stored messages it asks only for those whose topics lie in no namespace
+    late = {topic: kind for topic, kind in STORED.items() if topic.count("/") == 1}
+    with connected(port, message_files):
+        for topic, kind in {**TOPICS, **late}.items():
+            hear = partial(heard.__setitem__, topic)
+            ROS2Subscriber(topic, kind, hear, router_port=port, qos=LATCHED.text() if topic in late else None)
+        assert soon(lambda: heard.keys() == {*TOPICS, *late}, 20.0), {*TOPICS, *late} - heard.keys()
+    assert heard["/alice/odom"].child_frame_id == "alice/body"
+    assert heard["/map"].info.width == 30
+    assert heard["/alice/frontleft/image"].encoding == "rgb8"
+
+
+def test_another_decoder_reads_the_bytes_of_every_topic(served):
+    store, raw, session = get_typestore(Stores.ROS2_JAZZY), {}, served.node.session.inner
+    kept, history = [], ext.HistoryConfig(max_samples=1)
+    for topic, kind in (TOPICS | STORED).items():
+        key = served.node.key.data_key(topic, ros_types().message(kind).key)
+
+        def keep(sample, topic=topic):
+            raw[topic] = sample.payload.to_bytes()
+
+        late = topic in STORED
+        kept.append(
+            ext.declare_advanced_subscriber(session, key, keep, history=history)
+            if late
+            else session.declare_subscriber(key, keep)
+        )
+    assert soon(lambda: raw.keys() == (TOPICS | STORED).keys(), 20.0), (TOPICS | STORED).keys() - raw.keys()
+    for topic, kind in (TOPICS | STORED).items():
+        definition, _ = store.generate_msgdef(kind, ros_version=2)
+        decoded = generate_dynamic(kind, definition)[kind](raw[topic])
+        assert decoded.__slots__, topic
+
+
+def test_the_robot_drives_as_it_hears_and_stands_when_it_hears_nothing(served):
+    command = served.node.publisher("/alice/cmd_vel", TWIST)
+    assert soon(lambda: command.is_heard)
+    for _ in range(30):
+        command.put(twist(0.5, 0.2))
+        time.sleep(0.02)
+    assert served.robot.velocity[0] == pytest.approx(0.5, abs=0.05)
+    silent_s = time.monotonic()
+    assert soon(lambda: not np.any(np.abs(served.robot.velocity) > 0.01))
+    assert time.monotonic() - silent_s < 0.6
+
+
+@pytest.mark.parametrize("x", [float("nan"), float("inf")])
+def test_a_velocity_that_is_not_finite_moves_nothing(served, x):
+    command = served.node.publisher("/alice/cmd_vel", TWIST)
+    assert soon(lambda: command.is_heard)
+    for _ in range(10):
+        command.put(twist(x))
+        time.sleep(0.02)
+    assert not np.any(served.robot.velocity)
+
+
+def test_a_velocity_beyond_the_limits_is_reduced_to_them(served):
+    command = served.node.publisher("/alice/cmd_vel", TWIST)
+    assert soon(lambda: command.is_heard)
+    for _ in range(60):
+        command.put(twist(100.0, 100.0))
+        time.sleep(0.02)
+    most = served.robot.capabilities()
+    assert 0.0 < served.robot.velocity[0] <= most.max_speed_m_s + 1e-6
+    assert 0.0 < served.robot.velocity[2] <= most.max_turn_rate_rad_s + 1e-6
+
+
+def test_random_bytes_move_nothing(served, capfd):
+    key = served.node.key.data_key("/alice/cmd_vel", ros_types().message(TWIST).key)
+    chance = np.random.default_rng(1)
+    for _ in range(2000):
+        served.node.session.inner.put(key, chance.bytes(int(chance.integers(0, 47))))
+    time.sleep(4 * PERIOD_S)
+    assert not np.any(served.robot.velocity)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_pictures_are_taken_only_while_somebody_looks(served):
+    time.sleep(0.5)
+    assert "image" not in served.robot.calls
+    served.node.subscribe("/alice/hand/image", IMAGE, lambda message: None)
+    assert soon(lambda: "image" in served.robot.calls) or "image" not in dir(served.robot)

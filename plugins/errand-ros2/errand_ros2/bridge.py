@@ -1,4 +1,4 @@
-"""Bridge between a run and ROS 2: `errand run ... --ros2 [DOMAIN]`.
+"""Bridge between a run and ROS 2, for `errand run ... --ros2 [DOMAIN]`.
 
 Publishes what the robots sense, where they are and what they do; takes goals, velocities, sentences and services. The
 run goes at the pace of the wall clock.

@@ -1,4 +1,4 @@
-"""What ROS 2 sends, as plain values: poses on the map and velocities. Refuses what is not finite or lies elsewhere."""
+"""Reads poses on the map and velocities from messages of ROS 2; refuses numbers that are not finite."""
 
 from __future__ import annotations
 

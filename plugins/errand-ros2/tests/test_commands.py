@@ -1,4 +1,6 @@
-"""`errand ros2 bag`: bags as folders and files, of one robot or all, and bad input."""
+"""`errand ros2 bag`: bags as folders and files, of one robot or all; `errand serve-ros2`; and bad input."""
+
+import socket
 
 import pytest
 import yaml
@@ -54,3 +56,31 @@ def test_bad_input_is_refused_in_one_line(words, message, log_file, tmp_path, mo
 
 def test_a_bag_needs_a_name(log_file):
     assert "'--out'" in refusal("ros2", "bag", log_file)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("300", "'300': domains go to 232"),
+        ("0@:0", "ports from 1 to 65535"),
+        ("here", "'here' is no ROS domain"),
+        ("--robot 1a", "'1a' is not a name for a robot"),
+        ("--kind crane", "no kind of robot 'crane'"),
+        ("--world nowhere", "unknown world 'nowhere'"),
+        ("0@192.0.2.1", "no Zenoh router answers at 192.0.2.1:7447"),
+    ],
+)
+def test_a_robot_that_cannot_be_served_is_refused_in_one_line(words, message):
+    pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
+    said = refusal("serve-ros2", *words.split())
+    assert message in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.mission
+def test_a_simulated_robot_is_served_for_a_while():
+    pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    told = done("serve-ros2", f"7@127.0.0.1:{port}", "--for", "0.5", "--robot", "Bob", "--map", "--ground-truth")
+    assert told.stdout == f"ROS 2: /bob, domain 7, tcp/127.0.0.1:{port} (the router is here; Ctrl-C ends it)\n"

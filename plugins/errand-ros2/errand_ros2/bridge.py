@@ -7,6 +7,7 @@ run goes at the pace of the wall clock.
 from __future__ import annotations
 
 import json
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -82,6 +83,7 @@ class Bridge(RunVisitor):
         Raises InputError when no session can be opened.
         """
         self._open, self._pace, self._control = ExitStack(), pace, control
+        self._hurry = threading.Event()
         self.session = self._open.enter_context(open_session(place))
         self._pool = self._open.enter_context(ThreadPoolExecutor(1, thread_name_prefix="errand-ros2"))
         self._node = Node(self.session, NAME)
@@ -124,14 +126,14 @@ class Bridge(RunVisitor):
             replies.put(messages.text(self._conversations.hear(said.data, name).text))
 
         driving = Driving(name, self._control)
-        goals = Goals(node, prepared, self._control, self._grid, self._pool, refuse)
+        goals = Goals(node, prepared, self._control, self._grid, self._pool, refuse, self._hurry.set)
         own = _RobotBridge(node, driving, goals, events, plan, pose)
         node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", self._later(goals.hear_pose))
         node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
         node.subscribe(TOPIC, "geometry_msgs/msg/Twist", driving.hear)
         node.subscribe("say", "std_msgs/msg/String", self._later(hear))
         for what, call in self._commands(name).items():
-            node.answer(what, _TRIGGER, partial(_answer, what, call))
+            node.answer(what, _TRIGGER, partial(_answer, what, call, self._hurry.set))
         return own
 
     def _commands(self, name: str) -> Mapping[str, Callable[[], None]]:
@@ -198,7 +200,10 @@ class Bridge(RunVisitor):
         own.goals.tick(context, now_s, step)
 
     def _keep_pace(self, now_s: float) -> None:
-        """Waits until the wall clock has come as far as the robot's clock; forgets a delay that is too long."""
+        """Waits until the wall clock has come as far as the robot's clock, or a request is in a hurry.
+
+        Forgets a delay that is too long.
+        """
         if self._pace is None:
             return
         wall_s = time.monotonic()
@@ -206,9 +211,10 @@ class Bridge(RunVisitor):
         ahead_s = (now_s - begun_s) / self._pace - (wall_s - begun_wall_s)
         self.late_s = max(self.late_s, -ahead_s)
         if ahead_s > 0.0:
-            time.sleep(ahead_s)
+            self._hurry.wait(ahead_s)
         elif ahead_s < -_LATE_S:
             self._begun = (now_s, wall_s)
+        self._hurry.clear()
 
     def end(self, result: RunResult) -> None:
         """Ends all goals and leaves the graph."""
@@ -217,11 +223,12 @@ class Bridge(RunVisitor):
         self._open.close()
 
 
-def _answer(what: str, call: Callable[[], None], _: Any) -> Any:
+def _answer(what: str, call: Callable[[], None], hurry: Callable[[], None], _: Any) -> Any:
     """Calls a command of a service; returns the response, with the reason when it is refused."""
     response = ros_types().service(_TRIGGER).response.make
     try:
         call()
+        hurry()
     except ValueError as error:
         return response(False, str(error))
     return response(True, what)

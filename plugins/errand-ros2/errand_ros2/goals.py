@@ -10,6 +10,7 @@ import math
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
@@ -35,15 +36,20 @@ from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 
 FEEDBACK_PERIOD_S: Final = 0.5
+_STOP: Final = {"wait": {"seconds": 0.05}}
 _FAILED: Final = 9000
 """Error code of navigate_to_pose for any failure; its message has the cause."""
 
 
 @dataclass
 class _Pursued:
-    """Goal that is pursued as a mission; `goal` is None for one of the topic `goal_pose`."""
+    """Goal that is pursued as a mission; the mission `stop` takes its place when it is cancelled.
+
+    `goal` is None for one of the topic `goal_pose`.
+    """
 
     mission: str
+    stop: CompiledTree
     server: ActionServer | None
     goal: Goal | None
     pose: Pose2D | None
@@ -61,8 +67,13 @@ class Goals:
         grid: GridMap,
         pool: Executor,
         refuse: Callable[[str], None],
+        hurry: Callable[[], None] = lambda: None,
     ) -> None:
-        """`prepared` is the robot's part of the run; `pool` compiles goals, `refuse` tells why one is refused."""
+        """`prepared` is the robot's part of the run; `pool` compiles goals, `refuse` tells why one is refused.
+
+        `hurry` lets the next tick begin at once.
+        """
+        self._hurry = hurry
         self._prepared, self._control, self._grid, self._refuse = prepared, control, grid, refuse
         self._name = prepared.mission.robot_name
         self._numbers, self._lock = count(1), threading.RLock()
@@ -105,18 +116,19 @@ class Goals:
         with self._lock:
             found = next((each for each in self._pursued.values() if each.goal is goal), None)
             if found is not None:
-                tree = self._compiled(self._mission_of(f"{found.mission} cancelled", {"wait": {"seconds": 0.05}}))
-                self._control.replace(tree, instead_of=found.mission)
+                with suppress(ValueError):  # it is being cancelled already
+                    self._control.replace(found.stop, instead_of=found.mission)
+                self._hurry()
 
     def _pursue(
         self, mission: Callable[[str], Mission], server: ActionServer | None, goal: Goal | None, pose: Pose2D | None
     ) -> None:
         """Compiles a goal's mission, and lets it begin in place of the goal before. Raises InputError, ValueError."""
         name = f"ros2 goal {next(self._numbers)}"
-        tree = self._compiled(mission(name))
+        tree, stop = self._compiled(mission(name)), self._compiled(self._mission_of(f"{name} cancelled", _STOP))
         with self._lock:
             before = next(reversed(self._pursued), None)
-            self._pursued[name] = _Pursued(name, server, goal, pose)
+            self._pursued[name] = _Pursued(name, stop, server, goal, pose)
             try:
                 if before is None:
                     self._control.preempt(tree)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Mapping
-from itertools import pairwise
 from typing import Any, Final
 
 from bosdyn.api import robot_command_pb2
@@ -92,12 +91,13 @@ def check_values(message: Message, field: str = "request") -> None:
             continue
         for key, each in value.items() if isinstance(value, Mapping) else enumerate(value):
             _check(described, each, f"{name}[{key}]")
-        if described.name == "points":
-            times_s = [seconds(each.time_since_reference) for each in value if hasattr(each, "time_since_reference")]
-            for k, (before_s, after_s) in enumerate(pairwise(times_s), start=1):
-                if after_s < before_s:
-                    said = f"{name}[{k}].time_since_reference is {after_s:g} s; it must be at least {before_s:g} s"
+        if described.name == "points" and hasattr(value[0], "time_since_reference"):
+            least_s = -math.inf if message.HasField("reference_time") else 0.0  # before that time a point may be past
+            for k, at_s in enumerate(seconds(each.time_since_reference) for each in value):
+                if at_s < least_s:
+                    said = f"{name}[{k}].time_since_reference is {at_s:g} s; it must be at least {least_s:g} s"
                     raise InvalidRequestError(said)
+                least_s = at_s
 
 
 def _check(described: Any, value: Any, name: str) -> None:
@@ -105,7 +105,7 @@ def _check(described: Any, value: Any, name: str) -> None:
     kind = described.message_type.full_name if described.message_type is not None else ""
     low, high = _LEAST if described.name.startswith("max") else -_MOST, _MOST
     if kind == "google.protobuf.Duration":
-        value, low, high = seconds(value), 0.0, _YEARS_S
+        value, low, high = seconds(value), 0.0 if described.name != "time_since_reference" else -_YEARS_S, _YEARS_S
     elif kind.startswith("google.protobuf.") and hasattr(value, "value"):
         value = value.value
     elif isinstance(value, Message):

@@ -150,7 +150,7 @@ def _being(clause: Predicate, being: Being) -> Action:
     located = place or being.existential or (kind is not None and objects and objects[0].relations)
     fits = len(objects) == 1 and len(places) <= 1 and known and located
     before = [clause.subject] if clause.subject else []
-    unknown = () if fits and not any(map(_asks, objects)) else (spoken_words([*before, being, *clause.items]),)
+    unknown = () if fits and not any(map(_is_question, objects)) else (spoken_words([*before, being, *clause.items]),)
     choices = tuple(map(tuple, roles.choices))
     return Action(kind, "be", tuple(objects[:1]), place, unknown=unknown, choices=choices, teller=being.teller)
 
@@ -168,14 +168,14 @@ def _narrated(clause: Predicate, being: Being) -> Action:
 
 def _is_state(clause: Predicate, being: Being) -> bool:
     """Returns whether a clause only describes a state as a reason, as in "I'm thirsty" or "the baby is crying"."""
-    if clause.subject is None or clause.whether or (being.asked and _asks(clause.subject.phrase)):
+    if clause.subject is None or clause.whether or (being.asked and _is_question(clause.subject.phrase)):
         return False
     states = any(isinstance(item, Unknown | Adverb) for item in clause.items) or clause.subject.phrase.speaker
     rest = (item for item in clause.content if not (isinstance(item, Adverb) and item.here))
     return states and all(isinstance(item, Unknown) for item in rest)
 
 
-def _asks(phrase: Phrase) -> bool:
+def _is_question(phrase: Phrase) -> bool:
     return any(token.tag in _QUESTION_TAGS for token in phrase.tokens)
 
 
@@ -196,8 +196,9 @@ def _acting(clause: Predicate, verb: Verb) -> Iterator[Action]:
         yield from _finding(replace(blank, kind=VerbKind.FIND), roles)
     elif kind is VerbKind.WAIT:
         yield _waiting(blank, roles)
-    elif kind is VerbKind.CHARGE:
-        yield _charging(blank, roles)
+    elif kind is VerbKind.CHARGE:  # the robot charges only itself, at its dock
+        places = (place for place in (*roles.ats, *roles.goals) if place.phrase is not None)
+        yield replace(blank, passes=tuple(place for place in places if place.name in word_list("docks")))
     elif kind is VerbKind.CHECK:
         unknown = (spoken_words([verb, *clause.items]),)
         yield replace(blank, kind=kind if clause.content else VerbKind.FIND, unknown=unknown)
@@ -269,12 +270,6 @@ def _waiting(blank: Action, roles: Roles) -> Action:
     if not times and goal is not None:
         return replace(blank, kind=VerbKind.GO, goal=goal)
     return replace(blank, goal=goal, time=time, unknown=(*blank.unknown, *([] if fits else [blank.verb])))
-
-
-def _charging(blank: Action, roles: Roles) -> Action:
-    """Charges the robot's own battery at its dock; the robot charges nothing else and nowhere else."""
-    docks = (place for place in (*roles.ats, *roles.goals) if place.phrase and place.phrase.text in word_list("docks"))
-    return replace(blank, passes=tuple(docks))
 
 
 def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:

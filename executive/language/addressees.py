@@ -54,12 +54,6 @@ def _verbs() -> Mapping[str, str]:
     return {**forms, **lexicon().third_persons, **{base: base for base in bases}}
 
 
-@cache
-def addressees(names: tuple[str, ...]) -> Addressees:
-    """Returns the finder of robots with these names."""
-    return Addressees(names)
-
-
 @dataclass(frozen=True)
 class Addressees:
     """Finds the robots `names` in a sentence, and splits the text by robot."""
@@ -69,7 +63,7 @@ class Addressees:
     @cached_property
     def forms(self) -> Page:
         """Templates of calls and instructions."""
-        return page("robots", one=self.names, verb=tuple(_verbs()))
+        return page("robots", one=tuple(sorted(self.names, key=len, reverse=True)), verb=tuple(_verbs()))
 
     @cached_property
     def name(self) -> re.Pattern[str]:
@@ -165,6 +159,10 @@ class Addressees:
         return len(text) if self.forms["opened"].search(text[at:]) else at
 
 
+addressees: Final = cache(Addressees)
+"""Returns the finder of the robots with some names, and keeps it."""
+
+
 def _tidy(text: str) -> str:
     """Strips punctuation from both ends of a text, and joining words from its beginning."""
     return _JOINTS.sub("", text.strip(" ,;:-")).strip(" ,;:-")
@@ -193,11 +191,10 @@ class _Parting:
             if start < at or not (not n or words.words[n - 1] in boundary or word in opening):
                 continue
             if (begun := self._begins(n, start, at)) is not None:
-                match, lead = begun
-                calls = self.listener is None and match["kind"] == "call"
-                self.listener = self.listener or (self.calls.find_robots(match["who"]) if calls else None)
-                self._take(match, lead, text[at:start])
-                at = words.start(match.after)
+                if self.listener is None and begun["kind"] == "call":
+                    self.listener = self.calls.find_robots(begun["who"]) or None
+                self._take(begun, text[at:start])
+                at = words.start(begun.after)
             elif self.found[-1].past and text[:start].rstrip().endswith(","):
                 self._add(text[at:start])
                 self.found.append(AddressedText(self.address, "", then=True))
@@ -208,7 +205,7 @@ class _Parting:
             self.found[-1] = replace(self.found[-1], behind=behind)
         return tuple(self._sentences())
 
-    def _begins(self, n: int, start: int, at: int) -> tuple[Match, str] | None:
+    def _begins(self, n: int, start: int, at: int) -> Match | None:
         """Beginning of a part for another robot at a word, with the verb that it implies; None if there is none.
 
         Raises RefusalError if it forbids an action.
@@ -219,18 +216,18 @@ class _Parting:
                 continue
             if match["refused"]:
                 raise RefusalError(f"{match['refused']}: '{match.text}'", [match.text])
-            return match, match["lead"]
+            return match
         gap = self.calls.forms["gap"].match(self.text, n)
         if gap is None or current.who is None or not n:
             return None
         said = self.calls.imperative(_tidy(f"{current.text}{self.text[at:start]}"))
         verb = self.calls.forms["verb"].match(said)
-        return None if verb is None else (gap, f"{verb.text} ")
+        return None if verb is None else replace(gap, slots={**gap.slots, "lead": f"{verb.text} "})
 
-    def _take(self, begun: Match, lead: str, before: str) -> None:
+    def _take(self, begun: Match, before: str) -> None:
         """Ends the present part with the text `before`, and begins the next one."""
         at = self.calls.joint(before)
-        said, joint, kind = before[:at], before[at:], begun["kind"]
+        said, joint, kind, lead = before[:at], before[at:], begun["kind"], begun["lead"]
         if kind in ("after", "wait"):
             self._add(said)
             who = self.found[-1].who if kind == "wait" or self.address is None else self.address

@@ -45,11 +45,7 @@ def cover(
     targets = [one.target for one in actions if one.target is not None]
     targets += [one for each in related for one in each.landmarks]
     owned = [one.spoken for one in targets if any(token.word in word_list("owners") for token in one.tokens[:-1])]
-    notes = {
-        _LEFT_OUT: asides,
-        TOLD: told,
-        "I cannot tell whose it is: {}": owned,
-    }
+    notes = {_LEFT_OUT: asides, TOLD: told, "I cannot tell whose it is: {}": owned}
     return [form.format(listing(map(repr, words))) for form, words in notes.items() if words], lost
 
 

@@ -74,10 +74,7 @@ def amend(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> t
     if by.goal is None:
         return tuple(_counted(command, by.count) for command in commands)
     at = _place_of(commands, by)
-    return tuple(
-        replace(command, goal=by.goal, goal_at=by.goal_at) if number == at else command
-        for number, command in enumerate(commands)
-    )
+    return (*commands[:at], replace(commands[at], goal=by.goal, goal_at=by.goal_at), *commands[at + 1 :])
 
 
 def skip_fetching(commands: Sequence[Command], held: ObjectKind | None, knowledge: Knowledge) -> tuple[Command, ...]:
@@ -129,9 +126,9 @@ def _place_of(commands: Sequence[Command], by: Amendment) -> int:
     sources = [n for n, command in enumerate(commands) if command.item is None and command.task is not None]
     goals = [n for n, command in enumerate(commands) if n not in sources]
     if by.source:
-        return next(iter([*named, *sources, *goals]))
+        return [*named, *sources, *goals][0]
     said = [n for n in goals if commands[n].goal != START]
-    return next(iter([*named, *said[-1:], *goals[-1:], *sources]))
+    return [*named, *said[-1:], *goals[-1:], *sources][0]
 
 
 _PAGE: Final = page("followups")

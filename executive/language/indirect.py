@@ -18,7 +18,7 @@ CONTENTS: Final = Phrase((replace(OBJECTS.head, relation="attr"),))
 """All objects on a surface, as a question whether it is empty asks about them."""
 
 
-def _asks(items: Sequence[Item]) -> bool:
+def _looks(items: Sequence[Item]) -> bool:
     """Returns whether the last item is a verb that asks to look for an object."""
     last = items[-1] if items else None
     return isinstance(last, Verb) and bool(last.kinds & {VerbKind.FIND, VerbKind.CHECK})
@@ -26,7 +26,7 @@ def _asks(items: Sequence[Item]) -> bool:
 
 def where_is(row: Row, items: list[Item]) -> Item | None:
     """Reads "where is the hammer", "check where the hammer is" as a request to find an object or a person."""
-    asks, inverted = _asks(items), _is_be(row.token(1))
+    asks, inverted = _looks(items), _is_be(row.token(1))
     if row.word() != "where" or not (asks or may_begin_command(items)):
         return None
     phrase = row.phrase_at(row.at + 1 + inverted)
@@ -86,7 +86,7 @@ def do_we_have(row: Row, items: list[Item]) -> Item | None:
 
 def what_is(row: Row, items: list[Item]) -> Item | None:
     """Reads "what is on the bench" or "is the bench empty" as a request to look for all objects there."""
-    asks = _asks(items)
+    asks = _looks(items)
     if not (asks or may_begin_command(items)):
         return None
     for contents, read in ((OBJECTS, _whatever), (CONTENTS, _fullness)):

@@ -163,21 +163,14 @@ class Row:
 
     def phrase_at(self, start: int) -> Phrase | None:
         """Noun phrase that begins at `start`, even if its first words have been taken."""
-        whole = self.phrases.get(start)
-        if whole is not None:
-            return whole
-        cut = next((p for first, p in self.phrases.items() if first < start < first + len(p.tokens)), None)
-        return None if cut is None else Phrase(tuple(t for t in cut.tokens if t.index >= start))
+        tokens = next((p.tokens for at, p in self.phrases.items() if at <= start < at + len(p.tokens)), ())
+        rest = tuple(token for token in tokens if token.index >= start)
+        return Phrase(rest) if rest else None
 
     def take(self, count: int) -> str:
         """Takes the next words, and moves the position behind them."""
         self.at += count
         return " ".join(t.text for t in self.tokens[self.at - count : self.at])
-
-    def take_words(self, phrase: Sequence[str]) -> str:
-        """Takes the words of a phrase from the dictionaries."""
-        self.at += len(phrase)
-        return " ".join(phrase)
 
 
 def may_begin_command(items: Sequence[Item]) -> bool:
@@ -248,11 +241,9 @@ def _gap(items: Sequence[Item], place: Chunk) -> bool:
 
 def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
     """Begins a clause with "to be"; takes its subject, and the "if" before the subject, from the clause before."""
-    rest, subject = last.items, last.items[-1] if last.items and not being.existential else None
-    if not isinstance(subject, Chunk) or subject.role is not None:
-        subject = None
-    else:
-        rest = rest[:-1]
+    before = last.items[-1] if last.items and not being.existential else None
+    subject = before if isinstance(before, Chunk) and before.role is None else None
+    rest = last.items[: len(last.items) - (subject is not None)]
     whether = bool(rest) and isinstance(rest[-1], Whether)
     asked = replace(being, asked=being.asked and subject is None)
     return [replace(last, items=rest[: len(rest) - whether]), Predicate(asked, (), subject, whether)]

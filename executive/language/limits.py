@@ -37,7 +37,7 @@ def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> No
         raise RefusalError(f"I cannot carry people: {', '.join(people)}; {ABLE}", people)
     if knowledge is not None:
         rooms = [one for one in actions if one.kind is VerbKind.GO and one.goal is not None and one.goal.every_room]
-        actions = [replace(one, objects=()) if _asks_for_people(one) else one for one in actions if one not in rooms]
+        actions = [replace(one, objects=()) if _seeks_people(one) else one for one in actions if one not in rooms]
     moved = [one.target for one in actions if one.target is not None and _moved(one, one.target)]
     outside = [(part, part) for one in actions for part in _outside(one, one.target in moved)]
     if outside:
@@ -58,7 +58,7 @@ def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None
     return RefusalError(reason, [part for part, _ in parts], kind=RefusalKind.NOT_UNDERSTOOD)
 
 
-def _asks_for_people(action: Action) -> bool:
+def _seeks_people(action: Action) -> bool:
     """Returns whether an action looks for a person, or for anybody ("is anybody in the hall")."""
     phrase = action.target if action.kind is VerbKind.FIND else None
     return phrase is not None and (phrase.somebody or phrase.stands_for_somebody)

@@ -189,7 +189,8 @@ class RuleTokenizer:
         """Splits a text into words."""
         for word in [word for word in self._rules if word in text]:
             self._tokenizer.add_special_case(word, self._rules.pop(word))
-        return self._tokenizer(text)
+        doc: Doc = self._tokenizer(text)
+        return doc
 
 
 @contextmanager

@@ -282,9 +282,9 @@ def _joined_text(words: Sequence[Token | str]) -> str:
 
 
 def _is_determiner(token: Token) -> bool:
-    said_number = number_of_word(token.word) is not None or token.word in word_list("vague_numbers")
-    said_number = said_number or token.word in word_list("pointing")
-    return said_number or token.pos == "DET" or token.tag in ("PRP$", "DT", "PDT", "POS", "WP$") or token.text == "-"
+    named = token.word in word_list("vague_numbers") | word_list("pointing") | {"-"}
+    tagged = token.pos == "DET" or token.tag in ("PRP$", "DT", "PDT", "POS", "WP$")
+    return named or tagged or number_of_word(token.word) is not None
 
 
 def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:

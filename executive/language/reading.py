@@ -64,8 +64,8 @@ class Reader(Row):
         correction, negation = self.match(lexicon().corrections), self.match(lexicon().negations)
         nothing = correction == ("no",) and self.token(1).pos in ("NOUN", "ADJ")
         if correction and len(correction) >= len(negation) and not nothing:
-            return Correction(self.take_words(correction), lexicon().corrections[correction])
-        return Negation(self.take_words(negation)) if negation else None
+            return Correction(self.take(len(correction)).lower(), lexicon().corrections[correction])
+        return Negation(self.take(len(negation)).lower()) if negation else None
 
     def _verb(self, items: list[Item]) -> Item | None:
         found = self.match(lexicon().verbs) or self._gerund(items)
@@ -223,7 +223,7 @@ class Reader(Row):
         filler, noted = self._particle(items) or self.match(lexicon().fillers), self.match(lexicon().noted)
         if len(noted) > len(filler):
             return Aside(self.take(len(noted)))
-        return Separator(self.take_words(filler)) if filler else None
+        return Separator(self.take(len(filler)).lower()) if filler else None
 
     def _excepts(self, items: Sequence[Item]) -> bool:
         """Returns whether "but" means "except": after "everything", or after "all the drinks" if a noun follows."""

@@ -205,11 +205,10 @@ def _described(spoken: list[_Placed]) -> list[_Placed]:
     places = [n for n, one in enumerate(spoken) if one.chunk.role not in (None, PrepositionRole.FOR)]
     if len(places) < 2 or places[0] == 0:
         return spoken
-    first = places[0]
+    first, second = places[:2]
     beside, named = spoken[first].chunk, spoken[first - 1].chunk
-    if beside.role is not PrepositionRole.BESIDE or named.role is not None:
-        return spoken
-    if spoken[places[1]].chunk.role is PrepositionRole.AT and beside.phrase.kind is NounKind.THING:
+    lies = spoken[second].chunk.role is PrepositionRole.AT and beside.phrase.kind is NounKind.THING
+    if beside.role is not PrepositionRole.BESIDE or named.role is not None or lies:
         return spoken
     phrase = named.phrase.with_extra(*beside.preposition.split(), beside.phrase.text)
     described = replace(spoken[first - 1], chunk=replace(named, phrase=phrase))

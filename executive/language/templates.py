@@ -40,10 +40,7 @@ class Words:
         return self.spans[at][0] if at < len(self.spans) else len(self.text)
 
 
-@lru_cache(maxsize=4096)
-def words_of(text: str) -> Words:
-    """Words of a text."""
-    return Words(text)
+words_of = lru_cache(maxsize=4096)(Words)
 
 
 _WORD: Final = re.compile(
@@ -75,7 +72,7 @@ class Match:
 
 
 class Page:
-    """Templates of a page by intent; `lists` has the values of slots that the page leaves open."""
+    """Templates of a page by intent; `lists` has the words of slots that the page leaves open."""
 
     def __init__(self, name: str, **lists: tuple[str, ...]) -> None:
         self._name, self._given = name, lists
@@ -94,8 +91,12 @@ class Page:
 
     def entry(self, kind: str, name: str) -> Any:
         """Rule or list of the page, or else the common one; an unknown list takes any words."""
-        tables = ({"lists": self._given}, self.table, read_table("intents/common.yaml"))
+        tables = (self.table, read_table("intents/common.yaml"))
         return next((table[kind][name] for table in tables if name in table.get(kind, ())), {})
+
+    def words(self, name: str) -> _Part | None:
+        """Part for the words of an open slot; None for a list of the page."""
+        return _choice([_phrase(words) for words in self._given[name]]) if name in self._given else None
 
     def part(self, values: str | Iterable[str]) -> _Part:
         """Part for a template, or for one of several; each is parsed once."""
@@ -200,6 +201,12 @@ def _word(spellings: Iterable[str]) -> _Part:
     return _Part(_next_word, frozenset(spellings))
 
 
+def _phrase(text: str) -> _Part:
+    """Words of a text."""
+    words = [_word([word]) for word in words_of(text).words]
+    return words[0] if len(words) == 1 else _sequence(words)
+
+
 def _sequence(parts: Sequence[_Part]) -> _Part:
     def ends(words: Words, at: int, n: int = 0) -> _Ends:
         if n == len(parts):
@@ -292,9 +299,10 @@ def _part(part: str, parts: list[str], page: Page) -> _Part:
     if part[0] == "<":
         return page.part(page.entry("rules", part[1:-1]) or page.table["rules"][part[1:-1]])
     if part[0] != "{":
-        words = words_of(part).words
-        return _word(words) if len(words) == 1 else _sequence([_word([word]) for word in words])
+        return _phrase(part)
     name, _, slot = part[1:-1].partition(":")
+    if (words := page.words(name)) is not None:
+        return _slot(slot or name, words, {})
     values: Any = {} if name == "number" else page.entry("lists", name)
     if isinstance(values, Mapping) and values.keys() <= {"most", "without"}:
         return _slot(slot or name, _Part(_number) if name == "number" else _any(values), {})

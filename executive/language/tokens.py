@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Final
 
+from pydantic import TypeAdapter
+
 from executive.language.lexicon import any_of, expression, lexicon, read_table
 from executive.language.nouns import NounKind
 from executive.words.command import is_attribute, may_be_attribute
@@ -74,17 +76,18 @@ def repair_parse(tokens: Iterable[Token]) -> tuple[Token, ...]:
 class _Repair:
     """Conditions on the words around a word, by relative position, and the word's new values."""
 
-    where: Mapping[int, Mapping[str, tuple[bool, re.Pattern[str]]]]
+    where: Mapping[int, Mapping[str, str]]
     then: Mapping[int, Mapping[str, str]]
-    joins: tuple[int, ...]
-    only: re.Pattern[str]
+    joins: tuple[int, ...] = ()
+    only: str = ".*"
 
     def fits(self, tokens: Sequence[Token], at: int) -> bool:
-        return all(
-            (form.fullmatch(_fact(tokens, at + place, name)) is not None) == wanted
-            for place, facts in self.where.items()
-            for name, (wanted, form) in facts.items()
-        )
+        for place, facts in self.where.items():
+            for name, text in facts.items():
+                found = re.fullmatch(text.removeprefix("not "), _fact(tokens, at + place, name))
+                if (found is None) != text.startswith("not "):
+                    return False
+        return True
 
     def apply(self, tokens: list[Token], at: int) -> None:
         for place, become in self.then.items():
@@ -93,27 +96,13 @@ class _Repair:
         if self.joins:
             before, now = (at + place for place in self.joins)
             for n in range(at - 1):
-                if tokens[n].head == before and self.only.fullmatch(tokens[n].relation):
+                if tokens[n].head == before and re.fullmatch(self.only, tokens[n].relation):
                     tokens[n] = replace(tokens[n], head=now)
 
 
 @cache
 def _repairs() -> tuple[_Repair, ...]:
-    return tuple(
-        _Repair(
-            {int(at): {name: _form(text) for name, text in facts.items()} for at, facts in rule["where"].items()},
-            {int(at): become for at, become in rule["then"].items()},
-            tuple(map(int, rule.get("joins", ()))),
-            re.compile(rule.get("only", ".*")),
-        )
-        for rule in read_table("repairs.yaml")
-    )
-
-
-def _form(text: str) -> tuple[bool, re.Pattern[str]]:
-    """Expression for a field, and whether the field must match it."""
-    wanted = not text.startswith("not ")
-    return wanted, re.compile(text if wanted else text.removeprefix("not "))
+    return TypeAdapter(tuple[_Repair, ...]).validate_python(read_table("repairs.yaml"))
 
 
 def _fact(tokens: Sequence[Token], at: int, name: str) -> str:

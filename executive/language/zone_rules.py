@@ -58,8 +58,10 @@ class RoomRules:
 
 def read_rules(text: str, knowledge: Knowledge | None) -> RoomRules:
     """Reads rules for rooms in a sentence. Raises RefusalError for a rule without any work or an unclear rule."""
-    rest, zones = (text, {}) if knowledge is None else take_rules(text, knowledge)
-    if knowledge is None or not zones:
+    if knowledge is None or not {*_PAGE.table["lists"]["mentions"]} & {*words_of(text).words}:
+        return RoomRules(text, knowledge)
+    rest, zones = take_rules(text, knowledge)
+    if not zones:
         return RoomRules(text, knowledge)
     if not re.search(r"\w", rest):
         example = f"'{text.strip(' .!')} and bring me a drink'"

@@ -103,6 +103,28 @@ def test_a_match_tells_its_place_in_the_text():
     assert (match.text, match.start, match.end, match.after) == ("unless", 10, 16, 4)
 
 
+@pytest.mark.parametrize("name", ["R2-D2", "Bob (2)", "a|b", "<r>", "x[1", "Big Bob"])
+def test_words_that_a_page_is_given_are_no_templates(name):
+    assert page("wake", own=(name,))["greets"].fullmatch(f"hey {name}")["name"] == name
+
+
+@pytest.mark.parametrize(
+    ("row", "text", "found"),
+    [
+        ({"before": ["(can|could) you"]}, "stop can you", "stop"),
+        ({"before": ["(can|could) you"]}, "stop can we", None),
+        ({"before": [""]}, "stop", "stop"),
+        ({"before": [""]}, "stop it", None),
+        ({"not_before": ["it"]}, "stop it", None),
+        ({"not_before": ["it"]}, "stop", "stop"),
+        ({"not_before": [""]}, "stop", None),
+    ],
+)
+def test_a_row_looks_at_what_follows_its_template(row, text, found):
+    match = Template(page("clauses"), [{"template": "stop", **row}]).match(text)
+    assert (None if match is None else match.text) == found
+
+
 def test_a_template_with_an_unknown_rule_is_refused():
     with pytest.raises(KeyError, match="nowhere"):
         Template(page("clauses"), [{"template": "go to <nowhere>"}]).fullmatch("go to it")

@@ -22,7 +22,7 @@ from errand_ros2.wire.actions import GoalStatus
 from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Client, Node
 from errand_ros2.wire.session import Place, open_session
-from errand_ros2.wire.types import ros_types
+from errand_ros2.wire.types import older_types, ros_types
 from executive.app.prepare.from_request import prepare
 from executive.app.runs.one_run import run_request
 from executive.mission.request import Request
@@ -197,6 +197,20 @@ def test_a_goal_of_navigate_to_pose_is_reached(talk):
         assert math.hypot(ros.robot.pose.x_m - 0.6, ros.robot.pose.y_m + 1.2) < 0.15
         assert action.feedback[0].feedback.distance_remaining > 0.5
         assert action.cancel() == 3  # it has ended
+
+    talk(says)
+
+
+def test_a_client_of_an_older_distribution_gets_the_result_in_its_form(talk):
+    def says(ros):
+        action, older = ActionClient(ros, "navigate_to_pose", NAVIGATE), older_types().service(f"{NAVIGATE}_GetResult")
+        assert older.key != action.kind.get_result.key
+        action.goal.pose = stamped(0.3, 0.0)
+        assert action.send()
+        client = Client(ros.node, "/alice/navigate_to_pose/_action/get_result", older)
+        result = client.call(older.request.make(action.identity), limit_s=60.0)
+        assert (result.status, result.result.error_code) == (GoalStatus.SUCCEEDED, 0)
+        assert not hasattr(result.result, "error_msg")
 
     talk(says)
 

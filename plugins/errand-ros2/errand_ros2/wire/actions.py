@@ -15,7 +15,7 @@ import numpy as np
 
 from errand_ros2.wire.keys import Qos
 from errand_ros2.wire.node import Node, Request
-from errand_ros2.wire.types import ros_types
+from errand_ros2.wire.types import older_types, ros_types
 
 MOST_GOALS: Final = 64
 """Goals whose results are kept; older ones are forgotten."""
@@ -88,6 +88,8 @@ class ActionServer:
         node.serve(f"{base}/send_goal", self.kind.send_goal, lambda request: _submit(pool, self._send_goal, request))
         node.serve(f"{base}/cancel_goal", self.kind.cancel_goal, self._cancel_goal)
         node.serve(f"{base}/get_result", self.kind.get_result, self._get_result)
+        if older_types().has(type_name):  # its result has fewer fields there, and so another key
+            node.serve(f"{base}/get_result", older_types().service(f"{type_name}_GetResult"), self._get_result)
 
     def begin(self, goal: Goal) -> None:
         """Records that a goal is being pursued."""

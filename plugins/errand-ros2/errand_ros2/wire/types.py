@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 INTERFACES: Final = Path(__file__).parents[1] / "interfaces"
 """Folder of the interface files that rosbags lacks, as PACKAGE/KIND/NAME.KIND."""
+OLDER: Final = INTERFACES.with_name("interfaces_before_kilted")
+"""Folder of the interface files that distributions before Kilted have in another form."""
 _PARTS: Final = re.compile(r"^---$", re.MULTILINE)
 _EVENT: Final = "service_msgs/msg/ServiceEventInfo info\n{0}_Request[<=1] request\n{0}_Response[<=1] response"
 _SERVICE: Final = "{0}_Request request_message\n{0}_Response response_message\n{0}_Event event_message"
@@ -87,8 +89,13 @@ class Types:
         self._store = get_typestore(Stores.ROS2_JAZZY)
         for name, (constants, fields) in [*self._store.fielddefs.items()]:
             self._store.fielddefs[name] = (constants, _without_char(fields))
+        self._read: set[str] = set()
         for file in sorted(folder.glob("*/*/*.*"), key=lambda path: path.suffix != ".msg"):
             self._register(file)
+
+    def has(self, name: str) -> bool:
+        """Returns whether the folder has an interface file of this name."""
+        return name in self._read
 
     def message(self, name: str) -> MessageType:
         """Returns a message type. Raises KeyError when it is unknown."""
@@ -136,6 +143,7 @@ class Types:
     def _register(self, file: Path) -> None:
         """Registers the types of an interface file."""
         name = f"{file.parts[-3]}/{file.parts[-2]}/{file.stem}"
+        self._read.add(name)
         parts = [part.strip() for part in _PARTS.split(file.read_text(encoding="utf-8"))]
         if file.suffix == ".msg":
             self._store.register(get_types_from_msg(parts[0], name))
@@ -181,3 +189,9 @@ def _as_service(value: Any) -> Any:
 def ros_types() -> Types:
     """Returns the types that all nodes of this process share."""
     return Types()
+
+
+@cache
+def older_types() -> Types:
+    """Returns the types that distributions before Kilted have in another form."""
+    return Types(OLDER)

@@ -120,6 +120,17 @@ def laser_scan(reading: Scan, frame: str, period_s: float) -> Any:
     )
 
 
+def points(reading: Scan, frame: str) -> Any:
+    """Returns all returns of a scan as points in the body frame."""
+    xyz = np.ascontiguousarray(reading.points_B(), np.float32)
+    kind = ros.sensor_msgs__msg__PointField
+    fields = [kind(name, 4 * number, kind.FLOAT32, 1) for number, name in enumerate("xyz")]
+    width, data = 12 * len(xyz), xyz.view(np.uint8).ravel()
+    return ros.sensor_msgs__msg__PointCloud2(
+        header(reading.stamp_s, frame), 1, len(xyz), fields, False, 12, width, data, True
+    )
+
+
 def imu(reading: Imu, frame: str) -> Any:
     """Returns turn rates and accelerations; the orientation is not measured, which -1 in its covariance says."""
     unknown, still = np.array([-1.0, *[0.0] * 8]), np.zeros(9)

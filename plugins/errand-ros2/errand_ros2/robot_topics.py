@@ -62,6 +62,7 @@ class RobotTopics:
         self._joints = node.publisher("joint_states", "sensor_msgs/msg/JointState")
         self._imu = node.publisher("imu", "sensor_msgs/msg/Imu", SENSOR)
         self._scan = node.publisher("scan", "sensor_msgs/msg/LaserScan", SENSOR)
+        self._points = node.publisher("points", "sensor_msgs/msg/PointCloud2", SENSOR)
         self._battery = node.publisher("battery_state", "sensor_msgs/msg/BatteryState")
         description = node.publisher("robot_description", "std_msgs/msg/String", LATCHED)
         abilities = robot.capabilities()
@@ -98,6 +99,8 @@ class RobotTopics:
         self._last["scan"] = scan.stamp_s
         self._frames.fix(messages.transform(scan.stamp_s, self.body, self._lidar, scan.X_BL))
         self._scan.put(messages.laser_scan(scan, self._lidar, max(0.0, period_s)))
+        if self._points.is_heard:
+            self._points.put(messages.points(scan, self.body))
 
     def _publish_camera(self, at: _Camera, now_s: float) -> list[Any]:
         """Publishes what subscriptions ask for; returns the transform of a camera that moves on the body."""

@@ -36,6 +36,7 @@ TOPICS = {
     "/alice/joint_states": "sensor_msgs/msg/JointState",
     "/alice/imu": "sensor_msgs/msg/Imu",
     "/alice/scan": "sensor_msgs/msg/LaserScan",
+    "/alice/points": "sensor_msgs/msg/PointCloud2",
     "/alice/battery_state": "sensor_msgs/msg/BatteryState",
     "/ground_truth/alice/pose": "geometry_msgs/msg/PoseStamped",
     **{f"/alice/{each.source}/image": IMAGE for each in spot_capabilities().cameras},

@@ -36,7 +36,7 @@ from executive.record.event_log import plain_values
 from executive.record.other_tools import ros_name
 from executive.run.control import Control
 from executive.run.outcome import RunResult
-from executive.run.visitor import Progress, RunVisitor
+from executive.run.visitor import MissionEnd, Progress, RunVisitor
 from skills.api import LocalisationEstimate, SearchingLocaliser, SkillContext
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
@@ -60,7 +60,7 @@ def observe(value: str) -> Observe:
 
 @dataclass
 class _RobotBridge:
-    """Publishers and inputs of one robot; `context` is that of its present mission."""
+    """Publishers and inputs of one robot; `context` is that of its last mission, which lasts while it `is_active`."""
 
     node: Node
     driving: Driving
@@ -70,6 +70,7 @@ class _RobotBridge:
     pose: Publisher
     context: SkillContext | None = None
     topics: RobotTopics | None = None
+    is_active: bool = False
     pose_due_s: float = 0.0
     initial: list[Any] = field(default_factory=list)
 
@@ -154,7 +155,7 @@ class Bridge(RunVisitor):
     def mission_begun(self, nodes: Sequence[Behaviour], context: SkillContext) -> None:
         """Takes the context of a robot's new mission; publishes the robot's description and cameras at the first."""
         own = self._robots[context.robot.name]
-        own.context = context
+        own.context, own.is_active = context, True
         if own.topics is None:
             own.topics = RobotTopics(own.node, context.robot, self._frames)
 
@@ -196,8 +197,15 @@ class Bridge(RunVisitor):
         if estimate.localised and now_s >= own.pose_due_s:
             own.pose_due_s = now_s + _POSE_PERIOD_S
             own.pose.put(messages.pose_with_covariance(now_s, context.X_WB(), estimate.covariance))
-        own.driving.tick(context)
-        own.goals.tick(context, now_s, step)
+        if own.is_active:
+            own.driving.tick(context)
+            own.goals.tick(context, now_s, step)
+
+    def mission_ended(self, end: MissionEnd) -> None:
+        """Ends the goals of a robot whose mission has ended."""
+        own = self._robots[end.result.robot_name]
+        own.is_active = False
+        own.goals.end()
 
     def _keep_pace(self, now_s: float) -> None:
         """Waits until the wall clock has come as far as the robot's clock, or a request is in a hurry.

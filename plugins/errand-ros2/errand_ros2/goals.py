@@ -124,6 +124,8 @@ class Goals:
         self, mission: Callable[[str], Mission], server: ActionServer | None, goal: Goal | None, pose: Pose2D | None
     ) -> None:
         """Compiles a goal's mission, and lets it begin in place of the goal before. Raises InputError, ValueError."""
+        if not self._control.state.missions.get(self._name):
+            raise InputError(f"{self._name} has no mission any more", hint="send goals while its mission lasts")
         name = f"ros2 goal {next(self._numbers)}"
         tree, stop = self._compiled(mission(name)), self._compiled(self._mission_of(f"{name} cancelled", _STOP))
         with self._lock:

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import ExitStack
 from types import SimpleNamespace
 
 import numpy as np
@@ -91,6 +92,24 @@ def test_domains_do_not_hear_each_other(router):
         Node(session, "other").subscribe("/alice/chatter", STRING, lambda message: None)
         time.sleep(0.3)
         assert not chatter.is_heard
+
+
+def test_a_client_joins_its_router_again_after_a_restart():
+    place, heard = Place(port=free_port()), []
+    with ExitStack() as first, ExitStack() as client:
+        first.enter_context(open_session(place))
+        node = Node(client.enter_context(open_session(place)), "other")
+        chatter, latched = node.publisher("/chatter", STRING), node.publisher("/map", STRING, LATCHED)
+        latched.put(text("the map"))
+        first.close()
+        with open_session(place) as again:
+            assert again.is_router
+            late = Node(again, "errand")
+            late.subscribe("/chatter", STRING, lambda message: heard.append(message.data))
+            late.subscribe("/map", STRING, lambda message: heard.append(message.data), LATCHED)
+            assert soon(lambda: chatter.is_heard, 20.0)
+            chatter.put(text("hello"))
+            assert soon(lambda: sorted(heard) == ["hello", "the map"])
 
 
 def test_malformed_messages_are_dropped_and_counted(router, other, capfd):

@@ -19,7 +19,7 @@ from ros_client import free_port
 
 from errand_ros2.bridge import Bridge, observe
 from errand_ros2.wire.actions import GoalStatus
-from errand_ros2.wire.keys import LATCHED
+from errand_ros2.wire.keys import LATCHED, Attachment
 from errand_ros2.wire.node import Client, Node
 from errand_ros2.wire.session import Place, open_session
 from errand_ros2.wire.types import older_types, ros_types
@@ -361,8 +361,17 @@ def test_random_bytes_on_every_input_move_nothing(talk, capfd):
         for _ in range(500):
             for key in keys:
                 ros.node.session.inner.put(key, chance.bytes(int(chance.integers(0, 47))))
+        action, base = types.action(NAVIGATE), "/alice/navigate_to_pose/_action"
+        names = {"send_goal": action.send_goal, "cancel_goal": action.cancel_goal, "get_result": action.get_result}
+        attachment = Attachment(1, 2, bytes(16)).encoded()
+        for name, kind in names.items():
+            key = ros.node.key.data_key(f"{base}/{name}", kind.key)
+            for _ in range(60):
+                payload = b"\0\1\0\0" + chance.bytes(int(chance.integers(0, 120)))
+                ros.node.session.inner.get(key, timeout=0.2, payload=payload, attachment=attachment)
         time.sleep(0.5)
         assert ros.still()
+        assert ros.call("pause").success
 
     talk(says)
     assert "Traceback" not in capfd.readouterr().err

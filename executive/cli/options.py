@@ -86,7 +86,7 @@ FOXGLOVE = Annotated[
         help=f"Serve what the log gets live for Foxglove; by default at {_FOXGLOVE_ADDRESS}.",
     ),
 ]
-OBSERVE = Annotated[list[str] | None, grouped(Group.PAGE, "--observe", "--ros2", help="A plug-in joins: NAME[=VALUE].")]
+OBSERVE = Annotated[list[str] | None, grouped(Group.PAGE, "--observe", "--ros2", metavar="NAME", help="Add a plug-in.")]
 
 
 class StartCommand(TyperCommand):

@@ -45,7 +45,7 @@ NAME: Final = "errand"
 """Name of all nodes."""
 _PATH, _OUTCOME = "path", "outcome"
 _TRIGGER: Final = "std_srvs/srv/Trigger"
-_EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "taskChannel", "object_to_detect"})
+_EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
 _DIAGNOSTICS_PERIOD_S, _POSE_PERIOD_S = 1.0, 0.5
 _LATE_S: Final = 0.5

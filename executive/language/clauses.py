@@ -4,7 +4,7 @@ import enum
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from typing import Final
 
@@ -75,12 +75,6 @@ class Clause:
         """Returns whether "then" stands before the clause."""
         return re.search(r"\bthen\b", self.joint, re.IGNORECASE) is not None
 
-    @property
-    def ambiguous(self) -> RefusalError:
-        """Refusal of a cue that several actions could belong to."""
-        said = f"{self.cue} {self.text}".strip()
-        return RefusalError(f"it is not clear which action '{said}' belongs to; say it first", [said])
-
     def missing_action(self, text: str = "") -> RefusalError:
         """Refusal of a condition to which no action belongs."""
         said = f"{self.cue} {text}".strip()
@@ -148,6 +142,7 @@ def leading_cue(text: str) -> Clause | None:
     return None
 
 
+@lru_cache(maxsize=1024)
 def trailing_cue(text: str) -> Clause | None:
     """First cue after an action in a clause, which makes the action conditional or repeated; None if there is none."""
     for at in range(1, len(words_of(text).words)):

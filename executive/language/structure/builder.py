@@ -1,8 +1,10 @@
 """Builds the steps of a mission from the clauses of a sentence."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.language.amounts import parse_seconds, parse_time, parse_times
@@ -48,6 +50,7 @@ class Rounds:
     statement: str | None = None
 
 
+@dataclass
 class Builder:
     """Builder of the steps for clauses. Its methods raise RefusalError for a clause that they cannot build.
 
@@ -57,20 +60,18 @@ class Builder:
     steps of more than plain words.
     """
 
-    def __init__(
-        self,
-        reader: PlainReader,
-        act: Callable[["Builder", Clause], None],
-        clauses: Sequence[Clause],
-        state: State,
-        statement: str | None = None,
-        given: str | None = None,
-    ) -> None:
-        self.reader, self.act, self.state, self.statement, self.given = reader, act, state, statement, given
-        self.clauses, self.steps, self.plain = [*clauses], list[Step](), list[Clause]()
-        self.asked: SpokenCondition | None = None
-        self.at = self.begun = 0
-        self.special = False
+    reader: PlainReader
+    act: Callable[[Builder, Clause], None]
+    clauses: list[Clause]
+    state: State
+    statement: str | None = None
+    given: str | None = None
+    steps: list[Step] = field(default_factory=list)
+    plain: list[Clause] = field(default_factory=list)
+    asked: SpokenCondition | None = None
+    at: int = 0
+    begun: int = 0
+    special: bool = False
 
     def build(self) -> tuple[Steps, State]:
         """Builds the steps of all clauses, in order."""
@@ -91,7 +92,7 @@ class Builder:
         self.flush()
         return tuple(self.steps), self.state
 
-    def _inner(self, clauses: Sequence[Clause], state: State, statement: str | None) -> "Builder":
+    def _inner(self, clauses: Sequence[Clause], state: State, statement: str | None) -> Builder:
         clauses = [replace(one, joint="" if n == 0 else one.joint) for n, one in enumerate(clauses)]
         return Builder(self.reader, self.act, clauses, state, statement, self.given)
 
@@ -243,8 +244,6 @@ class Builder:
 
     def _choose(self, supposed: SpokenCondition, body: Sequence[Clause]) -> None:
         """Adds a choice of two branches, of which the next clause may begin the second."""
-        if not body:
-            raise Clause("", "", cue="if").missing_action(supposed.said)
         then, after = self.nest(body, supposed.holds, supposed)
         otherwise: Steps = ()
         other = supposed.fails
@@ -278,17 +277,17 @@ class Builder:
             return
         if not self.steps[self.begun :] and not (asked and self.steps):
             raise RefusalError(f"'{clause.cue}' refers to nothing that was said before", words)
-        if asked is not None and asked.looked and cue is not Cue.FAILED:
+        looked = asked is not None and asked.looked and cue is not Cue.FAILED
+        body = self.take(clause.text, end_of_scope(self.clauses, self.at, branch=not looked))
+        if not body:
+            raise clause.missing_action()
+        if asked is not None and looked:
             del self.steps[-asked.steps :]
-            supposed = asked if cue is Cue.SO else asked.opposite
-            self._choose(supposed, self.take(clause.text, end_of_scope(self.clauses, self.at)))
+            self._choose(asked if cue is Cue.SO else asked.opposite, body)
             return
         last = self.steps[-1] if self.steps else None
         if cue is Cue.SO or (isinstance(last, Choose | Repeat) and cue is not Cue.FAILED):
             raise RefusalError(f"I do not understand what '{clause.cue}' refers to; say the whole condition", words)
-        body = self.take(clause.text, end_of_scope(self.clauses, self.at, branch=True))
-        if not body:
-            raise clause.missing_action()
         if cue is Cue.NOT and clause.cue.lower() not in ("if not", "if no"):
             if asked is None:
                 raise RefusalError(f"'{clause.cue}' refers to no earlier look", words)
@@ -395,21 +394,18 @@ class Builder:
 
     def _scope(self, clause: Clause, cue: Clause) -> list[Clause]:
         """Clauses that a trailing cue applies to. Raises RefusalError when these are ambiguous."""
-        main = replace(clause, text=cue.before)
         alone = clause.begins or (clause.then and not CHECKS["comes_back"].fullmatch(cue.before))
-        earlier = [] if alone else list(self.plain)
-        start = max((n for n, one in enumerate(earlier) if one.begins or (one.then and n)), default=0)
-        earlier = earlier[start:]
-        if not earlier:
-            if self.steps[self.begun :] and not (clause.begins or clause.then) and not self.plain:
-                raise cue.ambiguous
-            self.flush()
-            return [replace(main, joint="")]
-        self.plain = self.plain[: len(self.plain) - len(earlier)]
+        starts = (n for n, one in enumerate(self.plain) if one.begins or (one.then and n))
+        start = len(self.plain) if alone else max(starts, default=0)
+        earlier, self.plain = self.plain[start:], self.plain[:start]
+        first = not (earlier or self.plain or clause.begins or clause.then)
+        unclear = first and bool(self.steps[self.begun :])
         self.flush()
-        scope = [replace(earlier[0], joint=""), *earlier[1:], main]
-        if not self._read_together(scope, self.state).one_errand:
-            raise cue.ambiguous
+        scope = [*earlier, replace(clause, text=cue.before)]
+        scope[0] = replace(scope[0], joint="")
+        if unclear or (earlier and not self._read_together(scope, self.state).one_errand):
+            said = f"{cue.cue} {cue.text}".strip()
+            raise RefusalError(f"it is not clear which action '{said}' belongs to; say it first", [said])
         return scope
 
 

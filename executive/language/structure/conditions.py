@@ -1,7 +1,7 @@
 """Parses spoken conditions: "there is a beer in the kitchen", "the battery is low"."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
@@ -192,8 +192,9 @@ def _joined(words: str, state: State, reader: PlainReader) -> SpokenCondition | 
     """Joins two conditions by "and" or "or"; if that fails, returns the first question that a half raised, or None."""
     left_open: RefusalError | None = None
     for word, kind in (("and", AllOf), ("or", AnyOf)):
-        for before, after in _halves(words, word):
-            halves = attempt(_both, before, after, state, reader)
+        for joint in re.finditer(rf" {word} (?:if )?(?:that )?", words, re.IGNORECASE):
+            before = re.sub(r"^(?:both |either )", "", words[: joint.start()]).strip(" ,")
+            halves = attempt(_both, before, words[joint.end() :], state, reader)
             if isinstance(halves, RefusalError):
                 left_open = left_open or (halves if halves.question is not None else None)
                 continue
@@ -213,12 +214,6 @@ def _joined(words: str, state: State, reader: PlainReader) -> SpokenCondition | 
     return left_open
 
 
-def _halves(words: str, word: str) -> Iterator[tuple[str, str]]:
-    """Yields the texts before and after each place of a joining word."""
-    for joint in re.finditer(rf" {word} (?:if )?(?:that )?", words, re.IGNORECASE):
-        yield re.sub(r"^(?:both |either )", "", words[: joint.start()]).strip(" ,"), words[joint.end() :]
-
-
 def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[SpokenCondition, SpokenCondition]:
     """Parses two joined conditions; the second may omit words of the first, and the first the place of both."""
     if _JOINED["there"].match(before) and _JOINED["bare"].match(after):
@@ -233,11 +228,7 @@ def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[S
 
 def statement_of_check(text: str) -> str | None:
     """Turns a check into a statement: "is the door open" becomes "the door is open"."""
-    if (checked := CHECKS["checked"].fullmatch(text)) is not None:
-        return checked["what"]
-    if (asked := CHECKS["asked"].fullmatch(text)) is None:
-        return None
-    return f"{asked['subject']} {'are' if asked['subject'].lower() == 'you' else 'is'} {asked['state']}"
+    return None if (match := CHECKS["checked"].fullmatch(text)) is None else match.instead
 
 
 def parse_wait(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
@@ -275,12 +266,9 @@ def parse_wait(text: str, known: Callable[[], State], reader: PlainReader) -> Do
 
 def _gone(where: str, state: State, reader: PlainReader) -> Done:
     """Adds the drive to the place of a wait."""
-    if _WAITING["here"].fullmatch(where):
-        return (), state
-    match = _WAITING["place"].fullmatch(where)
-    if match is None:
+    if (match := _WAITING["place"].fullmatch(where or "here")) is None:
         raise RefusalError(f"I do not understand where to wait: '{where}'", [where])
-    if match["there"] and state.goal is not None and state.at is not None:
+    if match["here"] or (match["there"] and state.goal is not None and state.at is not None):
         return (), state
     reading = reader.go_to(match["place"] or "there", state)
     return steps_of_commands(reading.commands), reading.state

@@ -27,7 +27,7 @@ from skills.api import ObjectKind
 
 _LEFT_OUT: Final = frozenset({"not", "n't", "but", "except", "instead", "rather", "neither", "nor"})
 _DENIALS: Final = page("denials")
-SEES: Final = "I can see whether something or somebody is somewhere"
+_SEES: Final = "I can see whether something or somebody is somewhere"
 T = TypeVar("T")
 
 
@@ -227,11 +227,11 @@ class PlainReader:
     ) -> SpokenCondition:
         """Condition of the looks that given items ask for; `text` is the full text."""
         reading = attempt(self.commands_from_items, [self._by_name(item, state) for item in items], state, tokens)
-        if isinstance(reading, RefusalError) and reading.kind is not RefusalKind.NOT_UNDERSTOOD:
-            raise reading
-        commands = () if isinstance(reading, RefusalError) else reading.commands
-        if isinstance(reading, RefusalError) or {command.task for command in commands} != {Task.FIND}:
-            raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text])
+        unseen = RefusalError(f"I cannot see whether '{text}'; {_SEES}", [text])
+        if isinstance(reading, RefusalError):
+            raise unseen if reading.kind is RefusalKind.NOT_UNDERSTOOD else reading
+        if {command.task for command in reading.commands} != {Task.FIND}:
+            raise unseen
         if any(action.choices for action in reading.trace.actions):
             raise RefusalError(f"I cannot tell which one '{text}' means; name one", [text])
         there = replace(state, goal=reading.state.goal, at=reading.state.at)

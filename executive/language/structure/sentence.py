@@ -367,9 +367,8 @@ def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, mem
     if len(clauses) > MOST_CLAUSES:
         raise RefusalError(f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most")
     assert pipeline.knowledge is not None
-    builder = Builder(
-        PlainReader(pipeline, pipeline.knowledge), act, clauses, State.initial(pipeline.knowledge, memory)
-    )
+    reader, begin = PlainReader(pipeline, pipeline.knowledge), State.initial(pipeline.knowledge, memory)
+    builder = Builder(reader, act, [*clauses], begin)
     steps, state = builder.build()
     if all(isinstance(step, Do) for step in steps) and not builder.special:
         return plain

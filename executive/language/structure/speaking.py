@@ -27,7 +27,7 @@ _ANSWERS: Final[dict[Cue | None, str]] = {Cue.SO: "yes", Cue.NOT: "no", Cue.OTHE
 
 def says(row: Builder, clause: Clause) -> bool:
     """Adds speech, behind the drive to the listener."""
-    text, found = clause.text, trailing_cue(clause.text)
+    text = clause.text
     if (match := SPEECH["tells_when"].fullmatch(text)) is not None:
         row.flush()
         statement = parse_condition(match["what"], row.state, row.reader).statement
@@ -41,6 +41,7 @@ def says(row: Builder, clause: Clause) -> bool:
     if (everywhere := ROOMS["says_everywhere"].fullmatch(text)) is not None:
         say_in_each_room(row, everywhere["said"])
         return True
+    found = trailing_cue(text)
     counts = found is not None and found.kind in (Cue.TIMES, Cue.EVERY) and found.text
     if found is not None and (not counts or re.match(r"for|until|every", found.text)):
         row.modify(clause, found)  # unless it is a part of what is said
@@ -111,6 +112,7 @@ def _words(match: Match, intent: str, parser: DependencyParser) -> str:
     if intent == "formula" or not said:
         return said
     clause = intent != "tells" and is_clause(said, parser)
+    nothing = SPEECH["nothing"].fullmatch(said) is not None
     if intent in ("says_to", "says"):
         whom = SPEECH["whom"].fullmatch(said)
         if whom is not None and (not clause or whom["human"]):
@@ -123,13 +125,13 @@ def _words(match: Match, intent: str, parser: DependencyParser) -> str:
         when = SPEECH["adverbial"].fullmatch(said)
         if when is not None and is_clause(when["told"], parser):
             raise RefusalError(f"I tell it as soon as I am there, not {when['when']!r}", [when["when"]])
-        if SPEECH["greetings"].fullmatch(said) is None and (match["speaker"] or not clause):
+        if SPEECH["greetings"].fullmatch(said) is None and (match["speaker"] or nothing or not clause):
             raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
     inner = None if intent in ("says_to", "says") else CLAUSES["deictic"].search(said) or SPEECH["inner"].search(said)
     if inner is not None:
         meant = "would mean somebody or something else"
         raise RefusalError(f"I cannot say '{said}' for you: '{inner.text}' {meant}", [said])
-    if SPEECH["nothing"].fullmatch(said) is not None:
+    if nothing:
         raise RefusalError(f"what am I to say? '{said}' says nothing", [said])
     return said.strip(" ,.'\"")
 

@@ -242,13 +242,13 @@ class Builder:
                 return
         self._choose(supposed.opposite if clause.kind is Cue.UNLESS else supposed, body)
 
-    def _choose(self, supposed: SpokenCondition, body: Sequence[Clause]) -> None:
-        """Adds a choice of two branches, of which the next clause may begin the second."""
+    def _choose(self, supposed: SpokenCondition, body: Sequence[Clause], more: tuple[Cue, ...] = ()) -> None:
+        """Adds a choice of two branches, of which the next clause may begin the second, also with one of the cues."""
         then, after = self.nest(body, supposed.holds, supposed)
         otherwise: Steps = ()
         other = supposed.fails
         second = self.clauses[self.at] if self.at < len(self.clauses) else None
-        if second is not None and second.kind in (Cue.OTHERWISE, Cue.NOT, Cue.SO):
+        if second is not None and second.kind in (Cue.OTHERWISE, Cue.NOT, Cue.SO, *more):
             if second.kind is Cue.SO and all(one.kind is not Cue.NOT for one in self.clauses[: self.at]):
                 raise RefusalError(f"I do not understand '{second.cue}' here", [second.cue])
             self.at += 1
@@ -390,7 +390,7 @@ class Builder:
         if cue.kind is Cue.IF:
             begun = replace(begun, memory=replace(begun.memory, locations=supposed.holds.memory.locations))
         both = supposed.negate(supposed.said) if cue.kind is Cue.UNLESS else supposed
-        self._choose(replace(both, holds=begun), scope)
+        self._choose(replace(both, holds=begun), scope, (Cue.FAILED,))
 
     def _scope(self, clause: Clause, cue: Clause) -> list[Clause]:
         """Clauses that a trailing cue applies to. Raises RefusalError when these are ambiguous."""

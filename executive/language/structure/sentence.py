@@ -124,16 +124,16 @@ def _brings_to_everyone(row: Builder, clause: Clause) -> bool:
 
     Raises RefusalError when no room is named, no known person is there, or there is only one such object.
     """
-    if ROOMS["gives"].match(clause.text) is None or ROOMS["everyone"].search(clause.text) is None:
+    text, group = clause.text, ROOMS["everyone"].search(clause.text)
+    if group is None or ROOMS["gives"].match(text) is None:
         return False
     state, knowledge = row.known(), row.reader.knowledge
-    actions = row.reader.read(state, clause.text, upto="understanding", elliptic=True).trace.actions
-    goals = (one.goal for one in actions if one.goal is not None and one.goal.phrase is not None)
-    to = next((goal for goal in goals if ROOMS["everyone"].fullmatch(goal.phrase.spoken if goal.phrase else "")), None)
-    if to is None or to.phrase is None:
+    actions = row.reader.read(state, text, upto="understanding", elliptic=True).trace.actions
+    goals = ((one.goal, one.goal.phrase.spoken) for one in actions if one.goal and one.goal.phrase)
+    to, who = next(((goal, said) for goal, said in goals if ROOMS["everyone"].fullmatch(said)), (None, ""))
+    if to is None:
         return False
-    who, place = to.phrase.spoken, to.within
-    if place is None or place.phrase is None:
+    if (place := to.within) is None or place.phrase is None:
         raise RefusalError(f"I bring objects to one person at a time, not to {who}; name one, or a room", [who])
     room = row.reader.room(place.phrase.spoken, state)
     people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
@@ -141,8 +141,8 @@ def _brings_to_everyone(row: Builder, clause: Clause) -> bool:
         raise RefusalError(f"I know nobody in the {room} to bring anything to: {who}", [who])
     if any(not phrase.indefinite for action in actions for phrase in action.objects):
         raise RefusalError(f"there is only one of it, and I cannot bring it to {who}; name one person", [who])
-    each = [re.sub(re.escape(who), name, clause.text, count=1) for name in people]
-    row.clauses[row.at : row.at] = [Clause(". ", text) for text in each]
+    each = [f"{text[: group.start]}{name}{text[group.end :]}" for name in people]
+    row.clauses[row.at : row.at] = [Clause(". ", said) for said in each]
     row.special = True
     return True
 

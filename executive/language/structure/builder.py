@@ -321,7 +321,8 @@ class Builder:
             return parse_condition(cue.text, state, self.reader)
         every_s, times = parse_seconds(cue.amount), parse_times(cue.amount)
         if cue.amount and every_s is None and times is None:
-            raise RefusalError(f"'{cue.cue}' is no time or number of times that I understand", [cue.cue])
+            what = "number of times" if cue.kind is Cue.TIMES else "time"
+            raise RefusalError(f"'{cue.cue}' is no {what} that I understand", [cue.cue])
         if cue.kind is Cue.EVERY and every_s:  # "for an hour" and "until three" may stand behind
             times = parse_times(cue.text)
             if (match := CHECKS["for_span"].fullmatch(cue.text)) is not None:

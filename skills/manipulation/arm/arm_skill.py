@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar, TypeVar
 
 import numpy as np
@@ -13,6 +13,7 @@ from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.forces import held_mass_kg
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
+from skills.manipulation.arm.motion import GripperTurn
 from skills.manipulation.arm.poses import carry_configuration, hangs_below
 from skills.manipulation.arm.solid_cells import Outline, OwnSpace, solid_boxes, wall_boxes
 from skills.robot import ArmCapabilities, ArmTrajectory, CommandId, FloatArray, GripperCapabilities
@@ -39,10 +40,6 @@ SHUT_RAD = 0.02
 """Opening below which the fingers may meet each other before an object that is in the hollow behind their tips."""
 _PADDING_M = 0.01
 """Distance that the arm keeps from boxes."""
-_GRIPPER_TURN_S = 1.6
-"""Time in which the gripper has turned."""
-_CHECKED_SAMPLE = 3
-"""Number of samples of the arm's trajectory between two checks while the gripper turns."""
 _BEYOND_M = 0.5
 """Length of the hand and the held object beyond the arm's reach."""
 _OUTLINE_MARGIN_M = 0.05
@@ -50,40 +47,6 @@ _STOWED_RAD = 0.05
 """Joints no farther from the stowed configuration than this are stowed."""
 _OPEN_RAD = 0.05
 """An opening beyond this is closed before the arm is stowed."""
-
-
-@dataclass(frozen=True)
-class GripperTurn:
-    """Motion of the gripper between two openings while the arm moves."""
-
-    start: float
-    end: float
-
-    @property
-    def closes(self) -> bool:
-        """Returns whether the gripper ends narrower than it began."""
-        return self.end < self.start
-
-    @property
-    def narrow(self) -> float:
-        """The narrower opening, with which the arm's motion is planned."""
-        return max(0.0, min(self.start, self.end))
-
-    def begins_s(self, scene: ArmScene, trajectory: ArmTrajectory) -> float | None:
-        """Time (s) on a trajectory from which on the wide gripper is free of contact; None when there is none."""
-        scene.set_opening(max(self.start, self.end))
-        times_s = trajectory.times_s
-        if self.closes:
-            wide = trajectory.positions_rad[times_s <= _GRIPPER_TURN_S]
-            return 0.0 if scene.path_free(wide[::_CHECKED_SAMPLE]) else None
-        begin_s = None
-        for time_s, q_rad in zip(
-            times_s[::-_CHECKED_SAMPLE], trajectory.positions_rad[::-_CHECKED_SAMPLE], strict=True
-        ):
-            if times_s[-1] - time_s > _GRIPPER_TURN_S or not scene.free(q_rad):
-                break
-            begin_s = float(time_s)
-        return begin_s
 
 
 class ArmSkill(RoutineSkill[InputsT]):

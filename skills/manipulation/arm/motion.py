@@ -30,6 +30,10 @@ _ESCAPES = (1.0, 2.0, 4.0, 8.0)
 """Factors by which the turns out of contact grow."""
 _PARTS_OF_ESCAPE = (0.25, 0.5, 0.75)
 """Parts of such a turn at which contact is checked."""
+_GRIPPER_TURN_S = 1.6
+"""Time in which the gripper has turned."""
+_CHECKED_SAMPLE = 3
+"""Number of samples of the arm's trajectory between two checks while the gripper turns."""
 _ONE_AT_A_TIME: Final = threading.Lock()
 """Lock of OMPL's random generator, which all threads of the process share."""
 
@@ -244,3 +248,37 @@ def _times(dense_rad: FloatArray, speed_rad_s: float, acceleration_rad_s2: float
     speeds = np.sqrt(limit)
     durations = 2.0 * steps / np.maximum(speeds[:-1] + speeds[1:], 1e-3)
     return np.concatenate([[0.0], np.cumsum(durations)])
+
+
+@dataclass(frozen=True)
+class GripperTurn:
+    """Motion of the gripper between two openings while the arm moves."""
+
+    start: float
+    end: float
+
+    @property
+    def closes(self) -> bool:
+        """Returns whether the gripper ends narrower than it began."""
+        return self.end < self.start
+
+    @property
+    def narrow(self) -> float:
+        """The narrower opening, with which the arm's motion is planned."""
+        return max(0.0, min(self.start, self.end))
+
+    def begins_s(self, scene: ArmScene, trajectory: ArmTrajectory) -> float | None:
+        """Time (s) on a trajectory from which on the wide gripper is free of contact; None when there is none."""
+        scene.set_opening(max(self.start, self.end))
+        times_s = trajectory.times_s
+        if self.closes:
+            wide = trajectory.positions_rad[times_s <= _GRIPPER_TURN_S]
+            return 0.0 if scene.path_free(wide[::_CHECKED_SAMPLE]) else None
+        begin_s = None
+        for time_s, q_rad in zip(
+            times_s[::-_CHECKED_SAMPLE], trajectory.positions_rad[::-_CHECKED_SAMPLE], strict=True
+        ):
+            if times_s[-1] - time_s > _GRIPPER_TURN_S or not scene.free(q_rad):
+                break
+            begin_s = float(time_s)
+        return begin_s

@@ -11,10 +11,12 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.kinematics import arm_model
-from skills.robot import ArmCapabilities, Capabilities, FloatArray, GripperCapabilities, Mount
+from skills.robot import ArmCapabilities, Capabilities, FloatArray, GripperCapabilities, GripperKind, Mount
 from skills.world_model import PlanningError
 
 UP_B = np.array([0.0, 0.0, 1.0])
+_HALF_OPEN_M = 0.05
+"""Gap between the jaws of a hinged gripper at which its moving finger reaches farthest."""
 _FOREARM_ROLL = 3
 """Joint whose turn costs twice as much as another's, in the choice among viewing configurations."""
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
@@ -246,3 +248,11 @@ def _in_view(points_C: FloatArray) -> NDArray[np.bool_]:
     """Mask (N,) of the points (3, N) in the camera frame that are in a wide field of view."""
     x, y, z = points_C
     return np.asarray(np.hypot(x, y) < _WIDE * z + _THICK_M)
+
+
+def finger_sweep_m(X_BH: RigidTransform, X_WB: RigidTransform, gripper: GripperCapabilities) -> float:
+    """Depth (m) by which a hinged finger passes below the fixed one's tip while it opens or closes; else 0."""
+    if gripper.kind is not GripperKind.HINGED:
+        return 0.0
+    up_H = (X_WB @ X_BH).rotation().matrix()[2]
+    return max(0.0, -float(up_H @ [gripper.tip_x_m - gripper.fixed_tip_x_m, 0.0, _HALF_OPEN_M]))

@@ -283,13 +283,14 @@ def others_first(
     centre_B: tuple[float, float],
     X_WB: RigidTransform,
 ) -> list[GraspCandidate]:
-    """Returns the candidates in their order, with those like a tried grasp last."""
+    """Returns the candidates in their order, those like tried grasps last, without those like the last two tries."""
 
-    def was_tried(candidate: GraspCandidate) -> bool:
+    def equal_tries(candidate: GraspCandidate) -> list[bool]:
         now = tried_grasp(candidate, centre_B, X_WB)
-        return any(same_grasp(now, before) for before in tried)
+        return [same_grasp(now, before) for before in tried]
 
-    return sorted(candidates, key=was_tried)
+    equal = [(sum(tries), number, tries) for number, tries in enumerate(map(equal_tries, candidates))]
+    return [candidates[number] for _, number, tries in sorted(equal) if len(tries) < 2 or not all(tries[-2:])]
 
 
 def same_grasp(one: TriedGrasp, other: TriedGrasp) -> bool:

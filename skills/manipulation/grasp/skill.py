@@ -13,6 +13,7 @@ from skills.api import Cause, ObjectObservation, PlanningError, Succeeded
 from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, GRIPPER_FORCE_N, SHUT_RAD
 from skills.manipulation.arm.collision import ArmScene, box_corners
 from skills.manipulation.arm.held_object import held_box, square_hand_pose
+from skills.manipulation.arm.poses import finger_sweep_m
 from skills.manipulation.grasp.candidates import (
     THIN_M,
     GraspCandidate,
@@ -38,6 +39,8 @@ _MOST_OF_FORCE = 0.95
 """Largest force of a grip, as a fraction of the gripper's limit."""
 _PER_LEVER_N_M = 400.0
 """Additional force per metre between the grip and the centre of mass; the tips would press a thin object out."""
+_THIN_N = 20.0
+"""Force on a thin object; rounded fingertips press it out with more."""
 _RELAX_M = 0.002
 """Height by which fingers on the surface rise before they close."""
 _RELAX_THIN_M = 0.0005
@@ -257,10 +260,11 @@ class Grasp(CloseLookingSkill[GraspInputs]):
     def _plan(self, view: CloseView, name: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
         """Plans a grasp and opens the gripper for it. Raises SkillFailure with cause PLANNING when none is feasible."""
         self.boxes = view.boxes
-        candidates = self.context.stack.grasp_planner.candidates(view.target, self.model.p_BS, self.gripper)
-        candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
+        every = self.context.stack.grasp_planner.candidates(view.target, self.model.p_BS, self.gripper)
+        candidates = others_first(every, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
-            raise SkillFailure(Cause.PLANNING, why_no_candidates(view.target, self.model.p_BS, self.gripper, name))
+            why = why_no_candidates(view.target, self.model.p_BS, self.gripper, name)
+            raise SkillFailure(Cause.PLANNING, f"the {name} offers no other hold than the last two" if every else why)
         *first, last = openings(candidates, self.gripper)
         scene_now, q, stack, seen = self.scene_now(), self.q_rad(), self.context.stack, self.seen_boxes()
         boxes, reach_m = (*view.boxes, *seen), self.arm.max_reach_m
@@ -298,12 +302,13 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", self.contact_guard(ahead))
         if touched:
             self._check_reached(plan.candidate.X_BH, name)
-        relax_m = _RELAX_M if view.target.height_m > THIN_M else _RELAX_THIN_M
+        thin, sweep_m = view.target.height_m <= THIN_M, finger_sweep_m(plan.candidate.X_BH, self.X_WB(), self.gripper)
+        relax_m = _RELAX_THIN_M if thin else max(_RELAX_M, sweep_m)
         yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
         X_BH = self.model.X_BH(self.q_rad())
         self.context.payload.kind = seen.kind
-        lever_m = plan.candidate.lever_m if view.target.height_m > THIN_M else 0.0
-        force_n = self.options.force_n + _PER_LEVER_N_M * lever_m
+        lever_m = 0.0 if thin else plan.candidate.lever_m
+        force_n = _THIN_N if thin else self.options.force_n + _PER_LEVER_N_M * lever_m
         yield from self.move_gripper(0.0, self._grip_n(force_n, least_kg), f"closing on the {name}")
         yield from self.pause(_FEEL_S, f"closing on the {name}")
         felt = self.context.robot.gripper()

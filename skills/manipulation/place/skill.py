@@ -19,7 +19,7 @@ from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, Goal
 from skills.manipulation.arm.collision import ArmScene, box_corners
 from skills.manipulation.arm.held_object import HeldObject, held_object
 from skills.manipulation.arm.looking_skill import PICTURE_LATENCY_S
-from skills.manipulation.arm.poses import UP_B, tucked_configuration
+from skills.manipulation.arm.poses import UP_B, finger_sweep_m, tucked_configuration
 from skills.manipulation.arm.solid_cells import cell_centres
 from skills.manipulation.grasp.reach import body_heights_m
 from skills.manipulation.place.bin import BinPlacement
@@ -64,6 +64,8 @@ _OTHER_HEIGHT_COST = 0.05
 """Cost of a body height for each step from the usual one."""
 _RELAX_M = 0.003
 """Distance by which the arm is raised after contact."""
+_LOW_TIP_M = 0.02
+"""Height of a fingertip over the surface below which a finger that opens would sweep over the surface."""
 _FEEL_S = 0.4
 """Pause for the gripper's readings of the held object."""
 _FLOOR_M = 0.06
@@ -410,7 +412,11 @@ class Place(BinPlacement[PlaceInputs]):
         if not stopped:
             stopped = yield from self._press_down(message)
         if stopped:
-            yield from self.try_shift_hand(_RELAX_M * UP_B, message)
+            X_BH = self.model.X_BH(self.q_rad())
+            tip_m = float((self.X_WB() @ X_BH @ [self.gripper.fixed_tip_x_m, 0.0, self.gripper.fixed_z_m])[2])
+            low = tip_m < surface.height_m + _LOW_TIP_M
+            sweep_m = finger_sweep_m(X_BH, self.X_WB(), self.gripper) if low else 0.0
+            yield from self.try_shift_hand(max(_RELAX_M, sweep_m) * UP_B, message)
 
     def _press_down(self, message: str) -> Routine[bool]:
         """Presses the object slowly down; returns whether contact stopped it. Fails when no line is feasible."""

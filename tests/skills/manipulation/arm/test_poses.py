@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform
+from pydrake.common.eigen_geometry import AngleAxis
+from pydrake.math import RigidTransform, RotationMatrix
 
 from plant.robots.fetch.kind import FETCH
 from plant.robots.spot.kind import spot_capabilities
@@ -11,6 +12,7 @@ from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.arm.poses import (
     carry_configuration,
+    finger_sweep_m,
     hand_rotation,
     overview_viewpoints,
     tucked_configuration,
@@ -23,6 +25,21 @@ FETCH_MODEL, LIFT = (
     arm_model(CAPABILITIES),
     {CAPABILITIES.lift_joint: CAPABILITIES.standing_height_m - CAPABILITIES.height_range_m[0]},
 )
+
+
+# tilt of the fingers, lean towards the fixed finger (degrees) -> depth of the moving finger's sweep (mm)
+@pytest.mark.parametrize(("tilt_deg", "lean_deg", "sweep_mm"), [(90, 0, 9.0), (90, 6, 3.7), (90, 14, 0.0), (0, 0, 0.0)])
+def test_finger_sweeps_below_the_fixed_one_unless_the_hand_leans(tilt_deg, lean_deg, sweep_mm):
+    R_BH = hand_rotation(np.radians(tilt_deg), 0.0, 1.0)
+    leaning = R_BH @ RotationMatrix(AngleAxis(-np.radians(lean_deg), np.array([0.0, 1.0, 0.0])))
+    spot = spot_capabilities().gripper
+    swept_m = finger_sweep_m(RigidTransform(leaning, np.zeros(3)), RigidTransform(), spot)
+    assert 1e3 * swept_m == pytest.approx(sweep_mm, abs=0.2)
+
+
+def test_two_moving_fingers_sweep_over_no_surface():
+    down = RigidTransform(hand_rotation(0.5 * np.pi, 0.0, 1.0), np.zeros(3))
+    assert finger_sweep_m(down, RigidTransform(), CAPABILITIES.gripper) == 0.0
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])

@@ -21,6 +21,15 @@ def candidates():
     return grasp_candidates(Target(points, CENTRE, 0.0, 0.2, 0.03, 0.03, 0.2, False), MODEL.p_BS, GRIPPER)
 
 
+def _unlike(first, found, X_WB):
+    """The first grasps that are unlike a first one and each other, as tried grasps."""
+    unlike = [tried_grasp(first, CENTRE, X_WB)]
+    for each in (tried_grasp(candidate, CENTRE, X_WB) for candidate in found):
+        if len(unlike) < 3 and not any(same_grasp(each, one) for one in unlike):
+            unlike.append(each)
+    return unlike[1:]
+
+
 def test_the_best_grasp_falls_behind_all_that_are_unlike_it():
     found, X_WB = candidates(), RigidTransform()
     tried = (tried_grasp(found[0], CENTRE, X_WB),)
@@ -35,10 +44,20 @@ def test_without_tried_grasps_the_order_stays():
     assert others_first(found, (), CENTRE, RigidTransform()) == found
 
 
-def test_when_all_were_tried_the_best_comes_first_again():
+def test_grasps_tried_twice_fall_behind_those_tried_once():
     found, X_WB = candidates(), RigidTransform()
-    tried = tuple(tried_grasp(candidate, CENTRE, X_WB) for candidate in found)
-    assert others_first(found, tried, CENTRE, X_WB) == found
+    once, other, twice = (tried_grasp(found[0], CENTRE, X_WB), *_unlike(found[0], found, X_WB))
+    ordered = others_first(found, (once, twice, other, twice), CENTRE, X_WB)
+    same = [[same_grasp(tried_grasp(each, CENTRE, X_WB), one) for one in (once, twice)] for each in ordered]
+    assert same.index([True, False]) < same.index([False, True])
+
+
+def test_three_equal_grasps_never_follow_each_other():
+    found, X_WB = candidates(), RigidTransform()
+    tried = (tried_grasp(found[0], CENTRE, X_WB),) * 2
+    left = others_first(found, tried, CENTRE, X_WB)
+    assert left and not any(same_grasp(tried_grasp(each, CENTRE, X_WB), tried[0]) for each in left)
+    assert others_first(found[:1], tried, CENTRE, X_WB) == []
 
 
 def test_a_grasp_is_known_again_from_where_the_body_stands_later():

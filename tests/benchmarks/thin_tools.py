@@ -19,7 +19,7 @@ from executive.app.prepare.placed_robots import only_robot
 from executive.app.runs.simulated import simulate
 from executive.run.worker import LockStepWorker
 from plant.worlds.seeding import place_objects
-from skills.api import Running, SkillContext, Succeeded
+from skills.api import TOUCHES, Running, SkillContext, Succeeded
 from skills.manipulation.grasp.candidates import same_grasp
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
 from skills.manipulation.posture import Stow, StowInputs
@@ -58,12 +58,16 @@ class Bench:
             worker=LockStepWorker(self.clock),
             localiser=place,
             costmap=BlockCostmap(),
-            publish=lambda topic, message: None,
+            publish=self._publish,
             seed=seed,
             detector=PlainColours(MappingProxyType({})),
         )
         self.mistaken_s = Counter()
         self.longest_s = Counter()
+
+    def _publish(self, topic, message):
+        if topic == TOUCHES:
+            self.simulation.referee.expect_touch(ROBOT, message["until_s"])
 
     def _start(self, p_W):
         """Pose before the table's front, the tool ahead."""

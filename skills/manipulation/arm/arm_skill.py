@@ -28,7 +28,7 @@ LINE_SPEED_RAD_S = 0.6
 CARRY_SPEED_RAD_S = 0.9
 GRIPPER_EXPIRY_S, GRIPPER_FORCE_N = 4.0, 20.0
 """Expiry of a gripper's command; force with which an empty gripper opens and closes."""
-CONTACT_LAG_M = 0.004
+CONTACT_LAG_M = 0.0035
 """Lag of a slow hand that means contact; a free hand lags by at most 2 mm (measured in the plant)."""
 WEIGHING_S, FEELING_S = 0.3, (0.5, 4.0)
 """Time over which weighing averages the noise of the readings; least and most time to feel a thin object's weight."""

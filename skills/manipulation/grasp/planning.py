@@ -35,6 +35,8 @@ _LIFT_STEP_M = 0.01
 """Distance between the checks of a lift."""
 _LIFT_MARGIN_M = 0.002
 """Least gap between the lifted object and an obstacle."""
+_DOWN = 0.8
+"""Vertical component of a direction that counts as down."""
 _LEVEL = 0.5
 """Horizontal component of the fingers' direction below which they point down."""
 _ALIKE_RAD = 0.3
@@ -103,15 +105,16 @@ class GeometricGraspPlanner:
     """Plans grasps from the object's outline: selects the first candidate that the arm can reach, approach and lift.
 
     `padding_m` and `final_padding_m`: clearance of the hand from obstacles on its path, and on the straight approach.
-    `approach_rad_s` and `last_rad_s`: joint speed limits on the approach, and on its last stretch. `beside_fixed_m` and
-    `beside_fixed_low_m`: gap at the fixed finger, and the gap for low objects, which would stop a finger that lands on
-    them.
+    `approach_rad_s` and `last_rad_s`: joint speed limits on the approach, and on its last stretch; `touch_rad_s` on a
+    last stretch down to a surface. `beside_fixed_m` and `beside_fixed_low_m`: gap at the fixed finger, and the gap for
+    low objects, which would stop a finger that lands on them.
     """
 
     padding_m: Margin = 0.01
     final_padding_m: Margin = 0.002
     approach_rad_s: TurnRate = 0.5
     last_rad_s: TurnRate = 0.15
+    touch_rad_s: TurnRate = 0.06
     beside_fixed_m: Margin = 0.010
     beside_fixed_low_m: Margin = 0.017
 
@@ -140,7 +143,9 @@ class GeometricGraspPlanner:
                 reasons.append(str(error))
                 continue
             to_grasp = arm_planner.trajectory(approach[:-_SLOW_POINTS], speed_rad_s=self.approach_rad_s)
-            last_bit = arm_planner.trajectory(approach[-_SLOW_POINTS - 1 :], speed_rad_s=self.last_rad_s)
+            down = float(candidate.X_BH.rotation().matrix()[2, 0]) < -_DOWN
+            last_rad_s = self.touch_rad_s if down else self.last_rad_s
+            last_bit = arm_planner.trajectory(approach[-_SLOW_POINTS - 1 :], speed_rad_s=last_rad_s)
             return GraspPlan(candidate, arm_planner.trajectory(path, scene=scene), to_grasp, last_bit, lift_B)
         if reasons and set(reasons) == {_OUT_OF_REACH}:
             raise PlanningError(_out_of_reach(scene.model, around))

@@ -30,7 +30,7 @@ from skills.manipulation.grasp.reach import heights_to_grasp, openings, passing,
 from skills.manipulation.grasp.servo import Aim, aim_approach, measure_shift
 from skills.quantities import Force, Length, Margin, Turn
 from skills.robot import FloatArray, GripperKind
-from skills.routine import Routine, SkillFailure
+from skills.routine import PlanningAttempt, Routine, SkillFailure
 from skills.world_model import IN_THE_WAY
 
 _PER_KG_N = 12.0
@@ -45,6 +45,10 @@ _RELAX_M = 0.002
 """Height by which fingers on the surface rise before they close."""
 _RELAX_THIN_M = 0.0005
 """The same for an object that is thinner than `THIN_M`."""
+_NEARBY_M = 0.02
+"""Space between fingers and a thin object before they go down once more, since the moving finger reaches lower then."""
+_CLEAR_M = 0.002
+"""Clearance of a finger that sweeps over the surface."""
 _SHORT_M = 0.025
 """Distance from the grasp beyond which a contact of the hand is not with the surface below the object."""
 _FEEL_M = 0.014
@@ -303,8 +307,12 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         if touched:
             self._check_reached(plan.candidate.X_BH, name)
         thin, sweep_m = view.target.height_m <= THIN_M, finger_sweep_m(plan.candidate.X_BH, self.X_WB(), self.gripper)
-        relax_m = _RELAX_THIN_M if thin else max(_RELAX_M, sweep_m)
+        relax_m = max(_RELAX_M, sweep_m + _CLEAR_M)
         yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
+        if thin and self.gripper.kind is GripperKind.HINGED:
+            nearby = self.gripper.opening_for(plan.candidate.width_m + _NEARBY_M)
+            yield from self.move_gripper(nearby, GRIPPER_FORCE_N, f"closing on the {name}")
+            yield from self._to_the_ground(ahead, False, _RELAX_THIN_M, f"closing on the {name}")
         X_BH = self.model.X_BH(self.q_rad())
         self.context.payload.kind = seen.kind
         lever_m = 0.0 if thin else plan.candidate.lever_m
@@ -353,8 +361,9 @@ class Grasp(CloseLookingSkill[GraspInputs]):
     def _to_the_ground(self, ahead_B: FloatArray, touched: bool, relax_m: float, message: str) -> Routine[None]:
         """Lowers downward fingers onto the surface, whose height is known only to a few millimetres."""
         if not touched and ahead_B @ up_B(self.X_WB()) < -_DOWN:
-            with suppress(PlanningError):
+            with PlanningAttempt() as attempt:
                 touched = yield from self.press(_FEEL_M * ahead_B, ahead_B, _FEEL_RAD_S, message)
+            touched = touched or attempt.failure is not None  # the surface may be just below
         if touched:
             yield from self.try_shift_hand(-relax_m * ahead_B, message)
 

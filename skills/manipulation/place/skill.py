@@ -65,7 +65,9 @@ _OTHER_HEIGHT_COST = 0.05
 _RELAX_M = 0.003
 """Distance by which the arm is raised after contact."""
 _LOW_TIP_M = 0.02
-"""Height of a fingertip over the surface below which a finger that opens would sweep over the surface."""
+"""Height of a fingertip over the object's lowest point below which it may touch the surface."""
+_TIPS_RAD_S = 0.05
+"""Joint speed limit while low fingertips near the surface."""
 _FEEL_S = 0.4
 """Pause for the gripper's readings of the held object."""
 _FLOOR_M = 0.06
@@ -162,7 +164,7 @@ class Place(BinPlacement[PlaceInputs]):
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist(), "kind": None if kind is None else kind.name}
         held_kg = yield from self.weigh(self.p_HT, f"weighing the object over the {surface.name}")
         self.context.expect_touch(_TOUCH_S)
-        yield from self._lower(surface, above)
+        yield from self._lower(surface, above, held)
         put_down = held.box(self.model.X_BH(self.q_rad()))
         yield from self.let_go(held_kg)
         self.context.expect_touch(0.0)
@@ -398,7 +400,7 @@ class Place(BinPlacement[PlaceInputs]):
                 raise
         return (yield from self.move_to(lambda scene, q: found[0], message, speed_rad_s=0.8))
 
-    def _lower(self, surface: Surface, above: PrePlacePose) -> Routine[None]:
+    def _lower(self, surface: Surface, above: PrePlacePose, held: HeldObject) -> Routine[None]:
         """Lowers the object until contact stops the hand, or to the height of the surface.
 
         The path down begins at its planned angles, not at the arm's present ones: near a singular posture their small
@@ -409,22 +411,22 @@ class Place(BinPlacement[PlaceInputs]):
         p_BH = self.model.X_BH(above.q_rad).translation() - (above.height_m - _SURELY_FREE_M) * UP_B
         early = self.contact_guard(-UP_B, _LAG_IN_CONTACT_M)
         stopped = yield from self.move_straight(p_BH, message, q_from_rad=above.q_rad, guard=early)
+        X_BH, gripper = self.model.X_BH(self.q_rad()), self.gripper
+        tip_B = X_BH.rotation() @ np.array([gripper.fixed_tip_x_m, 0.0, gripper.fixed_z_m])
+        low = held.drop_m(X_BH.rotation()) + float(tip_B[2]) < _LOW_TIP_M
         if not stopped:
-            stopped = yield from self._press_down(message)
+            stopped = yield from self._press_down(message, _TIPS_RAD_S if low else self.options.lower_rad_s)
         if stopped:
-            X_BH = self.model.X_BH(self.q_rad())
-            tip_m = float((self.X_WB() @ X_BH @ [self.gripper.fixed_tip_x_m, 0.0, self.gripper.fixed_z_m])[2])
-            low = tip_m < surface.height_m + _LOW_TIP_M
-            sweep_m = finger_sweep_m(X_BH, self.X_WB(), self.gripper) if low else 0.0
+            sweep_m = finger_sweep_m(X_BH, self.X_WB(), gripper) if low else 0.0
             yield from self.try_shift_hand(max(_RELAX_M, sweep_m) * UP_B, message)
 
-    def _press_down(self, message: str) -> Routine[bool]:
+    def _press_down(self, message: str, speed_rad_s: float) -> Routine[bool]:
         """Presses the object slowly down; returns whether contact stopped it. Fails when no line is feasible."""
         why: PlanningError | None = None
         for part in (1.0, 0.85, 0.7, 0.5):
             try:
                 down_B = -part * (_SURELY_FREE_M + _PRESS_M) * UP_B
-                return (yield from self.press(down_B, -UP_B, self.options.lower_rad_s, message))
+                return (yield from self.press(down_B, -UP_B, speed_rad_s, message))
             except PlanningError as error:
                 why = error
         raise SkillFailure(Cause.PLANNING, str(why)) from why

@@ -172,8 +172,10 @@ class Grasp(CloseLookingSkill[GraspInputs]):
 
     def _still_held(self, failure: SkillFailure) -> Routine[bool]:
         """Returns whether the gripper still holds the object that a failure calls lost."""
-        lost = failure.cause is Cause.POSTCONDITION
-        return lost and (yield from self.holds("feeling whether the gripper is empty"))
+        if failure.cause is not Cause.POSTCONDITION:
+            return False
+        yield from self.pause(_FEEL_S, "feeling whether the gripper is empty")  # moving fingers feel nothing
+        return (yield from self.holds("feeling whether the gripper is empty"))
 
     def _secured(self, inputs: GraspInputs) -> Routine[Succeeded]:
         """Carries an object that seemed to be lost while the arm still feels its weight."""

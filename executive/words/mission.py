@@ -79,6 +79,10 @@ class Manner(Strict):
     wanders: StrictBool = Field(
         default=False, description="Whether the person walks between free points that the seed draws, after the route."
     )
+    steps_aside: Share = Field(
+        default=1.0,
+        description="Probability that the person, asked by a robot to let it pass, does so; 0 for the deaf.",
+    )
     says: Text | None = Field(
         default=None, description="Words to the nearest robot within 3 m, once, at the end of the route."
     )

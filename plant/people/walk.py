@@ -142,6 +142,11 @@ class Walk(
         self._detour, self._asides, self._passing = None, (), False
 
     @property
+    def only_aside(self) -> bool:
+        """Returns whether the person has no path but the one aside and back."""
+        return self._detour is None and self._leg >= len(self._legs)
+
+    @property
     def next_stop_W(self) -> Point:
         """End of the present path. Raises IndexError when there is none."""
         if self._detour is not None:
@@ -233,8 +238,9 @@ class Walk(
         return True
 
     def step_aside(self, corners_W: tuple[Point, ...], pause_s: float) -> None:
-        """Leaves the path for another, pauses at its end, and comes back."""
-        self._asides, self._aside_m = (Leg(corners_W, pause_s), Leg(corners_W[::-1], 0.0)), 0.0
+        """Leaves the path or the place for another, pauses at its end, and comes back, there to go on as before."""
+        self._asides, self._aside_m = (Leg(corners_W, pause_s), Leg(corners_W[::-1], self._wait_s)), 0.0
+        self._wait_s = 0.0
         self._passing = True
 
     @property

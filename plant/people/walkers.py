@@ -56,6 +56,8 @@ DETOUR_M = 3.0
 GIVES_WAY_S = 0.5
 ASIDE_S = 3.0
 """Time for which a person stands aside where nobody can pass."""
+LETS_PASS_S, LETS_PASS_M = 12.0, (1.2, 0.9, 0.6)
+"""Time for which a person stands aside who was asked to, and distances from the robot's line, the best first."""
 ASIDE_M = 0.6
 """Distance of a person who stands aside from the paths of others."""
 DOOR_M = 0.6
@@ -129,6 +131,24 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         for name, route in self._routes.items():
             if route.follows in (robot, ANY_ROBOT) and self._away_m(robot, self._walks[name]) <= HEARS_M:
                 self._leaders[name], self._walks[name].lapsed = robot, False
+
+    def let_pass(self, robot: str, name: str | None) -> None:
+        """Lets a robot pass that has asked a person to: they step off the line ahead of it, or stay, by the seed."""
+        if name not in self._walks:
+            return
+        walk, route = self._walks[name], self._routes[name]
+        rng = np.random.default_rng([*route.stream, round(1000.0 * self._now_s)])
+        if rng.random() < route.steps_aside:
+            body = self._robots[robot].body
+            robot_W = self._plant.EvalBodyPoseInWorld(self._context, body).translation()[:2]
+            off_W = np.array(walk.place_W) - robot_W
+            beyond_W = robot_W + (1.0 + FREE_PATH_M / float(np.linalg.norm(off_W))) * off_W
+            ground = self._blocked_ground([*self._outlines_W(walk)])
+            line_W = (walk.place_W, tuple(robot_W), tuple(beyond_W))
+            places_W = (ground.aside(walk.place_W, [line_W], clear_m) for clear_m in LETS_PASS_M)
+            if (place_W := next(filter(None, places_W), None)) is not None:
+                with contextlib.suppress(WorldError):
+                    walk.step_aside(ground.plan_on(walk.place_W, place_W, who=name), LETS_PASS_S)
 
     def before_step(self, dt_s: float, standing: Collection[str] = (), barriers: Barriers = ()) -> None:
         """Sets each person's pose, and the velocity to the next pose within dt_s.
@@ -230,7 +250,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         if walk.held_s < (GIVES_WAY_S if first else PATIENCE_S):
             return
         walk.held_s = 0.0
-        if walk.turn_round():
+        if walk.turn_round() or walk.only_aside:
             return
         if self._is_taken(name, walk):
             walk.arrive()

@@ -41,7 +41,8 @@ class PointRoute:
 
     A person who `yields` stops for a robot close ahead; one who keeps `apart` also for people. `pace` is the fraction
     by which the speed varies. A person who `follows` robots begins once a robot has spoken; one who `wanders` draws
-    further stops. `says` is what the person says at the end of the route. `stream` seeds all draws on the route.
+    further stops. `says` is what the person says at the end of the route, `steps_aside` the probability that the person
+    lets a robot pass that asks for it. `stream` seeds all draws on the route.
     """
 
     stops: tuple[PointStop, ...]
@@ -56,6 +57,7 @@ class PointRoute:
     follows: str | None = None
     wanders: bool = False
     says: str | None = None
+    steps_aside: float = 1.0
     stream: tuple[int, ...] = ()
 
     def from_pose(self, at_W: Point, yaw_rad: float) -> PointRoute:
@@ -87,6 +89,7 @@ def point_route(route: Route, standing: Mapping[str, Point], stream: Sequence[in
         follows=route.follows,
         wanders=route.wanders,
         says=route.says,
+        steps_aside=route.steps_aside,
         stream=tuple(stream),
     )
 

@@ -197,6 +197,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
             first = self._planning.robots_blocked()
             if first:
                 raise _OnReservedPath(first)
+        self._planning.pass_request.update(self._planning.blocker, self._around.people_by_shape)
         self._around.look(self._base.last_velocity)
 
     def _localise(self) -> Routine[_Stage]:

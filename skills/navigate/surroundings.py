@@ -8,6 +8,7 @@ import numpy as np
 
 from skills.api import ClearableCostmap, FreeSpace, SkillContext
 from skills.doorway import Doorway
+from skills.geometry import bearing_rad
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.cut_off import DoorOptions, DoorWatch
@@ -191,6 +192,8 @@ class NavigateOptions:
 
 
 _OUTLINE_PERIOD_S = 0.5
+_AHEAD_RAD = 1.0
+"""Bearing to either side up to which a person may block the robot."""
 _WALKED_M = 0.5
 """Length of a track from which on it counts as a person rather than an object."""
 
@@ -263,6 +266,20 @@ class Surroundings:
         """The people nearby, without the accompanied person and without detections where other robots report to be."""
         people = self._people.people() if self._company is None else self._company.others()
         return tuple(one for one in people if not self.robots.is_robot(one.place_W))
+
+    def blocker(self, reach_m: float) -> SeenPerson | None:
+        """The nearest person ahead of the robot within reach_m; None without one, or where a door is closed."""
+        here = self._context.pose()
+        away_m = {math.dist(one.place_W, (here.x_m, here.y_m)): one for one in self.people_by_shape()}
+        ahead = [m for m, one in away_m.items() if m < reach_m and abs(bearing_rad(here, one.place_W)) < _AHEAD_RAD]
+        return away_m[min(ahead)] if ahead and not self.doors.closed else None
+
+    def people_by_shape(self) -> Sequence[SeenPerson]:
+        """The people nearby, or those too near for the cameras: what has the shape of a person in the scan."""
+        people = self.persons()
+        if people or self._company is not None:
+            return people
+        return [one for one in self._people.scanned() if not self.robots.is_robot(one.place_W)]
 
     def reduce_distance_to_people(self) -> bool:
         """Lets plans pass people at a smaller distance from now on; False when nobody is near or this is so already."""

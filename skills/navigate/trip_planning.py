@@ -4,17 +4,30 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from skills.api import Cause, ClearableCostmap, Job, SkillContext
 from skills.geometry import compose
 from skills.navigate.cut_off import closed_doors_sentence
 from skills.navigate.door_openers import DoorCalls
 from skills.navigate.giving_way import Avoided
+from skills.navigate.pass_request import PassRequest
 from skills.navigate.path import Path
 from skills.navigate.planner import LatticePlanner
 from skills.navigate.surroundings import NavigateInputs, NavigateOptions, Surroundings
+from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
 from skills.routine import Patience, SkillFailure
 from skills.world_model import zones_sentence
+
+EARSHOT_M = 3.0
+"""Distance up to which a person who leaves no path is asked to make way."""
+_CLOSE_M = 1.4
+"""Distance up to which a person is asked although there may be another path."""
+_AT_GOAL_M = 0.8
+"""Distance from the goal within which a person does not block the robot, but may be whom it meets."""
+_PERSON_M = 0.45
+"""Radius of a person's obstacles."""
 
 
 @dataclass
@@ -48,12 +61,14 @@ class TripPlanning:
         self._context, self._options, self._inputs, self._around = context, options, inputs, around
         self._job: Job[Path] | None = None
         self._map_alone = self._map_leads = self._looked_again = self._waited = self._detours = False
+        self._suspected = False
         self._replans = 0
         self._people, self._robots = _Presence(options.after_person_s), _Presence(options.after_person_s)
         self._closed = Patience(context.clock, options.doors.patience_s)
         self._calls = DoorCalls(context, options.doors.opens_s)
         self._tried: tuple[Pose2D, ...] = ()
         self._asked_due_s = -math.inf
+        self.pass_request = PassRequest(context)
         self.aside: Pose2D | None = None
         self.avoided = Avoided.PATHS
         self.obstacle_W: tuple[float, float] | None = None
@@ -63,6 +78,12 @@ class TripPlanning:
     def goal(self) -> Pose2D:
         """The present goal: the waiting pose if there is one, else the goal of the inputs."""
         return self.aside or self._inputs.goal
+
+    def blocker(self, reach_m: float | None = None) -> SeenPerson | None:
+        """The person who blocks the robot: close ahead, or in earshot where there is a path without that person."""
+        person = self._around.blocker(reach_m or (EARSHOT_M if self._map_leads else _CLOSE_M))
+        goal_W = self.goal.x_m, self.goal.y_m
+        return None if person is None or math.dist(person.place_W, goal_W) < _AT_GOAL_M else person
 
     @property
     def under_way(self) -> bool:
@@ -96,6 +117,7 @@ class TripPlanning:
     def retarget(self, inputs: NavigateInputs, start: Pose2D | None) -> None:
         """Plans to another goal, unless the robot waits aside, and forgets earlier failures."""
         self._inputs, self._replans, self._map_leads, self.wait_until_s = inputs, 0, False, -math.inf
+        self._suspected = False
         if self.aside is None:
             self.avoided = Avoided.PATHS
             self.ask(start)
@@ -136,8 +158,9 @@ class TripPlanning:
 
         Raises SkillFailure when nothing is left to try.
         """
-        if self._map_alone:  # nobody blocks this plan, so no path exists
+        if self._map_alone and not self._suspected:  # nobody blocks this plan, so no path exists
             raise SkillFailure(Cause.PLANNING, why)
+        self._map_alone = False
         waited, self._waited = self._waited, False
         if waited and self.aside is None and self._around.robots.robots_with_priority():
             return True
@@ -198,6 +221,8 @@ class TripPlanning:
     def _wait_or_give_up(self, why: str) -> None:
         """Waits for people, robots or doors, or looks again. Raises SkillFailure when patience or tries are used up."""
         robot = self._robot_may_go()
+        if not robot and self._waits_for_blocker():
+            return
         may_go = robot or self._people_may_go()
         if not robot and (self._waits_for_doors(may_go) or self._plans_detour()):
             return
@@ -219,6 +244,29 @@ class TripPlanning:
         self.wait_until_s = self._now() + self._options.replan_pause_s
         if robot and not self._map_leads and isinstance(self._context.costmap, ClearableCostmap):
             self.ask(map_alone=True)
+
+    def _waits_for_blocker(self) -> bool:
+        """Returns whether the robot waits for a person without whom there is a path, and who can still be asked.
+
+        Raises SkillFailure when the person has not made way.
+        """
+        person, costmap = self.blocker(EARSHOT_M), self._context.costmap
+        if not isinstance(costmap, ClearableCostmap) or (self._suspected and not self._map_leads):
+            return False
+        if person is None and (left_W := self.pass_request.awaited_W) is not None:
+            costmap.clear_obstacles(np.array([[*left_W, _PERSON_M]]))  # the LiDAR may not see that they have left
+            self.wait_until_s = self._now() + self._options.doors.look_s
+        if person is None:
+            return self._now() < self.wait_until_s
+        if self.pass_request.refused:
+            text = f"A person at {place_text(person.place_W)} blocks the path, and does not let the robot pass."
+            raise SkillFailure(Cause.PLANNING, text, final=True)
+        self.obstacle_W, self.wait_until_s = person.place_W, self._now() + self._options.replan_pause_s
+        if not self._suspected:
+            self._suspected = True
+            costmap.clear_obstacles(np.array([[*person.place_W, _PERSON_M]]))
+            self.ask(map_alone=True)
+        return True
 
     def _waits_for_doors(self, may_go: bool) -> bool:
         """Returns whether the robot goes to the blocking doors or waits for them; calls the doors' plug-ins.

@@ -273,7 +273,10 @@ class Bystanders(RunVisitor):
             self._simulation.record_picture(str(robot), str(camera), float(stamp_s))
         if topic == SPEECH and not self._simulation.engine.walkers.still:
             self._pipeline.settle()
-            self._simulation.engine.walkers.hear(str(message["robot"]))
+            robot, walkers = str(message["robot"]), self._simulation.engine.walkers
+            walkers.hear(robot)
+            if "may i pass" in str(message["text"]).casefold():
+                walkers.let_pass(robot, self._simulation.listeners.hearer(robot))
         return message
 
     def tick(self, progress: Progress) -> None:

@@ -193,6 +193,22 @@ def test_a_person_who_has_yielded_for_long_walks_around_the_robot(hall):
     assert stage.person_xy == pytest.approx((-1.0, 2.2), abs=1e-6) and not stage.referee.collisions
 
 
+def test_a_standing_person_asked_by_a_robot_lets_it_pass_and_comes_back(hall):
+    stage = hall((0.5, 0.0), robot=Pose2D(-1.5, 0.0, 0.0))
+    stage.engine.walkers.let_pass("Alice", "Kim")
+    stage.engine.advance(3.0)
+    assert abs(stage.person_W.y_m) > 0.9
+    stage.engine.advance(14.0)
+    assert stage.person_xy == pytest.approx((0.5, 0.0), abs=0.1) and not stage.referee.collisions
+
+
+def test_a_deaf_person_stays_before_a_robot_that_asks(hall):
+    stage = hall((0.5, 0.0), robot=Pose2D(-1.5, 0.0, 0.0), steps_aside=0.0)
+    stage.engine.walkers.let_pass("Alice", "Kim")
+    stage.engine.advance(3.0)
+    assert stage.person_xy == pytest.approx((0.5, 0.0), abs=1e-6)
+
+
 # a loop without a robot in the way, and a detour around one
 @pytest.mark.parametrize(
     ("points", "options", "before_s", "detour"),

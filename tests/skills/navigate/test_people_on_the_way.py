@@ -120,7 +120,7 @@ def test_a_door_blocked_by_a_person_is_a_planning_failure_after_long_patience():
     drive = Drive([person_at(7.45, 4.0)], start=BEFORE_DOOR, goal=room, options=patience)
     assert isinstance(drive.step, Failed)
     assert drive.step.cause is Cause.PLANNING
-    assert "blocked by an obstacle at (" in drive.step.message
+    assert "blocks the path, and does not let the robot pass" in drive.step.message
     assert 15.0 < drive.seconds < 40.0
     assert drive.bench.robot.least_clearance_m > 0.1
 

@@ -56,7 +56,7 @@ DETOUR_M = 3.0
 GIVES_WAY_S = 0.5
 ASIDE_S = 3.0
 """Time for which a person stands aside where nobody can pass."""
-LETS_PASS_S, LETS_PASS_M = 12.0, (1.2, 0.9, 0.6)
+LETS_PASS_S, LETS_PASS_M = 20.0, (1.2, 0.9, 0.6)
 """Time for which a person stands aside who was asked to, and distances from the robot's line, the best first."""
 ASIDE_M = 0.6
 """Distance of a person who stands aside from the paths of others."""

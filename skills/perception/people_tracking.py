@@ -25,7 +25,7 @@ from skills.perception.people import (
 )
 from skills.perception.point_cloud import camera_pose_W, project
 from skills.quantities import Count, Delay, Duration, Length, Margin, Share, Turn
-from skills.robot import CameraCapabilities, FloatArray, Image, NoImageError, Pose2D, Scan
+from skills.robot import CameraCapabilities, FloatArray, Image, NoImageError, Pose2D
 from skills.world_model import PERSON
 
 _ACCELERATION_M_S2 = 1.5
@@ -299,26 +299,20 @@ class PeopleWatch:
         if scan is None or scan.stamp_s <= self._scan_s or not (tracks_all or self._seen):
             return
         self._scan_s = scan.stamp_s
-        found = self._people_in(scan)
-        self._tracker.update(found, by_scan=True, apart_m=SCAN_APART_M, births=tracks_all)
+        self._tracker.update(self.scanned(), by_scan=True, apart_m=SCAN_APART_M, births=tracks_all)
         if tracks_all:
             self._tracker.revise(lambda one: one if self._is_tracked(one) else None)
 
     def scanned(self) -> Sequence[SeenPerson]:
         """Returns what has the shape of a person in the newest scan, whether or not a picture shows a person."""
-        scan = self._context.robot.scan()
-        return () if scan is None else self._people_in(scan)
-
-    def _people_in(self, scan: Scan) -> Sequence[SeenPerson]:
         robot = self._context.robot
-        return people_in_scan(
-            scan,
-            self._context.localiser.estimate().X_WO @ scan.X_OB,
-            robot.capabilities().footprint_m,
-            self._options.track_m or self._options.reach_m,
-            self._survey,
-            ahead_m=ARM_AHEAD_M if robot.gripper().holding else STOWED_AHEAD_M,
-        )
+        scan = robot.scan()
+        if scan is None:
+            return ()
+        X_WB = self._context.localiser.estimate().X_WO @ scan.X_OB
+        ahead_m = ARM_AHEAD_M if robot.gripper().holding else STOWED_AHEAD_M
+        reach_m, footprint_m = self._options.track_m or self._options.reach_m, robot.capabilities().footprint_m
+        return people_in_scan(scan, X_WB, footprint_m, reach_m, self._survey, ahead_m=ahead_m)
 
     def _is_tracked(self, one: SeenPerson) -> bool:
         """Returns whether a person is still tracked."""

@@ -17,7 +17,7 @@ from skills.manipulation.place.free_spots import SpotSearch, above_goal, free_ar
 from skills.manipulation.place.verification import PlaceVerification
 from skills.perception.point_cloud import cloud_from_image
 from skills.robot import FloatArray
-from skills.routine import Routine, SkillFailure
+from skills.routine import PlanningAttempt, Routine, SkillFailure
 
 _STEEP_RAD = tuple(np.radians([75.0, 66.0, 82.0, 58.0]))
 """Angles below level at which the camera looks into a bin, the best first."""
@@ -48,13 +48,8 @@ class BinPlacement(PlaceVerification[InputsT]):
 
         Raises SkillFailure with cause POSTCONDITION when nothing is seen inside.
         """
-        surface = search.surface
-        before = yield from self._look_inside(surface)
-        held, area, message = (
-            search.held,
-            free_area(surface, search.held),
-            f"bringing the object over the {surface.name}",
-        )
+        surface, held, area = search.surface, search.held, free_area(search.surface, search.held)
+        before, message = (yield from self._look_inside(surface)), f"bringing the object over the {surface.name}"
 
         def above() -> Routine[FloatArray]:
             X_WB, planner = self.X_WB(), self.context.stack.arm_planner
@@ -67,7 +62,7 @@ class BinPlacement(PlaceVerification[InputsT]):
         yield from self.attempt_at_heights(heights_m, message, above)
         over_W = self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO
         self.checkpoint = {**self.checkpoint, "spot_W": over_W[:2].tolist()}
-        held_kg = yield from self.weigh(self.p_HT, f"weighing the object over the {surface.name}")
+        held_kg = yield from self.weigh(self.p_HT, message)
         yield from self.try_shift_hand((_RELEASE_M - LEAST_ABOVE_M) * UP_B, message)
         yield from self.let_go(held_kg)
         yield from self.check_inside(surface, before)
@@ -87,11 +82,9 @@ class BinPlacement(PlaceVerification[InputsT]):
         message, p_BT = f"looking into the {surface.name}", self._middle_B(surface)
         self.boxes = surface_boxes([surface], self.X_WB())
         viewpoints = close_viewpoints(self.p_BS, p_BT, 0.0, _STEEP_RAD, _FROM_RIM_M)
-        try:
+        with PlanningAttempt() as attempt:
             yield from self.look_at(p_BT, viewpoints, message, CARRY_SPEED_RAD_S)
-        except SkillFailure as failure:
-            if failure.cause is not Cause.PLANNING:
-                raise
+        if attempt.failure is not None:
             return {}
         image = yield from self.picture(message)
         cloud = cloud_from_image(image, self.context.localiser.estimate().X_WO, heights_m=(-math.inf, surface.height_m))

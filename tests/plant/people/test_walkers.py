@@ -198,7 +198,7 @@ def test_a_standing_person_asked_by_a_robot_lets_it_pass_and_comes_back(hall):
     stage.engine.walkers.let_pass("Alice", "Kim")
     stage.engine.advance(3.0)
     assert abs(stage.person_W.y_m) > 0.9
-    stage.engine.advance(14.0)
+    stage.engine.advance(22.0)
     assert stage.person_xy == pytest.approx((0.5, 0.0), abs=0.1) and not stage.referee.collisions
 
 

@@ -258,6 +258,8 @@ class TripPlanning:
             self.wait_until_s = self._now() + self._options.doors.look_s
         if person is None:
             return self._now() < self.wait_until_s
+        if self.pass_request.refused and not self._around.persons():  # an obstacle with the shape of a person
+            return False
         if self.pass_request.refused:
             text = f"A person at {place_text(person.place_W)} blocks the path, and does not let the robot pass."
             raise SkillFailure(Cause.PLANNING, text, final=True)

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from skills.api import SkillContext
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
-from skills.small.speak import say
 
 ASKS_S = 8.0
 """Time for which the robot stands before a person until it asks, and until it asks again or gives up."""
@@ -41,10 +40,17 @@ class PassRequest:
         goes_on, self._tick_s = now_s - self._tick_s < ASKS_S, now_s
         if not goes_on or math.dist((here.x_m, here.y_m), (self._here.x_m, self._here.y_m)) > _STANDS_M:
             if goes_on and self._asked and all(math.dist(one.place_W, self._person_W) > _LEFT_M for one in people()):
-                say(self._context, "Thank you.")
+                _say(self._context, "Thank you.")
             self._here, self._since_s, self._asked = here, now_s, 0
         elif now_s - self._since_s >= ASKS_S and self._asked < TIMES:
             self._since_s = now_s
             if (blocker := find()) is not None:
-                say(self._context, "May I pass, please?")
+                _say(self._context, "May I pass, please?")
                 self._asked, self._person_W = self._asked + 1, blocker.place_W
+
+
+def _say(context: SkillContext, text: str) -> None:
+    """Says a text as the skill `speak` does, which stands in a room above."""
+    message = {"robot": context.robot.name, "text": text, "t": round(context.clock.now(), 6)}
+    silent = context.silent_zone()
+    context.publish("speech", message | ({"silent": silent} if silent else {}))

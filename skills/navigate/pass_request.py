@@ -30,7 +30,7 @@ class PassRequest:
 
     @property
     def awaited_W(self) -> tuple[float, float] | None:
-        """Where the person stood who has just been asked; None when the robot waits for no answer."""
+        """Position of the person who has just been asked; None when the robot waits for no answer."""
         waits = self._asked > 0 and self._context.clock.now() - self._since_s < ASKS_S
         return self._person_W if waits else None
 

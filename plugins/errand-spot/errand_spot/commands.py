@@ -34,7 +34,7 @@ USER: Final = "user"
 PASSWORD: Final = "simulated"  # of a simulator that only this machine reaches
 _FOLDER: Final = "spot-api"
 LAUNCH: Final = str(Path(__file__).with_name("launch.py"))
-_AROUND_M, _BESIDE_M, _FROM_PEOPLE_M, _AHEAD_M, _MOST_TRIED = 1.0, 0.5, 1.0, 3.0, 1000
+_AROUND_M, _BESIDE_M, _FROM_PEOPLE_M, _AHEAD_M, _MOST_TRIED = 1.0, 0.5, 1.2, 3.0, 1000
 """Free floor around the robot's start, beside its way ahead and from people; that way's length; places to try."""
 _SPOT: Final = re.compile(r"spot://(?P<host>[A-Za-z0-9.-]+)(:(?P<port>\d{1,5}))?")
 WORLD = Annotated[str, typer.Option("--world", help="A world by name or folder.")]

@@ -72,7 +72,7 @@ def test_a_command_imports_no_heavy_library_that_it_does_not_use(call_in_process
 
 def test_a_check_imports_nothing_that_understands_sentences_and_only_skills_of_the_mission(call_in_process):
     language, skills = (line.split() for line in call_in_process([CHECK])[0][-2:])
-    assert language == ["executive.language.parser", "executive.language.questions"]
+    assert language == [f"executive.language.{name}" for name in ("lexicon", "parser", "questions")]
     assert {"skills.navigate.skill", "skills.manipulation.grasp.skill"} < set(skills)
     assert not {"skills.small.speak", "skills.small.doors"} & set(skills)
     assert not [name for name in skills if name.startswith("skills.people.")]

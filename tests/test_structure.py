@@ -23,8 +23,8 @@ LINES = {
     "executive/view": 1922,
     "executive/testing": 860,
     "executive/app": 8278,
-    "executive/cli": 3937,
-    "skills": 28919,
+    "executive/cli": 3938,
+    "skills": 28922,
     "plant": 11544,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 426, 59, 7

@@ -86,7 +86,8 @@ FOXGLOVE = Annotated[
         help=f"Serve what the log gets live for Foxglove; by default at {_FOXGLOVE_ADDRESS}.",
     ),
 ]
-OBSERVE = Annotated[list[str] | None, grouped(Group.PAGE, "--observe", "--ros2", metavar="NAME", help="Add a plug-in.")]
+_OBSERVED = "Let a plug-in join the run: NAME=VALUE. --ros2 [DOMAIN] joins ROS 2."
+OBSERVE = Annotated[list[str] | None, grouped(Group.PAGE, "--observe", "--ros2", metavar="NAME", help=_OBSERVED)]
 
 
 class StartCommand(TyperCommand):

@@ -26,12 +26,15 @@ PlannedT = TypeVar("PlannedT")
 PLANNING_LATENCY_S = 0.3
 LINE_SPEED_RAD_S = 0.6
 CARRY_SPEED_RAD_S = 0.9
-GRIPPER_EXPIRY_S, GRIPPER_FORCE_N = 4.0, 20.0
-"""Expiry of a gripper's command; force with which an empty gripper opens and closes."""
+GRIPPER_EXPIRY_S = 4.0
+GRIPPER_FORCE_N = 20.0
+"""Force with which an empty gripper opens and closes."""
 CONTACT_LAG_M = 0.0035
 """Lag of a slow hand that means contact; a free hand lags by at most 2 mm (measured in the plant)."""
-WEIGHING_S, FEELING_S = 0.3, (0.5, 4.0)
-"""Time over which weighing averages the noise of the readings; least and most time to feel a thin object's weight."""
+WEIGHING_S = 0.3
+"""Time over which weighing averages the noise of the readings."""
+FEELING_S = (0.5, 4.0)
+"""Least and most time to feel a thin object's weight."""
 _FEELING_KG = 0.0045
 """Standard error of the mean at which the arm has felt long enough."""
 LEAST_FELT_KG = 0.015

@@ -114,9 +114,10 @@ class Fuzz:
 
 
 def revive(computer, connection):
-    """Releases the E-stop, takes the lease, and switches the motors on, whatever messages have done to them."""
+    """Releases the E-stop, takes the lease, clears the fault of a fall and switches the motors on."""
     computer.estop.level = lambda: int(estop_pb2.ESTOP_LEVEL_NONE)
     connection.acquire(take=True)
+    computer.do(lambda: setattr(computer, "fault", None)).result()
     computer.do(lambda: setattr(computer, "motors", Motors.ON)).result()
     computer.do(computer.step).result()
 

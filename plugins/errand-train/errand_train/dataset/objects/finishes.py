@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict
 
 from errand_make.mesh import Colour
 from errand_train.dataset.objects.draft import Draft, vary_shade
-from errand_train.dataset.objects.lettering import COLOURS, printed_label, write_word
+from errand_train.dataset.objects.lettering import COLOURS, crest_label, printed_label, script_label, write_word
 from errand_train.dataset.objects.wear import add_rust, add_wear, brushed_metal, plain_picture
 from errand_train.models.expressions import Number, evaluate
 from errand_train.models.pictures import cloth, noise, speckle, wood
@@ -144,6 +144,10 @@ _TEXTURES: Final[Mapping[str, Callable[[np.random.Generator, FloatArray, Finish]
     "screen": _screen,
     "keys": _keys,
     "dial": _dial,
+    "crest": lambda rng, colour, finish: crest_label(rng, colour, _second(rng), words=finish.words),
+    "script": lambda rng, colour, finish: script_label(
+        rng, colour, _second(rng), words=finish.words, brands=finish.brands
+    ),
     "label": lambda rng, colour, finish: printed_label(
         rng, colour, _second(rng), words=finish.words, brands=finish.brands, repeats=finish.repeats
     ),

@@ -141,3 +141,121 @@ def printed_label(
         small_print(image, rng, (0.92, low, 0.98, high), ink)
     bar_code(image, rng, (0.7, 1 - 0.11 * step, 0.9, 0.99))
     return image
+
+
+_METALS: Final = ((0.84, 0.68, 0.25), (0.84, 0.68, 0.25), (0.8, 0.81, 0.83), (0.93, 0.9, 0.78), (0.62, 0.07, 0.08))
+"""Colours of borders and crests: gold, silver, cream and dark red."""
+
+
+def crest_label(
+    rng: np.random.Generator, ground: FloatArray, accent: FloatArray, *, words: Sequence[str]
+) -> FloatArray:
+    """Draws a label of a beer (256, 512), twice side by side: bands, a crest, ears of barley, a name and a word."""
+    image = np.zeros((256, 512, 3)) + ground
+    metal = np.array(_METALS[int(rng.integers(len(_METALS)))])
+    if np.abs(metal - ground).max() < 0.25:
+        metal = accent if np.abs(accent - ground).max() > 0.3 else 1.0 - ground
+    if rng.random() < 0.3:
+        image *= np.linspace(rng.uniform(0.6, 1.1), rng.uniform(0.6, 1.1), 256)[:, None, None]
+    _rims(image, rng, (metal, accent))
+    inner = (ground, accent, np.array((0.95, 0.93, 0.86)), np.array((0.6, 0.05, 0.06)))[int(rng.integers(4))]
+    name, word, face = brand(rng), str(rng.choice(words)), int(rng.integers(9))
+    wide, tall, top = int(rng.integers(90, 190)), int(rng.integers(100, 180)), int(rng.integers(16, 60))
+    outline, figure = _crest_outline(rng), emblem(int(rng.integers(40, 70)), rng)
+    ears, ribbon, first = rng.random() < 0.5, rng.random() < 0.6, rng.random() < 0.5
+    for left in (128, 384):
+        if ears:
+            for side in (-1, 1):
+                _ear(image, (left + side * (wide // 2 + 14), 200), side, metal)
+        for scale, colour in ((1.0, metal), (0.88, inner)):
+            mask = _filled(outline, int(wide * scale), int(tall * scale))
+            blend(image, mask, colour, (top + (tall - mask.shape[0]) // 2, left - mask.shape[1] // 2))
+        ink = metal if np.abs(metal - inner).max() > 0.35 else np.where(np.mean(inner) > 0.5, 0.08, 0.94) * np.ones(3)
+        blend(image, figure, ink, (top + 12, left - figure.shape[1] // 2))
+        middle = (top + 0.62 * tall) / 256
+        half = (0.62 if ribbon else 0.42) * wide / 512
+        if ribbon:
+            back = accent if rng.random() < 0.5 else metal
+            box = (
+                slice(int((middle - 0.09) * 256), int((middle + 0.09) * 256)),
+                slice(int(left - half * 512), int(left + half * 512)),
+            )
+            image[box] = back
+            ink = np.where(np.mean(back) > 0.5, 0.08, 0.94) * np.ones(3)
+        lines = (name, word) if first else (word, name)
+        place = left / 512
+        write_word(image, lines[0], (middle - 0.08, place - half, middle + 0.08, place + half), ink, face=face)
+        under = np.where(np.mean(ground) > 0.5, 0.08, 0.94) * np.ones(3) if (top + tall) < 215 else ink
+        low = min((top + tall) / 256 + 0.01, 0.86)
+        write_word(image, lines[1], (low, place - 0.13, low + 0.11, place + 0.13), under, face=face + 1)
+    return np.clip(image, 0, 1)
+
+
+def _rims(image: FloatArray, rng: np.random.Generator, colours: Sequence[FloatArray]) -> None:
+    """Draws bands along the upper and the lower edge (in place)."""
+    for upper in (True, False):
+        at = 0
+        for _ in range(int(rng.integers(0, 4))):
+            thick, gap = int(rng.integers(2, 18)), int(rng.integers(2, 8))
+            rows = slice(at, at + thick) if upper else slice(256 - at - thick, 256 - at)
+            image[rows] = colours[int(rng.integers(len(colours)))]
+            at += thick + gap
+
+
+def _crest_outline(rng: np.random.Generator) -> FloatArray:
+    """Outline in the unit square of a shield, an oval, a rosette, a diamond or a rectangle."""
+    angle = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+    radius = np.full(64, 0.5) if rng.random() < 0.6 else 0.46 + 0.04 * np.cos(angle * int(rng.integers(8, 24)))
+    round_one = np.column_stack([0.5 + radius * np.cos(angle), 0.5 + radius * np.sin(angle)])
+    shield = np.array(_DECORATION["figures"][0])
+    plain = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    diamond = np.array([[0.5, 0.0], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5]])
+    return (round_one, round_one, round_one, shield, shield, plain, diamond)[int(rng.integers(7))]
+
+
+def _filled(outline: FloatArray, wide: int, tall: int) -> FloatArray:
+    """Coverage (tall, wide) by an outline in the unit square."""
+    canvas = np.zeros((tall * 2, wide * 2), np.uint8)
+    cv2.fillPoly(canvas, [np.round(outline * (2 * wide - 1, 2 * tall - 1)).astype(np.int32)], 255)
+    return np.asarray(cv2.resize(canvas, (wide, tall), interpolation=cv2.INTER_AREA) / 255.0)
+
+
+def _ear(image: FloatArray, foot: tuple[int, int], side: int, colour: FloatArray) -> None:
+    """Draws an ear of barley (in place) that bends outwards from its foot (column, row)."""
+    mask = np.zeros(image.shape[:2], np.uint8)
+    stalk = [(foot[0] + side * int(18 * (k / 10) ** 2), foot[1] - 11 * k) for k in range(11)]
+    cv2.polylines(mask, [np.array(stalk)], False, 255, 2)
+    for x, y in stalk[4:]:
+        for turn in (-1, 1):
+            cv2.ellipse(mask, (x + 5 * turn, y), (8, 3), -60 * turn, 0, 360, 255, -1)
+    blend(image, mask / 255.0, colour)
+
+
+def script_label(
+    rng: np.random.Generator, ground: FloatArray, accent: FloatArray, *, words: Sequence[str], brands: Sequence[str]
+) -> FloatArray:
+    """Draws a label of a soft drink (256, 512), twice side by side: a large name that may run upwards, and a wave."""
+    image = np.zeros((256, 512, 3)) + ground
+    light = float(np.mean(ground)) > 0.55
+    ink = (np.array((0.78, 0.04, 0.06)) if rng.random() < 0.7 else np.full(3, 0.08)) if light else np.full(3, 0.95)
+    rows, columns = np.indices((256, 512))
+    if rng.random() < 0.75:
+        swing, shift = rng.uniform(10, 40), rng.uniform(0, 6.28)
+        upright = rng.random() < 0.6
+        along, across = (rows, columns % 256) if upright else (columns, rows)
+        middle = rng.uniform(60, 200) + swing * np.sin(along * 4 * np.pi / 512 + shift)
+        blend(image, np.clip(rng.uniform(4, 22) - np.abs(across - middle), 0, 1), ink if rng.random() < 0.6 else accent)
+    name = str(rng.choice(brands)) if brands else brand(rng)
+    word = str(rng.choice(words)) if words else ""
+    face, up, thick = int(rng.integers(9)), rng.random() < 0.55, int(rng.integers(80, 150))
+    for left in (0, 256):
+        if up:
+            mask = np.rot90(word_mask(name, (thick, 236), face=face))
+            blend(image, mask, ink, (10, left + 100 - thick // 2))
+        else:
+            tall = int(rng.integers(70, 120))
+            blend(image, word_mask(name, (tall, 220), face=face), ink, (int(rng.integers(20, 90)), left + 10))
+        if word:
+            blend(image, word_mask(word, (34, 90), face=face + 1), ink, (int(rng.integers(190, 216)), left + 150))
+        small_print(image, rng, (0.3, (left + 222) / 512, 0.7, (left + 250) / 512), ink)
+    return image

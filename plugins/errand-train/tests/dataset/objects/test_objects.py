@@ -12,7 +12,8 @@ from pydrake.systems.framework import DiagramBuilder
 from errand_train.dataset.objects import CLASSES, DISTRACTORS, held_out, instance, is_repainted, is_untextured, numbers
 from errand_train.dataset.objects import make as make_object
 from errand_train.dataset.objects.draft import Draft
-from errand_train.dataset.objects.recipes import Part, Recipe, build
+from errand_train.dataset.objects.lettering import crest_label, script_label
+from errand_train.dataset.objects.recipes import Part, Recipe, build, load_recipes
 from plant.models.catalogue import load_catalogue
 
 make = cached(make_object)
@@ -249,3 +250,24 @@ def test_a_recipe_repeats_turns_and_places_its_parts():
     made, _, _ = build("row", recipe, Draft(np.random.default_rng(1)))
     np.testing.assert_allclose(made.size_m, (9, 2, 1))
     assert made.mass.mass_kg == pytest.approx(6.0)
+
+
+def test_half_of_the_beers_are_cans():
+    kinds = load_recipes("classes")["beer"].kinds
+    weights = {name: kind.weight for name, kind in kinds.items()}
+    assert sum(weight for name, weight in weights.items() if "can" in name) == pytest.approx(sum(weights.values()) / 2)
+
+
+@pytest.mark.parametrize("colour", [(0.05, 0.3, 0.13), (0.93, 0.93, 0.91), (0.82, 0.66, 0.24)])
+def test_a_crest_shows_other_colours_than_its_ground(colour):
+    rng = np.random.default_rng(5)
+    for _ in range(5):
+        label = crest_label(rng, np.array(colour), np.array([0.1, 0.25, 0.66]), words=["BEER"])
+        assert (label.shape, label.min() >= 0.0, label.max() <= 1.0) == ((256, 512, 3), True, True)
+        assert (np.abs(label - label[128, 0]).max(axis=2) > 0.2).mean() > 0.1
+
+
+def test_a_script_repeats_its_name_on_both_sides():
+    label = script_label(np.random.default_rng(2), np.array([0.8, 0.0, 0.0]), np.zeros(3), words=[], brands=["Cola"])
+    light = (label.min(axis=2) > 0.5).mean(axis=0)
+    assert min(light[:256].max(), light[256:].max()) > 0.1

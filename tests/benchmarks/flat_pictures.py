@@ -5,8 +5,9 @@
 an extinguisher and a person stand on the floor; every tenth scene holds others only. Eight pictures are taken of each,
 three in five by the hand camera, the rest by the body's cameras; noise and light are the plant's.
 
-With `--foreign FOLDER` they are objects that others modelled (`foreign_models.py`), which are written to that folder,
-and with `--scans STL_FOLDER` those that others scanned (`scanned_models.py`), too.
+With `--foreign FOLDER` they are objects that others modelled (`foreign_models.py`), which are written to that folder;
+`--scans STL_FOLDER` adds those that others scanned (`scanned_models.py`), `--gazebo-models FOLDER` Gazebo models
+(`gazebo_models.py`). With `--drinks` only beers and cokes lie about.
 """
 
 import json
@@ -40,6 +41,7 @@ from skills.estimate.grid_map import load_grid_map
 from tests.benchmarks.find_things import LYING_ABOUT, held_out_instance, middle, scattered
 from tests.benchmarks.flat_scene import FlatScene, surface_of, viewpoint_of
 from tests.benchmarks.foreign_models import CATALOGUES, OTHERS, supplied
+from tests.benchmarks.gazebo_models import gazebo
 from tests.benchmarks.harness import command, tell
 from tests.benchmarks.scanned_models import scanned
 
@@ -47,17 +49,19 @@ VIEWS, SURFACES_IN_USE, TRIES = 8, 4, 100
 ROOM_FOR_FEET_M, ROOM_FOR_PEOPLE_M, APART_M = 0.45, 0.3, 0.8
 HAND_HEIGHTS_M, REACH_M = (0.3, 1.5), 0.9
 LEAST_SHOWN_PX = 40
+DRINKS = ("beer", "coke")
 
 
 HELD_OUT = SimpleNamespace(lying_about=LYING_ABOUT, others=DISTRACTORS, take=held_out_instance)
 """Source of objects: categories that may lie about, those of no class, and a random one of a category."""
 
 
-def foreign_supply(folder, catalogues, scans):
-    """Objects that others modelled, and with a folder of `scans` those that others scanned, written to a folder."""
+def foreign_supply(folder, catalogues, scans, gazebo_models):
+    """Objects that others modelled or, with a folder of `scans`, scanned, written to a folder."""
     models = supplied(folder, catalogues)
-    for category, more in (scanned(folder, scans) if scans is not None else {}).items():
-        models[category] = [*models.get(category, ()), *more]
+    for read, source in ((scanned, scans), (gazebo, gazebo_models)):
+        for category, more in (read(folder, source) if source is not None else {}).items():
+            models[category] = [*models.get(category, ()), *more]
 
     def take(rng, category):
         return models[category][int(rng.integers(len(models[category])))]
@@ -191,11 +195,15 @@ def write(
     foreign: Path | None = None,
     catalogues: Path = CATALOGUES,
     scans: Path | None = None,
+    gazebo_models: Path | None = None,
+    drinks: bool = False,
 ):
-    if scans is not None and foreign is None:
-        raise SystemExit("--scans goes with --foreign FOLDER, which models are written to")
+    if (scans is not None or gazebo_models is not None) and foreign is None:
+        raise SystemExit("--scans and --gazebo-models go with --foreign FOLDER, which models are written to")
     out.mkdir(parents=True, exist_ok=True)
-    supply = HELD_OUT if foreign is None else foreign_supply(foreign, catalogues, scans)
+    supply = HELD_OUT if foreign is None else foreign_supply(foreign, catalogues, scans, gazebo_models)
+    if drinks:
+        supply = SimpleNamespace(**{**vars(supply), "lying_about": DRINKS})
     every = list(shots(out, seed, scenes, supply))
     told = document({"description": "Errand: things in the flat", "seed": seed, "split": "val"}, every)
     (out / "val.json").write_text(json.dumps(told), encoding="utf-8")

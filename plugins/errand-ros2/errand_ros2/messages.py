@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 MAP_FRAME: Final = "map"
 _LEAST_RANGE_M, _MOST_RANGE_M = 0.05, 100.0
-_MOST_WIDTH: Final = 320
-"""Raw pictures are reduced to at most so many columns."""
+MOST_COLUMNS: Final = 320
+"""Raw pictures of a run are reduced to at most so many columns."""
 _NAN: Final = math.nan
 
 
@@ -75,13 +75,11 @@ def vector(values: Sequence[float]) -> Any:
 
 def odometry(reading: Odometry, frame: str, body: str) -> Any:
     """Returns the robot's dead reckoning."""
-    vx, vy, wz = reading.velocity
-    twist = ros.geometry_msgs__msg__Twist(vector((vx, vy, 0.0)), vector((0.0, 0.0, wz)))
     return ros.nav_msgs__msg__Odometry(
         header(reading.stamp_s, frame),
         body,
         ros.geometry_msgs__msg__PoseWithCovariance(pose(reading.X_OB), np.zeros(36)),
-        ros.geometry_msgs__msg__TwistWithCovariance(twist, np.zeros(36)),
+        ros.geometry_msgs__msg__TwistWithCovariance(twist(reading.velocity), np.zeros(36)),
     )
 
 
@@ -162,17 +160,39 @@ def battery(reading: Battery) -> Any:
     )
 
 
-def picture(reading: Image, frame: str) -> Any:
-    """Returns a picture, colour or grey, reduced to at most 320 columns."""
-    step = _step(reading.intrinsics)
+def truth_value(value: bool) -> Any:
+    """Returns a truth value as std_msgs/Bool."""
+    return ros.std_msgs__msg__Bool(value)
+
+
+def wrench(stamp_s: float, frame: str, force_n: float) -> Any:
+    """Returns a force along the frame's z axis."""
+    force = ros.geometry_msgs__msg__Wrench(vector((0.0, 0.0, force_n)), vector((0.0, 0.0, 0.0)))
+    return ros.geometry_msgs__msg__WrenchStamped(header(stamp_s, frame), force)
+
+
+def twist(velocity: Sequence[float]) -> Any:
+    """Returns a velocity of the base: vx, vy (m/s), wz (rad/s)."""
+    vx, vy, wz = velocity
+    return ros.geometry_msgs__msg__Twist(vector((vx, vy, 0.0)), vector((0.0, 0.0, wz)))
+
+
+def twist_stamped(stamp_s: float, frame: str, velocity: Sequence[float]) -> Any:
+    """Returns a velocity of the base with its time."""
+    return ros.geometry_msgs__msg__TwistStamped(header(stamp_s, frame), twist(velocity))
+
+
+def picture(reading: Image, frame: str, most_columns: int = MOST_COLUMNS) -> Any:
+    """Returns a picture, colour or grey, reduced to at most so many columns."""
+    step = _step(reading.intrinsics, most_columns)
     pixels = reading.grey if reading.colour is None else reading.colour
     encoding, depth = ("mono8", 1) if reading.colour is None else ("rgb8", 3)
     return _image(header(reading.stamp_s, frame), pixels[::step, ::step], encoding, depth)
 
 
-def depth(reading: Image, frame: str) -> Any:
+def depth(reading: Image, frame: str, most_columns: int = MOST_COLUMNS) -> Any:
     """Returns depth in metres along the optical axis, NaN where it is unknown, reduced like the picture."""
-    step = _step(reading.depth_intrinsics)
+    step = _step(reading.depth_intrinsics, most_columns)
     values = reading.depth_m[::step, ::step].astype(np.float32)
     return _image(header(reading.stamp_s, frame), np.where(values > 0.0, values, np.float32(_NAN)), "32FC1", 4)
 
@@ -183,12 +203,12 @@ def _image(head: Any, pixels: Any, encoding: str, pixel_bytes: int) -> Any:
     return ros.sensor_msgs__msg__Image(head, height, width, encoding, 0, width * pixel_bytes, data)
 
 
-def camera_info(reading: Image, frame: str) -> Any:
-    """Returns the intrinsics of the picture that `picture` returns."""
-    lens, step = reading.intrinsics, _step(reading.intrinsics)
+def camera_info(stamp_s: float, frame: str, lens: Intrinsics, most_columns: int = MOST_COLUMNS) -> Any:
+    """Returns the intrinsics of a picture that `picture` or `depth` returns; `lens` are those before."""
+    step = _step(lens, most_columns)
     fx, fy, cx, cy = (value / step for value in (lens.fx, lens.fy, lens.cx, lens.cy))
     return ros.sensor_msgs__msg__CameraInfo(
-        header(reading.stamp_s, frame),
+        header(stamp_s, frame),
         height=math.ceil(lens.height / step),
         width=math.ceil(lens.width / step),
         distortion_model="plumb_bob",
@@ -202,8 +222,8 @@ def camera_info(reading: Image, frame: str) -> Any:
     )
 
 
-def _step(lens: Intrinsics) -> int:
-    return max(1, math.ceil(lens.width / _MOST_WIDTH))
+def _step(lens: Intrinsics, most_columns: int) -> int:
+    return max(1, math.ceil(lens.width / most_columns))
 
 
 def occupancy_grid(grid: GridMap) -> Any:

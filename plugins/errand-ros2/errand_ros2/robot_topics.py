@@ -46,15 +46,32 @@ class _Camera:
         self.image = node.publisher(f"{base}/image", "sensor_msgs/msg/Image", SENSOR)
         self.info = node.publisher(f"{base}/camera_info", "sensor_msgs/msg/CameraInfo", SENSOR)
         self.depth = node.publisher(f"{base}/depth", "sensor_msgs/msg/Image", SENSOR)
-        self.due_s = 0.0
+        self.depth_info = node.publisher(f"{base}/depth/camera_info", "sensor_msgs/msg/CameraInfo", SENSOR)
+        self._due_s = {True: 0.0, False: 0.0}
+
+    def is_due(self, now_s: float, period_s: float, *, depth: bool) -> bool:
+        """Returns whether a subscription waits for the picture, or the depth; the next one is due a period later."""
+        due = self._due_s[depth] <= now_s + _EPSILON_S
+        due = due and _heard(*((self.depth, self.depth_info) if depth else (self.image, self.info)))
+        self._due_s[depth] = now_s + period_s if due else self._due_s[depth]
+        return due
 
 
 class RobotTopics:
     """Publishers of one robot's readings. `publish` reads the robot, and must be called where its verbs may be."""
 
-    def __init__(self, node: Node, robot: Robot, frames: Frames) -> None:
+    def __init__(
+        self,
+        node: Node,
+        robot: Robot,
+        frames: Frames,
+        *,
+        most_columns: int = messages.MOST_COLUMNS,
+        image_period_s: float = IMAGE_PERIOD_S,
+    ) -> None:
         """The last part of the node's namespace names the robot's frames."""
         self._robot, self._frames = robot, frames
+        self._most_columns, self._image_period_s = most_columns, image_period_s
         space = node.namespace.strip("/")
         self._space, self.odom, self.body = space, f"{space}/odom", f"{space}/body"
         self._lidar = f"{space}/lidar"
@@ -64,6 +81,8 @@ class RobotTopics:
         self._scan = node.publisher("scan", "sensor_msgs/msg/LaserScan", SENSOR)
         self._points = node.publisher("points", "sensor_msgs/msg/PointCloud2", SENSOR)
         self._battery = node.publisher("battery_state", "sensor_msgs/msg/BatteryState")
+        self._holding = node.publisher("gripper/holding", "std_msgs/msg/Bool")
+        self._force = node.publisher("gripper/force", "geometry_msgs/msg/WrenchStamped")
         description = node.publisher("robot_description", "std_msgs/msg/String", LATCHED)
         abilities = robot.capabilities()
         description.put(messages.text(abilities.description))
@@ -79,17 +98,34 @@ class RobotTopics:
         moving = [messages.transform(odometry.stamp_s, self.odom, self.body, odometry.X_OB)]
         if X_WO is not None:
             moving.append(messages.transform(odometry.stamp_s, messages.MAP_FRAME, self.odom, X_WO))
+        self._last["odom"] = odometry.stamp_s
         self._odom.put(messages.odometry(odometry, self.odom, self.body))
         self._joints.put(messages.joint_state(self._robot.joints()))
+        if self._robot.capabilities().gripper is not None:
+            gripper = self._robot.gripper()
+            self._holding.put(messages.truth_value(gripper.holding))
+            self._force.put(messages.wrench(gripper.stamp_s, self.body, gripper.force_n))
         if (imu := self._robot.imu()) is not None:
             self._imu.put(messages.imu(imu, self.body))
         self._publish_scan()
         if now_s >= self._battery_due_s - _EPSILON_S:
             self._battery_due_s = now_s + BATTERY_PERIOD_S
             self._battery.put(messages.battery(self._robot.battery()))
-        for camera in self._cameras:
-            moving += self._publish_camera(camera, now_s)
-        self._frames.move(moving)
+        self._frames.move([*moving, *self.publish_pictures(now_s)])
+
+    @property
+    def odometry_stamp_s(self) -> float:
+        """Time of the last odometry that was published."""
+        return self._last["odom"]
+
+    @property
+    def scan_stamp_s(self) -> float | None:
+        """Time of the last scan that was published."""
+        return self._last.get("scan")
+
+    def publish_pictures(self, now_s: float) -> list[Any]:
+        """Publishes the pictures for which subscriptions wait; returns the transforms of moving cameras."""
+        return [each for camera in self._cameras for each in self._publish_camera(camera, now_s)]
 
     def _publish_scan(self) -> None:
         scan = self._robot.scan()
@@ -104,23 +140,24 @@ class RobotTopics:
 
     def _publish_camera(self, at: _Camera, now_s: float) -> list[Any]:
         """Publishes what subscriptions ask for; returns the transform of a camera that moves on the body."""
-        visual, depth = _heard(at.image, at.info), _heard(at.depth)
-        if now_s < at.due_s - _EPSILON_S or not (visual or depth):
+        visual, depth = (at.is_due(now_s, self._image_period_s, depth=each) for each in (False, True))
+        if not (visual or depth):
             return []
-        at.due_s = now_s + IMAGE_PERIOD_S
         try:
             reading = self._robot.image(at.camera.source, visual=visual, depth=depth)
         except NoImageError:
             return []
+        most, stamp_s = self._most_columns, reading.stamp_s
         if visual:
-            at.image.put(messages.picture(reading, at.frame))
-            at.info.put(messages.camera_info(reading, at.frame))
+            at.info.put(messages.camera_info(stamp_s, at.frame, reading.intrinsics, most))
+            at.image.put(messages.picture(reading, at.frame, most))
         if depth:
-            at.depth.put(messages.depth(reading, at.frame))
+            at.depth_info.put(messages.camera_info(stamp_s, at.frame, reading.depth_intrinsics, most))
+            at.depth.put(messages.depth(reading, at.frame, most))
         if at.camera.mount is Mount.BODY:
             return []
         X_OC = reading.frames.pose(reading.camera_frame)
-        return [messages.transform(reading.stamp_s, self.odom, at.frame, X_OC)]
+        return [messages.transform(stamp_s, self.odom, at.frame, X_OC)]
 
 
 def _heard(*publishers: Publisher) -> bool:

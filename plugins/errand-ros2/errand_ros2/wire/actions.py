@@ -1,9 +1,10 @@
-"""Server of an action: three services and two topics, as `rcl_action` defines them."""
+"""Server and client of an action: three services and two topics, as `rcl_action` defines them."""
 
 from __future__ import annotations
 
 import threading
 import time
+import uuid
 from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import suppress
@@ -14,11 +15,13 @@ from typing import Any, Final
 import numpy as np
 
 from errand_ros2.wire.keys import Qos
-from errand_ros2.wire.node import Node, Request
+from errand_ros2.wire.node import Client, Node, Request
 from errand_ros2.wire.types import older_types, ros_types
 
 MOST_GOALS: Final = 64
 """Goals whose results are kept; older ones are forgotten."""
+_RESULT_S: Final = 3600.0
+"""Time for which a client waits for a result."""
 _STATUS_QOS: Final = Qos(depth=1, transient_local=True)
 
 
@@ -195,3 +198,52 @@ def _submit(pool: Executor, handle: Callable[[Request], None], request: Request)
     """Lets the pool handle a request; drops it when the pool is closed."""
     with suppress(RuntimeError):
         pool.submit(handle, request)
+
+
+class NoAnswerError(RuntimeError):
+    """Error of a server that does not answer in time: the goal may be pursued."""
+
+
+@dataclass
+class SentGoal:
+    """Goal that a server accepted; status and result are set when it ends, by a thread of Zenoh."""
+
+    identity: Any
+    status: GoalStatus = GoalStatus.EXECUTING
+    result: Any = None
+
+
+class ActionClient:
+    """Client of one action."""
+
+    def __init__(self, node: Node, name: str, type_name: str) -> None:
+        self.kind, base = ros_types().action(type_name), f"{node.absolute(name)}/_action"
+        self.ended = 0
+        """Number of the goals whose result has come."""
+        self._send = Client(node, f"{base}/send_goal", self.kind.send_goal)
+        self._cancel = Client(node, f"{base}/cancel_goal", self.kind.cancel_goal)
+        self._result = Client(node, f"{base}/get_result", self.kind.get_result)
+        self._uuid = ros_types().message("unique_identifier_msgs/msg/UUID").make
+
+    def send(self, goal: Any, *, limit_s: float) -> SentGoal | None:
+        """Sends a goal; returns None when the server rejects it. Raises NoAnswerError."""
+        sent = SentGoal(self._uuid(np.frombuffer(uuid.uuid4().bytes, np.uint8)))
+        answer = self._send.call(self.kind.send_goal.request.make(sent.identity, goal), limit_s=limit_s)
+        if answer is None:
+            self.cancel(sent)
+            raise NoAnswerError("the action's server does not answer")
+        if not answer.accepted:
+            return None
+
+        def take(response: Any) -> None:
+            sent.result, self.ended = response.result, self.ended + 1
+            sent.status = GoalStatus(response.status) if 0 <= response.status <= max(GoalStatus) else GoalStatus.ABORTED
+
+        self._result.ask(self.kind.get_result.request.make(sent.identity), take, limit_s=_RESULT_S)
+        return sent
+
+    def cancel(self, sent: SentGoal) -> None:
+        """Asks the server to cancel a goal; does not wait."""
+        info = ros_types().blank("action_msgs/msg/GoalInfo")
+        info.goal_id = sent.identity
+        self._cancel.ask(self.kind.cancel_goal.request.make(info), lambda _: None, limit_s=_RESULT_S)

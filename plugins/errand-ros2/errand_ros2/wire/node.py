@@ -35,7 +35,8 @@ class Publisher:
         self.kind, self.topic = kind, topic
         self._key = node.key.data_key(topic, kind.key)
         self._gid = node.declare(EntityKind.PUBLISHER, topic, kind.key, qos)
-        self._numbers = count(1)
+        self.sent = 0
+        """Number of the messages sent."""
         session, reliability = node.session.inner, zenoh.Reliability.RELIABLE
         self._plain: zenoh.Publisher | None = None
         self._cached: ext.AdvancedPublisher | None = None
@@ -58,7 +59,8 @@ class Publisher:
     def put(self, message: Any) -> None:
         """Publishes a message."""
         data = self.kind.encode(message)
-        attachment = Attachment(next(self._numbers), time.time_ns(), self._gid).encoded()
+        self.sent += 1
+        attachment = Attachment(self.sent, time.time_ns(), self._gid).encoded()
         to = self._plain or self._cached
         assert to is not None
         to.put(data, attachment=attachment)
@@ -94,14 +96,32 @@ class Client:
 
     def call(self, request: Any, *, limit_s: float) -> Any:
         """Returns the service's response; None when no service answers within the limit (s)."""
-        attachment = Attachment(next(self._numbers), time.time_ns(), self._gid).encoded()
-        data, target = self._kind.request.encode(request), zenoh.QueryTarget.ALL_COMPLETE
-        for reply in self._session.get(
-            self._key, target=target, timeout=limit_s, payload=data, encoding=_CDR, attachment=attachment
-        ):
-            if (sample := reply.ok) is not None:
-                return self._kind.response.decode(sample.payload.to_bytes())
+        for reply in self._session.get(self._key, **self._options(request, limit_s)):
+            if (response := self._response(reply)) is not None:
+                return response
         return None
+
+    def ask(self, request: Any, take: Callable[[Any], None], *, limit_s: float) -> None:
+        """Calls `take` with the service's response when it comes, in a thread of Zenoh."""
+
+        def taken(reply: zenoh.Reply) -> None:
+            if (response := self._response(reply)) is not None:
+                take(response)
+
+        self._session.get(self._key, taken, **self._options(request, limit_s))
+
+    def _options(self, request: Any, limit_s: float) -> dict[str, Any]:
+        attachment = Attachment(next(self._numbers), time.time_ns(), self._gid).encoded()
+        payload = self._kind.request.encode(request)
+        how = {"target": zenoh.QueryTarget.ALL_COMPLETE, "timeout": limit_s, "encoding": _CDR}
+        return {**how, "payload": payload, "attachment": attachment}
+
+    def _response(self, reply: zenoh.Reply) -> Any:
+        """Returns the response in a reply; None for an error, and for one that cannot be decoded."""
+        try:
+            return None if reply.ok is None else self._kind.response.decode(reply.ok.payload.to_bytes())
+        except MalformedError:
+            return None
 
 
 class Node:
@@ -131,21 +151,33 @@ class Node:
         self._declared.append(made)  # Zenoh ends what nobody refers to
         return made
 
-    def subscribe(self, topic: str, type_name: str, handle: Callable[[Any], None], qos: Qos | None = None) -> None:
-        """Calls `handle` with each message of a topic."""
+    def subscribe(
+        self, topic: str, type_name: str, handle: Callable[[Any], None], qos: Qos | None = None
+    ) -> Callable[[], None]:
+        """Calls `handle` with each message of a topic; returns a function that ends the subscription."""
         name, kind, qos = self.absolute(topic), ros_types().message(type_name), qos or Qos()
         self.declare(EntityKind.SUBSCRIPTION, name, kind.key, qos)
+        token = self._declared[-1]
 
         def received(sample: zenoh.Sample) -> None:
             if (message := self._decoded(kind, sample.payload)) is not None:
                 self.guarded(lambda: handle(message), name)
 
         key, session = self.key.data_key(name, kind.key), self.session.inner
+        subscriber: Any
         if qos.transient_local:
             history = ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth)
-            self._declared.append(ext.declare_advanced_subscriber(session, key, received, history=history))
+            subscriber = ext.declare_advanced_subscriber(session, key, received, history=history)
         else:
-            self._declared.append(session.declare_subscriber(key, received))
+            subscriber = session.declare_subscriber(key, received)
+        self._declared.append(subscriber)
+
+        def end() -> None:
+            for each in (subscriber, token):
+                self._declared.remove(each)
+                each.undeclare()
+
+        return end
 
     def serve(self, name: str, kind: ServiceType, handle: Callable[[Request], None]) -> None:
         """Calls `handle` with each request for a service; it may answer later."""

@@ -1,0 +1,1 @@
+"""Adapter: a robot of ROS 2 behind the robot protocol."""

@@ -1,0 +1,204 @@
+"""Messages of ROS 2 as readings of the robot protocol. Functions raise ValueError for what cannot be used."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RigidTransform, RotationMatrix
+
+from errand_ros2.adapter.description import Description, LidarFile
+from skills.robot import Gripper, Imu, Intrinsics, Joints, Odometry, Scan
+
+_NEAREST_M: Final = 0.3
+_MOST_PIXELS: Final = 1 << 24
+_POINT_TYPES: Final = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+_PIXELS: Final[dict[str, tuple[str, int]]] = {
+    "rgb8": ("u1", 3),
+    "bgr8": ("u1", 3),
+    "rgba8": ("u1", 4),
+    "bgra8": ("u1", 4),
+    "mono8": ("u1", 1),
+    "16UC1": ("u2", 1),
+    "mono16": ("u2", 1),
+    "32FC1": ("f4", 1),
+}
+_MILLIMETRE_M: Final = 0.001
+
+
+def stamp_of(header: Any) -> float:
+    """Returns the time of a message (s)."""
+    return float(header.stamp.sec) + 1e-9 * float(header.stamp.nanosec)
+
+
+def transform_of(at: Any, turn: Any) -> RigidTransform:
+    """Returns a position and a quaternion as a transform."""
+    p, q = np.array([at.x, at.y, at.z], float), np.array([turn.w, turn.x, turn.y, turn.z], float)
+    length = float(np.linalg.norm(q))
+    if not (np.isfinite(p).all() and math.isfinite(length) and length > 0.1):
+        raise ValueError("a pose is not finite, or has no rotation")
+    return RigidTransform(Quaternion(q / length), p)
+
+
+def odometry(message: Any, stamp_s: float, raised_m: float) -> Odometry:
+    """Returns the dead reckoning of nav_msgs/Odometry; B lies `raised_m` above its child frame."""
+    X_OB = transform_of(message.pose.pose.position, message.pose.pose.orientation)
+    twist = message.twist.twist
+    velocity = (float(twist.linear.x), float(twist.linear.y), float(twist.angular.z))
+    if not all(map(math.isfinite, velocity)):
+        raise ValueError("a velocity is not finite")
+    if raised_m:
+        X_OB = RigidTransform(X_OB.rotation(), X_OB.translation() + np.array([0.0, 0.0, raised_m]))
+    return Odometry(stamp_s, X_OB, velocity)
+
+
+def between(before: Odometry, after: Odometry, stamp_s: float) -> RigidTransform:
+    """Returns the pose X_OB at a time between two readings."""
+    span_s = after.stamp_s - before.stamp_s
+    share = min(1.0, max(0.0, (stamp_s - before.stamp_s) / span_s)) if span_s > 0.0 else 1.0
+    turned = before.X_OB.rotation().ToQuaternion().slerp(share, after.X_OB.rotation().ToQuaternion())
+    p, q = before.X_OB.translation(), after.X_OB.translation()
+    return RigidTransform(RotationMatrix(turned), p + share * (q - p))
+
+
+def joints(message: Any, stamp_s: float, names: dict[str, str]) -> Joints:
+    """Returns sensor_msgs/JointState under our names; `names` are ours by those of ROS. Unknown values are zero."""
+    told = [names.get(each, each) for each in message.name]
+    if len(message.position) != len(told) or not np.isfinite(message.position).all():
+        raise ValueError("a joint has no finite position")
+    columns = []
+    for values in (message.position, message.velocity, message.effort):
+        finite = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+        columns.append(
+            dict(zip(told, (finite if len(finite) == len(told) else np.zeros(len(told))).tolist(), strict=True))
+        )
+    return Joints(stamp_s, *columns)
+
+
+def merged(before: Joints | None, new: Joints) -> Joints:
+    """Returns new joints over earlier ones: drivers of base, arm and gripper may publish apart."""
+    if before is None or before.position_rad.keys() <= new.position_rad.keys():
+        return new
+    columns = ("position_rad", "velocity_rad_s", "effort_nm")
+    return Joints(new.stamp_s, *({**getattr(before, each), **getattr(new, each)} for each in columns))
+
+
+def imu(message: Any, stamp_s: float) -> Imu:
+    """Returns sensor_msgs/Imu, in the axes of its frame."""
+    w, a = message.angular_velocity, message.linear_acceleration
+    return Imu(stamp_s, (w.x, w.y, w.z), (a.x, a.y, a.z))
+
+
+def gripper(description: Description, now: Joints, force_n: float | None, holding: bool | None) -> Gripper:
+    """Returns the gripper by its finger joints; without topics of its own, force and holding are not known."""
+    can = description.capabilities.gripper
+    if can is None:
+        return Gripper(now.stamp_s, 0.0, 0.0, False)
+    shares = [(now.position_rad[name], share) for name, share in can.finger_joints if name in now.position_rad]
+    opening = float(np.mean([position / share for position, share in shares])) if shares else 0.0
+    return Gripper(now.stamp_s, max(0.0, opening), force_n or 0.0, bool(holding))
+
+
+def cloud_points(message: Any) -> NDArray[np.float64]:
+    """Returns the finite points (N, 3) of sensor_msgs/PointCloud2, in its frame."""
+    fields = {each.name: each for each in message.fields}
+    order = ">" if message.is_bigendian else "<"
+    if not {"x", "y", "z"} <= fields.keys() or any(fields[axis].datatype not in (7, 8) for axis in "xyz"):
+        raise ValueError("the points have no x, y, z of floats")
+    kinds = [f"{order}{_POINT_TYPES[fields[axis].datatype]}" for axis in "xyz"]
+    kind = np.dtype(
+        {
+            "names": [*"xyz"],
+            "formats": kinds,
+            "offsets": [fields[axis].offset for axis in "xyz"],
+            "itemsize": message.point_step,
+        }
+    )
+    rows = np.asarray(message.data, np.uint8)
+    if message.row_step != message.width * message.point_step:
+        rows = rows.reshape(message.height, message.row_step)[:, : message.width * message.point_step].ravel()
+    points = np.frombuffer(np.ascontiguousarray(rows).tobytes(), kind, message.width * message.height)
+    xyz = np.stack([points[axis].astype(np.float64) for axis in "xyz"], axis=1)
+    return np.asarray(xyz[np.isfinite(xyz).all(axis=1)])
+
+
+def cloud_scan(
+    points_L: NDArray[np.float64], file: LidarFile, stamp_s: float, X_BL: RigidTransform, X_OB: RigidTransform
+) -> Scan:
+    """Returns points (N, 3) in the lidar's frame as a revolution; the nearest of a ring and column counts."""
+    far_m = np.linalg.norm(points_L, axis=1)
+    points_L, far_m = points_L[far_m > _NEAREST_M], far_m[far_m > _NEAREST_M]
+    elevations = np.radians(np.linspace(file.lowest, file.highest, file.rings))
+    found = np.arcsin(np.clip(points_L[:, 2] / far_m, -1.0, 1.0))
+    rings = np.rint((found - elevations[0]) / (elevations[1] - elevations[0])).astype(int)
+    turn = np.arctan2(points_L[:, 1], points_L[:, 0])
+    columns = np.rint((turn + np.pi) / (2.0 * np.pi) * file.columns).astype(int) % file.columns
+    ranges: NDArray[np.float32] = np.full((file.rings, file.columns), np.inf, dtype=np.float32)
+    inside = (rings >= 0) & (rings < file.rings)
+    np.minimum.at(ranges, (rings[inside], columns[inside]), far_m[inside].astype(np.float32))
+    ranges[np.isinf(ranges)] = np.nan
+    azimuths = -np.pi + np.arange(file.columns) * (2.0 * np.pi / file.columns)
+    return Scan(stamp_s, ranges, elevations, azimuths, X_BL, X_OB)
+
+
+def flat_scan(message: Any, stamp_s: float, X_BL: RigidTransform, X_OB: RigidTransform) -> Scan:
+    """Returns sensor_msgs/LaserScan as a revolution of one ring."""
+    ranges = np.asarray(message.ranges, np.float32)
+    if len(ranges) < 2 or not all(map(math.isfinite, (message.angle_min, message.angle_increment))):
+        raise ValueError("the scan has no beams")
+    unknown = ~np.isfinite(ranges) | (ranges < max(message.range_min, 0.01)) | (ranges > message.range_max)
+    azimuths = message.angle_min + message.angle_increment * np.arange(len(ranges), dtype=np.float64)
+    values = np.where(unknown, np.float32(np.nan), ranges)[None, :]
+    return Scan(stamp_s, values, np.zeros(1), azimuths, X_BL, X_OB)
+
+
+def pixels(message: Any) -> NDArray[Any]:
+    """Returns the pixels of sensor_msgs/Image: (H, W) grey or depth, or (H, W, 3) RGB."""
+    known = _PIXELS.get(message.encoding)
+    if known is None or not 0 < message.width * message.height <= _MOST_PIXELS:
+        raise ValueError(f"a picture of {message.width}x{message.height} {message.encoding[:20]!r}")
+    (name, channels), height, width = known, message.height, message.width
+    kind = np.dtype((">" if message.is_bigendian else "<") + name)
+    rows = np.asarray(message.data, np.uint8)[: height * message.step].reshape(height, message.step)
+    row_bytes = width * channels * kind.itemsize
+    if message.step < row_bytes:
+        raise ValueError("the rows of a picture are too short")
+    made = np.ascontiguousarray(rows[:, :row_bytes]).view(kind).reshape((height, width, channels))
+    if channels == 1:
+        return np.asarray(made[:, :, 0])
+    return np.ascontiguousarray(made[:, :, :3] if message.encoding.startswith("rgb") else made[:, :, 2::-1])
+
+
+def grey_of(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Returns a picture without its colours."""
+    return picture if picture.ndim == 2 else np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), np.uint8)
+
+
+def depth_m(message: Any) -> NDArray[np.float32]:
+    """Returns depth (H, W) in metres from floats in metres or integers in millimetres, 0 where it is unknown."""
+    values = pixels(message)
+    if values.ndim != 2:
+        raise ValueError("the depth has colours")
+    metres = values.astype(np.float32) * np.float32(_MILLIMETRE_M if values.dtype.kind == "u" else 1.0)
+    return np.where(np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0))
+
+
+def lens(message: Any) -> Intrinsics:
+    """Returns the intrinsics of sensor_msgs/CameraInfo, without distortion."""
+    fx, fy, cx, cy = (float(message.k[number]) for number in (0, 4, 2, 5))
+    if not (fx > 0.0 and fy > 0.0 and math.isfinite(fx + fy + cx + cy)):
+        raise ValueError("the camera has no intrinsics")
+    return Intrinsics(int(message.width), int(message.height), fx, fy, cx, cy)
+
+
+def usable(read: Callable[..., Any], *args: Any) -> Any:
+    """Returns what a function reads, None for what cannot be used."""
+    try:
+        return read(*args)
+    except (ValueError, IndexError, TypeError, OverflowError, KeyError, MemoryError):
+        return None

@@ -1,0 +1,386 @@
+"""A robot of ROS 2 behind the robot protocol. Readings are the latest; commands are followed by `poll`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any, Final
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from errand_ros2 import messages
+from errand_ros2.adapter.description import DRIVE_EXPIRY_S, Description
+from errand_ros2.adapter.sensors import OLD_STATE_S, Sensors
+from errand_ros2.served_motions import GRIPPER, INVALID_GOAL, TRAJECTORY
+from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError, SentGoal
+from errand_ros2.wire.node import Node
+from errand_ros2.wire.types import ros_types
+from skills.command_table import CommandTable
+from skills.robot import (
+    ArmTrajectory,
+    BaseKind,
+    Battery,
+    Capabilities,
+    Clock,
+    CommandCause,
+    CommandId,
+    CommandState,
+    CommandStatus,
+    DoorHandle,
+    Gripper,
+    Image,
+    Imu,
+    Joints,
+    Lease,
+    LeaseError,
+    Odometry,
+    OwnLocalisation,
+    Scan,
+)
+
+SILENT_S, GONE_S = 3.0, 15.0
+_CALL_S: Final = 0.5
+_LEAST_POINT_S, _HEAD_RAD_S = 0.2, 1.0
+_REACHED_M, _REACHED_RAD = 0.02, 0.03
+BASE, POSTURE, ARM, HEAD, GRIP = "base", "posture", "arm", "head", "gripper"
+
+
+class Ros2Robot:
+    """Robot of ROS 2. Implements `skills.robot.Robot`."""
+
+    def __init__(self, name: str, node: Node, clock: Clock, description: Description) -> None:
+        """Subscribes and declares the publishers and action clients that the description names."""
+        self._name, self._clock, self._description = name, clock, description
+        self._node, file = node, description.file
+        self.sensors = Sensors(node, description, clock.now)
+        kind = "TwistStamped" if file.base.stamped else "Twist"
+        self._velocity = node.publisher(file.base.command, f"geometry_msgs/msg/{kind}")
+        posture, carry = file.base.posture, file.gripper.carry if file.gripper else None
+        self._posture = None if posture is None else node.publisher(posture, "geometry_msgs/msg/Pose")
+        self._carry = None if carry is None else node.publisher(carry, "std_msgs/msg/Bool")
+        given = {ARM: (file.arm, TRAJECTORY), HEAD: (file.head, TRAJECTORY), GRIP: (file.gripper, GRIPPER)}
+        self.actions = {
+            part: ActionClient(node, each.action, action) for part, (each, action) in given.items() if each is not None
+        }
+        self._commands, self._unsure = CommandTable[str](), set[str]()
+        self._lease_number = 0
+        self._current: Lease | None = None
+
+    # -- know and sense ----------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+        return self._name
+
+    def capabilities(self) -> Capabilities:
+        """Capabilities of the described robot."""
+        return self._description.capabilities
+
+    def odometry(self) -> Odometry:
+        """Latest dead reckoning; before the first, that of a robot which never answered."""
+        return self.sensors.odometry or Odometry(-math.inf, RigidTransform(), (0.0, 0.0, 0.0))
+
+    def own_localisation(self) -> OwnLocalisation | None:
+        """Latest pose by the robot's own localisation; None without one."""
+        return self.sensors.place
+
+    def imu(self) -> Imu | None:
+        """Latest inertial measurement; None without one."""
+        return self.sensors.imu
+
+    def scan(self) -> Scan | None:
+        """Latest LiDAR revolution; None before the first."""
+        return self.sensors.scan
+
+    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
+        """Takes a picture with depth, or only one of the two. Raises ValueError and NoImageError."""
+        return self.sensors.image(source, visual=visual, depth=depth)
+
+    def joints(self) -> Joints:
+        """Latest joint state."""
+        return self.sensors.joints
+
+    def gripper(self) -> Gripper:
+        """Latest gripper state."""
+        return self.sensors.gripper()
+
+    def battery(self) -> Battery:
+        """Latest battery state; full when no topic tells."""
+        return self.sensors.battery()
+
+    def faults(self) -> tuple[str, ...]:
+        """Returns a fault while the robot is silent."""
+        silent_s = self.sensors.silent_s()
+        return (f"the robot has not answered for {silent_s:.0f} s",) if silent_s > SILENT_S else ()
+
+    @property
+    def sent(self) -> int:
+        """Number of the messages sent to the robot's topics."""
+        return sum(each.sent for each in (self._velocity, self._posture, self._carry) if each is not None)
+
+    def notes(self, address: str, endpoint: str) -> tuple[str, ...]:
+        """Returns sentences for the report on what the robot does not tell."""
+        file, grip = self._description.file, self._description.file.gripper
+        untold = {
+            "No topic tells the battery's charge: it counts as full.": file.battery is None,
+            "No topic tells whether the gripper holds an object.": grip is not None and grip.holding is None,
+            "The scan has one ring.": file.lidar.scan is not None,
+        }
+        who = f"Robot of ROS 2 at {address}, by {endpoint}."
+        return (who, *(text for text, holds in untold.items() if holds))
+
+    # -- act ---------------------------------------------------------------------------------------------------------
+
+    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Drives at a body-frame velocity until the clock reads `until_s`, at most 0.6 s."""
+        can, sideways = self._description.capabilities, vy != 0.0
+        if sideways and can.base_kind is BaseKind.DIFFERENTIAL:
+            return self._commands.refuse("drive: this base cannot go sideways")
+        if (refused := self._objection(BASE, lease, until_s, (vx, vy, wz))) is not None:
+            return refused
+        share = min(1.0, can.max_speed_m_s / max(math.hypot(vx, vy), 1e-9))
+        most = can.max_turn_rate_rad_s
+        velocity = (share * vx, share * vy, min(max(wz, -most), most))
+        now_s = self._clock.now()
+        self._say(velocity)
+        return self._commands.begin(BASE, velocity, now_s, min(until_s, now_s + DRIVE_EXPIRY_S))
+
+    def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Holds the body origin at a height above the floor and a pitch."""
+        can = self._description.capabilities
+        low, high = can.height_range_m
+        least, most = can.pitch_range_rad
+        if self._posture is None:
+            return self._commands.refuse("stand: the posture cannot be set", CommandCause.UNSUPPORTED)
+        if (refused := self._objection(POSTURE, lease, until_s, (height_m, pitch_rad))) is not None:
+            return refused
+        if not (low <= height_m <= high and least <= pitch_rad <= most):
+            return self._commands.refuse(f"stand: {height_m:.2f} m, {pitch_rad:.2f} rad is out of range")
+        X = RigidTransform(RotationMatrix.MakeYRotation(pitch_rad), [0.0, 0.0, height_m - can.standing_height_m])
+        self._posture.put(messages.pose(X))
+        return self._commands.begin(POSTURE, (height_m, pitch_rad), self._clock.now(), until_s)
+
+    def sit(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Refuses: no topic of ROS 2 is common for it."""
+        return self._unsupported("sit")
+
+    def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
+        """Refuses: see `sit`."""
+        return self._unsupported("dock")
+
+    def undock(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Refuses: see `sit`."""
+        return self._unsupported("undock")
+
+    def open_door(self, handle: DoorHandle, *, until_s: float, lease: Lease) -> CommandId:
+        """Refuses: see `sit`."""
+        return self._unsupported("open_door")
+
+    def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
+        """Sends a joint trajectory to the arm's controller; done by its result."""
+        arm = self._description.capabilities.arm
+        if arm is None or trajectory.positions_rad.shape[1] != len(arm.joint_names):
+            return self._unsupported("move_arm") if arm is None else self._commands.refuse("move_arm: wrong joints")
+        goal = self._trajectory(arm.joint_names, trajectory)
+        return self._act(ARM, goal, until_s, lease, trajectory.times_s)
+
+    def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Sends pan and tilt to the head's controller; done by its result."""
+        head = self._description.capabilities.head
+        if head is None:
+            return self._unsupported("point_head")
+        (left, right), (up, down) = head.pan_range_rad, head.tilt_range_rad
+        if not (left <= pan_rad <= right and up <= tilt_rad <= down):
+            return self._commands.refuse(f"point_head: pan {pan_rad:.2f}, tilt {tilt_rad:.2f} rad is out of range")
+        now = self.sensors.joints.position_rad
+        far_rad = max(
+            abs(want - now.get(name, 0.0)) for want, name in zip((pan_rad, tilt_rad), head.joint_names, strict=True)
+        )
+        way = ArmTrajectory(np.array([max(_LEAST_POINT_S, far_rad / _HEAD_RAD_S)]), np.array([[pan_rad, tilt_rad]]))
+        return self._act(HEAD, self._trajectory(head.joint_names, way), until_s, lease, (pan_rad, tilt_rad))
+
+    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Sends an opening and a force to the gripper's controller; done by its result."""
+        file = self._description.file.gripper
+        if file is None or self._description.capabilities.gripper is None:
+            return self._unsupported("set_gripper")
+        goal = ros_types().blank(f"{GRIPPER}_Goal")
+        goal.command.position, goal.command.max_effort = file.scale * opening, force_n
+        return self._act(GRIP, goal, until_s, lease, (opening, force_n))
+
+    def carry(self, holding: bool, *, lease: Lease) -> None:
+        """Tells the robot whether the gripper holds an object, if a topic is described for it."""
+        if lease == self._current and self._carry is not None:
+            self._carry.put(messages.truth_value(holding))
+
+    def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
+        """Stops base, arm and head, or only the part of a command; the gripper keeps its force."""
+        if (gone := self._without(lease)) is not None:
+            return self._commands.refuse(f"stop: {gone}", CommandCause.NO_LEASE)
+        for part in (BASE, POSTURE, ARM, HEAD):
+            active = self._commands.running(part)
+            if only is None or (active is not None and active.id == only):
+                self._halt(part, CommandStatus(CommandState.STOPPED, "stopped by command", CommandCause.STOPPED))
+        return self._commands.note(CommandState.DONE)
+
+    def command_status(self, command: CommandId) -> CommandStatus:
+        """Returns the last known status of a command. Raises KeyError for an unknown id."""
+        return self._commands.status(command)
+
+    # -- own ---------------------------------------------------------------------------------------------------------
+
+    def lease_holder(self) -> Lease | None:
+        """Valid lease within this program; ROS 2 has none."""
+        return self._current
+
+    def acquire_lease(self, holder: str) -> Lease:
+        """Takes the lease within this program. Raises LeaseError when another has it."""
+        if self._current is not None:
+            raise LeaseError(f"{self._name}: the lease is held by {self._current.holder!r}")
+        return self.take_lease(holder)
+
+    def take_lease(self, holder: str) -> Lease:
+        """Takes the lease from its holder; the robot stops."""
+        if self._current is not None:
+            self.stop(lease=self._current)
+        self._lease_number += 1
+        self._current = Lease(self._name, holder, self._lease_number)
+        return self._current
+
+    def return_lease(self, lease: Lease) -> None:
+        """Returns the lease; the robot stops."""
+        if lease == self._current:
+            self.stop(lease=lease)
+            self._current = None
+
+    # -- upkeep ------------------------------------------------------------------------------------------------------
+
+    def poll(self) -> None:
+        """Renews the velocity, follows the actions, and ends what is late; call it once a tick."""
+        now_s, silent_s = self._clock.now(), self.sensors.silent_s()
+        if silent_s > OLD_STATE_S:
+            self._fall_silent(silent_s)
+            return
+        for part in list(self._unsure):
+            self._halt(part, CommandStatus(CommandState.STOPPED, "", CommandCause.NO_ANSWER))
+        if (base := self._commands.running(BASE)) is not None:
+            if now_s < base.until_s:
+                self._say(base.goal)
+            else:
+                self._halt(BASE, CommandStatus(CommandState.DONE))
+        self._follow_posture(now_s)
+        for part in self.actions:
+            self._follow(part, now_s)
+
+    def stopped_because(self) -> str:
+        """Reason why the robot has stopped for good; empty while it goes on."""
+        return f"the robot has not answered for {GONE_S:.0f} s" if self.sensors.silent_s() > GONE_S else ""
+
+    def _fall_silent(self, silent_s: float) -> None:
+        """Ends the running commands of a silent robot; their parts are stopped when it answers again."""
+        status = CommandStatus(CommandState.STOPPED, f"the last state is {silent_s:.1f} s old", CommandCause.NO_ANSWER)
+        for part in (BASE, POSTURE, ARM, HEAD):
+            if self._commands.running(part) is not None:
+                self._unsure.add(part)
+                self._halt(part, status)
+                self._unsure.add(part)
+
+    def _follow_posture(self, now_s: float) -> None:
+        if (active := self._commands.running(POSTURE)) is None:
+            return
+        height_m, pitch_rad = active.goal
+        X_OB = self.odometry().X_OB
+        off_m = abs(float(X_OB.translation()[2]) - height_m)
+        off_rad = abs(RollPitchYaw(X_OB.rotation()).pitch_angle() - pitch_rad)
+        if off_m < _REACHED_M and off_rad < _REACHED_RAD:
+            self._commands.finish(POSTURE, CommandState.DONE)
+        elif now_s > active.until_s:
+            self._commands.finish(POSTURE, CommandState.STOPPED, "expired before it was done", CommandCause.LATE)
+
+    def _follow(self, part: str, now_s: float) -> None:
+        if (active := self._commands.running(part)) is None:
+            return
+        sent: SentGoal = active.goal
+        if sent.status.is_final:
+            state, reason, cause = _ended(part, sent)
+            self._commands.finish(part, state, reason, cause)
+        elif now_s > active.until_s:
+            self._halt(part, CommandStatus(CommandState.STOPPED, "expired before it was done", CommandCause.LATE))
+
+    # -- inside ------------------------------------------------------------------------------------------------------
+
+    def _say(self, velocity: tuple[float, float, float]) -> None:
+        if not self._description.file.base.stamped:
+            self._velocity.put(messages.twist(velocity))
+        else:
+            stamp_s = self.sensors.time.theirs(self._clock.now())
+            self._velocity.put(messages.twist_stamped(stamp_s, self.sensors.body_frame, velocity))
+
+    def _halt(self, part: str, status: CommandStatus) -> None:
+        """Stops a part and ends its command."""
+        active = self._commands.running(part)
+        if part == BASE and (active is not None or part in self._unsure):
+            self._say((0.0, 0.0, 0.0))
+        if part in self.actions and active is not None:
+            self.actions[part].cancel(active.goal)
+        self._unsure.discard(part)
+        self._commands.finish(part, status.state, status.reason, status.cause)
+
+    def _trajectory(self, names: tuple[str, ...], trajectory: ArmTrajectory) -> Any:
+        """Returns the goal of a trajectory under the names of ROS, which begins when it arrives."""
+        goal, types = ros_types().blank(f"{TRAJECTORY}_Goal"), ros_types()
+        goal.trajectory.joint_names = [self._description.joint_in_ros(name) for name in names]
+        for time_s, positions in zip(trajectory.times_s.tolist(), trajectory.positions_rad, strict=True):
+            point = types.blank("trajectory_msgs/msg/JointTrajectoryPoint")
+            point.positions = np.asarray(positions, np.float64)
+            start = point.time_from_start
+            start.sec, start.nanosec = divmod(max(0, round(time_s * 1e9)), 10**9)
+            goal.trajectory.points.append(point)
+        return goal
+
+    def _act(self, part: str, goal: Any, until_s: float, lease: Lease, values: Iterable[float]) -> CommandId:
+        """Sends the goal of an action, unless there is an objection."""
+        if (refused := self._objection(part, lease, until_s, values)) is not None:
+            return refused
+        try:
+            sent = self.actions[part].send(goal, limit_s=_CALL_S)
+        except NoAnswerError as error:
+            return self._commands.refuse(f"{part}: {error}", CommandCause.NO_ANSWER)
+        if sent is None:
+            return self._commands.refuse(f"{part}: the controller rejects the goal", CommandCause.REFUSED)
+        return self._commands.begin(part, sent, self._clock.now(), until_s)
+
+    def _unsupported(self, verb: str) -> CommandId:
+        return self._commands.refuse(f"{verb}: the robot has no such part", CommandCause.UNSUPPORTED)
+
+    def _without(self, lease: Lease) -> str | None:
+        """Returns why a lease does not count; None when it does."""
+        return None if lease == self._current else f"lease {lease.number} of {lease.holder!r} no longer counts"
+
+    def _objection(self, part: str, lease: Lease, until_s: float, values: Iterable[float]) -> CommandId | None:
+        """Refuses a forbidden command; returns None for an allowed one."""
+        now_s, silent_s = self._clock.now(), self.sensors.silent_s()
+        if (gone := self._without(lease)) is not None:
+            return self._commands.refuse(f"{part}: {gone}", CommandCause.NO_LEASE)
+        if not np.isfinite([*values, min(until_s, 1e9)]).all():
+            return self._commands.refuse(f"{part}: a value is not finite")
+        if until_s <= now_s:
+            late = f"{part}: expires at {until_s:.2f} s, and it is {now_s:.2f} s already"
+            return self._commands.refuse(late, CommandCause.LATE)
+        if silent_s > OLD_STATE_S:
+            return self._commands.refuse(f"{part}: the last state is {silent_s:.1f} s old", CommandCause.NO_ANSWER)
+        return None
+
+
+def _ended(part: str, sent: SentGoal) -> tuple[CommandState, str, CommandCause]:
+    """Returns how a goal ended: its state, the reason and the cause."""
+    if sent.status is GoalStatus.SUCCEEDED or (part == GRIP and getattr(sent.result, "stalled", False)):
+        stalled = part == GRIP and sent.result.stalled
+        return CommandState.DONE, "stopped by an object in the gripper" if stalled else "", CommandCause.NONE
+    if sent.status is GoalStatus.CANCELED:
+        return CommandState.STOPPED, "cancelled by the controller", CommandCause.STOPPED
+    reason = str(getattr(sent.result, "error_string", ""))[:200] or "the controller gave up"
+    invalid = getattr(sent.result, "error_code", 0) == INVALID_GOAL
+    return CommandState.STOPPED, reason, CommandCause.INVALID if invalid else CommandCause.BLOCKED

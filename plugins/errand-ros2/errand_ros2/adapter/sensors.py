@@ -1,0 +1,360 @@
+"""Sensors of a robot of ROS 2: what its topics said last, on the clock of the robot protocol.
+
+Handlers run in threads of Zenoh; readings are immutable and replaced as a whole.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from errand_ros2.adapter import readings
+from errand_ros2.adapter.description import CameraFile, Description
+from errand_ros2.wire.keys import LATCHED, SENSOR
+from errand_ros2.wire.node import Node
+from skills.geometry import compose, inverse
+from skills.manipulation.arm.kinematics import ArmModel, arm_model
+from skills.robot import (
+    Battery,
+    FrameTree,
+    Gripper,
+    Image,
+    Imu,
+    Joints,
+    Mount,
+    NoImageError,
+    Odometry,
+    OwnLocalisation,
+    Pose2D,
+    Scan,
+)
+
+OLD_STATE_S: Final = 0.5
+_JUMP_S: Final = 0.7
+_DELAYS_S: Final = 5.0
+_KEPT: Final = 400
+_PICTURE_S: Final = 2.0
+_SAME_S: Final = 0.051
+_EPSILON_S: Final = 1e-6
+_BODY_FRAMES: Final = 8
+
+
+class RobotTime:
+    """Maps stamps of the robot to our clock: the shortest delay of the last seconds counts as none.
+
+    So the robot's clock may be ahead, run slower, or jump. A jump by 0.7 s or more begins anew.
+    """
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self._behind: deque[tuple[float, float]] = deque()
+        self._behind_s, self._last_s = 0.0, -math.inf
+        self.jumps = 0
+
+    def hear(self, stamp_s: float) -> None:
+        """Takes the stamp of a message that has just arrived."""
+        now_s = self._now()
+        behind_s = now_s - stamp_s
+        back, ahead = stamp_s < self._last_s - _JUMP_S, self._behind and behind_s < self._behind_s - _JUMP_S
+        if back or ahead:
+            self.jumps += 1
+            self._behind.clear()
+        self._last_s = stamp_s if back else max(stamp_s, self._last_s)
+        self._behind.append((now_s, behind_s))
+        while self._behind[0][0] < now_s - _DELAYS_S and len(self._behind) > 1:
+            self._behind.popleft()
+        self._behind_s = min(each for _, each in self._behind)
+
+    def ours(self, stamp_s: float) -> float:
+        """Returns a stamp on our clock."""
+        return min(stamp_s + self._behind_s, self._now())
+
+    def theirs(self, time_s: float) -> float:
+        """Returns a time of our clock on the robot's."""
+        return time_s - self._behind_s
+
+
+class Sensors:
+    """Sensors of one robot."""
+
+    def __init__(self, node: Node, description: Description, now: Callable[[], float]) -> None:
+        """Subscribes to the topics that the description names."""
+        self._node, self._description, self._now = node, description, now
+        self._space, self.time, file = node.namespace.strip("/"), RobotTime(now), description.file
+        self._names = {theirs: ours for ours, theirs in file.joint_names.items()}
+        self._lock = threading.RLock()
+        self._odometry: deque[Odometry] = deque(maxlen=_KEPT)
+        self._joints: deque[Joints] = deque(maxlen=_KEPT)
+        self._fixed: dict[str, tuple[str, RigidTransform]] = {}
+        self._jumps, self.body_frame = 0, ""
+        self.scan: Scan | None = None
+        self.imu: Imu | None = None
+        self.place: OwnLocalisation | None = None
+        self.force_n: float | None = None
+        self.holding: bool | None = None
+        self.charge: tuple[float, float] | None = None
+        node.subscribe(file.odometry.topic, "nav_msgs/msg/Odometry", self._hear_odometry)
+        node.subscribe("/tf_static", "tf2_msgs/msg/TFMessage", self._hear_fixed, LATCHED)
+        self._hear(file.joints, "sensor_msgs/msg/JointState", self._hear_joints)
+        self._hear(file.lidar.points, "sensor_msgs/msg/PointCloud2", self._hear_points)
+        self._hear(file.lidar.scan, "sensor_msgs/msg/LaserScan", self._hear_scan)
+        self._hear(file.imu, "sensor_msgs/msg/Imu", self._hear_imu)
+        self._hear(file.battery, "sensor_msgs/msg/BatteryState", self._hear_battery)
+        self._hear(file.pose, "geometry_msgs/msg/PoseWithCovarianceStamped", self._hear_pose)
+        if (grip := file.gripper) is not None:
+            self._hear(grip.holding, "std_msgs/msg/Bool", lambda told: setattr(self, "holding", bool(told.data)))
+            self._hear(grip.force, "geometry_msgs/msg/WrenchStamped", self._hear_force)
+
+    def _hear(self, topic: str | None, kind: str, handle: Callable[[Any], None]) -> None:
+        if topic is not None:
+            self._node.subscribe(topic, kind, handle, SENSOR)
+
+    # -- what was heard ----------------------------------------------------------------------------------------------
+
+    @property
+    def odometry(self) -> Odometry | None:
+        """Latest dead reckoning."""
+        with self._lock:
+            return self._odometry[-1] if self._odometry else None
+
+    @property
+    def joints(self) -> Joints:
+        """Latest joint state; empty before the first."""
+        with self._lock:
+            return self._joints[-1] if self._joints else Joints(self._now(), {}, {}, {})
+
+    def gripper(self) -> Gripper:
+        """Latest gripper state."""
+        return readings.gripper(self._description, self.joints, self.force_n, self.holding)
+
+    def battery(self) -> Battery:
+        """Latest battery state; full when no topic tells."""
+        stamp_s, charge = self.charge or (self._now(), 1.0)
+        return Battery(stamp_s, charge)
+
+    def silent_s(self) -> float:
+        """Age of the last odometry; infinite before the first."""
+        last = self.odometry
+        return math.inf if last is None else self._now() - last.stamp_s
+
+    def missing(self) -> str:
+        """Names the first topic that has said nothing yet; empty when all that is needed was heard."""
+        file, can = self._description.file, self._description.capabilities
+        needed = set(can.arm.joint_names if can.arm else ())
+        if self.odometry is None:
+            return file.odometry.topic
+        if not needed <= self.joints.position_rad.keys():
+            left = ", ".join(sorted(needed - self.joints.position_rad.keys()))
+            return f"{file.joints} with {left}"
+        if self.scan is None:
+            frame = f" (or no /tf_static to {self._lidar_frame})" if self._X_BF(self._lidar_frame) is None else ""
+            return f"{file.lidar.points or file.lidar.scan}{frame}"
+        return ""
+
+    # -- handlers ----------------------------------------------------------------------------------------------------
+
+    def _hear_odometry(self, message: Any) -> None:
+        raised_m, stamp_s = self._description.file.odometry.raised, readings.stamp_of(message.header)
+        read = readings.usable(readings.odometry, message, stamp_s, raised_m)
+        if read is None:
+            return
+        with self._lock:
+            self.body_frame = message.child_frame_id.strip("/")
+            self.time.hear(stamp_s)
+            if self.time.jumps != self._jumps:
+                self._jumps = self.time.jumps
+                self._odometry.clear()
+                self._joints.clear()
+            stamped = replace(read, stamp_s=self.time.ours(stamp_s))
+            if not self._odometry or stamped.stamp_s > self._odometry[-1].stamp_s - _EPSILON_S:
+                self._odometry.append(stamped)
+
+    def _hear_joints(self, message: Any) -> None:
+        with self._lock:
+            stamp_s = self.time.ours(readings.stamp_of(message.header))
+            read = readings.usable(readings.joints, message, stamp_s, self._names)
+            if read is not None and (not self._joints or stamp_s > self._joints[-1].stamp_s - _SAME_S):
+                self._joints.append(readings.merged(self._joints[-1] if self._joints else None, read))
+
+    def _hear_fixed(self, message: Any) -> None:
+        for each in message.transforms:
+            moved = readings.usable(readings.transform_of, each.transform.translation, each.transform.rotation)
+            if moved is not None and len(self._fixed) < _KEPT:
+                self._fixed[each.child_frame_id.strip("/")] = (each.header.frame_id.strip("/"), moved)
+
+    def _hear_points(self, message: Any) -> None:
+        X_BF, X_BL = self._X_BF(message.header.frame_id.strip("/")), self._X_BF(self._lidar_frame)
+        stamp_s = self.time.ours(readings.stamp_of(message.header))
+        points_F, X_OB = readings.usable(readings.cloud_points, message), self._X_OB(stamp_s)
+        if points_F is None or X_BF is None or X_BL is None or X_OB is None:
+            return
+        points_L = (X_BL.inverse() @ X_BF @ points_F.T).T if len(points_F) else points_F
+        self.scan = readings.cloud_scan(points_L, self._description.file.lidar, stamp_s, X_BL, X_OB)
+
+    def _hear_scan(self, message: Any) -> None:
+        stamp_s = self.time.ours(readings.stamp_of(message.header))
+        X_BL, X_OB = self._X_BF(message.header.frame_id.strip("/")), self._X_OB(stamp_s)
+        if X_BL is not None and X_OB is not None:
+            self.scan = readings.usable(readings.flat_scan, message, stamp_s, X_BL, X_OB) or self.scan
+
+    def _hear_imu(self, message: Any) -> None:
+        self.imu = readings.imu(message, self.time.ours(readings.stamp_of(message.header)))
+
+    def _hear_force(self, message: Any) -> None:
+        force = message.wrench.force
+        told = math.sqrt(force.x**2 + force.y**2 + force.z**2)
+        self.force_n = told if math.isfinite(told) else self.force_n
+
+    def _hear_battery(self, message: Any) -> None:
+        if 0.0 <= message.percentage <= 1.0:
+            self.charge = (self.time.ours(readings.stamp_of(message.header)), float(message.percentage))
+
+    def _hear_pose(self, message: Any) -> None:
+        stamp_s = self.time.ours(readings.stamp_of(message.header))
+        X_MB = readings.usable(readings.transform_of, message.pose.pose.position, message.pose.pose.orientation)
+        X_OB = self._X_OB(stamp_s)
+        if X_MB is not None and X_OB is not None:
+            X_MO = compose(Pose2D.from_transform(X_MB), inverse(Pose2D.from_transform(X_OB)))
+            self.place = OwnLocalisation(stamp_s, X_MO)
+
+    # -- frames ------------------------------------------------------------------------------------------------------
+
+    @property
+    def _lidar_frame(self) -> str:
+        return self._description.file.lidar.frame or f"{self._space}/lidar"
+
+    def _X_BF(self, frame: str) -> RigidTransform | None:
+        """Pose of a fixed frame in the body; None when no static transforms lead there."""
+        X = RigidTransform()
+        for _ in range(_BODY_FRAMES):
+            if frame == self.body_frame:
+                return X
+            if frame not in self._fixed:
+                return None
+            frame, X_PF = self._fixed[frame]
+            X = X_PF @ X
+        return None
+
+    def _X_OB(self, stamp_s: float) -> RigidTransform | None:
+        """Pose of the body at a time; None when odometry does not reach so far back."""
+        with self._lock:
+            seen = list(self._odometry)
+        after = next((n for n in range(len(seen) - 1, -1, -1) if seen[n].stamp_s <= stamp_s + _EPSILON_S), None)
+        if after is None:
+            return None
+        return readings.between(seen[after], seen[min(after + 1, len(seen) - 1)], stamp_s)
+
+    @cached_property
+    def _arm(self) -> ArmModel:
+        return arm_model(self._description.capabilities)
+
+    def frames_at(self, stamp_s: float) -> FrameTree | None:
+        """Frame tree at a time; None when odometry or joints do not reach so far back."""
+        can, X_OB = self._description.capabilities, self._X_OB(stamp_s)
+        with self._lock:
+            joints = min(self._joints, key=lambda each: abs(each.stamp_s - stamp_s), default=None)
+        if X_OB is None:
+            return None
+        edges = {"body": ("odom", X_OB)}
+        at = {} if joints is None else joints.position_rad
+        if can.arm is not None:
+            if not at.keys() >= {*can.arm.joint_names}:
+                return None
+            edges["hand"] = ("body", self._arm.X_BH(np.array([at[name] for name in can.arm.joint_names])))
+        if can.head is not None:
+            pan, tilt = (at.get(name, 0.0) for name in can.head.joint_names)
+            edges["head"] = ("body", can.head.X_BF(pan, tilt))
+        parents = {Mount.BODY: "body", Mount.HAND: "hand", Mount.HEAD: "head"}
+        for camera in can.cameras:
+            if parents[camera.mount] in edges:
+                edges[f"{camera.source}_camera"] = (parents[camera.mount], camera.X_FC)
+        return FrameTree(edges)
+
+    # -- pictures ----------------------------------------------------------------------------------------------------
+
+    def image(self, source: str, *, visual: bool, depth: bool) -> Image:
+        """Subscribes for one picture with depth. Raises ValueError and NoImageError."""
+        file = self._description.file.cameras.get(source)
+        if file is None:
+            raise ValueError(f"there is no camera {source!r}")
+        if depth and file.depth is None:
+            raise NoImageError(f"{source}: the camera has no depth")
+        taken = Shots(
+            self._node, file, visual=visual, depth=depth, since_s=self._now() - _EPSILON_S, ours=self.time.ours
+        )
+        with taken:
+            found = taken.wait(_PICTURE_S)
+        if found is None:
+            raise NoImageError(f"{source}: no picture came within {_PICTURE_S:g} s")
+        return self._image(source, found, visual=visual, depth=depth)
+
+    def _image(self, source: str, found: Mapping[str, Any], *, visual: bool, depth: bool) -> Image:
+        stamp_s = self.time.ours(readings.stamp_of(found["image" if visual else "depth"].header))
+        frames = self.frames_at(stamp_s)
+        picture = readings.usable(readings.pixels, found["image"]) if visual else np.zeros((0, 0), np.uint8)
+        far = readings.usable(readings.depth_m, found["depth"]) if depth else np.zeros((0, 0), np.float32)
+        lenses = [readings.usable(readings.lens, found[each]) for each in ("info", "depth_info") if each in found]
+        if frames is None or picture is None or far is None or None in lenses:
+            raise NoImageError(f"{source}: the picture cannot be used")
+        colour = picture if picture.ndim == 3 else None
+        grey = readings.grey_of(picture)
+        return Image(stamp_s, source, f"{source}_camera", lenses[0], lenses[-1], colour, grey, far, frames)
+
+
+class Shots:
+    """Subscriptions for one picture, its depth, and their intrinsics; they end with the block."""
+
+    def __init__(
+        self, node: Node, file: CameraFile, *, visual: bool, depth: bool, since_s: float, ours: Callable[[float], float]
+    ) -> None:
+        self._since_s, self._ours = since_s, ours
+        self._new, self._ends = threading.Condition(), ExitStack()
+        self._found: dict[str, Any] = {}
+        self._wanted: dict[str, tuple[str, str]] = {}
+        info, image = "sensor_msgs/msg/CameraInfo", "sensor_msgs/msg/Image"
+        if visual:
+            self._wanted |= {"info": (file.info, info), "image": (file.image, image)}
+        if depth:
+            self._wanted |= {"depth_info": (file.depth_info or file.info, info), "depth": (str(file.depth), image)}
+        self._node = node
+
+    def __enter__(self) -> None:
+        for what, (topic, kind) in self._wanted.items():
+            self._ends.callback(self._node.subscribe(topic, kind, self._taker(what), SENSOR))
+
+    def __exit__(self, *_: object) -> None:
+        self._ends.close()
+
+    def _taker(self, what: str) -> Callable[[Any], None]:
+        def take(message: Any) -> None:
+            with self._new:
+                self._found[what] = message
+                self._new.notify()
+
+        return take
+
+    def wait(self, limit_s: float) -> Mapping[str, Any] | None:
+        """Returns messages of about one time, taken since the picture was asked for; None after the limit."""
+        until_s = time.monotonic() + limit_s
+        with self._new:
+            while not self._fits():
+                if (left_s := until_s - time.monotonic()) <= 0.0:
+                    return None
+                self._new.wait(left_s)
+            return dict(self._found)
+
+    def _fits(self) -> bool:
+        if self._found.keys() != self._wanted.keys():
+            return False
+        stamps = [self._ours(readings.stamp_of(self._found[what].header)) for what in self._found if "info" not in what]
+        return min(stamps) >= self._since_s and max(stamps) - min(stamps) <= _SAME_S

@@ -1,0 +1,206 @@
+"""Arm, head, gripper and posture of a served robot: actions and topics that become commands of the robot's protocol."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import Any, Final
+
+import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RollPitchYaw
+
+from errand_ros2.wire.actions import ActionServer, Goal, GoalStatus
+from errand_ros2.wire.node import Node
+from skills.robot import (
+    ArmTrajectory,
+    Clock,
+    CommandCause,
+    CommandId,
+    CommandState,
+    CommandStatus,
+    Lease,
+    Robot,
+)
+
+TRAJECTORY: Final = "control_msgs/action/FollowJointTrajectory"
+GRIPPER: Final = "control_msgs/action/GripperCommand"
+ARM_ACTION: Final = "arm_controller/follow_joint_trajectory"
+HEAD_ACTION: Final = "head_controller/follow_joint_trajectory"
+GRIPPER_ACTION: Final = "gripper_controller/gripper_cmd"
+POSTURE: Final = "body_pose"
+CARRY: Final = "gripper/carry"
+INVALID_GOAL, PATH_VIOLATED = -1, -4
+_EXTRA_S, _MOST_S = 5.0, 120.0
+"""Time that a trajectory may take longer, and the most that a gripper or posture takes."""
+_OBJECT: Final = 0.02
+"""Share of the gripper's opening by which an object keeps it open."""
+
+
+class WorkQueue(Executor):
+    """Executor whose work is done by the thread that owns the robot, between its steps."""
+
+    def __init__(self) -> None:
+        self._given: SimpleQueue[Callable[[], None]] = SimpleQueue()
+
+    def submit(self, work: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        """Hands work over; the future has its result."""
+        future: Future[Any] = Future()
+
+        def done() -> None:
+            try:
+                future.set_result(work(*args, **options))
+            except Exception as error:
+                future.set_exception(error)
+
+        self._given.put(done)
+        return future
+
+    def work_for(self, limit_s: float) -> None:
+        """Does what was handed over, and what comes within a time (s, wall clock)."""
+        until_s = time.monotonic() + limit_s
+        while True:
+            try:
+                self._given.get(timeout=max(0.0, until_s - time.monotonic()))()
+            except Empty:
+                return
+
+
+@dataclass
+class _Served:
+    """Goal under way, with the command of the robot that pursues it."""
+
+    server: ActionServer
+    goal: Goal
+    command: CommandId
+
+
+class ServedMotions:
+    """Actions and topics of the robot's parts. Everything but `heard` runs in the thread that owns the robot."""
+
+    def __init__(self, node: Node, robot: Robot, clock: Clock, lease: Lease, work: WorkQueue) -> None:
+        """Declares the parts that the robot has."""
+        self._robot, self._clock, self._lease, self._work = robot, clock, lease, work
+        self._served: list[_Served] = []
+        self.heard, self.ended = 0, 0
+        """Numbers of the messages heard, and of the goals ended."""
+        can = robot.capabilities()
+        if can.arm is not None:
+            self._serve(node, ARM_ACTION, TRAJECTORY, self._arm(can.arm.joint_names))
+        if can.head is not None:
+            self._serve(node, HEAD_ACTION, TRAJECTORY, self._head(can.head.joint_names))
+        if can.gripper is not None:
+            self._serve(node, GRIPPER_ACTION, GRIPPER, self._grip(can.gripper.max_force_n))
+            node.subscribe(CARRY, "std_msgs/msg/Bool", self._later(lambda told: self._carry(told.data)))
+        self._height_m, self._thin = can.standing_height_m, _OBJECT * (can.gripper.widest if can.gripper else 1.0)
+        node.subscribe(POSTURE, "geometry_msgs/msg/Pose", self._later(self._stand))
+
+    def _later(self, handle: Callable[[Any], Any]) -> Callable[[Any], None]:
+        def hear(message: Any) -> None:
+            self._work.submit(handle, message)
+            self.heard += 1
+
+        return hear
+
+    def _serve(self, node: Node, name: str, kind: str, begin: Callable[[Any], CommandId]) -> None:
+        def accept(goal: Goal) -> bool:
+            try:
+                command = begin(goal.message)
+            except ValueError:
+                return False
+            if self._robot.command_status(command).state is CommandState.REFUSED:
+                return False
+            self._served.append(_Served(server, goal, command))
+            return True
+
+        def cancel(goal: Goal) -> None:
+            self._work.submit(self._cancel, goal)
+
+        server = ActionServer(node, name, kind, accept=accept, cancel=cancel, pool=self._work)
+
+    def _cancel(self, goal: Goal) -> None:
+        for each in self._served:
+            if each.goal is goal:
+                self._robot.stop(lease=self._lease, only=each.command)
+
+    def _arm(self, names: tuple[str, ...]) -> Callable[[Any], CommandId]:
+        def begin(goal: Any) -> CommandId:
+            trajectory = trajectory_of(goal.trajectory, names)
+            until_s = self._clock.now() + float(trajectory.times_s[-1]) + _EXTRA_S
+            return self._robot.move_arm(trajectory, until_s=until_s, lease=self._lease)
+
+        return begin
+
+    def _head(self, names: tuple[str, ...]) -> Callable[[Any], CommandId]:
+        def begin(goal: Any) -> CommandId:
+            trajectory = trajectory_of(goal.trajectory, names)
+            until_s = self._clock.now() + float(trajectory.times_s[-1]) + _EXTRA_S
+            pan_rad, tilt_rad = trajectory.positions_rad[-1].tolist()
+            return self._robot.point_head(pan_rad, tilt_rad, until_s=until_s, lease=self._lease)
+
+        return begin
+
+    def _grip(self, max_force_n: float) -> Callable[[Any], CommandId]:
+        def begin(goal: Any) -> CommandId:
+            force_n = goal.command.max_effort if goal.command.max_effort > 0.0 else max_force_n
+            until_s = self._clock.now() + _MOST_S
+            return self._robot.set_gripper(goal.command.position, force_n, until_s=until_s, lease=self._lease)
+
+        return begin
+
+    def _carry(self, holding: bool) -> None:
+        self._robot.carry(holding, lease=self._lease)
+
+    def _stand(self, pose: Any) -> None:
+        """Takes a height over the usual one and a pitch; what is not finite or no rotation is ignored."""
+        turn = pose.orientation
+        values = np.array([turn.w, turn.x, turn.y, turn.z, pose.position.z])
+        if np.all(np.isfinite(values)) and np.linalg.norm(values[:4]) > 0.1:
+            pitch_rad = RollPitchYaw(Quaternion(values[:4] / np.linalg.norm(values[:4]))).pitch_angle()
+            height_m, until_s = self._height_m + float(values[4]), self._clock.now() + _MOST_S
+            self._robot.stand(height_m, pitch_rad, until_s=until_s, lease=self._lease)
+
+    def tick(self) -> None:
+        """Ends the goals whose commands have ended; call it after each step."""
+        for each in list(self._served):
+            if each.goal.status is GoalStatus.ACCEPTED:
+                each.server.begin(each.goal)
+            status = self._robot.command_status(each.command)
+            if status.state is not CommandState.RUNNING:
+                self._served.remove(each)
+                self._end(each, status)
+
+    def _end(self, each: _Served, status: CommandStatus) -> None:
+        done, make = status.state is CommandState.DONE, each.server.kind.result.make
+        if each.server.kind.name == TRAJECTORY:
+            code = 0 if done else INVALID_GOAL if status.cause is CommandCause.INVALID else PATH_VIOLATED
+            result = make(code, status.reason)
+        else:
+            reading = self._robot.gripper()
+            wanted = each.goal.message.command.position
+            stalled = done and reading.opening - wanted > self._thin
+            result = make(reading.opening, reading.force_n, stalled, done and not stalled)
+        cancelled = each.goal.status is GoalStatus.CANCELING
+        final = GoalStatus.SUCCEEDED if done else GoalStatus.CANCELED if cancelled else GoalStatus.ABORTED
+        each.server.end(each.goal, final, result)
+        self.ended += 1
+
+
+def trajectory_of(message: Any, names: tuple[str, ...]) -> ArmTrajectory:
+    """Reads trajectory_msgs/JointTrajectory, which begins now. Raises ValueError unless it moves just these joints."""
+    order = {name: number for number, name in enumerate(message.joint_names)}
+    if order.keys() != {*names} or len(message.joint_names) != len(names):
+        raise ValueError(f"the trajectory moves {', '.join(message.joint_names)}, not {', '.join(names)}")
+    if not message.points or any(len(point.positions) != len(names) for point in message.points):
+        raise ValueError("the trajectory has no points, or one without a position of each joint")
+    columns = [order[name] for name in names]
+    starts = [point.time_from_start for point in message.points]
+    times = np.array([each.sec + 1e-9 * each.nanosec for each in starts])
+    positions = np.array([np.asarray(point.positions)[columns] for point in message.points])
+    if not 0.0 <= times[0] <= times[-1] <= _MOST_S or not math.isfinite(float(positions.sum())):
+        raise ValueError(f"the trajectory does not lie within {_MOST_S:g} s")
+    return ArmTrajectory(times, positions)

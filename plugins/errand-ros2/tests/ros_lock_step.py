@@ -1,0 +1,95 @@
+"""A served robot whose clock a client steps, in a thread of its own, and an adapter's robot in lock-step with it."""
+
+import gc
+import threading
+import time
+from contextlib import ExitStack
+
+from errand_ros2.adapter.description import described, served_file
+from errand_ros2.adapter.robot import Ros2Robot
+from errand_ros2.server import PERIOD_S, RobotServer, Served
+from errand_ros2.wire.node import Node
+from errand_ros2.wire.session import open_session
+
+IDLE_S, PATIENCE_S = 0.005, 20.0
+
+
+class LockStep:
+    """Server, clock and robot. `build` makes robot and clock in the server's thread, to which a renderer belongs.
+
+    `carry` is called with the step after each one, and returns whether messages travel.
+    """
+
+    def __init__(self, build, place, *, kind="spot", name="Alice", file=None):
+        self._build, self._place, self._ending = build, place, ExitStack()
+        self._ready, self._stopping, self._failure = threading.Event(), threading.Event(), None
+        self._now_s = 0.0
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+        self._ready.wait()
+        if self._failure is not None:
+            raise self._failure
+        session = self._ending.enter_context(open_session(place))
+        self.node = Node(session, "driver", f"/{name.lower()}")
+        self.robot = Ros2Robot(name, self.node, self, described(file or served_file(kind)))
+        assert self.until(lambda: not self.robot.sensors.missing()), self.robot.sensors.missing()
+
+    def _serve(self):
+        try:
+            robot, clock = self._build()
+        except Exception as error:
+            self._failure = error
+            self._ready.set()
+            return
+        with open_session(self._place) as session:
+            self.server = RobotServer(session, robot, clock, Served(life=self.now, image_period_s=0.0))
+            self.served, self.clock = robot, clock
+            self._now_s = clock.now()
+            self._ready.set()
+            while not self._stopping.is_set():
+                self.server.work.work_for(IDLE_S)
+                self.server.show()
+        del robot, clock, self.served, self.clock, self._build, self.server
+        gc.collect()  # a renderer ends in the thread in which it began
+
+    def now(self):
+        return self._now_s
+
+    def advance(self, dt_s):
+        """Steps the server once what was sent has arrived; then waits until what it published has."""
+        server, robot = self.server, self.robot
+        self._soon(lambda: server.heard + server.motions.heard >= robot.sent)
+        for _ in range(max(1, round(dt_s / PERIOD_S))):
+            self._now_s = round(self._now_s + PERIOD_S, 9)
+            server.work.submit(server.step).result()
+            stamp_s, scanned_s = server.topics.odometry_stamp_s, server.topics.scan_stamp_s
+            seen = robot.sensors
+            self._soon(lambda stamp_s=stamp_s: seen.odometry is not None and seen.odometry.stamp_s >= stamp_s - 1e-6)
+            self._soon(lambda stamp_s=stamp_s: seen.joints.stamp_s >= stamp_s - 1e-6)
+            self._soon(
+                lambda at_s=scanned_s: at_s is None or (seen.scan is not None and seen.scan.stamp_s >= at_s - 1e-6)
+            )
+            self._soon(lambda: server.motions.ended <= sum(each.ended for each in robot.actions.values()))
+        robot.poll()
+
+    def _soon(self, true):
+        until_s = time.monotonic() + PATIENCE_S
+        while not true() and time.monotonic() < until_s:
+            time.sleep(0.0005)
+
+    def until(self, true, most_s=10.0, *, every_s=0.05):
+        """Advances until a condition holds; returns whether it did in time."""
+        until_s = self.now() + most_s
+        while not true() and self.now() < until_s:
+            self.advance(every_s)
+        return true()
+
+    def ends(self, command):
+        """Advances until a command has ended; returns its status."""
+        assert self.until(lambda: self.robot.command_status(command).state.value != "running", 60.0)
+        return self.robot.command_status(command)
+
+    def close(self):
+        self._ending.close()
+        self._stopping.set()
+        self._thread.join()

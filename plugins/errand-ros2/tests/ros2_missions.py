@@ -1,6 +1,6 @@
 """Missions through ROS 2 beside the same missions in process. Prints JSON at the end.
 
-    python plugins/errand-ros2/tests/ros2_missions.py [--missions fetch_drink,patrol] [--seed 1] [--seeds 1] [--ros-only]
+    python plugins/errand-ros2/tests/ros2_missions.py [--missions fetch_drink] [--seed 1] [--seeds 1] [--ros-only]
 
 Adapter and server run in lock-step, and the referee of the plant behind the server judges. Without `--missions`, all
 shipped missions of one robot run. `same` counts the pairs with equal outcome and equal verdict; with `--ros-only` the

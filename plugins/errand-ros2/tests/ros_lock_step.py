@@ -62,15 +62,16 @@ class LockStep:
         for _ in range(max(1, round(dt_s / PERIOD_S))):
             self._now_s = round(self._now_s + PERIOD_S, 9)
             server.work.submit(server.step).result()
-            stamp_s, scanned_s = server.topics.odometry_stamp_s, server.topics.scan_stamp_s
-            seen = robot.sensors
-            self._soon(lambda stamp_s=stamp_s: seen.odometry is not None and seen.odometry.stamp_s >= stamp_s - 1e-6)
-            self._soon(lambda stamp_s=stamp_s: seen.joints.stamp_s >= stamp_s - 1e-6)
-            self._soon(
-                lambda at_s=scanned_s: at_s is None or (seen.scan is not None and seen.scan.stamp_s >= at_s - 1e-6)
-            )
-            self._soon(lambda: server.motions.ended <= sum(each.ended for each in robot.actions.values()))
+            self._soon(self._has_arrived)
         robot.poll()
+
+    def _has_arrived(self):
+        """Whether the robot has heard all that the server published."""
+        topics, seen = self.server.topics, self.robot.sensors
+        heard = [(topics.odometry_stamp_s, seen.odometry), (topics.odometry_stamp_s, seen.joints)]
+        heard += [] if topics.scan_stamp_s is None else [(topics.scan_stamp_s, seen.scan)]
+        all_heard = all(each is not None and each.stamp_s >= at_s - 1e-6 for at_s, each in heard)
+        return all_heard and self.server.motions.ended <= sum(each.ended for each in self.robot.actions.values())
 
     def _soon(self, true):
         until_s = time.monotonic() + PATIENCE_S

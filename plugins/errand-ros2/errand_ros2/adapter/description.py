@@ -75,10 +75,13 @@ class ArmFile(Part):
 
 
 class GripperFile(Part):
-    """Gripper: its action; `scale` from the opening to the action's position; topics of what it feels."""
+    """Gripper: its action; `scale` from the opening to the action's position; topics of what it feels.
+
+    Without `holding`, a gripper that stalled holds an object.
+    """
 
     action: Topic
-    scale: float = Field(default=1.0)
+    scale: float = Field(default=1.0, gt=0.0)
     holding: Topic | None = None
     force: Topic | None = None
     carry: Topic | None = None

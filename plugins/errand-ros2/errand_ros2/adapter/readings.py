@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Final
 
 import cv2
@@ -94,14 +95,23 @@ def imu(message: Any, stamp_s: float) -> Imu:
     return Imu(stamp_s, (w.x, w.y, w.z), (a.x, a.y, a.z))
 
 
-def gripper(description: Description, now: Joints, force_n: float | None, holding: bool | None) -> Gripper:
-    """Returns the gripper by its finger joints; without topics of its own, force and holding are not known."""
+@dataclass(frozen=True)
+class Felt:
+    """What a gripper told: its opening at the end of the last command, its force, and whether it holds an object."""
+
+    opening: float = 0.0
+    force_n: float = 0.0
+    holding: bool = False
+
+
+def gripper(description: Description, now: Joints, felt: Felt) -> Gripper:
+    """Returns the gripper by its finger joints, or without their positions as it felt."""
     can = description.capabilities.gripper
     if can is None:
         return Gripper(now.stamp_s, 0.0, 0.0, False)
     shares = [(now.position_rad[name], share) for name, share in can.finger_joints if name in now.position_rad]
-    opening = float(np.mean([position / share for position, share in shares])) if shares else 0.0
-    return Gripper(now.stamp_s, max(0.0, opening), force_n or 0.0, bool(holding))
+    opening = float(np.mean([position / share for position, share in shares])) if shares else felt.opening
+    return Gripper(now.stamp_s, max(0.0, opening), felt.force_n, felt.holding)
 
 
 def cloud_points(message: Any) -> NDArray[np.float64]:

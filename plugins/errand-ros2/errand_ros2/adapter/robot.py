@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from errand_ros2 import messages
-from errand_ros2.adapter.description import DRIVE_EXPIRY_S, Description
+from errand_ros2.adapter.description import DRIVE_EXPIRY_S, Description, GripperFile
 from errand_ros2.adapter.sensors import OLD_STATE_S, Sensors
 from errand_ros2.served_motions import GRIPPER, INVALID_GOAL, TRAJECTORY
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError, SentGoal
@@ -125,7 +125,7 @@ class Ros2Robot:
         file, grip = self._description.file, self._description.file.gripper
         untold = {
             "No topic tells the battery's charge: it counts as full.": file.battery is None,
-            "No topic tells whether the gripper holds an object.": grip is not None and grip.holding is None,
+            "A gripper that stalled counts as holding an object.": grip is not None and grip.holding is None,
             "The scan has one ring.": file.lidar.scan is not None,
         }
         who = f"Robot of ROS 2 at {address}, by {endpoint}."
@@ -304,10 +304,20 @@ class Ros2Robot:
             return
         sent: SentGoal = active.goal
         if sent.status.is_final:
+            if part == GRIP and self._description.file.gripper is not None:
+                self._feel(self._description.file.gripper, sent.result)
             state, reason, cause = _ended(part, sent)
             self._commands.finish(part, state, reason, cause)
         elif now_s > active.until_s:
             self._halt(part, CommandStatus(CommandState.STOPPED, "expired before it was done", CommandCause.LATE))
+
+    def _feel(self, file: GripperFile, result: Any) -> None:
+        """Takes what a gripper's result tells, where no topic does."""
+        self.sensors.feel(opening=result.position / file.scale)
+        if file.force is None:
+            self.sensors.feel(force_n=result.effort)
+        if file.holding is None:
+            self.sensors.feel(holding=bool(result.stalled))
 
     # -- inside ------------------------------------------------------------------------------------------------------
 

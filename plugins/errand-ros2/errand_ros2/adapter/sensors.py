@@ -100,8 +100,7 @@ class Sensors:
         self.scan: Scan | None = None
         self.imu: Imu | None = None
         self.place: OwnLocalisation | None = None
-        self.force_n: float | None = None
-        self.holding: bool | None = None
+        self.felt = readings.Felt()
         self.charge: tuple[float, float] | None = None
         node.subscribe(file.odometry.topic, "nav_msgs/msg/Odometry", self._hear_odometry)
         node.subscribe("/tf_static", "tf2_msgs/msg/TFMessage", self._hear_fixed, LATCHED)
@@ -112,7 +111,7 @@ class Sensors:
         self._hear(file.battery, "sensor_msgs/msg/BatteryState", self._hear_battery)
         self._hear(file.pose, "geometry_msgs/msg/PoseWithCovarianceStamped", self._hear_pose)
         if (grip := file.gripper) is not None:
-            self._hear(grip.holding, "std_msgs/msg/Bool", lambda told: setattr(self, "holding", bool(told.data)))
+            self._hear(grip.holding, "std_msgs/msg/Bool", lambda told: self.feel(holding=bool(told.data)))
             self._hear(grip.force, "geometry_msgs/msg/WrenchStamped", self._hear_force)
 
     def _hear(self, topic: str | None, kind: str, handle: Callable[[Any], None]) -> None:
@@ -135,7 +134,12 @@ class Sensors:
 
     def gripper(self) -> Gripper:
         """Latest gripper state."""
-        return readings.gripper(self._description, self.joints, self.force_n, self.holding)
+        return readings.gripper(self._description, self.joints, self.felt)
+
+    def feel(self, **changes: Any) -> None:
+        """Changes what the gripper told."""
+        with self._lock:
+            self.felt = replace(self.felt, **changes)
 
     def battery(self) -> Battery:
         """Latest battery state; full when no topic tells."""
@@ -213,7 +217,8 @@ class Sensors:
     def _hear_force(self, message: Any) -> None:
         force = message.wrench.force
         told = math.sqrt(force.x**2 + force.y**2 + force.z**2)
-        self.force_n = told if math.isfinite(told) else self.force_n
+        if math.isfinite(told):
+            self.feel(force_n=told)
 
     def _hear_battery(self, message: Any) -> None:
         if 0.0 <= message.percentage <= 1.0:

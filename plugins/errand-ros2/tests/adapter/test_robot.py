@@ -1,0 +1,185 @@
+"""Every verb of a robot of ROS 2 against the server in lock-step, expiry, refusals and silence."""
+
+import math
+
+import numpy as np
+import pytest
+
+from errand_ros2.adapter.robot import SILENT_S
+from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError
+
+
+def within(step, seconds):
+    return {"until_s": step.now() + seconds, "lease": step.lease}
+
+
+def arm_to(step, offset_rad, seconds=1.0):
+    there = step.served.q_rad + np.array([offset_rad, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return ArmTrajectory(np.array([seconds]), there[None, :])
+
+
+def test_readings_are_those_of_the_served_robot(step):
+    step.advance(0.2)
+    robot, served = step.robot, step.served
+    assert robot.odometry().stamp_s == pytest.approx(step.now())
+    assert robot.odometry().X_OB.translation() == pytest.approx(served.odometry().X_OB.translation(), abs=1e-6)
+    assert robot.joints().position_rad["arm_sh1"] == pytest.approx(served.q_rad[1])
+    assert robot.battery().charge == pytest.approx(served.charge, abs=1e-3)
+    assert robot.imu().linear_acceleration_B[2] == pytest.approx(9.81)
+    assert robot.faults() == ()
+
+
+def test_a_scan_through_points_sees_the_wall_where_it_is(step):
+    step.advance(0.2)
+    points = step.robot.scan().points_B()
+    ahead = points[(np.abs(points[:, 1]) < 0.2) & (points[:, 0] > 0.0)]
+    assert np.median(ahead[:, 0]) == pytest.approx(3.0, abs=0.03)
+
+
+@pytest.mark.parametrize(("visual", "depth"), [(True, True), (True, False), (False, True)])
+def test_a_picture_has_pixels_depth_and_frames_of_one_time(step, visual, depth):
+    image = step.robot.image("hand", visual=visual, depth=depth)
+    own = step.served.image("hand")
+    assert image.stamp_s == pytest.approx(step.now())
+    assert (image.grey.size > 0, image.depth_m.size > 0) == (visual, depth)
+    assert image.frames.pose("hand_camera").translation() == pytest.approx(
+        own.frames.pose("hand_camera").translation(), abs=1e-6
+    )
+    if visual:
+        assert image.colour.shape == own.colour.shape
+        assert (image.intrinsics.fx, image.intrinsics.cx) == pytest.approx((own.intrinsics.fx, own.intrinsics.cx))
+    if depth:
+        assert image.depth_intrinsics == own.depth_intrinsics
+        assert np.median(image.depth_m) == pytest.approx(np.median(own.depth_m), abs=0.02)
+
+
+def test_no_camera_of_that_name_is_an_error(step):
+    with pytest.raises(ValueError, match="no camera 'nose'"):
+        step.robot.image("nose")
+
+
+def test_a_drive_ends_by_itself(step):
+    drive = step.robot.drive(0.5, 0.0, 0.2, **within(step, 0.3))
+    step.advance(0.2)
+    assert step.served.velocity[0] > 0.3
+    assert step.ends(drive).state is CommandState.DONE
+    step.until(lambda: not step.served.velocity.any(), 0.6)
+    assert not step.served.velocity.any()
+
+
+def test_a_drive_lives_for_0_6_s_at_most(step):
+    begun_s, drive = step.now(), step.robot.drive(0.5, 0.0, 0.0, **within(step, 30.0))
+    assert step.ends(drive).state is CommandState.DONE
+    assert step.now() - begun_s <= 0.65 + 1e-6
+
+
+def test_a_new_drive_replaces_the_one_before(step):
+    first = step.robot.drive(0.3, 0.0, 0.0, **within(step, 0.3))
+    step.robot.drive(0.2, 0.0, 0.0, **within(step, 0.3))
+    assert step.robot.command_status(first).state is CommandState.STOPPED
+
+
+def test_the_arm_follows_a_trajectory(step):
+    goal_rad = step.served.q_rad[0] + 0.4
+    assert step.ends(step.robot.move_arm(arm_to(step, 0.4), **within(step, 5.0))).state is CommandState.DONE
+    assert step.served.q_rad[0] == pytest.approx(goal_rad, abs=0.02)
+
+
+def test_stop_cancels_the_arm_and_the_base(step):
+    arm = step.robot.move_arm(arm_to(step, 0.8, 4.0), **within(step, 8.0))
+    drive = step.robot.drive(0.5, 0.0, 0.0, **within(step, 0.5))
+    step.advance(0.3)
+    step.robot.stop(lease=step.lease)
+    assert {step.robot.command_status(each).state for each in (arm, drive)} == {CommandState.STOPPED}
+    assert step.until(lambda: not step.served.moving_parts, 1.0)
+
+
+def test_stop_of_one_command_leaves_the_others(step):
+    arm = step.robot.move_arm(arm_to(step, 0.4, 1.0), **within(step, 5.0))
+    drive = step.robot.drive(0.3, 0.0, 0.0, **within(step, 0.5))
+    step.advance(0.1)
+    step.robot.stop(lease=step.lease, only=drive)
+    assert step.ends(arm).state is CommandState.DONE
+
+
+def test_an_arm_that_is_late_is_cancelled(step):
+    arm = step.robot.move_arm(arm_to(step, 0.8, 4.0), **within(step, 0.5))
+    status = step.ends(arm)
+    assert (status.state, status.cause) == (CommandState.STOPPED, CommandCause.LATE)
+    assert step.until(lambda: not step.served.moving_parts, 1.0)
+
+
+def test_a_trajectory_that_the_controller_rejects_is_refused(step):
+    far = ArmTrajectory(np.array([0.01]), (step.served.q_rad + 2.0)[None, :])
+    status = step.robot.command_status(step.robot.move_arm(far, **within(step, 5.0)))
+    assert (status.state, status.cause) == (CommandState.REFUSED, CommandCause.REFUSED)
+
+
+def test_the_gripper_opens_and_closes_on_an_object(step):
+    assert step.ends(step.robot.set_gripper(1.0, 20.0, **within(step, 5.0))).state is CommandState.DONE
+    assert step.robot.gripper().opening == pytest.approx(step.served.opening, abs=0.02)
+    step.served.in_gripper_rad = 0.4
+    status = step.ends(step.robot.set_gripper(0.0, 20.0, **within(step, 5.0)))
+    assert status.state is CommandState.DONE
+    step.advance(0.1)
+    assert step.robot.gripper().holding
+    step.robot.carry(True, lease=step.lease)
+    step.advance(0.05)
+    assert step.served.carries
+
+
+def test_the_body_takes_a_posture(step):
+    assert step.ends(step.robot.stand(0.45, 0.1, **within(step, 5.0))).state is CommandState.DONE
+    assert (step.served.height_m, step.served.pitch_rad) == pytest.approx((0.45, 0.1), abs=0.03)
+
+
+@pytest.mark.parametrize("verb", ["sit", "undock"])
+def test_what_has_no_topic_is_unsupported(step, verb):
+    status = step.robot.command_status(getattr(step.robot, verb)(**within(step, 5.0)))
+    assert (status.state, status.cause) == (CommandState.REFUSED, CommandCause.UNSUPPORTED)
+
+
+@pytest.mark.parametrize(
+    ("cause", "command"),
+    [
+        (CommandCause.INVALID, lambda step: step.robot.drive(math.nan, 0.0, 0.0, **within(step, 0.3))),
+        (CommandCause.INVALID, lambda step: step.robot.stand(2.0, 0.0, **within(step, 5.0))),
+        (CommandCause.LATE, lambda step: step.robot.drive(0.3, 0.0, 0.0, **within(step, -0.1))),
+        (CommandCause.UNSUPPORTED, lambda step: step.robot.point_head(0.0, 0.0, **within(step, 5.0))),
+        (
+            CommandCause.NO_LEASE,
+            lambda step: step.robot.drive(
+                0.3, 0.0, 0.0, until_s=step.now() + 1.0, lease=step.robot.take_lease("x") and step.lease
+            ),
+        ),
+    ],
+    ids=["nan", "height", "late", "head", "lease"],
+)
+def test_a_command_that_is_not_allowed_moves_nothing(step, cause, command):
+    status = step.robot.command_status(command(step))
+    assert (status.state, status.cause) == (CommandState.REFUSED, cause)
+    step.advance(0.2)
+    assert not step.served.moving_parts
+
+
+def test_the_lease_counts_within_the_program(step):
+    with pytest.raises(LeaseError, match="held by 'test'"):
+        step.robot.acquire_lease("other")
+    step.robot.return_lease(step.lease)
+    assert step.robot.lease_holder() is None
+
+
+def test_a_silent_robot_is_not_driven_and_its_arm_stops_when_it_answers_again(step):
+    arm = step.robot.move_arm(arm_to(step, 1.5, 10.0), **within(step, 20.0))
+    step.advance(0.2)
+    step._now_s += 1.0  # time passes while nothing is heard
+    step.robot.poll()
+    assert step.robot.command_status(arm).cause is CommandCause.NO_ANSWER
+    refused = step.robot.command_status(step.robot.drive(0.3, 0.0, 0.0, **within(step, 0.3)))
+    assert (refused.state, refused.cause) == (CommandState.REFUSED, CommandCause.NO_ANSWER)
+    step._now_s += SILENT_S
+    assert step.robot.faults() == ("the robot has not answered for 4 s",)
+    assert step.robot.stopped_because() == ""
+    step._now_s += 12.0
+    assert "has not answered for 15 s" in step.robot.stopped_because()
+    assert step.until(lambda: not step.served.moving_parts, 2.0)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 from typing import Final
 
+from errand_ros2.adapter.clocks import SimulatedClock, WallClock
 from errand_ros2.adapter.description import load_description
 from errand_ros2.adapter.robot import Ros2Robot
 from errand_ros2.wire.node import Node
@@ -22,25 +23,6 @@ _NAME: Final = "errand_driver"
 _NAMESPACE: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 _PATIENCE_S: Final = 10.0
 _TICK_S: Final = 0.05
-
-
-class WallClock:
-    """Clock of a robot: wall time since the connection; `advance` waits, and `after` is called after each wait."""
-
-    def __init__(self) -> None:
-        self._began_s, self._due_s = time.monotonic(), 0.0
-        self.after: list[Callable[[], None]] = []
-
-    def now(self) -> float:
-        """Seconds since the connection was made."""
-        return time.monotonic() - self._began_s
-
-    def advance(self, dt_s: float) -> None:
-        """Waits until dt_s have passed since the last advance; a late program goes on at once."""
-        self._due_s = max(self._due_s + dt_s, self.now() - dt_s)
-        Event().wait(max(0.0, self._due_s - self.now()))
-        for each in self.after:
-            each()
 
 
 @dataclass(frozen=True)
@@ -63,22 +45,35 @@ class Ros2:
             raise InputError(f"ros2://{address[:60]}: is no namespace of ROS 2", hint="write ros2://alice")
         place, description = Place.parse(self.network), load_description(self.file, self.kind)
         with open_session(place) as session:
-            clock = WallClock()
-            robot, watch = Ros2Robot(name, Node(session, _NAME, f"/{space}"), clock, description), Event()
-            until_s = clock.now() + _PATIENCE_S
-            while (missing := robot.sensors.missing()) and clock.now() < until_s:
-                clock.advance(_TICK_S)
-            if missing:
+            clock, node = (
+                SimulatedClock() if description.file.sim_time else WallClock(),
+                Node(session, _NAME, f"/{space}"),
+            )
+            if isinstance(clock, SimulatedClock):
+                node.subscribe("/clock", "rosgraph_msgs/msg/Clock", clock.hear_clock)
+            robot, ready = Ros2Robot(name, node, clock, description), Event()
+            if missing := _missing(robot, clock):
                 hint = "is the robot on, with RMW_IMPLEMENTATION=rmw_zenoh_cpp, in this domain and at this router?"
                 raise InputError(f"ros2://{space}: nothing is heard on {missing}", hint=hint)
 
             def look() -> None:
                 robot.poll()
-                if watch.is_set() and (why := robot.stopped_because()):
+                if ready.is_set() and (why := robot.stopped_because()):
                     raise RobotStoppedError(why)
 
             clock.after.append(look)
             try:
-                yield ConnectedRobot(robot, clock, watch.set, robot.notes(f"ros2://{space}", session.place.endpoint))
+                yield ConnectedRobot(robot, clock, ready.set, robot.notes(f"ros2://{space}", session.place.endpoint))
             finally:
                 robot.return_lease(robot.take_lease(_NAME))
+
+
+def _missing(robot: Ros2Robot, clock: SimulatedClock | WallClock) -> str:
+    """Waits for the first readings; returns the topic on which nothing was heard, empty when all are there."""
+    until_s = time.monotonic() + _PATIENCE_S
+    while True:
+        silent = isinstance(clock, SimulatedClock) and not clock.is_heard
+        missing = "/clock" if silent else robot.sensors.missing()
+        if not missing or time.monotonic() > until_s:
+            return missing
+        Event().wait(_TICK_S)

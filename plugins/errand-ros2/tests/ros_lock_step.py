@@ -5,6 +5,7 @@ import threading
 import time
 from contextlib import ExitStack
 
+from errand_ros2.adapter.clocks import DelayedTime
 from errand_ros2.adapter.description import described, served_file
 from errand_ros2.adapter.robot import Ros2Robot
 from errand_ros2.server import PERIOD_S, RobotServer, Served
@@ -23,7 +24,7 @@ class LockStep:
     def __init__(self, build, place, *, kind="spot", name="Alice", file=None):
         self._build, self._place, self._ending = build, place, ExitStack()
         self._ready, self._stopping, self._failure = threading.Event(), threading.Event(), None
-        self._now_s = 0.0
+        self._now_s, self.time = 0.0, DelayedTime(self.now)
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
         self._ready.wait()

@@ -88,9 +88,13 @@ class GripperFile(Part):
 
 
 class RobotFile(Part):
-    """A robot of ROS 2; `kind` names the installed kind of robot whose sizes count."""
+    """A robot of ROS 2; `kind` names the installed kind of robot whose sizes count.
+
+    `sim_time`: stamps are those of `/clock`, which the run follows.
+    """
 
     kind: str = "spot"
+    sim_time: bool = False
     base: BaseFile = BaseFile()
     odometry: OdometryFile = OdometryFile()
     joints: Topic | None = "joint_states"
@@ -127,6 +131,7 @@ def served_file(kind: str) -> RobotFile:
     can = _capabilities(kind)
     return RobotFile(
         kind=kind,
+        sim_time=True,
         base=BaseFile(posture=POSTURE),
         lidar=LidarFile(points="points"),
         imu="imu",

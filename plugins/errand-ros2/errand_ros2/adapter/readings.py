@@ -162,7 +162,7 @@ def flat_scan(message: Any, stamp_s: float, X_BL: RigidTransform, X_OB: RigidTra
     if len(ranges) < 2 or not all(map(math.isfinite, (message.angle_min, message.angle_increment))):
         raise ValueError("the scan has no beams")
     unknown = ~np.isfinite(ranges) | (ranges < max(message.range_min, 0.01)) | (ranges > message.range_max)
-    azimuths = message.angle_min + message.angle_increment * np.arange(len(ranges), dtype=np.float64)
+    azimuths = float(message.angle_min) + float(message.angle_increment) * np.arange(float(len(ranges)))
     values = np.where(unknown, np.float32(np.nan), ranges)[None, :]
     return Scan(stamp_s, values, np.zeros(1), azimuths, X_BL, X_OB)
 

@@ -10,6 +10,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from errand_ros2 import messages
+from errand_ros2.adapter.clocks import TimedClock
 from errand_ros2.adapter.description import DRIVE_EXPIRY_S, Description, GripperFile
 from errand_ros2.adapter.sensors import OLD_STATE_S, Sensors
 from errand_ros2.served_motions import GRIPPER, INVALID_GOAL, TRAJECTORY
@@ -22,7 +23,6 @@ from skills.robot import (
     BaseKind,
     Battery,
     Capabilities,
-    Clock,
     CommandCause,
     CommandId,
     CommandState,
@@ -49,11 +49,11 @@ BASE, POSTURE, ARM, HEAD, GRIP = "base", "posture", "arm", "head", "gripper"
 class Ros2Robot:
     """Robot of ROS 2. Implements `skills.robot.Robot`."""
 
-    def __init__(self, name: str, node: Node, clock: Clock, description: Description) -> None:
-        """Subscribes and declares the publishers and action clients that the description names."""
+    def __init__(self, name: str, node: Node, clock: TimedClock, description: Description) -> None:
+        """Subscribes, and declares the publishers and action clients that the description names."""
         self._name, self._clock, self._description = name, clock, description
         self._node, file = node, description.file
-        self.sensors = Sensors(node, description, clock.now)
+        self.sensors = Sensors(node, description, clock.now, clock.time)
         kind = "TwistStamped" if file.base.stamped else "Twist"
         self._velocity = node.publisher(file.base.command, f"geometry_msgs/msg/{kind}")
         posture, carry = file.base.posture, file.gripper.carry if file.gripper else None
@@ -63,7 +63,7 @@ class Ros2Robot:
         self.actions = {
             part: ActionClient(node, each.action, action) for part, (each, action) in given.items() if each is not None
         }
-        self._commands, self._unsure = CommandTable[str](), set[str]()
+        self._commands, self._unsure = CommandTable[str](), dict[str, Any]()
         self._lease_number = 0
         self._current: Lease | None = None
 
@@ -263,8 +263,8 @@ class Ros2Robot:
         if silent_s > OLD_STATE_S:
             self._fall_silent(silent_s)
             return
-        for part in list(self._unsure):
-            self._halt(part, CommandStatus(CommandState.STOPPED, "", CommandCause.NO_ANSWER))
+        for part in list(self._unsure):  # it may be moving on since the robot fell silent
+            self._stop_part(part, self._unsure.pop(part))
         if (base := self._commands.running(BASE)) is not None:
             if now_s < base.until_s:
                 self._say(base.goal)
@@ -282,10 +282,9 @@ class Ros2Robot:
         """Ends the running commands of a silent robot; their parts are stopped when it answers again."""
         status = CommandStatus(CommandState.STOPPED, f"the last state is {silent_s:.1f} s old", CommandCause.NO_ANSWER)
         for part in (BASE, POSTURE, ARM, HEAD):
-            if self._commands.running(part) is not None:
-                self._unsure.add(part)
+            if (active := self._commands.running(part)) is not None:
                 self._halt(part, status)
-                self._unsure.add(part)
+                self._unsure[part] = active.goal
 
     def _follow_posture(self, now_s: float) -> None:
         if (active := self._commands.running(POSTURE)) is None:
@@ -329,14 +328,16 @@ class Ros2Robot:
             self._velocity.put(messages.twist_stamped(stamp_s, self.sensors.body_frame, velocity))
 
     def _halt(self, part: str, status: CommandStatus) -> None:
-        """Stops a part and ends its command."""
-        active = self._commands.running(part)
-        if part == BASE and (active is not None or part in self._unsure):
+        """Stops a part, if it has a command, and ends that."""
+        if (active := self._commands.running(part)) is not None:
+            self._stop_part(part, active.goal)
+            self._commands.finish(part, status.state, status.reason, status.cause)
+
+    def _stop_part(self, part: str, goal: Any) -> None:
+        if part == BASE:
             self._say((0.0, 0.0, 0.0))
-        if part in self.actions and active is not None:
-            self.actions[part].cancel(active.goal)
-        self._unsure.discard(part)
-        self._commands.finish(part, status.state, status.reason, status.cause)
+        if part in self.actions:
+            self.actions[part].cancel(goal)
 
     def _trajectory(self, names: tuple[str, ...], trajectory: ArmTrajectory) -> Any:
         """Returns the goal of a trajectory under the names of ROS, which begins when it arrives."""

@@ -19,6 +19,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from errand_ros2.adapter import readings
+from errand_ros2.adapter.clocks import RobotTime
 from errand_ros2.adapter.description import CameraFile, Description
 from errand_ros2.wire.keys import LATCHED, SENSOR
 from errand_ros2.wire.node import Node
@@ -40,8 +41,6 @@ from skills.robot import (
 )
 
 OLD_STATE_S: Final = 0.5
-_JUMP_S: Final = 0.7
-_DELAYS_S: Final = 5.0
 _KEPT: Final = 400
 _PICTURE_S: Final = 2.0
 _SAME_S: Final = 0.051
@@ -49,48 +48,13 @@ _EPSILON_S: Final = 1e-6
 _BODY_FRAMES: Final = 8
 
 
-class RobotTime:
-    """Maps stamps of the robot to our clock: the shortest delay of the last seconds counts as none.
-
-    So the robot's clock may be ahead, run slower, or jump. A jump by 0.7 s or more begins anew.
-    """
-
-    def __init__(self, now: Callable[[], float]) -> None:
-        self._now = now
-        self._behind: deque[tuple[float, float]] = deque()
-        self._behind_s, self._last_s = 0.0, -math.inf
-        self.jumps = 0
-
-    def hear(self, stamp_s: float) -> None:
-        """Takes the stamp of a message that has just arrived."""
-        now_s = self._now()
-        behind_s = now_s - stamp_s
-        back, ahead = stamp_s < self._last_s - _JUMP_S, self._behind and behind_s < self._behind_s - _JUMP_S
-        if back or ahead:
-            self.jumps += 1
-            self._behind.clear()
-        self._last_s = stamp_s if back else max(stamp_s, self._last_s)
-        self._behind.append((now_s, behind_s))
-        while self._behind[0][0] < now_s - _DELAYS_S and len(self._behind) > 1:
-            self._behind.popleft()
-        self._behind_s = min(each for _, each in self._behind)
-
-    def ours(self, stamp_s: float) -> float:
-        """Returns a stamp on our clock."""
-        return min(stamp_s + self._behind_s, self._now())
-
-    def theirs(self, time_s: float) -> float:
-        """Returns a time of our clock on the robot's."""
-        return time_s - self._behind_s
-
-
 class Sensors:
     """Sensors of one robot."""
 
-    def __init__(self, node: Node, description: Description, now: Callable[[], float]) -> None:
+    def __init__(self, node: Node, description: Description, now: Callable[[], float], time: RobotTime) -> None:
         """Subscribes to the topics that the description names."""
-        self._node, self._description, self._now = node, description, now
-        self._space, self.time, file = node.namespace.strip("/"), RobotTime(now), description.file
+        self._node, self._description, self._now, self.time = node, description, now, time
+        self._space, file = node.namespace.strip("/"), description.file
         self._names = {theirs: ours for ours, theirs in file.joint_names.items()}
         self._lock = threading.RLock()
         self._odometry: deque[Odometry] = deque(maxlen=_KEPT)

@@ -1,0 +1,167 @@
+"""Clocks of a robot of ROS 2: the wall's, or that of `/clock` where a simulator publishes it."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from threading import Event
+from typing import Any, Final, Protocol
+
+_JUMP_S: Final = 0.7
+_DELAYS_S: Final = 5.0
+_GRACE_S: Final = 1.0
+"""Silence of `/clock` (wall clock) after which time goes on without it."""
+_LOOK_S: Final = 0.02
+
+
+class RobotTime(Protocol):
+    """Relation between the robot's stamps and our clock; `jumps` counts the jumps of the robot's clock."""
+
+    jumps: int
+
+    def hear(self, stamp_s: float) -> None:
+        """Takes the stamp of a message that has just arrived."""
+
+    def ours(self, stamp_s: float) -> float:
+        """Returns a stamp on our clock; never later than now."""
+
+    def theirs(self, time_s: float) -> float:
+        """Returns a time of our clock on the robot's."""
+
+
+class TimedClock(Protocol):
+    """Clock of the robot protocol that knows the robot's stamps."""
+
+    time: RobotTime
+
+    def now(self) -> float:
+        """Seconds on the clock."""
+
+
+class DelayedTime:
+    """Robot whose clock is ahead or behind: the shortest delay of the last seconds counts as none.
+
+    A jump by 0.7 s or more begins anew.
+    """
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self._behind: deque[tuple[float, float]] = deque()
+        self._behind_s, self._last_s = 0.0, -math.inf
+        self.jumps = 0
+
+    def hear(self, stamp_s: float) -> None:
+        """Takes the stamp of a message that has just arrived."""
+        now_s = self._now()
+        behind_s = now_s - stamp_s
+        back, ahead = stamp_s < self._last_s - _JUMP_S, self._behind and behind_s < self._behind_s - _JUMP_S
+        if back or ahead:
+            self.jumps += 1
+            self._behind.clear()
+        self._last_s = stamp_s if back else max(stamp_s, self._last_s)
+        self._behind.append((now_s, behind_s))
+        while self._behind[0][0] < now_s - _DELAYS_S and len(self._behind) > 1:
+            self._behind.popleft()
+        self._behind_s = min(each for _, each in self._behind)
+
+    def ours(self, stamp_s: float) -> float:
+        """Returns a stamp on our clock; never later than now."""
+        return min(stamp_s + self._behind_s, self._now())
+
+    def theirs(self, time_s: float) -> float:
+        """Returns a time of our clock on the robot's."""
+        return time_s - self._behind_s
+
+
+class _Waiting:
+    """Clock that waits; `after` is called after each wait."""
+
+    def __init__(self) -> None:
+        self._due_s = 0.0
+        self.after: list[Callable[[], None]] = []
+
+    def now(self) -> float:
+        """Seconds on the clock."""
+        raise NotImplementedError
+
+    def _wait_until(self, due_s: float) -> None:
+        Event().wait(max(0.0, due_s - self.now()))
+
+    def advance(self, dt_s: float) -> None:
+        """Waits until dt_s have passed since the last advance; a late program goes on at once."""
+        self._due_s = max(self._due_s + dt_s, self.now() - dt_s)
+        self._wait_until(self._due_s)
+        for each in self.after:
+            each()
+
+
+class WallClock(_Waiting):
+    """Clock of a real robot: wall time since the connection."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._began_s = time.monotonic()
+        self.time: RobotTime = DelayedTime(self.now)
+
+    def now(self) -> float:
+        """Seconds since the connection was made."""
+        return time.monotonic() - self._began_s
+
+
+class SimulatedClock(_Waiting):
+    """Clock that follows `/clock`, also its own map from stamps; it never goes back, and goes on without messages."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._told = threading.Condition()
+        self._stamp_s, self._heard_s, self._extra_s, self._base_s = 0.0, math.inf, 0.0, 0.0
+        self.time: RobotTime = self
+        self.jumps = 0
+
+    def hear_clock(self, message: Any) -> None:
+        """Takes rosgraph_msgs/Clock."""
+        stamp_s = message.clock.sec + 1e-9 * message.clock.nanosec
+        with self._told:
+            now_s = self._now()
+            if stamp_s < self._stamp_s - _JUMP_S:
+                self.jumps += 1
+                self._base_s = now_s - stamp_s
+            self._extra_s = max(self._base_s, now_s - stamp_s)
+            self._stamp_s, self._heard_s = stamp_s, time.monotonic()
+            self._told.notify_all()
+
+    @property
+    def is_heard(self) -> bool:
+        """Returns whether `/clock` was heard."""
+        return math.isfinite(self._heard_s)
+
+    def now(self) -> float:
+        """Time of `/clock`."""
+        with self._told:
+            return self._now()
+
+    def _now(self) -> float:
+        silent_s = 0.0 if math.isinf(self._heard_s) else time.monotonic() - self._heard_s
+        return self._stamp_s + self._extra_s + max(0.0, silent_s - _GRACE_S)
+
+    def _wait_until(self, due_s: float) -> None:
+        with self._told:
+            while self._now() < due_s - 1e-6:
+                self._told.wait(_LOOK_S)
+                if math.isinf(self._heard_s):
+                    return
+
+    def hear(self, stamp_s: float) -> None:
+        """Does nothing: stamps are those of `/clock`."""
+
+    def ours(self, stamp_s: float) -> float:
+        """Returns a stamp on our clock; never later than now."""
+        with self._told:
+            return min(stamp_s + self._extra_s, self._now())
+
+    def theirs(self, time_s: float) -> float:
+        """Returns a time of our clock on the robot's."""
+        return time_s - self._extra_s

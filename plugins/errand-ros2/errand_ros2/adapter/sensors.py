@@ -45,7 +45,7 @@ _KEPT: Final = 400
 _PICTURE_S: Final = 2.0
 _SAME_S: Final = 0.051
 _EPSILON_S: Final = 1e-6
-_BODY_FRAMES: Final = 8
+_MOST_FRAMES: Final = 32
 
 
 class Sensors:
@@ -204,15 +204,20 @@ class Sensors:
 
     def _X_BF(self, frame: str) -> RigidTransform | None:
         """Pose of a fixed frame in the body; None when no static transforms lead there."""
-        X = RigidTransform()
-        for _ in range(_BODY_FRAMES):
-            if frame == self.body_frame:
-                return X
-            if frame not in self._fixed:
-                return None
-            frame, X_PF = self._fixed[frame]
-            X = X_PF @ X
-        return None
+        to_body, to_frame = self._above(self.body_frame), self._above(frame)
+        common = next((each for each in to_frame if each in to_body), None)
+        if common is None or not self.body_frame:
+            return None
+        raised = RigidTransform([0.0, 0.0, -self._description.file.odometry.raised])
+        return raised @ to_body[common].inverse() @ to_frame[common]
+
+    def _above(self, frame: str) -> dict[str, RigidTransform]:
+        """Frames from a frame up to its root, each with the pose of the first in it."""
+        found = {frame: RigidTransform()}
+        while frame in self._fixed and len(found) < _MOST_FRAMES:
+            parent, X_PF = self._fixed[frame]
+            found[parent], frame = X_PF @ found[frame], parent
+        return found
 
     def _X_OB(self, stamp_s: float) -> RigidTransform | None:
         """Pose of the body at a time; None when odometry does not reach so far back."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from threading import Event
 from typing import Final
 
-from errand_ros2.adapter.clocks import SimulatedClock, WallClock
+from errand_ros2.adapter.clocks import RobotClock, SimulatedClock
 from errand_ros2.adapter.description import load_description
 from errand_ros2.adapter.robot import Ros2Robot
 from errand_ros2.wire.node import Node
@@ -46,7 +46,7 @@ class Ros2:
         place, description = Place.parse(self.network), load_description(self.file, self.kind)
         with open_session(place) as session:
             clock, node = (
-                SimulatedClock() if description.file.sim_time else WallClock(),
+                SimulatedClock() if description.file.sim_time else RobotClock(),
                 Node(session, _NAME, f"/{space}"),
             )
             if isinstance(clock, SimulatedClock):
@@ -68,12 +68,12 @@ class Ros2:
                 robot.return_lease(robot.take_lease(_NAME))
 
 
-def _missing(robot: Ros2Robot, clock: SimulatedClock | WallClock) -> str:
+def _missing(robot: Ros2Robot, clock: RobotClock) -> str:
     """Waits for the first readings; returns the topic on which nothing was heard, empty when all are there."""
     until_s = time.monotonic() + _PATIENCE_S
     while True:
         silent = isinstance(clock, SimulatedClock) and not clock.is_heard
-        missing = "/clock" if silent else robot.sensors.missing()
+        missing = "/clock" if silent else robot.missing()
         if not missing or time.monotonic() > until_s:
             return missing
         Event().wait(_TICK_S)

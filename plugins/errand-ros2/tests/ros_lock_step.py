@@ -5,7 +5,7 @@ import threading
 import time
 from contextlib import ExitStack
 
-from errand_ros2.adapter.clocks import DelayedTime
+from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import described, served_file
 from errand_ros2.adapter.robot import Ros2Robot
 from errand_ros2.server import PERIOD_S, RobotServer, Served
@@ -15,7 +15,7 @@ from errand_ros2.wire.session import open_session
 IDLE_S, PATIENCE_S = 0.005, 20.0
 
 
-class LockStep:
+class LockStep(RobotClock):
     """Server, clock and robot. `build` makes robot and clock in the server's thread, to which a renderer belongs.
 
     `carry` is called with the step after each one, and returns whether messages travel.
@@ -24,7 +24,8 @@ class LockStep:
     def __init__(self, build, place, *, kind="spot", name="Alice", file=None):
         self._build, self._place, self._ending = build, place, ExitStack()
         self._ready, self._stopping, self._failure = threading.Event(), threading.Event(), None
-        self._now_s, self.time = 0.0, DelayedTime(self.now)
+        super().__init__()
+        self._now_s = 0.0
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
         self._ready.wait()
@@ -33,7 +34,7 @@ class LockStep:
         session = self._ending.enter_context(open_session(place))
         self.node = Node(session, "driver", f"/{name.lower()}")
         self.robot = Ros2Robot(name, self.node, self, described(file or served_file(kind)))
-        assert self.until(lambda: not self.robot.sensors.missing()), self.robot.sensors.missing()
+        assert self.until(lambda: not self.robot.missing()), self.robot.missing()
 
     def _serve(self):
         try:
@@ -68,9 +69,9 @@ class LockStep:
 
     def _has_arrived(self):
         """Whether the robot has heard all that the server published."""
-        topics, seen = self.server.topics, self.robot.sensors
-        heard = [(topics.odometry_stamp_s, seen.odometry), (topics.odometry_stamp_s, seen.joints)]
-        heard += [] if topics.scan_stamp_s is None else [(topics.scan_stamp_s, seen.scan)]
+        topics, seen = self.server.topics, self.robot
+        heard = [(topics.odometry_stamp_s, seen.odometry()), (topics.odometry_stamp_s, seen.joints())]
+        heard += [] if topics.scan_stamp_s is None else [(topics.scan_stamp_s, seen.scan())]
         all_heard = all(each is not None and each.stamp_s >= at_s - 1e-6 for at_s, each in heard)
         return all_heard and self.server.motions.ended <= sum(each.ended for each in self.robot.actions.values())
 

@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from threading import Event
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 _JUMP_S: Final = 0.7
 _DELAYS_S: Final = 5.0
@@ -17,45 +17,37 @@ _GRACE_S: Final = 1.0
 _LOOK_S: Final = 0.02
 
 
-class RobotTime(Protocol):
-    """Relation between the robot's stamps and our clock; `jumps` counts the jumps of the robot's clock."""
+class RobotClock:
+    """Wall time since the connection; maps stamps of a robot whose clock is ahead or behind.
 
-    jumps: int
-
-    def hear(self, stamp_s: float) -> None:
-        """Takes the stamp of a message that has just arrived."""
-
-    def ours(self, stamp_s: float) -> float:
-        """Returns a stamp on our clock; never later than now."""
-
-    def theirs(self, time_s: float) -> float:
-        """Returns a time of our clock on the robot's."""
-
-
-class TimedClock(Protocol):
-    """Clock of the robot protocol that knows the robot's stamps."""
-
-    time: RobotTime
-
-    def now(self) -> float:
-        """Seconds on the clock."""
-
-
-class DelayedTime:
-    """Robot whose clock is ahead or behind: the shortest delay of the last seconds counts as none.
-
-    A jump by 0.7 s or more begins anew.
+    The shortest delay of the last seconds counts as none. After a jump of the robot's clock by 0.7 s or more, which
+    `jumps` counts, this begins anew. `advance` calls `after` after each wait.
     """
 
-    def __init__(self, now: Callable[[], float]) -> None:
-        self._now = now
+    def __init__(self) -> None:
+        self._began_s, self._due_s = time.monotonic(), 0.0
         self._behind: deque[tuple[float, float]] = deque()
         self._behind_s, self._last_s = 0.0, -math.inf
         self.jumps = 0
+        self.after: list[Callable[[], None]] = []
+
+    def now(self) -> float:
+        """Seconds since the connection was made."""
+        return time.monotonic() - self._began_s
+
+    def advance(self, dt_s: float) -> None:
+        """Waits until dt_s have passed since the last advance; a late program goes on at once."""
+        self._due_s = max(self._due_s + dt_s, self.now() - dt_s)
+        self._wait_until(self._due_s)
+        for each in self.after:
+            each()
+
+    def _wait_until(self, due_s: float) -> None:
+        Event().wait(max(0.0, due_s - self.now()))
 
     def hear(self, stamp_s: float) -> None:
         """Takes the stamp of a message that has just arrived."""
-        now_s = self._now()
+        now_s = self.now()
         behind_s = now_s - stamp_s
         back, ahead = stamp_s < self._last_s - _JUMP_S, self._behind and behind_s < self._behind_s - _JUMP_S
         if back or ahead:
@@ -68,68 +60,31 @@ class DelayedTime:
         self._behind_s = min(each for _, each in self._behind)
 
     def ours(self, stamp_s: float) -> float:
-        """Returns a stamp on our clock; never later than now."""
-        return min(stamp_s + self._behind_s, self._now())
+        """Returns a stamp on this clock; never later than now."""
+        return min(stamp_s + self._behind_s, self.now())
 
     def theirs(self, time_s: float) -> float:
-        """Returns a time of our clock on the robot's."""
+        """Returns a time of this clock on the robot's."""
         return time_s - self._behind_s
 
 
-class _Waiting:
-    """Clock that waits; `after` is called after each wait."""
-
-    def __init__(self) -> None:
-        self._due_s = 0.0
-        self.after: list[Callable[[], None]] = []
-
-    def now(self) -> float:
-        """Seconds on the clock."""
-        raise NotImplementedError
-
-    def _wait_until(self, due_s: float) -> None:
-        Event().wait(max(0.0, due_s - self.now()))
-
-    def advance(self, dt_s: float) -> None:
-        """Waits until dt_s have passed since the last advance; a late program goes on at once."""
-        self._due_s = max(self._due_s + dt_s, self.now() - dt_s)
-        self._wait_until(self._due_s)
-        for each in self.after:
-            each()
-
-
-class WallClock(_Waiting):
-    """Clock of a real robot: wall time since the connection."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._began_s = time.monotonic()
-        self.time: RobotTime = DelayedTime(self.now)
-
-    def now(self) -> float:
-        """Seconds since the connection was made."""
-        return time.monotonic() - self._began_s
-
-
-class SimulatedClock(_Waiting):
-    """Clock that follows `/clock`, also its own map from stamps; it never goes back, and goes on without messages."""
+class SimulatedClock(RobotClock):
+    """Clock that follows `/clock`, whose stamps it takes as they are; it never goes back, nor stands still for long."""
 
     def __init__(self) -> None:
         super().__init__()
         self._told = threading.Condition()
-        self._stamp_s, self._heard_s, self._extra_s, self._base_s = 0.0, math.inf, 0.0, 0.0
-        self.time: RobotTime = self
-        self.jumps = 0
+        self._stamp_s, self._heard_s, self._base_s = 0.0, math.inf, 0.0
 
     def hear_clock(self, message: Any) -> None:
         """Takes rosgraph_msgs/Clock."""
         stamp_s = message.clock.sec + 1e-9 * message.clock.nanosec
         with self._told:
-            now_s = self._now()
+            now_s = self.now()
             if stamp_s < self._stamp_s - _JUMP_S:
                 self.jumps += 1
                 self._base_s = now_s - stamp_s
-            self._extra_s = max(self._base_s, now_s - stamp_s)
+            self._behind_s = max(self._base_s, now_s - stamp_s)
             self._stamp_s, self._heard_s = stamp_s, time.monotonic()
             self._told.notify_all()
 
@@ -141,27 +96,13 @@ class SimulatedClock(_Waiting):
     def now(self) -> float:
         """Time of `/clock`."""
         with self._told:
-            return self._now()
-
-    def _now(self) -> float:
-        silent_s = 0.0 if math.isinf(self._heard_s) else time.monotonic() - self._heard_s
-        return self._stamp_s + self._extra_s + max(0.0, silent_s - _GRACE_S)
+            silent_s = time.monotonic() - self._heard_s if self.is_heard else 0.0
+            return self._stamp_s + self._behind_s + max(0.0, silent_s - _GRACE_S)
 
     def _wait_until(self, due_s: float) -> None:
         with self._told:
-            while self._now() < due_s - 1e-6:
+            while self.is_heard and self.now() < due_s - 1e-6:
                 self._told.wait(_LOOK_S)
-                if math.isinf(self._heard_s):
-                    return
 
     def hear(self, stamp_s: float) -> None:
         """Does nothing: stamps are those of `/clock`."""
-
-    def ours(self, stamp_s: float) -> float:
-        """Returns a stamp on our clock; never later than now."""
-        with self._told:
-            return min(stamp_s + self._extra_s, self._now())
-
-    def theirs(self, time_s: float) -> float:
-        """Returns a time of our clock on the robot's."""
-        return time_s - self._extra_s

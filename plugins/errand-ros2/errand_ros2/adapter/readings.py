@@ -152,7 +152,7 @@ def cloud_scan(
     inside = (rings >= 0) & (rings < file.rings)
     np.minimum.at(ranges, (rings[inside], columns[inside]), far_m[inside].astype(np.float32))
     ranges[np.isinf(ranges)] = np.nan
-    azimuths = -np.pi + np.arange(file.columns) * (2.0 * np.pi / file.columns)
+    azimuths = (-np.pi + np.arange(file.columns) * (2.0 * np.pi / file.columns)).astype(np.float64)
     return Scan(stamp_s, ranges, elevations, azimuths, X_BL, X_OB)
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from errand_ros2 import messages
-from errand_ros2.adapter.clocks import TimedClock
+from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import DRIVE_EXPIRY_S, Description, GripperFile
-from errand_ros2.adapter.sensors import OLD_STATE_S, Sensors
+from errand_ros2.adapter.sensors import OLD_STATE_S, SensedRobot
 from errand_ros2.served_motions import GRIPPER, INVALID_GOAL, TRAJECTORY
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError, SentGoal
 from errand_ros2.wire.node import Node
@@ -21,39 +21,28 @@ from skills.command_table import CommandTable
 from skills.robot import (
     ArmTrajectory,
     BaseKind,
-    Battery,
-    Capabilities,
     CommandCause,
     CommandId,
     CommandState,
     CommandStatus,
-    DoorHandle,
-    Gripper,
-    Image,
-    Imu,
-    Joints,
     Lease,
     LeaseError,
-    Odometry,
-    OwnLocalisation,
-    Scan,
 )
 
-SILENT_S, GONE_S = 3.0, 15.0
+GONE_S: Final = 15.0
 _CALL_S: Final = 0.5
 _LEAST_POINT_S, _HEAD_RAD_S = 0.2, 1.0
 _REACHED_M, _REACHED_RAD = 0.02, 0.03
 BASE, POSTURE, ARM, HEAD, GRIP = "base", "posture", "arm", "head", "gripper"
 
 
-class Ros2Robot:
+class Ros2Robot(SensedRobot):
     """Robot of ROS 2. Implements `skills.robot.Robot`."""
 
-    def __init__(self, name: str, node: Node, clock: TimedClock, description: Description) -> None:
+    def __init__(self, name: str, node: Node, clock: RobotClock, description: Description) -> None:
         """Subscribes, and declares the publishers and action clients that the description names."""
-        self._name, self._clock, self._description = name, clock, description
-        self._node, file = node, description.file
-        self.sensors = Sensors(node, description, clock.now, clock.time)
+        super().__init__(name, node, clock, description)
+        file = description.file
         kind = "TwistStamped" if file.base.stamped else "Twist"
         self._velocity = node.publisher(file.base.command, f"geometry_msgs/msg/{kind}")
         posture, carry = file.base.posture, file.gripper.carry if file.gripper else None
@@ -66,54 +55,6 @@ class Ros2Robot:
         self._commands, self._unsure = CommandTable[str](), dict[str, Any]()
         self._lease_number = 0
         self._current: Lease | None = None
-
-    # -- know and sense ----------------------------------------------------------------------------------------------
-
-    @property
-    def name(self) -> str:
-        """Name of the robot."""
-        return self._name
-
-    def capabilities(self) -> Capabilities:
-        """Capabilities of the described robot."""
-        return self._description.capabilities
-
-    def odometry(self) -> Odometry:
-        """Latest dead reckoning; before the first, that of a robot which never answered."""
-        return self.sensors.odometry or Odometry(-math.inf, RigidTransform(), (0.0, 0.0, 0.0))
-
-    def own_localisation(self) -> OwnLocalisation | None:
-        """Latest pose by the robot's own localisation; None without one."""
-        return self.sensors.place
-
-    def imu(self) -> Imu | None:
-        """Latest inertial measurement; None without one."""
-        return self.sensors.imu
-
-    def scan(self) -> Scan | None:
-        """Latest LiDAR revolution; None before the first."""
-        return self.sensors.scan
-
-    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        """Takes a picture with depth, or only one of the two. Raises ValueError and NoImageError."""
-        return self.sensors.image(source, visual=visual, depth=depth)
-
-    def joints(self) -> Joints:
-        """Latest joint state."""
-        return self.sensors.joints
-
-    def gripper(self) -> Gripper:
-        """Latest gripper state."""
-        return self.sensors.gripper()
-
-    def battery(self) -> Battery:
-        """Latest battery state; full when no topic tells."""
-        return self.sensors.battery()
-
-    def faults(self) -> tuple[str, ...]:
-        """Returns a fault while the robot is silent."""
-        silent_s = self.sensors.silent_s()
-        return (f"the robot has not answered for {silent_s:.0f} s",) if silent_s > SILENT_S else ()
 
     @property
     def sent(self) -> int:
@@ -162,27 +103,17 @@ class Ros2Robot:
         self._posture.put(messages.pose(X))
         return self._commands.begin(POSTURE, (height_m, pitch_rad), self._clock.now(), until_s)
 
-    def sit(self, *, until_s: float, lease: Lease) -> CommandId:
-        """Refuses: no topic of ROS 2 is common for it."""
-        return self._unsupported("sit")
+    def sit(self, *_: Any, **__: Any) -> CommandId:
+        """Refuses, as docking and opening doors: no topics or actions of ROS 2 are common for them."""
+        return self._commands.refuse("ROS 2 has no such command", CommandCause.UNSUPPORTED)
 
-    def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
-        """Refuses: see `sit`."""
-        return self._unsupported("dock")
-
-    def undock(self, *, until_s: float, lease: Lease) -> CommandId:
-        """Refuses: see `sit`."""
-        return self._unsupported("undock")
-
-    def open_door(self, handle: DoorHandle, *, until_s: float, lease: Lease) -> CommandId:
-        """Refuses: see `sit`."""
-        return self._unsupported("open_door")
+    dock = undock = open_door = sit
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Sends a joint trajectory to the arm's controller; done by its result."""
         arm = self._description.capabilities.arm
         if arm is None or trajectory.positions_rad.shape[1] != len(arm.joint_names):
-            return self._unsupported("move_arm") if arm is None else self._commands.refuse("move_arm: wrong joints")
+            return self.sit() if arm is None else self._commands.refuse("move_arm: wrong joints")
         goal = self._trajectory(arm.joint_names, trajectory)
         return self._act(ARM, goal, until_s, lease, trajectory.times_s)
 
@@ -190,11 +121,11 @@ class Ros2Robot:
         """Sends pan and tilt to the head's controller; done by its result."""
         head = self._description.capabilities.head
         if head is None:
-            return self._unsupported("point_head")
+            return self.sit()
         (left, right), (up, down) = head.pan_range_rad, head.tilt_range_rad
         if not (left <= pan_rad <= right and up <= tilt_rad <= down):
             return self._commands.refuse(f"point_head: pan {pan_rad:.2f}, tilt {tilt_rad:.2f} rad is out of range")
-        now = self.sensors.joints.position_rad
+        now = self.joints().position_rad
         far_rad = max(
             abs(want - now.get(name, 0.0)) for want, name in zip((pan_rad, tilt_rad), head.joint_names, strict=True)
         )
@@ -205,7 +136,7 @@ class Ros2Robot:
         """Sends an opening and a force to the gripper's controller; done by its result."""
         file = self._description.file.gripper
         if file is None or self._description.capabilities.gripper is None:
-            return self._unsupported("set_gripper")
+            return self.sit()
         goal = ros_types().blank(f"{GRIPPER}_Goal")
         goal.command.position, goal.command.max_effort = file.scale * opening, force_n
         return self._act(GRIP, goal, until_s, lease, (opening, force_n))
@@ -259,7 +190,7 @@ class Ros2Robot:
 
     def poll(self) -> None:
         """Renews the velocity, follows the actions, and ends what is late; call it once a tick."""
-        now_s, silent_s = self._clock.now(), self.sensors.silent_s()
+        now_s, silent_s = self._clock.now(), self.silent_s()
         if silent_s > OLD_STATE_S:
             self._fall_silent(silent_s)
             return
@@ -276,7 +207,7 @@ class Ros2Robot:
 
     def stopped_because(self) -> str:
         """Reason why the robot has stopped for good; empty while it goes on."""
-        return f"the robot has not answered for {GONE_S:.0f} s" if self.sensors.silent_s() > GONE_S else ""
+        return f"the robot has not answered for {GONE_S:.0f} s" if self.silent_s() > GONE_S else ""
 
     def _fall_silent(self, silent_s: float) -> None:
         """Ends the running commands of a silent robot; their parts are stopped when it answers again."""
@@ -304,19 +235,19 @@ class Ros2Robot:
         sent: SentGoal = active.goal
         if sent.status.is_final:
             if part == GRIP and self._description.file.gripper is not None:
-                self._feel(self._description.file.gripper, sent.result)
+                self._feel_result(self._description.file.gripper, sent.result)
             state, reason, cause = _ended(part, sent)
             self._commands.finish(part, state, reason, cause)
         elif now_s > active.until_s:
             self._halt(part, CommandStatus(CommandState.STOPPED, "expired before it was done", CommandCause.LATE))
 
-    def _feel(self, file: GripperFile, result: Any) -> None:
+    def _feel_result(self, file: GripperFile, result: Any) -> None:
         """Takes what a gripper's result tells, where no topic does."""
-        self.sensors.feel(opening=result.position / file.scale)
+        self._feel(opening=result.position / file.scale)
         if file.force is None:
-            self.sensors.feel(force_n=result.effort)
+            self._feel(force_n=result.effort)
         if file.holding is None:
-            self.sensors.feel(holding=bool(result.stalled))
+            self._feel(holding=bool(result.stalled))
 
     # -- inside ------------------------------------------------------------------------------------------------------
 
@@ -324,8 +255,8 @@ class Ros2Robot:
         if not self._description.file.base.stamped:
             self._velocity.put(messages.twist(velocity))
         else:
-            stamp_s = self.sensors.time.theirs(self._clock.now())
-            self._velocity.put(messages.twist_stamped(stamp_s, self.sensors.body_frame, velocity))
+            stamp_s = self._clock.theirs(self._clock.now())
+            self._velocity.put(messages.twist_stamped(stamp_s, self.body_frame, velocity))
 
     def _halt(self, part: str, status: CommandStatus) -> None:
         """Stops a part, if it has a command, and ends that."""
@@ -363,16 +294,13 @@ class Ros2Robot:
             return self._commands.refuse(f"{part}: the controller rejects the goal", CommandCause.REFUSED)
         return self._commands.begin(part, sent, self._clock.now(), until_s)
 
-    def _unsupported(self, verb: str) -> CommandId:
-        return self._commands.refuse(f"{verb}: the robot has no such part", CommandCause.UNSUPPORTED)
-
     def _without(self, lease: Lease) -> str | None:
         """Returns why a lease does not count; None when it does."""
         return None if lease == self._current else f"lease {lease.number} of {lease.holder!r} no longer counts"
 
     def _objection(self, part: str, lease: Lease, until_s: float, values: Iterable[float]) -> CommandId | None:
         """Refuses a forbidden command; returns None for an allowed one."""
-        now_s, silent_s = self._clock.now(), self.sensors.silent_s()
+        now_s, silent_s = self._clock.now(), self.silent_s()
         if (gone := self._without(lease)) is not None:
             return self._commands.refuse(f"{part}: {gone}", CommandCause.NO_LEASE)
         if not np.isfinite([*values, min(until_s, 1e9)]).all():

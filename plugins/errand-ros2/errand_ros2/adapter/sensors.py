@@ -19,7 +19,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from errand_ros2.adapter import readings
-from errand_ros2.adapter.clocks import RobotTime
+from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import CameraFile, Description
 from errand_ros2.wire.keys import LATCHED, SENSOR
 from errand_ros2.wire.node import Node
@@ -27,6 +27,7 @@ from skills.geometry import compose, inverse
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.robot import (
     Battery,
+    Capabilities,
     FrameTree,
     Gripper,
     Image,
@@ -40,7 +41,8 @@ from skills.robot import (
     Scan,
 )
 
-OLD_STATE_S: Final = 0.5
+OLD_STATE_S, SILENT_S = 0.5, 3.0
+NEVER: Final = Odometry(-math.inf, RigidTransform(), (0.0, 0.0, 0.0))
 _KEPT: Final = 400
 _PICTURE_S: Final = 2.0
 _SAME_S: Final = 0.051
@@ -48,12 +50,12 @@ _EPSILON_S: Final = 1e-6
 _MOST_FRAMES: Final = 32
 
 
-class Sensors:
-    """Sensors of one robot."""
+class SensedRobot:
+    """Robot that senses: the verbs of `skills.robot.Robot` for that."""
 
-    def __init__(self, node: Node, description: Description, now: Callable[[], float], time: RobotTime) -> None:
+    def __init__(self, name: str, node: Node, clock: RobotClock, description: Description) -> None:
         """Subscribes to the topics that the description names."""
-        self._node, self._description, self._now, self.time = node, description, now, time
+        self._name, self._node, self._clock, self._description = name, node, clock, description
         self._space, file = node.namespace.strip("/"), description.file
         self._names = {theirs: ours for ours, theirs in file.joint_names.items()}
         self._lock = threading.RLock()
@@ -61,11 +63,11 @@ class Sensors:
         self._joints: deque[Joints] = deque(maxlen=_KEPT)
         self._fixed: dict[str, tuple[str, RigidTransform]] = {}
         self._jumps, self.body_frame = 0, ""
-        self.scan: Scan | None = None
-        self.imu: Imu | None = None
-        self.place: OwnLocalisation | None = None
-        self.felt = readings.Felt()
-        self.charge: tuple[float, float] | None = None
+        self._scan: Scan | None = None
+        self._imu: Imu | None = None
+        self._place: OwnLocalisation | None = None
+        self._felt = readings.Felt()
+        self._charge: tuple[float, float] | None = None
         node.subscribe(file.odometry.topic, "nav_msgs/msg/Odometry", self._hear_odometry)
         node.subscribe("/tf_static", "tf2_msgs/msg/TFMessage", self._hear_fixed, LATCHED)
         self._hear(file.joints, "sensor_msgs/msg/JointState", self._hear_joints)
@@ -75,59 +77,81 @@ class Sensors:
         self._hear(file.battery, "sensor_msgs/msg/BatteryState", self._hear_battery)
         self._hear(file.pose, "geometry_msgs/msg/PoseWithCovarianceStamped", self._hear_pose)
         if (grip := file.gripper) is not None:
-            self._hear(grip.holding, "std_msgs/msg/Bool", lambda told: self.feel(holding=bool(told.data)))
+            self._hear(grip.holding, "std_msgs/msg/Bool", lambda told: self._feel(holding=bool(told.data)))
             self._hear(grip.force, "geometry_msgs/msg/WrenchStamped", self._hear_force)
 
     def _hear(self, topic: str | None, kind: str, handle: Callable[[Any], None]) -> None:
         if topic is not None:
             self._node.subscribe(topic, kind, handle, SENSOR)
 
-    # -- what was heard ----------------------------------------------------------------------------------------------
+    # -- verbs -------------------------------------------------------------------------------------------------------
 
     @property
-    def odometry(self) -> Odometry | None:
-        """Latest dead reckoning."""
+    def name(self) -> str:
+        """Name of the robot."""
+        return self._name
+
+    def capabilities(self) -> Capabilities:
+        """Capabilities of the described robot."""
+        return self._description.capabilities
+
+    def odometry(self) -> Odometry:
+        """Latest dead reckoning; before the first, that of a robot which never answered."""
         with self._lock:
-            return self._odometry[-1] if self._odometry else None
+            return self._odometry[-1] if self._odometry else NEVER
 
-    @property
     def joints(self) -> Joints:
         """Latest joint state; empty before the first."""
         with self._lock:
-            return self._joints[-1] if self._joints else Joints(self._now(), {}, {}, {})
+            return self._joints[-1] if self._joints else Joints(self._clock.now(), {}, {}, {})
+
+    def own_localisation(self) -> OwnLocalisation | None:
+        """Latest pose by the robot's own localisation; None without one."""
+        return self._place
+
+    def imu(self) -> Imu | None:
+        """Latest inertial measurement; None without one."""
+        return self._imu
+
+    def scan(self) -> Scan | None:
+        """Latest LiDAR revolution; None before the first."""
+        return self._scan
 
     def gripper(self) -> Gripper:
         """Latest gripper state."""
-        return readings.gripper(self._description, self.joints, self.felt)
-
-    def feel(self, **changes: Any) -> None:
-        """Changes what the gripper told."""
-        with self._lock:
-            self.felt = replace(self.felt, **changes)
+        return readings.gripper(self._description, self.joints(), self._felt)
 
     def battery(self) -> Battery:
         """Latest battery state; full when no topic tells."""
-        stamp_s, charge = self.charge or (self._now(), 1.0)
+        stamp_s, charge = self._charge or (self._clock.now(), 1.0)
         return Battery(stamp_s, charge)
+
+    def faults(self) -> tuple[str, ...]:
+        """Returns a fault while the robot is silent."""
+        silent_s = self.silent_s()
+        return (f"the robot has not answered for {silent_s:.0f} s",) if silent_s > SILENT_S else ()
 
     def silent_s(self) -> float:
         """Age of the last odometry; infinite before the first."""
-        last = self.odometry
-        return math.inf if last is None else self._now() - last.stamp_s
+        return self._clock.now() - self.odometry().stamp_s
 
     def missing(self) -> str:
         """Names the first topic that has said nothing yet; empty when all that is needed was heard."""
         file, can = self._description.file, self._description.capabilities
-        needed = set(can.arm.joint_names if can.arm else ())
-        if self.odometry is None:
+        left = sorted({*(can.arm.joint_names if can.arm else ())} - self.joints().position_rad.keys())
+        if self.odometry() is NEVER:
             return file.odometry.topic
-        if not needed <= self.joints.position_rad.keys():
-            left = ", ".join(sorted(needed - self.joints.position_rad.keys()))
-            return f"{file.joints} with {left}"
-        if self.scan is None:
+        if left:
+            return f"{file.joints} with {', '.join(left)}"
+        if self._scan is None:
             frame = f" (or no /tf_static to {self._lidar_frame})" if self._X_BF(self._lidar_frame) is None else ""
             return f"{file.lidar.points or file.lidar.scan}{frame}"
         return ""
+
+    def _feel(self, **changes: Any) -> None:
+        """Changes what the gripper told."""
+        with self._lock:
+            self._felt = replace(self._felt, **changes)
 
     # -- handlers ----------------------------------------------------------------------------------------------------
 
@@ -138,18 +162,18 @@ class Sensors:
             return
         with self._lock:
             self.body_frame = message.child_frame_id.strip("/")
-            self.time.hear(stamp_s)
-            if self.time.jumps != self._jumps:
-                self._jumps = self.time.jumps
+            self._clock.hear(stamp_s)
+            if self._clock.jumps != self._jumps:
+                self._jumps = self._clock.jumps
                 self._odometry.clear()
                 self._joints.clear()
-            stamped = replace(read, stamp_s=self.time.ours(stamp_s))
+            stamped = replace(read, stamp_s=self._clock.ours(stamp_s))
             if not self._odometry or stamped.stamp_s > self._odometry[-1].stamp_s - _EPSILON_S:
                 self._odometry.append(stamped)
 
     def _hear_joints(self, message: Any) -> None:
         with self._lock:
-            stamp_s = self.time.ours(readings.stamp_of(message.header))
+            stamp_s = self._clock.ours(readings.stamp_of(message.header))
             read = readings.usable(readings.joints, message, stamp_s, self._names)
             if read is not None and (not self._joints or stamp_s > self._joints[-1].stamp_s - _SAME_S):
                 self._joints.append(readings.merged(self._joints[-1] if self._joints else None, read))
@@ -162,39 +186,39 @@ class Sensors:
 
     def _hear_points(self, message: Any) -> None:
         X_BF, X_BL = self._X_BF(message.header.frame_id.strip("/")), self._X_BF(self._lidar_frame)
-        stamp_s = self.time.ours(readings.stamp_of(message.header))
+        stamp_s = self._clock.ours(readings.stamp_of(message.header))
         points_F, X_OB = readings.usable(readings.cloud_points, message), self._X_OB(stamp_s)
         if points_F is None or X_BF is None or X_BL is None or X_OB is None:
             return
         points_L = (X_BL.inverse() @ X_BF @ points_F.T).T if len(points_F) else points_F
-        self.scan = readings.cloud_scan(points_L, self._description.file.lidar, stamp_s, X_BL, X_OB)
+        self._scan = readings.cloud_scan(points_L, self._description.file.lidar, stamp_s, X_BL, X_OB)
 
     def _hear_scan(self, message: Any) -> None:
-        stamp_s = self.time.ours(readings.stamp_of(message.header))
+        stamp_s = self._clock.ours(readings.stamp_of(message.header))
         X_BL, X_OB = self._X_BF(message.header.frame_id.strip("/")), self._X_OB(stamp_s)
         if X_BL is not None and X_OB is not None:
-            self.scan = readings.usable(readings.flat_scan, message, stamp_s, X_BL, X_OB) or self.scan
+            self._scan = readings.usable(readings.flat_scan, message, stamp_s, X_BL, X_OB) or self._scan
 
     def _hear_imu(self, message: Any) -> None:
-        self.imu = readings.imu(message, self.time.ours(readings.stamp_of(message.header)))
+        self._imu = readings.imu(message, self._clock.ours(readings.stamp_of(message.header)))
 
     def _hear_force(self, message: Any) -> None:
         force = message.wrench.force
         told = math.sqrt(force.x**2 + force.y**2 + force.z**2)
         if math.isfinite(told):
-            self.feel(force_n=told)
+            self._feel(force_n=told)
 
     def _hear_battery(self, message: Any) -> None:
         if 0.0 <= message.percentage <= 1.0:
-            self.charge = (self.time.ours(readings.stamp_of(message.header)), float(message.percentage))
+            self._charge = (self._clock.ours(readings.stamp_of(message.header)), float(message.percentage))
 
     def _hear_pose(self, message: Any) -> None:
-        stamp_s = self.time.ours(readings.stamp_of(message.header))
+        stamp_s = self._clock.ours(readings.stamp_of(message.header))
         X_MB = readings.usable(readings.transform_of, message.pose.pose.position, message.pose.pose.orientation)
         X_OB = self._X_OB(stamp_s)
         if X_MB is not None and X_OB is not None:
             X_MO = compose(Pose2D.from_transform(X_MB), inverse(Pose2D.from_transform(X_OB)))
-            self.place = OwnLocalisation(stamp_s, X_MO)
+            self._place = OwnLocalisation(stamp_s, X_MO)
 
     # -- frames ------------------------------------------------------------------------------------------------------
 
@@ -256,7 +280,7 @@ class Sensors:
 
     # -- pictures ----------------------------------------------------------------------------------------------------
 
-    def image(self, source: str, *, visual: bool, depth: bool) -> Image:
+    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         """Subscribes for one picture with depth. Raises ValueError and NoImageError."""
         file = self._description.file.cameras.get(source)
         if file is None:
@@ -264,7 +288,7 @@ class Sensors:
         if depth and file.depth is None:
             raise NoImageError(f"{source}: the camera has no depth")
         taken = Shots(
-            self._node, file, visual=visual, depth=depth, since_s=self._now() - _EPSILON_S, ours=self.time.ours
+            self._node, file, visual=visual, depth=depth, since_s=self._clock.now() - _EPSILON_S, ours=self._clock.ours
         )
         with taken:
             found = taken.wait(_PICTURE_S)
@@ -273,7 +297,7 @@ class Sensors:
         return self._image(source, found, visual=visual, depth=depth)
 
     def _image(self, source: str, found: Mapping[str, Any], *, visual: bool, depth: bool) -> Image:
-        stamp_s = self.time.ours(readings.stamp_of(found["image" if visual else "depth"].header))
+        stamp_s = self._clock.ours(readings.stamp_of(found["image" if visual else "depth"].header))
         frames = self.frames_at(stamp_s)
         picture = readings.usable(readings.pixels, found["image"]) if visual else np.zeros((0, 0), np.uint8)
         far = readings.usable(readings.depth_m, found["depth"]) if depth else np.zeros((0, 0), np.float32)

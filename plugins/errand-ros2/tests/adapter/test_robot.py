@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from errand_ros2.adapter.robot import SILENT_S
+from errand_ros2.adapter.sensors import SILENT_S
 from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError
 
 

@@ -43,7 +43,7 @@ Truth = Callable[[], RigidTransform]
 
 @dataclass(frozen=True)
 class Served:
-    """What a server publishes besides, and its times.
+    """Options of a server: further topics, and its times.
 
     `grid` is published as `/map`, and `truth` under `/ground_truth`. `life` is the clock (s) by which velocities die.
     """

@@ -21,7 +21,7 @@ class RobotClock:
     """Wall time since the connection; maps stamps of a robot whose clock is ahead or behind.
 
     The shortest delay of the last seconds counts as none. After a jump of the robot's clock by 0.7 s or more, which
-    `jumps` counts, this begins anew. `advance` calls `after` after each wait.
+    `jumps` counts, this begins again. `advance` calls `after` after each wait.
     """
 
     def __init__(self) -> None:

@@ -97,7 +97,7 @@ def imu(message: Any, stamp_s: float) -> Imu:
 
 @dataclass(frozen=True)
 class Felt:
-    """What a gripper told: its opening at the end of the last command, its force, and whether it holds an object."""
+    """Readings of a gripper: its opening at the end of the last command, its force, and whether it holds an object."""
 
     opening: float = 0.0
     force_n: float = 0.0

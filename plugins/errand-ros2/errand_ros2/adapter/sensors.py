@@ -12,7 +12,6 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -24,7 +23,7 @@ from errand_ros2.adapter.description import CameraFile, Description
 from errand_ros2.wire.keys import LATCHED, SENSOR
 from errand_ros2.wire.node import Node
 from skills.geometry import compose, inverse
-from skills.manipulation.arm.kinematics import ArmModel, arm_model
+from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import (
     Battery,
     Capabilities,
@@ -252,10 +251,6 @@ class SensedRobot:
             return None
         return readings.between(seen[after], seen[min(after + 1, len(seen) - 1)], stamp_s)
 
-    @cached_property
-    def _arm(self) -> ArmModel:
-        return arm_model(self._description.capabilities)
-
     def frames_at(self, stamp_s: float) -> FrameTree | None:
         """Frame tree at a time; None when odometry or joints do not reach so far back."""
         can, X_OB = self._description.capabilities, self._X_OB(stamp_s)
@@ -268,7 +263,7 @@ class SensedRobot:
         if can.arm is not None:
             if not at.keys() >= {*can.arm.joint_names}:
                 return None
-            edges["hand"] = ("body", self._arm.X_BH(np.array([at[name] for name in can.arm.joint_names])))
+            edges["hand"] = ("body", arm_model(can).X_BH(np.array([at[name] for name in can.arm.joint_names])))
         if can.head is not None:
             pan, tilt = (at.get(name, 0.0) for name in can.head.joint_names)
             edges["head"] = ("body", can.head.X_BF(pan, tilt))

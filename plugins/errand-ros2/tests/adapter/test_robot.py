@@ -134,7 +134,7 @@ def test_the_body_takes_a_posture(step):
 
 
 @pytest.mark.parametrize("verb", ["sit", "undock"])
-def test_what_has_no_topic_is_unsupported(step, verb):
+def test_verbs_without_a_topic_are_unsupported(step, verb):
     status = step.robot.command_status(getattr(step.robot, verb)(**within(step, 5.0)))
     assert (status.state, status.cause) == (CommandState.REFUSED, CommandCause.UNSUPPORTED)
 

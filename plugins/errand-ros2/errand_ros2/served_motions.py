@@ -37,8 +37,14 @@ CARRY: Final = "gripper/carry"
 INVALID_GOAL, PATH_VIOLATED = -1, -4
 _EXTRA_S, _MOST_S = 5.0, 120.0
 """Time that a trajectory may take longer, and the most that a gripper or posture takes."""
+_MOST_WORK: Final = 1000
+"""Most work that is done between two steps."""
 _OBJECT: Final = 0.02
 """Share of the gripper's opening by which an object keeps it open."""
+
+
+Begin = Callable[[Any], CommandId]
+"""Function that begins the motion of a goal. Raises ValueError for a goal that is none."""
 
 
 class WorkQueue(Executor):
@@ -63,7 +69,7 @@ class WorkQueue(Executor):
     def work_for(self, limit_s: float) -> None:
         """Does what was handed over, and what comes within a time (s, wall clock)."""
         until_s = time.monotonic() + limit_s
-        while True:
+        for _ in range(_MOST_WORK):
             try:
                 self._given.get(timeout=max(0.0, until_s - time.monotonic()))()
             except Empty:
@@ -90,11 +96,11 @@ class ServedMotions:
         """Numbers of the messages heard, and of the goals ended."""
         can = robot.capabilities()
         if can.arm is not None:
-            self._serve(node, ARM_ACTION, TRAJECTORY, self._arm(can.arm.joint_names))
+            self._serve(node, ARM_ACTION, TRAJECTORY, self._follow(can.arm.joint_names, self._move_arm))
         if can.head is not None:
-            self._serve(node, HEAD_ACTION, TRAJECTORY, self._head(can.head.joint_names))
+            self._serve(node, HEAD_ACTION, TRAJECTORY, self._follow(can.head.joint_names, self._point_head))
         if can.gripper is not None:
-            self._serve(node, GRIPPER_ACTION, GRIPPER, self._grip(can.gripper.max_force_n))
+            self._serve(node, GRIPPER_ACTION, GRIPPER, self._grip)
             node.subscribe(CARRY, "std_msgs/msg/Bool", self._later(lambda told: self._carry(told.data)))
         self._height_m, self._thin = can.standing_height_m, _OBJECT * (can.gripper.widest if can.gripper else 1.0)
         node.subscribe(POSTURE, "geometry_msgs/msg/Pose", self._later(self._stand))
@@ -106,7 +112,7 @@ class ServedMotions:
 
         return hear
 
-    def _serve(self, node: Node, name: str, kind: str, begin: Callable[[Any], CommandId]) -> None:
+    def _serve(self, node: Node, name: str, kind: str, begin: Begin) -> None:
         def accept(goal: Goal) -> bool:
             try:
                 command = begin(goal.message)
@@ -127,30 +133,27 @@ class ServedMotions:
             if each.goal is goal:
                 self._robot.stop(lease=self._lease, only=each.command)
 
-    def _arm(self, names: tuple[str, ...]) -> Callable[[Any], CommandId]:
+    def _follow(self, names: tuple[str, ...], move: Callable[[ArmTrajectory, float], CommandId]) -> Begin:
+        """Returns a function that begins a trajectory of these joints by `move`, which takes also its latest end."""
+
         def begin(goal: Any) -> CommandId:
             trajectory = trajectory_of(goal.trajectory, names)
-            until_s = self._clock.now() + float(trajectory.times_s[-1]) + _EXTRA_S
-            return self._robot.move_arm(trajectory, until_s=until_s, lease=self._lease)
+            return move(trajectory, self._clock.now() + float(trajectory.times_s[-1]) + _EXTRA_S)
 
         return begin
 
-    def _head(self, names: tuple[str, ...]) -> Callable[[Any], CommandId]:
-        def begin(goal: Any) -> CommandId:
-            trajectory = trajectory_of(goal.trajectory, names)
-            until_s = self._clock.now() + float(trajectory.times_s[-1]) + _EXTRA_S
-            pan_rad, tilt_rad = trajectory.positions_rad[-1].tolist()
-            return self._robot.point_head(pan_rad, tilt_rad, until_s=until_s, lease=self._lease)
+    def _move_arm(self, trajectory: ArmTrajectory, until_s: float) -> CommandId:
+        return self._robot.move_arm(trajectory, until_s=until_s, lease=self._lease)
 
-        return begin
+    def _point_head(self, trajectory: ArmTrajectory, until_s: float) -> CommandId:
+        return self._robot.point_head(*trajectory.positions_rad[-1].tolist(), until_s=until_s, lease=self._lease)
 
-    def _grip(self, max_force_n: float) -> Callable[[Any], CommandId]:
-        def begin(goal: Any) -> CommandId:
-            force_n = goal.command.max_effort if goal.command.max_effort > 0.0 else max_force_n
-            until_s = self._clock.now() + _MOST_S
-            return self._robot.set_gripper(goal.command.position, force_n, until_s=until_s, lease=self._lease)
-
-        return begin
+    def _grip(self, goal: Any) -> CommandId:
+        command, can, until_s = goal.command, self._robot.capabilities().gripper, self._clock.now() + _MOST_S
+        if can is None or not math.isfinite(command.position + command.max_effort):
+            raise ValueError("the opening or the force is not finite")
+        force_n = command.max_effort if command.max_effort > 0.0 else can.max_force_n
+        return self._robot.set_gripper(command.position, force_n, until_s=until_s, lease=self._lease)
 
     def _carry(self, holding: bool) -> None:
         self._robot.carry(holding, lease=self._lease)

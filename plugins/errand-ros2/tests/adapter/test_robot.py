@@ -1,11 +1,16 @@
 """Every verb of a robot of ROS 2 against the server in lock-step, expiry, refusals and silence."""
 
 import math
+import time
 
 import numpy as np
 import pytest
 
+from errand_ros2.adapter.description import served_file
 from errand_ros2.adapter.sensors import SILENT_S
+from errand_ros2.served_motions import GRIPPER, TRAJECTORY
+from errand_ros2.wire.keys import Attachment
+from errand_ros2.wire.types import ros_types
 from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError
 
 
@@ -183,3 +188,36 @@ def test_a_silent_robot_is_not_driven_and_its_arm_stops_when_it_answers_again(st
     step._now_s += 12.0
     assert "has not answered for 15 s" in step.robot.stopped_because()
     assert step.until(lambda: not step.served.moving_parts, 2.0)
+
+
+def test_random_bytes_on_every_topic_and_service_move_nothing(step, capfd):
+    types, chance, space, length = ros_types(), np.random.default_rng(1), "/alice", 200_000
+    file, session = served_file("spot"), step.node.session.inner
+    topics = {file.base.command: "geometry_msgs/msg/Twist", "body_pose": "geometry_msgs/msg/Pose"}
+    topics |= {"gripper/carry": "std_msgs/msg/Bool", "odom": "nav_msgs/msg/Odometry"}
+    topics |= {"joint_states": "sensor_msgs/msg/JointState", "points": "sensor_msgs/msg/PointCloud2"}
+    topics |= {"imu": "sensor_msgs/msg/Imu", "battery_state": "sensor_msgs/msg/BatteryState"}
+    keys = [step.node.key.data_key(f"{space}/{name}", types.message(kind).key) for name, kind in topics.items()]
+    keys.append(step.node.key.data_key("/tf_static", types.message("tf2_msgs/msg/TFMessage").key))
+    begun = step.served.pose, step.served.q_rad.copy(), step.served.opening
+    for key in keys:
+        left = length
+        while left > 0:
+            data = b"\0\1\0\0"[: int(chance.integers(0, 5))] + chance.bytes(int(chance.integers(0, 2000)))
+            left -= len(data)
+            if not 52 <= len(data) < 68:  # the bytes of a velocity or a posture are one
+                session.put(key, data)
+    attachment = Attachment(1, 2, bytes(16)).encoded()
+    for name, kind in ((file.arm.action, TRAJECTORY), (file.gripper.action, GRIPPER)):
+        action = types.action(kind)
+        for part in ("send_goal", "cancel_goal", "get_result"):
+            key = step.node.key.data_key(f"{space}/{name}/_action/{part}", getattr(action, part).key)
+            for _ in range(20):
+                payload = b"\0\1\0\0" + chance.bytes(length // 20)
+                session.get(key, timeout=0.2, payload=payload, attachment=attachment)
+    time.sleep(1.0)
+    step.server.work.submit(step.server.step).result()
+    assert "Traceback" not in capfd.readouterr().err
+    assert (step.served.pose, step.served.opening) == (begun[0], begun[2])
+    assert np.array_equal(step.served.q_rad, begun[1])
+    assert step.served.moving_parts in ((), ("stand",))

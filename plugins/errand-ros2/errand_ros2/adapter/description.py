@@ -124,6 +124,8 @@ class Description:
 
 
 DRIVE_EXPIRY_S: Final = 0.6
+_RINGED: Final = frozenset({"spot"})
+"""Kinds whose LiDAR has the rings of `LidarFile`; of others one ring is used."""
 
 
 def served_file(kind: str) -> RobotFile:
@@ -133,7 +135,7 @@ def served_file(kind: str) -> RobotFile:
         kind=kind,
         sim_time=True,
         base=BaseFile(posture=POSTURE),
-        lidar=LidarFile(points="points"),
+        lidar=LidarFile(points="points") if kind in _RINGED else LidarFile(scan="scan"),
         imu="imu",
         battery="battery_state",
         cameras={

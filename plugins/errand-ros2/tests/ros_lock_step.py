@@ -3,29 +3,26 @@
 import gc
 import threading
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 
 from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import described, served_file
 from errand_ros2.adapter.robot import Ros2Robot
 from errand_ros2.server import PERIOD_S, RobotServer, Served
-from errand_ros2.wire.node import Node
+from errand_ros2.wire.node import Client, Node, Publisher
 from errand_ros2.wire.session import open_session
 
 IDLE_S, PATIENCE_S = 0.005, 20.0
 
 
 class LockStep(RobotClock):
-    """Server, clock and robot. `build` makes robot and clock in the server's thread, to which a renderer belongs.
-
-    `carry` is called with the step after each one, and returns whether messages travel.
-    """
+    """Server, clock and robot. `build` makes robot and clock in the server's thread, to which a renderer belongs."""
 
     def __init__(self, build, place, *, kind="spot", name="Alice", file=None):
         self._build, self._place, self._ending = build, place, ExitStack()
         self._ready, self._stopping, self._failure = threading.Event(), threading.Event(), None
         super().__init__()
-        self._now_s = 0.0
+        self._now_s, self._is_cut = 0.0, False
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
         self._ready.wait()
@@ -77,8 +74,23 @@ class LockStep(RobotClock):
 
     def _soon(self, true):
         until_s = time.monotonic() + PATIENCE_S
-        while not true() and time.monotonic() < until_s:
+        while not self._is_cut and not true() and time.monotonic() < until_s:
             time.sleep(0.0005)
+
+    @contextmanager
+    def cut(self):
+        """Loses every message of both sides while the block lasts; the clocks go on."""
+        ways = (Publisher, "put"), (Client, "call"), (Client, "ask")
+        kept = {way: getattr(*way) for way in ways}
+        for kind, name in ways:
+            setattr(kind, name, lambda *_, **__: None)
+        self._is_cut = True
+        try:
+            yield
+        finally:
+            self._is_cut = False
+            for (kind, name), method in kept.items():
+                setattr(kind, name, method)
 
     def until(self, true, most_s=10.0, *, every_s=0.05):
         """Advances until a condition holds; returns whether it did in time."""

@@ -175,19 +175,22 @@ def test_the_lease_counts_within_the_program(step):
 
 
 def test_a_silent_robot_is_not_driven_and_its_arm_stops_when_it_answers_again(step):
-    arm = step.robot.move_arm(arm_to(step, 1.5, 10.0), **within(step, 20.0))
+    arm = step.robot.move_arm(arm_to(step, 1.5, 20.0), **within(step, 40.0))
     step.advance(0.2)
-    step._now_s += 1.0  # time passes while nothing is heard
-    step.robot.poll()
-    assert step.robot.command_status(arm).cause is CommandCause.NO_ANSWER
-    refused = step.robot.command_status(step.robot.drive(0.3, 0.0, 0.0, **within(step, 0.3)))
-    assert (refused.state, refused.cause) == (CommandState.REFUSED, CommandCause.NO_ANSWER)
-    step._now_s += SILENT_S
-    assert step.robot.faults() == ("the robot has not answered for 4 s",)
-    assert step.robot.stopped_because() == ""
-    step._now_s += 12.0
-    assert "has not answered for 15 s" in step.robot.stopped_because()
+    with step.cut():
+        step.advance(0.6)
+        assert step.robot.command_status(arm).cause is CommandCause.NO_ANSWER
+        refused = step.robot.command_status(step.robot.drive(0.3, 0.0, 0.0, **within(step, 0.3)))
+        assert (refused.state, refused.cause) == (CommandState.REFUSED, CommandCause.NO_ANSWER)
+        step.advance(SILENT_S)
+        assert step.robot.faults() == ("the robot has not answered for 4 s",)
+        assert step.robot.stopped_because() == ""
+        assert step.served.moving_parts == ("move_arm",)
     assert step.until(lambda: not step.served.moving_parts, 2.0)
+    assert step.robot.faults() == ()
+    with step.cut():
+        step.advance(15.5)
+        assert "has not answered for 15 s" in step.robot.stopped_because()
 
 
 def test_random_bytes_on_every_topic_and_service_move_nothing(step, capfd):

@@ -56,7 +56,7 @@ def test_points_are_all_returns_of_all_rings():
 def test_a_picture_is_reduced_with_its_intrinsics(colour, encoding, row):
     picture, info = (
         decoded(messages.picture(image_of(colour), "c")),
-        decoded(messages.camera_info(image_of(colour), "c")),
+        decoded(messages.camera_info(1.0, "c", image_of(colour).intrinsics)),
     )
     assert (picture.width, picture.height, picture.encoding, picture.step) == (320, 240, encoding, row)
     assert len(picture.data) == row * 240

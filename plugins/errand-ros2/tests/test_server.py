@@ -38,10 +38,13 @@ TOPICS = {
     "/alice/scan": "sensor_msgs/msg/LaserScan",
     "/alice/points": "sensor_msgs/msg/PointCloud2",
     "/alice/battery_state": "sensor_msgs/msg/BatteryState",
+    "/alice/gripper/holding": "std_msgs/msg/Bool",
+    "/alice/gripper/force": "geometry_msgs/msg/WrenchStamped",
     "/ground_truth/alice/pose": "geometry_msgs/msg/PoseStamped",
     **{f"/alice/{each.source}/image": IMAGE for each in spot_capabilities().cameras},
     **{f"/alice/{each.source}/depth": IMAGE for each in spot_capabilities().cameras},
     **{f"/alice/{each.source}/camera_info": INFO for each in spot_capabilities().cameras},
+    **{f"/alice/{each.source}/depth/camera_info": INFO for each in spot_capabilities().cameras},
 }
 STORED = {
     "/map": "nav_msgs/msg/OccupancyGrid",

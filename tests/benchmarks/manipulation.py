@@ -12,7 +12,8 @@ time of planning each single arm motion with its goal, `grasp_planning_s` that o
 `pick_s` is the robot's time from when it stood still before the object, all looks included, to when it was lifted.
 
 `--models` takes objects of your own in the place of the catalogue's: a folder of `errand object import`, or one of such
-folders. Each needs a class (`--class` when it was imported): the robot goes for what its detector knows.
+folders. The robot goes for the class of each; one without a class (`--class` when it was imported) it takes as any
+object (`thing`), with nothing around.
 
 `--shapes` takes so many random boxes, cylinders and blocks, one by each seed, as any object (`thing`), with nothing
 around.
@@ -220,23 +221,24 @@ def cases(
     for class_name, model in targets if not shapes else ():
         for number in range(trials):
             others = int(np.random.default_rng([seed + number, 3]).integers(int(low), int(high or low) + 1))
+            others = 0 if class_name == ANY_OBJECT else others
             yield class_name, surfaces[number % len(surfaces)], others, seed + number, model
 
 
 def own(folder):
-    """Class and folder of each imported object in a folder, or of the one that it is. Raises SystemExit."""
+    """Class and folder of each imported object in a folder, or of the one that it is; `thing` for one without a class.
+
+    Raises SystemExit.
+    """
     folders = sorted(path.parent for path in folder.glob(f"*/{FACTS_FILE}"))
     folders = [folder] if (folder / FACTS_FILE).exists() else folders
     try:
-        found = [(read_imported(each).class_name, str(each.resolve())) for each in folders]
+        named = [(read_imported(each).class_name, str(each.resolve())) for each in folders]
     except InputError as error:
         raise SystemExit(str(error)) from error
-    if not found:
+    if not named:
         raise SystemExit(f"{folder}: there is no imported object; make one by `errand object import`")
-    for class_name, each in found:
-        if class_name not in CLASSES:
-            raise SystemExit(f"{each}: no detector knows it; import it with --class, one of {', '.join(CLASSES)}")
-    return found
+    return [(class_name if class_name in CLASSES else ANY_OBJECT, each) for class_name, each in named]
 
 
 def run_case(class_name, surface, clutter, seed, source, folder):

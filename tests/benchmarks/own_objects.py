@@ -124,15 +124,19 @@ def foreign(folder, half, catalogues=CATALOGUES):
     every = [entry for file in sorted(catalogues.glob("*.sh3f")) for entry in entries(file)]
     sized = [entry for entry in every if SIZES_M[0] <= entry.size_m.max() <= SIZES_M[1]]
     for number, entry in enumerate([entry for entry in sized if entry.category == OTHERS][half::2]):
-        own = folder / f"foreign_{number:02d}"
-        with zipfile.ZipFile(entry.catalogue) as archive:
-            inside = [name for name in archive.namelist() if Path(name).parent == Path(entry.path.parent)]
-            archive.extractall(own, inside)
-        lines = (own / entry.path).read_text("latin-1").splitlines()
-        points = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], dtype=float)
-        longest = float(np.ptp(points @ entry.R.T, axis=0).max())
-        scale = float(entry.size_m.max()) / max(longest, 1e-9)
-        yield own / entry.path, ImportOptions(f"other{number}", None, None, scale, "y", close_holes=True)
+        file, scale = unpacked(entry, folder / f"foreign_{number:02d}")
+        yield file, ImportOptions(f"other{number}", None, None, scale, "y", close_holes=True)
+
+
+def unpacked(entry, folder):
+    """Unpacks the files of a catalogue's entry into a folder; returns its mesh and the metres of one of its units."""
+    with zipfile.ZipFile(entry.catalogue) as archive:
+        inside = [name for name in archive.namelist() if Path(name).parent == Path(entry.path.parent)]
+        archive.extractall(folder, inside)
+    lines = (folder / entry.path).read_text("latin-1").splitlines()
+    points = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], dtype=float)
+    longest = float(np.ptp(points @ entry.R.T, axis=0).max())
+    return folder / entry.path, float(entry.size_m.max()) / max(longest, 1e-9)
 
 
 def imported(folder, half):

@@ -6,11 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from plant.models.catalogue import read_imported
+from plant.models.catalogue import ImportedObject, read_imported
 from plant.worlds.seeding import place_objects, place_people
 from tests.benchmarks.carry import doors, entered
 from tests.benchmarks.manipulation import (
     TimedWorker,
+    cases,
     failure,
     failures,
     is_false_claim,
@@ -141,3 +142,22 @@ def test_a_crowded_room_leaves_out_the_objects_that_do_not_fit(tmp_path):
 def test_a_person_stands_in_a_room_for_handing_over(tmp_path):
     (person,) = place_people(room(tmp_path, "coke", (), "table", 3, person=True), 3)
     assert (person.name, person.receiving is not None) == (PERSON, True)
+
+
+def test_objects_of_your_own_are_asked_for_by_class_or_as_anything_with_nothing_around(tmp_path):
+    for name, class_name in (("mug", "mug"), ("old_hammer", "hammer")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / f"{name}.sdf").touch()
+        ImportedObject(
+            name=name,
+            class_name=class_name,
+            mass_kg=0.5,
+            size_m=(0.2, 0.1, 0.03),
+            com_m=(0.0, 0.0, 0.0),
+            inertia_kg_m2=(0.01, 0.01, 0.01, 0.0, 0.0, 0.0),
+            collision_parts=1,
+            triangles=12,
+            round=False,
+        ).write(tmp_path / name)
+    drawn = [case[:3] for case in cases(models=tmp_path, clutter="2", trials=1)]
+    assert drawn == [("thing", "table", 0), ("hammer", "table", 2)]

@@ -44,17 +44,18 @@ class Stow(ArmSkill[StowInputs]):
     def run(self, inputs: StowInputs) -> Routine[Succeeded]:
         """Folds the empty arm or draws in the held object.
 
-        On a raised body the arm moves first, because it would press on obstacles below while the body sinks.
+        It weighs what shut jaws hold before the levers of a folded arm are short. On a raised body the arm moves first,
+        because it would press on obstacles below while the body sinks.
         """
         if self.context.robot.capabilities().arm is None:
             return Succeeded("there is no arm to stow")
         yield from self.feel_arm("stowing the arm")
+        holding = yield from self.holds("feeling what the gripper holds")
         usual_m = self.context.robot.capabilities().standing_height_m
         if self.context.robot.odometry().X_OB.translation()[2] > usual_m + _RAISED_M:
             with PlanningAttempt():
                 yield from self._come_near()
         yield from self.stand_at(usual_m, "standing as usual")
-        holding = yield from self.holds("feeling what the gripper holds")
         yield from self._come_near()
         yield from self.feel_arm("stowing the arm")
         return Succeeded("the object is held near the body" if holding else "the arm is stowed")

@@ -234,7 +234,6 @@ class ArmSkill(RoutineSkill[InputsT]):
         The gripper moves to `opening` during the motion if the wider of its two openings is free of contact. Otherwise
         it closes before the motion, or opens after it.
         """
-
         scene_now, start, opening_now = self.scene_now(), self.q_rad(), self.context.robot.gripper().opening
         turn = None if opening is None else GripperTurn(opening_now, opening)
 

@@ -12,6 +12,7 @@ from skills.manipulation.arm.arm_skill import ArmSkill
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.forces import held_mass_kg
 from skills.manipulation.arm.kinematics import arm_model
+from skills.manipulation.posture import Stow, StowInputs
 
 CAPABILITIES = spot_capabilities()
 MODEL = arm_model(CAPABILITIES)
@@ -81,3 +82,11 @@ def test_a_gripper_that_is_not_shut_holds_what_it_reports():
     context = context_of(robot := Weighted(0.06, opening=0.3, holding=False))
     context.payload.kind = ObjectKind("wrench")
     assert (outcome(Feels(context), None).message, "carry" in robot.calls) == ("False", False)
+
+
+# mass (kg) of what shut jaws hold over a table -> what the arm feels before it is folded, where its levers are short
+@pytest.mark.parametrize(("mass_kg", "said"), [(0.06, "the object is held near the body"), (0.0, "the arm is stowed")])
+def test_what_shut_jaws_hold_is_weighed_before_the_arm_is_folded(mass_kg, said):
+    context = context_of(robot := Weighted(mass_kg, opening=0.0, height_m=0.62))
+    context.payload.kind = ObjectKind("wrench")
+    assert (outcome(Stow(context), StowInputs()).message, robot.carries) == (said, mass_kg > 0.0)

@@ -41,7 +41,6 @@ _SURFACE_YIELDS_M = 0.003
 """Depth by which the surface is taken lower than it was seen."""
 _NEIGHBOUR_GROWN_M = 0.005
 """Excess of neighbours' boxes over their true size, by the noise of the depth."""
-
 _TALLER_M = 0.05
 """Height that an observation from afar may miss."""
 WIDE = 0.9

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -250,12 +251,10 @@ def _lift(scene: ArmScene, q_rad: FloatArray, around: Surroundings, arm_planner:
     for lift_B in lifts(scene.model, X_BH, around.up_B):
         if not around.lets_rise(lift_B):
             continue
-        try:
+        with suppress(PlanningError):
             lifted = RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B)
             arm_planner.line(scene.model, q_rad, lifted, scene)
-        except PlanningError:
-            continue
-        return lift_B
+            return lift_B
     raise PlanningError("the arm cannot lift the object from there")
 
 

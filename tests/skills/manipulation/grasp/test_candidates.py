@@ -6,6 +6,7 @@ import pytest
 from plant.robots.fetch.kind import FETCH
 from plant.robots.spot.kind import spot_capabilities
 from skills.manipulation.arm.kinematics import arm_model
+from skills.manipulation.arm.poses import moving_tip_x_m
 from skills.manipulation.grasp.candidates import grasp_candidates
 from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.planning import within_reach
@@ -61,6 +62,14 @@ def test_the_can_lies_between_palm_and_fingertips_and_clear_of_the_fixed_gripper
     assert p_HT[2] - 0.033 > GRIPPER.fixed_z_m + 0.005
 
 
+# width of an upright peg -> the rubber of both tips closes on its middle, or it is loose in the hollow behind them
+@pytest.mark.parametrize("width_m", [0.02, 0.03, 0.045])
+def test_a_slim_upright_object_is_held_between_the_tips(width_m):
+    for candidate in [each for each in _found(_target(width_m, width_m, 0.15, is_round=True)) if each.tilt_rad == 0.0]:
+        middle_m = float((candidate.X_BH.inverse() @ np.array([0.85, 0.0, 0.2]))[0])
+        assert GRIPPER.fixed_tip_x_m - 0.012 < middle_m < GRIPPER.fixed_tip_x_m
+
+
 # height -> the fingers can take it from above, too, with the palm over its top and the tips clear of the surface
 @pytest.mark.parametrize("height_m", [0.08, 0.115, 0.24])
 def test_an_upright_object_can_be_taken_from_above(height_m):
@@ -100,10 +109,10 @@ def test_fingers_do_not_close_on_the_round_jaws_of_a_wrench():
     assert best.width_m < 0.03
 
 
-def _tips_m(candidate, base_m, beside_m):
-    """How high over the surface the ends of the fixed finger and of the moving one at the object are."""
-    fixed = (GRIPPER.fixed_tip_x_m, GRIPPER.fixed_z_m)
-    moving = (GRIPPER.tip_x_m - 0.004, GRIPPER.fixed_z_m + candidate.width_m + beside_m)
+def _tips_m(candidate, base_m, beside_m=0.0):
+    """Heights over the surface of the ends of the fixed finger, and of the moving one so far from the object."""
+    fixed, gap_m = (GRIPPER.fixed_tip_x_m, GRIPPER.fixed_z_m), candidate.width_m + beside_m
+    moving = (moving_tip_x_m(GRIPPER, gap_m), GRIPPER.fixed_z_m + gap_m)
     ends = [np.array([x, y, z]) for x, z in (fixed, moving) for y in (-GRIPPER.half_breadth_m, GRIPPER.half_breadth_m)]
     return [float((candidate.X_BH @ end)[2]) - base_m for end in ends]
 
@@ -115,22 +124,22 @@ def _tips_m(candidate, base_m, beside_m):
 )
 def test_fingertips_keep_off_the_surface(target, beside_m, least_m):
     for candidate in _found(target):
-        assert min(_tips_m(candidate, target.base_m, beside_m)) > least_m - 1e-6
+        for gap_m in (0.0, beside_m):
+            assert min(_tips_m(candidate, target.base_m, gap_m)) > least_m - 1e-6
 
 
-def test_a_thin_object_is_held_by_fingers_that_end_level():
-    # 9.6 mm: straight from above the fixed finger, 11 mm shorter than the other can be, would pass over it
-    found = _found(_wrench(0.3))
-    assert found
-    for candidate in found:
-        assert max(_tips_m(candidate, _wrench(0.3).base_m, 0.012)) < 0.0096 - 0.003
+# width of an object, 9.6 mm high -> both closed fingers end within 2 mm over the lowest part of the hand, which goes
+# down until it touches; straight from above, the moving one, up to 9 mm longer, would keep the fixed one off the object
+@pytest.mark.parametrize("width_m", [0.008, 0.014, 0.028])
+def test_a_thin_object_is_held_by_fingers_that_end_level(width_m):
+    target = _target(0.27, width_m, 0.0096, yaw=0.3)
+    assert max(_tips_m(_found(target)[0], target.base_m)) < 0.004 + 0.002
 
 
 @pytest.mark.parametrize("height_m", [0.018, 0.024, 0.032])
 def test_both_fingers_end_well_below_the_middle_of_a_round_handle(height_m):
     handle = _target(0.25, height_m, height_m, yaw=0.3)
-    beside_m = 0.012 if height_m < 0.02 else 0.017
-    assert max(_tips_m(_found(handle)[0], handle.base_m, beside_m)) < 0.5 * height_m - 0.0035
+    assert max(_tips_m(_found(handle)[0], handle.base_m)) < 0.5 * height_m - 0.003
 
 
 def _screwdriver():

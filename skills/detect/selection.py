@@ -27,8 +27,6 @@ _MOST_LENGTH = 1.3
 """Fraction of the longest object of a class: clusters may be merged."""
 _FREE_M = 0.15
 """Distance to the next object beyond which more does not count."""
-
-
 _SEEN_AGAIN_M = 0.06
 """Distance from where an object was seen within which a segment without a label may be it."""
 _SAME_SIZE_M = 0.015

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import ClassVar, TypeVar
 
@@ -31,6 +32,8 @@ GRIPPER_FORCE_N = 20.0
 """Force with which an empty gripper opens and closes."""
 CONTACT_LAG_M = 0.0035
 """Lag of a slow hand that means contact; a free hand lags by at most 2 mm (measured in the plant)."""
+_FEEL_LAG_M, _DOWN = 0.0016, 0.8
+"""The same for an empty hand that moves down at 0.08 rad/s at most (13 N), and the vertical component that is down."""
 WEIGHING_S = 0.3
 """Time over which weighing averages the noise of the readings."""
 FEELING_S = (0.5, 4.0)
@@ -308,7 +311,6 @@ class ArmSkill(RoutineSkill[InputsT]):
         The line begins at the arm's present angles, or at the nearby angles `q_from_rad`. With `clear_of_boxes` the arm
         must touch no obstacle.
         """
-
         q = self.q_rad() if q_from_rad is None else q_from_rad
         scene_now = self.scene_now() if clear_of_boxes else None
 
@@ -349,12 +351,17 @@ class ArmSkill(RoutineSkill[InputsT]):
         trajectory, guard = planner.trajectory(path, speed_rad_s=speed_rad_s), self.contact_guard(direction_B)
         return (yield from self.follow(trajectory, message, guard))
 
-    def contact_guard(self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M) -> Callable[[FloatArray], bool]:
-        """A guard for `follow` that stops a slow hand at contact: when the hand lags by `lag_m` along a direction."""
+    def contact_guard(self, direction_B: FloatArray, lag_m: float | None = None) -> Callable[[FloatArray], bool]:
+        """A guard for `follow` that stops a slow hand at contact: when the hand lags by `lag_m` along a direction.
+
+        By default an empty hand that feels for a surface below it stops at a smaller lag than any other.
+        """
+        feels = self.context.payload.kind is None and direction_B[2] < -_DOWN
+        most_m = lag_m or (_FEEL_LAG_M if feels else CONTACT_LAG_M)
 
         def guard(q_wanted_rad: FloatArray) -> bool:
             lag = self.model.X_BH(q_wanted_rad).translation() - self.model.X_BH(self.q_rad()).translation()
-            return float(lag @ direction_B) > lag_m
+            return float(lag @ direction_B) > most_m
 
         return guard
 
@@ -406,10 +413,8 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def try_stow(self) -> Routine[None]:
         """Stows the arm after a failure; does nothing when stowing fails too."""
-        try:
+        with suppress(SkillFailure):
             yield from self.stow("stowing the arm after the failure")
-        except SkillFailure:
-            return
 
     def stand_as_usual(self, message: str = "standing as usual") -> Routine[None]:
         """Brings the body to its usual height."""

@@ -172,11 +172,9 @@ class GeometricGraspPlanner:
 
         def graspable(space: Surroundings) -> bool:
             for candidate in candidates[:_MOST_CANDIDATES]:
-                try:
+                with suppress(PlanningError):
                     self._reached(scene, q_near_rad, candidate, space, arm_planner)
-                except PlanningError:
-                    continue
-                return True
+                    return True
             return False
 
         p_BT = around.target.X_FG.translation()

@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
@@ -422,14 +423,11 @@ class Place(BinPlacement[PlaceInputs]):
 
     def _press_down(self, message: str, speed_rad_s: float) -> Routine[bool]:
         """Presses the object slowly down; returns whether contact stopped it. Fails when no line is feasible."""
-        why: PlanningError | None = None
         for part in (1.0, 0.85, 0.7, 0.5):
-            try:
+            with suppress(PlanningError):
                 down_B = -part * (_SURELY_FREE_M + _PRESS_M) * UP_B
                 return (yield from self.press(down_B, -UP_B, speed_rad_s, message))
-            except PlanningError as error:
-                why = error
-        raise SkillFailure(Cause.PLANNING, str(why)) from why
+        raise SkillFailure(Cause.PLANNING, "the arm cannot lower the object straight down")
 
 
 def _by_distance(points_W: FloatArray, X_WB: RigidTransform) -> FloatArray:

@@ -32,8 +32,8 @@ GRIPPER_FORCE_N = 20.0
 """Force with which an empty gripper opens and closes."""
 CONTACT_LAG_M = 0.0035
 """Lag of a slow hand that means contact; a free hand lags by at most 2 mm (measured in the plant)."""
-_FEEL_LAG_M, _DOWN = 0.0016, 0.8
-"""The same for an empty hand that moves down at 0.08 rad/s at most (13 N), and the vertical component that is down."""
+_FEEL_LAG_M, _DOWN = 0.0022, 0.8
+"""The same for an empty hand that moves down at 0.05 rad/s at most, and the vertical component that counts as down."""
 WEIGHING_S = 0.3
 """Time over which weighing averages the noise of the readings."""
 FEELING_S = (0.5, 4.0)

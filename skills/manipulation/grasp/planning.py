@@ -115,7 +115,7 @@ class GeometricGraspPlanner:
     final_padding_m: Margin = 0.002
     approach_rad_s: TurnRate = 0.5
     last_rad_s: TurnRate = 0.15
-    touch_rad_s: TurnRate = 0.06
+    touch_rad_s: TurnRate = 0.05
     beside_fixed_m: Margin = 0.010
     beside_fixed_low_m: Margin = 0.017
 

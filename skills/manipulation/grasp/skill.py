@@ -53,7 +53,7 @@ _SHORT_M = 0.025
 """Distance from the grasp beyond which a contact of the hand is not with the surface below the object."""
 _FEEL_M = 0.014
 """Additional depth of the fingers, to feel the surface."""
-_FEEL_RAD_S = 0.08
+_FEEL_RAD_S = 0.05
 _TOUCH_S = 15.0
 """Longest time from the last bit of the approach to the lift, in which fingertips may touch the surface."""
 _DOWN = 0.8

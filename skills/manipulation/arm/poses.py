@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -16,10 +15,8 @@ from skills.robot import ArmCapabilities, Capabilities, FloatArray, GripperCapab
 from skills.world_model import PlanningError
 
 UP_B = np.array([0.0, 0.0, 1.0])
-_HALF_OPEN_M = 0.046
+_HALF_OPEN_M = 0.05
 """Gap between the jaws of a hinged gripper at which its moving finger reaches farthest."""
-_TIP_RADIUS_M = 0.118
-"""Radius of the arc along which the tip of a hinged finger moves."""
 _FOREARM_ROLL = 3
 """Joint whose turn costs twice as much as another's, in the choice among viewing configurations."""
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
@@ -41,6 +38,7 @@ _BELOW_RAD = (0.45, 1.05)
 """Range of angles below level of a view that counts as close."""
 _OFF_AXIS_RAD = 0.12
 """Largest angle off the optical axis in a view that counts as close."""
+
 _TRIES = 3000
 """Configurations that are tried to stow an arm."""
 _LOW = 0.1
@@ -252,17 +250,9 @@ def _in_view(points_C: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(np.hypot(x, y) < _WIDE * z + _THICK_M)
 
 
-def moving_tip_x_m(gripper: GripperCapabilities, gap_m: float) -> float:
-    """Position (m) along the hand of a moving finger's tip at a gap between the jaws; a hinged one follows an arc."""
-    if gripper.kind is not GripperKind.HINGED:
-        return gripper.tip_x_m
-    return gripper.tip_x_m - _TIP_RADIUS_M + math.sqrt(max(0.0, _TIP_RADIUS_M**2 - (gap_m - _HALF_OPEN_M) ** 2))
-
-
 def finger_sweep_m(X_BH: RigidTransform, X_WB: RigidTransform, gripper: GripperCapabilities) -> float:
     """Depth (m) by which a hinged finger passes below the fixed one's tip while it opens or closes; else 0."""
     if gripper.kind is not GripperKind.HINGED:
         return 0.0
-    up_x, _, up_z = (X_WB @ X_BH).rotation().matrix()[2]
-    hinge_x_m = gripper.tip_x_m - _TIP_RADIUS_M - gripper.fixed_tip_x_m
-    return max(0.0, float(_TIP_RADIUS_M * math.hypot(up_x, up_z) - up_x * hinge_x_m - up_z * _HALF_OPEN_M))
+    up_H = (X_WB @ X_BH).rotation().matrix()[2]
+    return max(0.0, -float(up_H @ [gripper.tip_x_m - gripper.fixed_tip_x_m, 0.0, _HALF_OPEN_M]))

@@ -13,7 +13,7 @@ import numpy as np
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.manipulation.arm.poses import hand_rotation, moving_tip_x_m
+from skills.manipulation.arm.poses import hand_rotation
 from skills.manipulation.grasp.placements import Placement, Target, placements
 from skills.perception.class_forms import class_form
 from skills.quantities import Coordinate, Cosine
@@ -40,10 +40,17 @@ _PER_HIGH_M = 60.0
 """Cost of fingers that end higher, per metre."""
 _BESIDE_THIN_M = 0.012
 """Gap between the fixed finger and a thin object."""
+_ENDING_LEVEL_M = 0.012
+"""Gap between fingers and object in the computation of the lean at which fingers of different length end level.
+
+It is less than the gap before they close, because afterwards there is none.
+"""
 _PER_UNEVEN_M = 60.0
 """Cost of the difference in height of the ends of closed fingers, which press an object round, per metre."""
 _BEVEL_M = 0.003
 """Distance by which the back of a fingertip ends behind its tip."""
+_SHORTER_CLOSED_M = 0.004
+"""Loss of the moving finger's reach from half open to closed."""
 _HIGHEST_FLAT_MM = 40
 """Height up to which an object may be refused as too flat."""
 _BELOW_PALM_M = 0.05
@@ -117,7 +124,7 @@ def _least_height_m(target: Target, p_BS: FloatArray, gripper: GripperCapabiliti
 def _attitudes(target: Target, placement: Placement, gripper: GripperCapabilities) -> Sequence[tuple[float, float]]:
     """Tilts of the fingers below level and, for grasps from above, roll angles about the object's long axis (rad).
 
-    At the first roll, the back of the fixed finger's tip is as low as the longer moving finger once it has closed.
+    At the first roll, fingers of different length end at equal height on both sides of an object of this width.
     """
     if placement.rim:
         return [(0.5 * np.pi, 0.0)]
@@ -125,8 +132,8 @@ def _attitudes(target: Target, placement: Placement, gripper: GripperCapabilitie
         tilts = (60.0, 75.0, 90.0) if placement.below_top_m else (0.0, 10.0, 20.0, 32.0, 45.0)
         return [(float(np.radians(tilt)), 0.0) for tilt in tilts]
     down = [(90.0, 0.0), (78.0, 0.0), (66.0, 0.0), (54.0, 0.0), (44.0, 0.0)]
-    higher_m = moving_tip_x_m(gripper, placement.width_m) - gripper.fixed_tip_x_m + _BEVEL_M
-    ending_level = np.degrees(np.arctan2(higher_m, placement.width_m + gripper.tip_thickness_m))
+    uneven_m = _closed_tip_x_m(gripper) - gripper.fixed_tip_x_m
+    ending_level = np.degrees(np.arctan2(uneven_m, placement.width_m + _ENDING_LEVEL_M))
     leaning = [(90.0, lean) for lean in (ending_level, -ending_level, 22.0, -22.0, 32.0, -32.0, 44.0, -44.0)]
     return [(float(np.radians(tilt)), float(np.radians(lean))) for tilt, lean in (*down, *leaning)]
 
@@ -187,13 +194,12 @@ def _low_grip(
     if not _hinged(gripper):  # the fingers close on both sides alike
         inner_z, beside_m = -0.5 * width_m, 0.0
     down, outer_z = -float(up_H[0]), inner_z + beside_m + width_m
-    ends = (gripper.fixed_tip_x_m, inner_z), (moving_tip_x_m(gripper, width_m), inner_z + width_m)
-    before_end = (moving_tip_x_m(gripper, beside_m + width_m), outer_z)
+    fixed_end, moving_end = (gripper.fixed_tip_x_m, inner_z), (_closed_tip_x_m(gripper), outer_z)
     thick = gripper.tip_thickness_m
-    backs = ((x - _BEVEL_M, z + out) for (x, z), out in ((ends[0], -thick), (ends[1], thick), (before_end, thick)))
-    corners = [*ends, before_end, *backs]
+    backs = ((x - _BEVEL_M, z + out) for (x, z), out in ((fixed_end, -thick), (moving_end, thick)))
+    corners = [fixed_end, moving_end, *backs]
     lowest = min(up_H[0] * x + up_H[2] * z for x, z in corners) - abs(up_H[1]) * gripper.half_breadth_m
-    open_m = max(up_H[0] * x + up_H[2] * z for x, z in ends) - lowest
+    open_m = max(up_H[0] * x + up_H[2] * z for x, z in (fixed_end, moving_end)) - lowest
     least = -(_LEAST_BEYOND if height_m < 0.04 else 0.5) * height_m
     above = _above_surface(height_m, 0.5 * height_m - open_m - least * down)
     beyond = (0.5 * height_m - above - open_m) / down
@@ -205,9 +211,13 @@ def _low_grip(
 
 def _uneven_m(R_BH: RotationMatrix, width_m: float, gripper: GripperCapabilities) -> float:
     """Difference in height (m) between the tips of both fingers when they are closed on a width."""
-    ahead_m = moving_tip_x_m(gripper, width_m) - gripper.fixed_tip_x_m
-    across_m = width_m if _hinged(gripper) else 0.0
+    ahead_m, across_m = _closed_tip_x_m(gripper) - gripper.fixed_tip_x_m, width_m if _hinged(gripper) else 0.0
     return abs(float(R_BH.matrix()[2] @ [ahead_m, 0.0, across_m]))
+
+
+def _closed_tip_x_m(gripper: GripperCapabilities) -> float:
+    """Position (m) along the hand of the moving finger's tip on a narrow object: it reaches farthest half open."""
+    return max(gripper.fixed_tip_x_m, gripper.tip_x_m - _SHORTER_CLOSED_M)
 
 
 def _hinged(gripper: GripperCapabilities) -> bool:

@@ -6,7 +6,6 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
 from plant.robots.fetch.kind import FETCH
-from plant.robots.spot.description import spot_facts
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import PlanningError
 from skills.manipulation.arm.collision import ArmScene, Box
@@ -15,7 +14,6 @@ from skills.manipulation.arm.poses import (
     carry_configuration,
     finger_sweep_m,
     hand_rotation,
-    moving_tip_x_m,
     overview_viewpoints,
     tucked_configuration,
     viewpoints_beside,
@@ -30,22 +28,13 @@ FETCH_MODEL, LIFT = (
 
 
 # tilt of the fingers, lean towards the fixed finger (degrees) -> depth of the moving finger's sweep (mm)
-@pytest.mark.parametrize(("tilt_deg", "lean_deg", "sweep_mm"), [(90, 0, 9.0), (90, 6, 4.8), (90, 18, 0.0), (0, 0, 0.0)])
+@pytest.mark.parametrize(("tilt_deg", "lean_deg", "sweep_mm"), [(90, 0, 9.0), (90, 6, 3.7), (90, 14, 0.0), (0, 0, 0.0)])
 def test_finger_sweeps_below_the_fixed_one_unless_the_hand_leans(tilt_deg, lean_deg, sweep_mm):
     R_BH = hand_rotation(np.radians(tilt_deg), 0.0, 1.0)
     leaning = R_BH @ RotationMatrix(AngleAxis(-np.radians(lean_deg), np.array([0.0, 1.0, 0.0])))
     spot = spot_capabilities().gripper
     swept_m = finger_sweep_m(RigidTransform(leaning, np.zeros(3)), RigidTransform(), spot)
     assert 1e3 * swept_m == pytest.approx(sweep_mm, abs=0.2)
-
-
-@pytest.mark.parametrize("turn_rad", np.arange(0.1, 0.8, 0.1))
-def test_the_tip_of_a_hinged_finger_moves_along_the_arc_of_its_rubber(turn_rad):
-    finger, spot = spot_facts()["arm"][-1], spot_capabilities().gripper
-    rubber, c, s = finger["pads"][-1], np.cos(turn_rad), np.sin(turn_rad)
-    dots = np.array(rubber["xz"]) @ np.array([[c, s], [-s, c]]) + np.array(finger["offset"])[[0, 2]]
-    gap_m = float(dots[:, 1].min()) - rubber["radius"] - spot.fixed_z_m
-    assert moving_tip_x_m(spot, gap_m) == pytest.approx(float(dots[-1, 0]) + rubber["radius"], abs=0.001)
 
 
 def test_two_moving_fingers_sweep_over_no_surface():

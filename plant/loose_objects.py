@@ -331,17 +331,15 @@ class CarriedObjects:
         plant, context = self._plant, self._context
         p_WH = plant.EvalBodyPoseInWorld(context, hand).translation()
         places_W = plant.GetPositions(context)[self._places]
-        near = np.flatnonzero(np.abs(places_W - p_WH).max(axis=1) <= _AT_HAND_M)
-        if len(near) == 0:
-            return
         V_WH = plant.EvalBodySpatialVelocityInWorld(context, hand)
-        for number in near:
+        for number in np.flatnonzero(np.abs(places_W - p_WH).max(axis=1) <= _AT_HAND_M):
             body, p_WO = self._loose[number], places_W[number]
             v_WO = plant.EvalBodySpatialVelocityInWorld(context, body).translational()
             with_hand = V_WH.translational() + _cross(V_WH.rotational(), p_WO - p_WH)
-            if np.linalg.norm(v_WO - with_hand) < WITH_HAND_M_S:
+            bias_m_s2 = self._bias_m_s2(hand, p_WO)  # contact made the velocities equal before the hand turned on
+            if np.linalg.norm(v_WO - with_hand + dt_s * bias_m_s2) < WITH_HAND_M_S:
                 q = plant.GetPositions(context)
-                q[self._places[number]] += steps * arc_m(self._bias_m_s2(hand, p_WO), dt_s)
+                q[self._places[number]] += steps * arc_m(bias_m_s2, dt_s)
                 plant.SetPositions(context, q)
 
     def _bias_m_s2(self, hand: RigidBody, p_WO: FloatArray) -> FloatArray:

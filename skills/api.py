@@ -277,8 +277,8 @@ class SkillContext:
     For the motion of the base, a skill queries `free_space` rather than `costmap`, which ignores the zones.
 
     `doors` and `zones` are those on the robot's map; `door_memory` has the last known state of each door. `tags` are
-    the AprilTags whose poses or carriers the robot knows. `walls` are the columns (N, 2) of the map that are solid at
-    the heights of the arm (`skills.manipulation.arm.solid_cells`).
+    the AprilTags whose poses or carriers the robot knows. `solid_columns` (N, 3) are walls
+    and furniture of the map (`skills.manipulation.arm.solid_cells`).
     """
 
     robot: Robot
@@ -301,7 +301,7 @@ class SkillContext:
     door_memory: DoorMemory = field(default_factory=DoorMemory)
     tags: tuple[Tag, ...] = ()
     zones: tuple[Zone, ...] = ()
-    walls: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
+    solid_columns: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
     _last_pose: _LastPose = field(default_factory=_LastPose, repr=False, compare=False)
 
     def zone_map(self) -> ZoneMap:

@@ -90,7 +90,7 @@ class RunRobot:
             doors=entry.tree.doors,
             tags=entry.tree.tags,
             zones=entry.tree.zones,
-            walls=entry.walls,
+            solid_columns=entry.solid_columns,
             traffic=shared.traffic.view_of(name),
         )
 

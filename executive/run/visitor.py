@@ -31,9 +31,9 @@ class RunEntry:
     """Robot with its tree, estimators, detector and stack.
 
     The mission begins when the missions of the robots `after` have succeeded, and fails when one of these fails. The
-    person who asked for the mission stands at `speaker_W` (world frame; None: where the robot begins). `walls` are the
-    walls on the robot's map (`skills.api.SkillContext`). People stand around a `real` robot: when another program has
-    taken its lease, or it does not answer, the run pauses (`Session.may_move`).
+    person who asked for the mission stands at `speaker_W` (world frame; None: where the robot begins). `solid_columns`
+    are walls and furniture on its map (`skills.api.SkillContext`). People stand around a `real` robot: when another
+    program has taken its lease, or it does not answer, the run pauses (`Session.may_move`).
     """
 
     tree: CompiledTree
@@ -44,7 +44,7 @@ class RunEntry:
     stack: RobotStack = field(default_factory=default_stack)
     after: tuple[str, ...] = ()
     speaker_W: Pose2D | None = None
-    walls: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
+    solid_columns: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
     real: bool = False
 
 

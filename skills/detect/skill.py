@@ -109,11 +109,12 @@ class Detect(LookingSkill[DetectInputs]):
         self._tried: dict[int, int] = {}
         self._clusters: list[Cluster] = []
         self._is_covered = False
+        self._fits_near = inputs.seen_before is not None and max(inputs.seen_before.size_m) < _FITS_NEAR_M
         blocked: list[SkillFailure] = []
         targets_W = [X_WB @ p_BT for p_BT in targets]
         for k, p_WT in enumerate(targets_W):
             p_BT = self.X_WB().inverse() @ p_WT
-            yield from self._look_and_confirm(inputs, p_BT, blocked, close=_fits_near(inputs))
+            yield from self._look_and_confirm(inputs, p_BT, blocked, close=self._fits_near)
             if self._has_enough(inputs):
                 break
             yield Running(f"looking for {wanted_names(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
@@ -160,7 +161,7 @@ class Detect(LookingSkill[DetectInputs]):
         if inputs.expected_W is not None:
             if not self._has_enough(inputs):
                 p_BT = self.X_WB().inverse() @ np.array(inputs.expected_W)
-                yield from self._look_and_confirm(inputs, p_BT, [], close=not _fits_near(inputs))
+                yield from self._look_and_confirm(inputs, p_BT, [], close=not self._fits_near)
             return
         if ANY_OBJECT in inputs.classes:
             return
@@ -406,11 +407,6 @@ class Detect(LookingSkill[DetectInputs]):
             few = f"{count_sentence(found, inputs.surfaces)}, fewer than {inputs.count} ({seen})"
             return SkillFailure(Cause.POSTCONDITION, few)
         return SkillFailure(Cause.POSTCONDITION, f"no {what} seen on {names} from here ({seen})")
-
-
-def _fits_near(inputs: DetectInputs) -> bool:
-    """Returns whether the object was observed before and fits into a close picture."""
-    return inputs.seen_before is not None and max(inputs.seen_before.size_m) < _FITS_NEAR_M
 
 
 def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:

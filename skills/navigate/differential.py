@@ -113,11 +113,6 @@ def driven_poses(space: Space, knots: FloatArray) -> FloatArray:
     return np.array([*poses, last])
 
 
-def _allowed(space: Space, poses: FloatArray) -> bool:
-    """Returns whether all motions between poses respect the one-way zones."""
-    return all(math.isfinite(zone_factor(space, *a[:2], *(b - a)[:2])) for a, b in pairwise(poses))
-
-
 _Leg = tuple[FloatArray, FloatArray, float]
 
 
@@ -153,6 +148,6 @@ def _rounded(space: Space, first: _Leg, second: _Leg, free_m: float) -> list[Flo
         y = begin[1] - side * (np.cos(angles) - math.cos(course))
         arc = np.column_stack([x, y, yaws])
         clear = float(np.min(clearances(space, arc))) >= max(clearance_needed(space, x[0], y[0]), space.needs.margin_m)
-        if clear and _allowed(space, arc):
+        if clear and all(math.isfinite(zone_factor(space, *a[:2], *(b - a)[:2])) for a, b in pairwise(arc)):
             return list(arc)
     return None

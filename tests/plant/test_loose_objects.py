@@ -194,6 +194,16 @@ def test_a_carried_object_is_moved_towards_the_axis_of_the_turn(scene, p_W, v_W,
     assert np.allclose(1e3 * moved, [-moved_mm, 0.0, 0.0], atol=1e-9)
 
 
+def test_a_fast_turn_leaves_no_carried_object_behind(scene):
+    """Contact made its velocity equal to the hand's before the hand turned on, by 0.08 m/s of direction here."""
+    plant, context, hand, thing = scene
+    plant.GetJointByName("turn").set_angular_rate(context, 4.0)
+    _set(plant, context, thing, [0.4, 0.0, 0.2], [0.0, 0.0, 4.0], 1.6 * np.array([np.sin(4.0 * DT_S), 1.0, 0.0]))
+    CarriedObjects(plant, context, [thing]).after_steps(hand, DT_S)
+    moved = plant.EvalBodyPoseInWorld(context, thing).translation() - [0.4, 0.0, 0.2]
+    assert np.allclose(moved, [-0.5 * DT_S**2 * 16.0 * 0.4, 0.0, 0.0], atol=1e-9)
+
+
 def test_steps_along_tangents_with_the_arc_stay_on_the_circle():
     p_m, turn = np.array([REACH_M, 0.0, 0.0]), np.array([0.0, 0.0, TURN_RAD_S])
     tangents_m = p_m.copy()

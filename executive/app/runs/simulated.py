@@ -35,7 +35,7 @@ from plant.worlds.world import World, WorldError
 from skills.api import PICTURES, TOUCHES, Publish
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
-from skills.manipulation.arm.solid_cells import wall_columns
+from skills.manipulation.arm.solid_cells import map_columns
 from skills.navigate.lattice import search
 from skills.robot import Clock, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
@@ -233,7 +233,7 @@ def run_entry(
         costmap=stack.costmap.build(keepout_map),
         detector=shared_detector(stack, world),
         stack=stack,
-        walls=wall_columns(scan_maps, tree.surfaces),
+        solid_columns=map_columns(scan_maps, tree.surfaces),
     )
 
 

@@ -42,11 +42,11 @@ _TOLERANCES = {
     GripperKind.HINGED: GripperTolerances(arrived=0.03, stall_rate=0.03),
 }
 _NOISES = {
-    GripperKind.PARALLEL: GripperNoise(opening=0.0003, closed=0.002, thin=0.006),
+    GripperKind.PARALLEL: GripperNoise(opening=0.0003, closed=0.002, thin=0.0),
     GripperKind.HINGED: GripperNoise(),
 }
-_MOVES = {GripperKind.PARALLEL: 0.004, GripperKind.HINGED: 0.05}
-"""Rates of fingers (m/s, rad/s) beyond which they feel no force."""
+_MOVES = {GripperKind.PARALLEL: 0.04, GripperKind.HINGED: 0.05}
+"""Rates of an opening (m/s, rad/s) beyond which fingers feel no force; what they carry moves them by a tenth."""
 _FINGER_GAINS = {GripperKind.PARALLEL: (2e4, 200.0), GripperKind.HINGED: (60.0, 0.8)}
 """Gains (p, d) of the fingers' servos."""
 
@@ -131,7 +131,7 @@ class UrdfSensors(SensorSuite):
         """Opening of the gripper, and the force that each finger exerts on an object."""
         index = self._index
         opening, fingers = index.opening(positions), index.fingers
-        if not len(fingers) or float(np.abs(rates[fingers]).max()) > _MOVES[index.kind]:
+        if not len(fingers) or abs(index.opening(rates)) > _MOVES[index.kind]:
             return opening, 0.0
         return opening, max(0.0, -float((efforts[fingers] * np.sign(index.shares)).mean())) / index.lever
 

@@ -11,13 +11,13 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, InputsT, Running, SkillContext
 from skills.manipulation.arm.collision import ArmScene, Box
-from skills.manipulation.arm.forces import held_mass_kg
+from skills.manipulation.arm.forces import hand_force_n, held_mass_kg
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.manipulation.arm.motion import GripperTurn
 from skills.manipulation.arm.poses import carry_configuration, hangs_below
-from skills.manipulation.arm.solid_cells import Outline, OwnSpace, solid_boxes, wall_boxes
-from skills.robot import ArmCapabilities, ArmTrajectory, CommandId, FloatArray, GripperCapabilities
+from skills.manipulation.arm.solid_cells import Outline, OwnSpace, column_boxes, solid_boxes
+from skills.robot import ArmCapabilities, ArmTrajectory, CommandId, FloatArray, GripperCapabilities, GripperKind
 from skills.routine import PlanningAttempt, Routine, RoutineSkill, SkillFailure
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
@@ -34,6 +34,8 @@ CONTACT_LAG_M = 0.0035
 """Lag of a slow hand that means contact; a free hand lags by at most 2 mm (measured in the plant)."""
 _FEEL_LAG_M, _DOWN = 0.0022, 0.8
 """The same for an empty hand that moves down at 0.05 rad/s at most, and the vertical component that counts as down."""
+CONTACT_N = 8.0
+"""Force on a slow hand that means contact; on a free hand it is at most 6 N (measured in the plant)."""
 WEIGHING_S = 0.3
 """Time over which weighing averages the noise of the readings."""
 FEELING_S = (0.5, 4.0)
@@ -193,7 +195,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return prepared
 
     def seen_boxes(self, beyond_m: float = 0.0) -> list[Box]:
-        """Boxes (B) around the solid cells and walls within the arm's reach plus `beyond_m`, outside `known_W`.
+        """Boxes (B) around the solid cells and columns within the arm's reach plus `beyond_m`, outside `known_W`.
 
         Omits cells at the body, the arm and the held object: a small pose error must not block the arm.
         """
@@ -204,7 +206,8 @@ class ArmSkill(RoutineSkill[InputsT]):
         own = OwnSpace(self._outline(), (arm_W,), tuple(self.known_W), held_W)
         reach_m = _BEYOND_M + self.arm.max_reach_m + beyond_m
         seen = solid_boxes(context.solid.cells, X_WB, reach_m, own.holds)
-        return [*seen, *wall_boxes(context.walls, X_WB, reach_m, replace(own, lines_W=(arm_W, stowed_W)).holds)]
+        own = replace(own, lines_W=(arm_W, stowed_W))
+        return [*seen, *column_boxes(context.solid_columns, X_WB, reach_m, own.holds)]
 
     def _outline(self) -> Outline:
         """The body's outline, grown by a margin."""
@@ -341,37 +344,48 @@ class ArmSkill(RoutineSkill[InputsT]):
                 return True
         return False
 
-    def press(self, offset_B: FloatArray, direction_B: FloatArray, speed_rad_s: float, message: str) -> Routine[bool]:
+    def press(
+        self, offset_B: FloatArray, direction_B: FloatArray, speed_rad_s: float, message: str, most_n: float = math.inf
+    ) -> Routine[bool]:
         """Moves the hand slowly by an offset (3,) in B; returns whether contact along a direction stopped the hand.
 
         Ignores obstacles. Raises PlanningError when the arm cannot follow the line.
         """
         X_BH, planner = self.model.X_BH(self.q_rad()), self.context.stack.arm_planner
         path = planner.line(self.model, self.q_rad(), RigidTransform(X_BH.rotation(), X_BH.translation() + offset_B))
-        trajectory, guard = planner.trajectory(path, speed_rad_s=speed_rad_s), self.contact_guard(direction_B)
-        return (yield from self.follow(trajectory, message, guard))
+        trajectory = planner.trajectory(path, speed_rad_s=speed_rad_s)
+        return (yield from self.follow(trajectory, message, self.contact_guard(direction_B, most_n=most_n)))
 
-    def contact_guard(self, direction_B: FloatArray, lag_m: float | None = None) -> Callable[[FloatArray], bool]:
-        """A guard for `follow` that stops a slow hand at contact: when the hand lags by `lag_m` along a direction.
+    def contact_guard(
+        self, direction_B: FloatArray, lag_m: float | None = None, most_n: float = math.inf
+    ) -> Callable[[FloatArray], bool]:
+        """A guard for `follow` that stops a slow hand at contact: a lag or a new force on it along a direction.
 
         By default an empty hand that feels for a surface below it stops at a smaller lag than any other.
         """
-        feels = self.context.payload.kind is None and direction_B[2] < -_DOWN
+        before_nm, feels = self.efforts_nm(), self.context.payload.kind is None and direction_B[2] < -_DOWN
         most_m = lag_m or (_FEEL_LAG_M if feels else CONTACT_LAG_M)
 
         def guard(q_wanted_rad: FloatArray) -> bool:
-            lag = self.model.X_BH(q_wanted_rad).translation() - self.model.X_BH(self.q_rad()).translation()
-            return float(lag @ direction_B) > most_m
+            q_rad = self.q_rad()
+            lag = self.model.X_BH(q_wanted_rad).translation() - self.model.X_BH(q_rad).translation()
+            force_n = hand_force_n(self.model, q_rad, self.p_HT, self.efforts_nm() - before_nm)
+            return float(lag @ direction_B) > most_m or -float(force_n @ direction_B) > most_n
 
         return guard
+
+    def efforts_nm(self) -> FloatArray:
+        """Present efforts (J,) of the arm's joints (N m)."""
+        efforts = self.context.robot.joints().effort_nm
+        return np.array([efforts[name] for name in self.model.names])
 
     def holds(self, message: str) -> Routine[bool]:
         """Returns whether the gripper holds something, and tells the robot: shut jaws by the weight on the resting arm.
 
-        A gripper that has opened since the last grasp holds what it reports.
+        A gripper that has opened since the last grasp, or has two flat fingers, holds what it reports.
         """
-        reading, payload = self.context.robot.gripper(), self.context.payload
-        if payload.kind is None or reading.opening > self.gripper.like_turn(SHUT_RAD):
+        reading, payload, kind = self.context.robot.gripper(), self.context.payload, self.gripper.kind
+        if payload.kind is None or kind is not GripperKind.HINGED or reading.opening > SHUT_RAD:
             return reading.holding
         held = (yield from self.weigh(self.p_HT, message, FEELING_S)) > LEAST_FELT_KG
         self.context.robot.carry(held, lease=self.context.lease)
@@ -391,10 +405,8 @@ class ArmSkill(RoutineSkill[InputsT]):
         while (spent_s := self.context.clock.now() - begun_s) < span_s[1]:
             if spent_s > span_s[0] and np.std(found) < _FEELING_KG * math.sqrt(len(found)):
                 break
-            efforts = self.context.robot.joints().effort_nm
             q = self.q_rad()
-            extra = np.array([efforts[name] for name in self.model.names]) - scene.gravity_efforts(q)
-            found.append(held_mass_kg(self.model, q, p_HO, extra))
+            found.append(held_mass_kg(self.model, q, p_HO, self.efforts_nm() - scene.gravity_efforts(q)))
             yield Running(message)
         return float(np.mean(found))
 

@@ -180,7 +180,7 @@ def head_angles(head: HeadCapabilities, camera: CameraCapabilities, p_BT: FloatA
     pan_rad = math.atan2(p_BT[1] - head.p_BP_m[1], p_BT[0] - head.p_BP_m[0])
     tilt_rad = 0.0
     for _ in range(_HEAD_TURNS):
-        pan_rad, tilt_rad = (_within(pan_rad, head.pan_range_rad), _within(tilt_rad, head.tilt_range_rad))
+        pan_rad, tilt_rad = float(np.clip(pan_rad, *head.pan_range_rad)), float(np.clip(tilt_rad, *head.tilt_range_rad))
         x, y, z = (head.X_BF(pan_rad, tilt_rad) @ camera.X_FC).inverse() @ p_BT
         off_rad = math.atan2(math.hypot(x, y), z)
         pan_rad, tilt_rad = pan_rad - math.atan2(x, max(z, _NEAREST_M)), tilt_rad + math.atan2(y, max(z, _NEAREST_M))
@@ -188,11 +188,7 @@ def head_angles(head: HeadCapabilities, camera: CameraCapabilities, p_BT: FloatA
     if off_rad > most_rad or math.hypot(x, y, z) < _NEAREST_M:
         blind = "the head does not turn far enough to see it" if camera.mount is Mount.HEAD else ""
         raise PlanningError(blind or f"it is outside of the view of the {camera.source} camera")
-    return _within(pan_rad, head.pan_range_rad), _within(tilt_rad, head.tilt_range_rad)
-
-
-def _within(angle_rad: float, range_rad: tuple[float, float]) -> float:
-    return min(max(angle_rad, range_rad[0]), range_rad[1])
+    return float(np.clip(pan_rad, *head.pan_range_rad)), float(np.clip(tilt_rad, *head.tilt_range_rad))
 
 
 def mask_arm(image: Image, arm_B: FloatArray, held_radius_m: float | None = None) -> Image:

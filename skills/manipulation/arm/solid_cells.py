@@ -14,7 +14,7 @@ from pydrake.math import RigidTransform
 from skills.estimate.compiled import compiled
 from skills.estimate.grid_map import GridMap
 from skills.estimate.scan_points import segment_distance
-from skills.geometry import inside_polygon
+from skills.geometry import grid_inside, inside_polygon
 from skills.manipulation.arm.collision import Box
 from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, distinct_cells, lens_rays
 from skills.robot import FloatArray, Image, Intrinsics
@@ -52,8 +52,10 @@ _AT_SURFACE_M = 0.06
 """Distance from a surveyed surface within which occupied cells are its edge."""
 _FEWEST_COLUMNS = 8
 """Number of connected columns from which on they are a wall."""
-_WALL_LEVELS = np.arange(round(0.08 / CELL_M), round(2.0 / CELL_M))
-"""Levels of the cells of a wall, from just above the floor to above the arm."""
+_LEVELS = np.arange(round(0.08 / CELL_M), round(2.0 / CELL_M))
+"""Levels of the cells of a column, from just above the floor to above the arm."""
+_BELOW_TOP_M = 0.01
+"""Distance from a surveyed surface down to the solid below it."""
 
 Cells = NDArray[np.int64]
 View = tuple[Image, RigidTransform]
@@ -189,6 +191,20 @@ def boxes_around(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArra
     return [_box(low, high, X_BW) for low, high in merge_cells(cells[chosen(cell_centres(cells))])]
 
 
+def map_columns(grids: Sequence[GridMap], surfaces: Sequence[Surface]) -> Cells:
+    """Columns (N, 3) of solid cells, x, y and one past the highest level: walls, and what is below each lowest surface.
+
+    A camera above a table sees neither its sides nor its far corners, and the arm must go round them.
+    """
+    walls = wall_columns(grids, surfaces)
+    columns = [np.insert(walls, 2, _LEVELS[-1] + 1, axis=1)]
+    for surface in sorted(surfaces, key=lambda surface: surface.height_m):
+        below = np.floor(grid_inside(surface.polygon_W, CELL_M, margin_m=1e-6) / CELL_M).astype(np.int64)
+        columns.append(np.insert(below, 2, math.floor((surface.height_m - _BELOW_TOP_M) / CELL_M), axis=1))
+    every = np.vstack(columns)
+    return every[np.sort(np.unique(every[:, :2], axis=0, return_index=True)[1])]
+
+
 def wall_columns(grids: Sequence[GridMap], surfaces: Iterable[Surface]) -> Cells:
     """Columns (N, 2) of cells that are occupied in all grids of a map, and thus solid at all their heights.
 
@@ -211,13 +227,14 @@ def wall_columns(grids: Sequence[GridMap], surfaces: Iterable[Surface]) -> Cells
     return np.asarray(np.argwhere((parts > 0) & (about[parts, cv2.CC_STAT_AREA] >= _FEWEST_COLUMNS)) + low)
 
 
-def wall_boxes(
+def column_boxes(
     columns: Cells, X_WB: RigidTransform, reach_m: float, left_out: Callable[[FloatArray], NDArray[np.bool_]]
 ) -> list[Box]:
-    """Boxes in the body frame around the wall columns within reach, except cells for which `left_out` is true."""
-    off_m = (columns + 0.5) * CELL_M - X_WB.translation()[:2]
+    """Boxes in the body frame around the solid columns within reach, except cells for which `left_out` is true."""
+    off_m = (columns[:, :2] + 0.5) * CELL_M - X_WB.translation()[:2]
     near = columns[np.linalg.norm(off_m, axis=1) < reach_m]
-    cells = np.column_stack([np.repeat(near, len(_WALL_LEVELS), axis=0), np.tile(_WALL_LEVELS, len(near))])
+    cells = np.column_stack([np.repeat(near, len(_LEVELS), axis=0), np.tile(_LEVELS, len(near))])
+    cells = cells[cells[:, 3] < cells[:, 2]][:, [0, 1, 3]]
     return boxes_around(cells, X_WB, lambda p_W: ~left_out(p_W))
 
 

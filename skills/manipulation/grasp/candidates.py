@@ -168,7 +168,7 @@ def _candidate(
         cost = placement.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean)
         cost += _PER_HIGH_M * max(0.0, _WELL_BEYOND_M - beyond)
         cost += _PER_UNEVEN_M * _uneven_m(R_BH, placement.width_m, gripper)
-    across_m = gripper.fixed_z_m + beside_m + 0.5 * placement.width_m if _hinged(gripper) else 0.0
+    across_m = gripper.fixed_z_m + beside_m + 0.5 * placement.width_m if gripper.kind is GripperKind.HINGED else 0.0
     p_HT = np.array([depth, 0.0, across_m])
     p_BT = np.array([*placement.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
@@ -191,7 +191,7 @@ def _low_grip(
     when the fingers cover too little of the object.
     """
     up_H, inner_z = R_BH.matrix()[2], gripper.fixed_z_m
-    if not _hinged(gripper):  # the fingers close on both sides alike
+    if gripper.kind is not GripperKind.HINGED:  # the fingers close on both sides alike
         inner_z, beside_m = -0.5 * width_m, 0.0
     down, outer_z = -float(up_H[0]), inner_z + beside_m + width_m
     fixed_end, moving_end = (gripper.fixed_tip_x_m, inner_z), (_closed_tip_x_m(gripper), outer_z)
@@ -211,17 +211,14 @@ def _low_grip(
 
 def _uneven_m(R_BH: RotationMatrix, width_m: float, gripper: GripperCapabilities) -> float:
     """Difference in height (m) between the tips of both fingers when they are closed on a width."""
-    ahead_m, across_m = _closed_tip_x_m(gripper) - gripper.fixed_tip_x_m, width_m if _hinged(gripper) else 0.0
+    ahead_m = _closed_tip_x_m(gripper) - gripper.fixed_tip_x_m
+    across_m = width_m if gripper.kind is GripperKind.HINGED else 0.0
     return abs(float(R_BH.matrix()[2] @ [ahead_m, 0.0, across_m]))
 
 
 def _closed_tip_x_m(gripper: GripperCapabilities) -> float:
     """Position (m) along the hand of the moving finger's tip on a narrow object: it reaches farthest half open."""
     return max(gripper.fixed_tip_x_m, gripper.tip_x_m - _SHORTER_CLOSED_M)
-
-
-def _hinged(gripper: GripperCapabilities) -> bool:
-    return gripper.kind is GripperKind.HINGED
 
 
 def _above_surface(height_m: float, spare_m: float) -> float:

@@ -76,8 +76,8 @@ def measure_shift(target: Target, image: Image, X_BC: RigidTransform) -> SeenShi
     for step_m, reach_m in _STEPS_M:
         middle_B = best.offset_B
         for offset_B in _offsets(X_BC, step_m, reach_m):
-            overlap = picture.overlap(middle_B + offset_B)
-            if overlap - _PER_M * _length(middle_B + offset_B) > best.overlap - _PER_M * _length(best.offset_B):
+            overlap, nearer_m = picture.overlap(middle_B + offset_B), np.linalg.norm(best.offset_B)
+            if overlap + _PER_M * (nearer_m - np.linalg.norm(middle_B + offset_B)) > best.overlap:
                 best = SeenShift(middle_B + offset_B, overlap)
     return best
 
@@ -116,10 +116,6 @@ def shift_trajectory(model: ArmModel, trajectory: ArmTrajectory, offset_B: Float
             return None
         positions.append(q)
     return ArmTrajectory(trajectory.times_s, np.array(positions))
-
-
-def _length(offset_B: FloatArray) -> float:
-    return float(np.linalg.norm(offset_B))
 
 
 def _offsets(X_BC: RigidTransform, step_m: float, reach_m: float) -> Iterator[FloatArray]:

@@ -1,5 +1,6 @@
 """The grasp skill: views the object closely, plans a grasp, grasps and lifts the object, and checks that it is held."""
 
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -10,7 +11,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, ObjectObservation, PlanningError, Succeeded
-from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, GRIPPER_FORCE_N, SHUT_RAD
+from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, CONTACT_N, GRIPPER_FORCE_N, SHUT_RAD
 from skills.manipulation.arm.collision import ArmScene, box_corners
 from skills.manipulation.arm.held_object import held_box, square_hand_pose
 from skills.manipulation.arm.poses import finger_sweep_m
@@ -30,7 +31,7 @@ from skills.manipulation.grasp.reach import heights_to_grasp, openings, passing,
 from skills.manipulation.grasp.servo import Aim, aim_approach, measure_shift
 from skills.quantities import Force, Length, Margin, Turn
 from skills.robot import FloatArray, GripperKind
-from skills.routine import PlanningAttempt, Routine, SkillFailure
+from skills.routine import Routine, SkillFailure
 from skills.world_model import IN_THE_WAY
 
 _PER_KG_N = 12.0
@@ -40,7 +41,7 @@ _MOST_OF_FORCE = 0.95
 _PER_LEVER_N_M = 400.0
 """Additional force per metre between the grip and the centre of mass; the tips would press a thin object out."""
 _THIN_N = 20.0
-"""Force on a thin object; rounded fingertips press it out with more."""
+"""Force on a thin object between rounded fingertips, which press it out with more."""
 _RELAX_M = 0.002
 """Height by which fingers on the surface rise before they close."""
 _RELAX_THIN_M = 0.0005
@@ -53,7 +54,7 @@ _SHORT_M = 0.025
 """Distance from the grasp beyond which a contact of the hand is not with the surface below the object."""
 _FEEL_M = 0.014
 """Additional depth of the fingers, to feel the surface."""
-_FEEL_RAD_S = 0.05
+_FEEL_RAD_S = 0.03
 _TOUCH_S = 15.0
 """Longest time from the last bit of the approach to the lift, in which fingertips may touch the surface."""
 _DOWN = 0.8
@@ -305,20 +306,21 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         yield from self.follow(plan.to_grasp, f"reaching for the {name}")
         ahead = plan.candidate.X_BH.rotation().matrix()[:, 0]
         self.context.expect_touch(_TOUCH_S)
-        touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", self.contact_guard(ahead))
+        guard = self.contact_guard(ahead, most_n=CONTACT_N if ahead @ up_B(self.X_WB()) < -_DOWN else math.inf)
+        touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", guard)
         if touched:
             self._check_reached(plan.candidate.X_BH, name)
         thin, sweep_m = view.target.height_m <= THIN_M, finger_sweep_m(plan.candidate.X_BH, self.X_WB(), self.gripper)
-        relax_m = max(_RELAX_M, sweep_m + _CLEAR_M)
+        rounded, relax_m = thin and self.gripper.kind is GripperKind.HINGED, max(_RELAX_M, sweep_m + _CLEAR_M)
         yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
-        if thin and self.gripper.kind is GripperKind.HINGED:
+        if rounded:
             nearby = self.gripper.opening_for(plan.candidate.width_m + _NEARBY_M)
             yield from self.move_gripper(nearby, GRIPPER_FORCE_N, f"closing on the {name}")
             yield from self._to_the_ground(ahead, False, _RELAX_THIN_M, f"closing on the {name}")
         X_BH = self.model.X_BH(self.q_rad())
         self.context.payload.kind = seen.kind
         lever_m = 0.0 if thin else plan.candidate.lever_m
-        force_n = _THIN_N if thin else self.options.force_n + _PER_LEVER_N_M * lever_m
+        force_n = _THIN_N if rounded else self.options.force_n + _PER_LEVER_N_M * lever_m
         yield from self.move_gripper(0.0, self._grip_n(force_n, least_kg), f"closing on the {name}")
         yield from self.pause(_FEEL_S, f"closing on the {name}")
         felt = self.context.robot.gripper()
@@ -363,9 +365,10 @@ class Grasp(CloseLookingSkill[GraspInputs]):
     def _to_the_ground(self, ahead_B: FloatArray, touched: bool, relax_m: float, message: str) -> Routine[None]:
         """Lowers downward fingers onto the surface, whose height is known only to a few millimetres."""
         if not touched and ahead_B @ up_B(self.X_WB()) < -_DOWN:
-            with PlanningAttempt() as attempt:
-                touched = yield from self.press(_FEEL_M * ahead_B, ahead_B, _FEEL_RAD_S, message)
-            touched = touched or attempt.failure is not None  # the surface may be just below
+            try:
+                touched = yield from self.press(_FEEL_M * ahead_B, ahead_B, _FEEL_RAD_S, message, CONTACT_N)
+            except PlanningError:
+                touched = True  # the surface may be just below
         if touched:
             yield from self.try_shift_hand(-relax_m * ahead_B, message)
 

@@ -162,11 +162,9 @@ class HandOver(HandOverVerification[HandOverInputs]):
         asked, end_s = self.context.ask(question), self.context.clock.now() + self.options.wait_s
         try:
             while self.context.clock.now() < end_s:
-                joints = robot.joints()
-                efforts_nm = np.array([joints.effort_nm[name] for name in self.model.names])
                 confirmed = asked.done() and asked.result() == _LETS_GO
                 gone = hold.judge(robot.gripper(), self.context.clock.now()) is Grip.LOST
-                if gone or confirmed or watch.feels_pull(joints.stamp_s, self.q_rad(), efforts_nm):
+                if gone or confirmed or watch.feels_pull(robot.joints().stamp_s, self.q_rad(), self.efforts_nm()):
                     return True
                 yield Running(message)
             return False
@@ -205,7 +203,8 @@ class HandOver(HandOverVerification[HandOverInputs]):
             if scan.stamp_s > stamp_s:
                 stamp_s = scan.stamp_s
                 people = people_in_scan(scan, self.X_WB(), self.context.robot.capabilities().footprint_m)
-                seen += people[:1] if not seen else _same(people, seen[0])
+                near = (p for p in people if not seen or math.dist(p.place_W, seen[0].place_W) < _SAME_PERSON_M)
+                seen += [*near][:1]
             yield Running(f"looking for {name}")
         if len(seen) < _SCANS:
             raise SkillFailure(Cause.PRECONDITION, "nobody is seen near to take the object")
@@ -291,8 +290,3 @@ def _towards(R_BH: RotationMatrix, direction_rad: float) -> list[RotationMatrix]
 def _well_placed(p_BP: FloatArray, range_m: tuple[float, float]) -> bool:
     near = range_m[0] <= float(np.linalg.norm(p_BP)) <= range_m[1]
     return near and abs(math.atan2(p_BP[1], p_BP[0])) < _FACING_RAD
-
-
-def _same(people: list[SeenPerson], other: SeenPerson) -> list[SeenPerson]:
-    """Returns the person at the position of an earlier detection, as a list; empty when nobody is there."""
-    return [p for p in people if math.dist(p.place_W, other.place_W) < _SAME_PERSON_M][:1]

@@ -275,7 +275,8 @@ class SpotSearch:
         free, shown = self.free(seen), np.concatenate([seen.plane_points.p_W[:, :2], objects_W(seen)])
         unseen = candidates[distances_m(shown, candidates) > _UNSEEN_M]
         lacks_m = _ENOUGH_CLEARANCE_M - np.minimum(clearances_m(seen, free), _ENOUGH_CLEARANCE_M)
-        costs = [_drive_m(free, here_W) + _PER_CLEARANCE * lacks_m, _drive_m(unseen, here_W)]
+        drive_m, other_m = (np.linalg.norm(each - here_W, axis=1) for each in (free, unseen))
+        costs = [drive_m + _PER_CLEARANCE * lacks_m, other_m]
         ordered = [
             spots_W[np.argsort(cost, kind="stable")] for spots_W, cost in zip((free, unseen), costs, strict=True)
         ]
@@ -295,21 +296,13 @@ class SpotSearch:
             return f"no free spot of the {name} is within the arm's reach"
         if self.relations:
             return f"no free spot of the {name} is {' and '.join(map(str, self.relations))}"
+        import shapely
+
         inside = grid_inside(self.surface.polygon_W, _CELL_M)
-        room_m = np.minimum(clearances_m(seen, inside), _from_edge_m(self.surface, inside))
+        edge_m = shapely.distance(shapely.Polygon(self.surface.polygon_W).exterior, shapely.points(inside))
+        room_m = np.minimum(clearances_m(seen, inside), edge_m)
         objects = "1 object" if count == 1 else f"{count} objects"
         return f"the {name} is full: {objects}, the largest free spot is {200.0 * float(room_m.max()):.0f} cm"
-
-
-def _drive_m(spots_W: FloatArray, here_W: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.norm(spots_W - here_W, axis=1))
-
-
-def _from_edge_m(surface: Surface, points_W: FloatArray) -> FloatArray:
-    """Distances (N,) from points (N, 2) to a surface's edges."""
-    import shapely
-
-    return np.asarray(shapely.distance(shapely.Polygon(surface.polygon_W).exterior, shapely.points(points_W)))
 
 
 @dataclass(frozen=True)

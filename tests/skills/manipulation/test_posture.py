@@ -76,7 +76,7 @@ def test_the_arm_comes_near_before_a_raised_body_is_lowered(holding):
 def wall(x0_m, y0_m, x1_m, y1_m):
     """Columns of 4 cm of a wall between two corners."""
     x, y = (np.arange(round(a / 0.04), round(b / 0.04)) for a, b in ((x0_m, x1_m), (y0_m, y1_m)))
-    return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return np.stack(np.meshgrid(x, y, [50], indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 BEHIND = np.array([2.9, -0.3, 0.3, 0.0, 0.3, 0.0])
@@ -91,7 +91,7 @@ def most_left_m(robot):
 def test_the_arm_is_stowed_around_a_wall_of_the_map():
     free, walled = TableRobot(BEHIND.copy()), TableRobot(BEHIND.copy())
     assert isinstance(outcome(Stow(context_of(free)), StowInputs()), Succeeded)
-    context = replace(context_of(walled), walls=wall(-0.2, 0.44, 1.2, 0.56))
+    context = replace(context_of(walled), solid_columns=wall(-0.2, 0.44, 1.2, 0.56))
     assert isinstance(outcome(Stow(context), StowInputs()), Succeeded)
     assert most_left_m(free) > 0.44 > most_left_m(walled)
 
@@ -99,7 +99,7 @@ def test_the_arm_is_stowed_around_a_wall_of_the_map():
 def test_walls_at_the_arm_by_a_small_error_of_the_pose_do_not_block_it():
     robot = TableRobot(OUT.copy())
     x, y, _ = MODEL.X_BH(OUT).translation()
-    context = replace(context_of(robot), walls=wall(x - 0.04, y - 0.6, x + 0.08, y + 0.6))
+    context = replace(context_of(robot), solid_columns=wall(x - 0.04, y - 0.6, x + 0.08, y + 0.6))
     assert isinstance(outcome(Stow(context), StowInputs()), Succeeded)
     assert np.allclose(robot.q_rad, MODEL.stowed_rad, atol=1e-6)
 

@@ -67,7 +67,7 @@ def test_wheels_and_casters_are_no_trunk():
 
 def test_only_the_plant_has_rubber_on_the_fingers():
     assembly = DESCRIPTION.assembly
-    assert (assembly.text().count("finger_pad_"), assembly.planned_text().count("finger_pad_")) == (48, 0)
+    assert (assembly.text().count("finger_pad_"), assembly.planned_text().count("finger_pad_")) == (54, 0)
 
 
 def test_the_how_to_shows_the_keys_of_the_file():

@@ -235,7 +235,7 @@ def boxed(floor, tmp_path):
 
 
 def test_the_gripper_closes_on_a_box_and_carries_it(boxed):
-    """A box of 5 cm and 0.3 kg between the fingers stays there while the robot drives and turns."""
+    """A box of 5 cm and 0.3 kg between the fingers stays there, and is felt, while the robot drives and turns."""
     bob, plant = boxed.robots["Bob"], boxed.world.plant
     lease = bob.acquire_lease("test")
     start = np.array(bob.capabilities().arm.stowed_rad)
@@ -260,8 +260,9 @@ def test_the_gripper_closes_on_a_box_and_carries_it(boxed):
     assert bob.gripper().opening == pytest.approx(0.05, abs=0.004)
     assert bob.gripper().force_n == pytest.approx(40.0, abs=8.0)
     X_HO = plant.EvalBodyPoseInWorld(boxed.context, hand).inverse() @ plant.EvalBodyPoseInWorld(boxed.context, box)
-    for _ in range(40):
-        bob.drive(0.5, 0.0, 0.5, until_s=boxed.now() + 0.3, lease=lease)
+    for number in range(40):
+        bob.drive(0.5, 0.0, -1.8 if number // 10 % 2 else 1.8, until_s=boxed.now() + 0.3, lease=lease)
         boxed.advance(0.1)
+        assert bob.gripper().holding
     now = plant.EvalBodyPoseInWorld(boxed.context, hand).inverse() @ plant.EvalBodyPoseInWorld(boxed.context, box)
     np.testing.assert_allclose(now.translation(), X_HO.translation(), atol=0.01)

@@ -1,5 +1,7 @@
 """Tests of solid cells from depth pictures, and of the boxes that cover them."""
 
+from dataclasses import replace
+
 import numpy as np
 from pydrake.math import RigidTransform
 from table_scene import CAMERA, TABLE, Can, scene
@@ -11,10 +13,11 @@ from skills.manipulation.arm.solid_cells import (
     add_picture,
     add_view,
     boxes_around,
+    column_boxes,
+    map_columns,
     merge_cells,
     never_seen,
     solid_boxes,
-    wall_boxes,
     wall_columns,
 )
 from skills.world_model import Surface
@@ -165,8 +168,18 @@ def test_the_edges_of_surfaces_and_single_posts_are_no_walls():
 
 
 def test_a_wall_is_solid_at_all_heights_of_the_arm_within_its_reach():
-    boxes = wall_boxes(wall_columns([grid_of(WALL)], ()), BODY, 1.0, lambda p_W: p_W[:, 0] < 0.4)
+    boxes = column_boxes(map_columns([grid_of(WALL)], ()), BODY, 1.0, lambda p_W: p_W[:, 0] < 0.4)
     assert inside(boxes, (0.6, 0.05, 0.3))
     assert inside(boxes, (0.6, 0.05, 1.8))
     assert not inside(boxes, (0.2, 0.05, 1.0))
     assert not inside(boxes, (1.5, 0.05, 1.0))
+
+
+def test_furniture_is_solid_from_just_below_its_lowest_surface_to_the_floor():
+    shelf = replace(DESK, height_m=1.2)
+    boxes = column_boxes(map_columns([grid_of(WALL)], [shelf, DESK]), BODY, 2.0, nothing_of)
+    assert inside(boxes, (0.7, 1.3, 0.1))
+    assert inside(boxes, (0.7, 1.3, DESK.height_m - 0.05))
+    assert not inside(boxes, (0.7, 1.3, DESK.height_m - 0.005))
+    assert not inside(boxes, (0.7, 1.3, 1.1))
+    assert not inside(boxes, (1.4, 1.3, 0.5))

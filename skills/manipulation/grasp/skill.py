@@ -410,7 +410,7 @@ class Grasp(CloseLookingSkill[GraspInputs]):
                 yield from recovery()
 
     def _open(self) -> Routine[None]:
-        yield from self.move_gripper(WIDE * self.gripper.widest, GRIPPER_FORCE_N, "opening the gripper after a failure")
+        yield from self.move_gripper(WIDE * self.gripper.widest, GRIPPER_FORCE_N, "opening after the failure")
 
     def _draw_back(self) -> Routine[None]:
         """Draws back from the object, so that the closing gripper does not catch it."""

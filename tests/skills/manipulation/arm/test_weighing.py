@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from table_robot import TableRobot, context_of, outcome
+from table_robot import HEAD_CAPABILITIES, HEAD_MODEL, TableRobot, context_of, outcome
 
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import ObjectKind, Succeeded
@@ -90,3 +90,9 @@ def test_what_shut_jaws_hold_is_weighed_before_the_arm_is_folded(mass_kg, said):
     context = context_of(robot := Weighted(mass_kg, opening=0.0, height_m=0.62))
     context.payload.kind = ObjectKind("wrench")
     assert (outcome(Stow(context), StowInputs()).message, robot.carries) == (said, mass_kg > 0.0)
+
+
+def test_flat_fingers_hold_what_they_report():
+    context = context_of(robot := TableRobot(HEAD_MODEL.stowed_rad, capabilities=HEAD_CAPABILITIES))
+    context.payload.kind = ObjectKind("wrench")
+    assert (outcome(Feels(context), None).message, "carry" in robot.calls, robot.now()) == ("False", False, 0.0)

@@ -1,11 +1,14 @@
 """Tests of failures of the grasp skill."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 from table_robot import MODEL, TableRobot, context_of, failed, outcome
 
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, PlanningError, Running, Succeeded
+from skills.manipulation.arm.motion import RrtConnect
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
 
 SEEN = GraspInputs(
@@ -146,3 +149,25 @@ def test_a_failure_to_plan_returns_the_objects_in_the_way():
 
 def test_another_failure_returns_that_no_object_is_in_the_way():
     assert outcome(Grasp(context_of(TableRobot())), SEEN).outputs == {"tried": (), "in_the_way": ()}
+
+
+class AtItsReach(RrtConnect):
+    """Finds no straight line of the hand."""
+
+    def line(self, model, q_start_rad, X_BH_to, scene=None):
+        raise PlanningError("the hand cannot follow the straight line within the arm's reach")
+
+
+class Feeling(Grasp):
+    """Feels for the surface below its fingers."""
+
+    def run(self, inputs):
+        yield from self._to_the_ground(np.array([0.0, 0.0, -1.0]), False, 0.002, "feeling")
+        return Succeeded("felt")
+
+
+def test_a_surface_below_the_arms_reach_is_not_felt_for():
+    context = context_of(robot := TableRobot())
+    context = replace(context, stack=replace(context.stack, arm_planner=AtItsReach()))
+    assert isinstance(outcome(Feeling(context), SEEN), Succeeded)
+    assert robot.arm_commands == []

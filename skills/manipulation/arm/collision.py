@@ -161,18 +161,20 @@ class ArmScene:
             return False
         return bool(self._robot.checker.CheckConfigCollisionFree(self._full(q_rad)))
 
-    def free_as_usual(self, q_rad: FloatArray) -> bool:
-        """Returns whether arm angles q_rad (J,) are free with the torso at its usual height; True without a lift."""
+    def free_as_usual(self, q_rad: FloatArray, clear_m: float = 0.0) -> bool:
+        """Returns whether angles q_rad (J,) are free by `clear_m` more at a lift's usual height; True without one."""
         lift, usual_m = self._capabilities.lift_joint, self._capabilities.standing_height_m
         if lift is None:
             return True
-        boxes, X_BF, joints = self._boxes, self._X_BF, self._joints_rad
+        boxes, X_BF, joints, padding_m = self._boxes, self._X_BF, self._joints_rad, self._padding_m
         usual = usual_m - self._capabilities.height_range_m[0]
         try:
             self.set_boxes(boxes, RigidTransform([0.0, 0.0, joints.get(lift, usual) - usual]) @ X_BF)
             self._turn_joints({**joints, lift: usual})
+            self.set_padding(padding_m + clear_m)
             return self.free(q_rad)
         finally:
+            self.set_padding(padding_m)
             self.set_boxes(boxes, X_BF)
             self._turn_joints(joints)
 

@@ -21,6 +21,8 @@ _FOREARM_ROLL = 3
 """Joint whose turn costs twice as much as another's, in the choice among viewing configurations."""
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
 """Pitches of a hand that cannot keep the object upright while it carries, in groups, best first."""
+_CLEAR_M = (0.03, 0.0)
+"""Clearances from boxes, the best first, once the torso has sunk with a held object, whose box is a little small."""
 _HANGS_M = 0.03
 """Least distance of a hanging object's centre beyond the fingertips."""
 _TURNS_HANGING_RAD = tuple(np.linspace(-np.pi, np.pi, 8, endpoint=False))
@@ -192,8 +194,8 @@ def _best_free(
         for solution in scene.model.inverse(RigidTransform(rotation, [x, 0.0, z]), margin_rad=0.05)
         for q in [scene.model.turned_near(solution, q_near_rad)]
     ]
-    cheapest = sorted(candidates, key=lambda candidate: candidate[0])
-    return next((q for _, q in cheapest if scene.free(q) and scene.free_as_usual(q)), None)
+    cheapest = itertools.product(_CLEAR_M, sorted(candidates, key=lambda candidate: candidate[0]))
+    return next((q for clear_m, (_, q) in cheapest if scene.free(q) and scene.free_as_usual(q, clear_m)), None)
 
 
 def _carry_cost(off_x_m: float, z_m: float, q_rad: FloatArray, q_near_rad: FloatArray) -> float:

@@ -192,10 +192,7 @@ def boxes_around(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArra
 
 
 def map_columns(grids: Sequence[GridMap], surfaces: Sequence[Surface]) -> Cells:
-    """Columns (N, 3) of solid cells, x, y and one past the highest level: walls, and what is below each lowest surface.
-
-    A camera above a table sees neither its sides nor its far corners, and the arm must go round them.
-    """
+    """Columns (N, 3) of solid cells, x, y and one past the highest level: walls, and all below a lowest surface."""
     walls = wall_columns(grids, surfaces)
     columns = [np.insert(walls, 2, _LEVELS[-1] + 1, axis=1)]
     for surface in sorted(surfaces, key=lambda surface: surface.height_m):

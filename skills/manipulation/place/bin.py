@@ -33,8 +33,6 @@ _LEAST_RISEN = 5
 """Least number of such cells for an object."""
 _FLOOR_PERCENT = 20
 """Percentile of the seen heights that counts as the bin's floor."""
-_RAISED_M = 0.5
-"""Height by which the body rises at most, so that a head camera looks over the rim."""
 _RELEASE_M = 0.02
 """Height of the object's lowest point over the rim at the release."""
 
@@ -85,7 +83,7 @@ class BinPlacement(PlaceVerification[InputsT]):
         self.boxes = surface_boxes([surface], self.X_WB())
         viewpoints = close_viewpoints(self.p_BS, p_BT, 0.0, _STEEP_RAD, _FROM_RIM_M)
         with PlanningAttempt() as attempt:
-            yield from self.look_at(p_BT, viewpoints, message, CARRY_SPEED_RAD_S, _RAISED_M)
+            yield from self.look_at(p_BT, viewpoints, message, CARRY_SPEED_RAD_S, raised_m=1.0)
         if attempt.failure is not None:
             return {}
         image = yield from self.picture(message)

@@ -88,6 +88,8 @@ def test_a_pose_free_with_the_torso_up_may_touch_once_it_is_down():
     usual = ArmScene(fetch, model, {fetch.lift_joint: usual_lift_m})
     usual.set_boxes([below])
     assert usual.free_as_usual(ahead)
+    assert not usual.free_as_usual(ahead, clear_m=1.0)
+    assert usual.free_as_usual(ahead)
 
 
 # a cube with sides of 0.2 m at the origin: where another stands, how it is turned about z, how far it is off

@@ -384,8 +384,8 @@ class ArmSkill(RoutineSkill[InputsT]):
 
         A gripper that has opened since the last grasp, or has two flat fingers, holds what it reports.
         """
-        reading, payload, kind = self.context.robot.gripper(), self.context.payload, self.gripper.kind
-        if payload.kind is None or kind is not GripperKind.HINGED or reading.opening > SHUT_RAD:
+        reading, payload = self.context.robot.gripper(), self.context.payload
+        if payload.kind is None or self.gripper.kind is not GripperKind.HINGED or reading.opening > SHUT_RAD:
             return reading.holding
         held = (yield from self.weigh(self.p_HT, message, FEELING_S)) > LEAST_FELT_KG
         self.context.robot.carry(held, lease=self.context.lease)

@@ -156,7 +156,7 @@ def _candidate(
     elif target.upright:
         height = placement.height_m
         depth = gripper.palm_x_m + placement.half_depth_m + _AHEAD_OF_PALM_M
-        if _hinged(gripper) and placement.width_m < _HOLLOW_M:
+        if gripper.kind is GripperKind.HINGED and placement.width_m < _HOLLOW_M:
             depth = max(depth, gripper.fixed_tip_x_m - _BEHIND_TIPS_M)
     else:
         beside_m = min(beside_m, _BESIDE_THIN_M) if target.height_m < THIN_M else beside_m

@@ -86,7 +86,7 @@ def test_a_gripper_that_is_not_shut_holds_what_it_reports():
 
 # mass (kg) of what shut jaws hold over a table -> what the arm feels before it is folded, where its levers are short
 @pytest.mark.parametrize(("mass_kg", "said"), [(0.06, "the object is held near the body"), (0.0, "the arm is stowed")])
-def test_what_shut_jaws_hold_is_weighed_before_the_arm_is_folded(mass_kg, said):
+def test_shut_jaws_weigh_an_object_before_the_arm_is_folded(mass_kg, said):
     context = context_of(robot := Weighted(mass_kg, opening=0.0, height_m=0.62))
     context.payload.kind = ObjectKind("wrench")
     assert (outcome(Stow(context), StowInputs()).message, robot.carries) == (said, mass_kg > 0.0)

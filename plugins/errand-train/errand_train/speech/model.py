@@ -15,6 +15,7 @@ import torch
 import torch.nn.functional as tf
 from torch import Tensor, nn
 
+from errand_train.detector.learner import quick_in_bfloat16
 from executive.speech.adapter import Adapter, LowRank, ModelFile
 
 __all__ = ["AdaptedWhisper"]
@@ -25,12 +26,15 @@ _START_SCALE: Final = 0.02
 
 
 class AdaptedWhisper(nn.Module):
-    """Whisper with adapters. `ranks` gives the rank of the adapter of every matrix whose name begins with the key."""
+    """Whisper with adapters. `ranks` gives the rank of the adapter of every matrix whose name begins with the key.
 
-    def __init__(self, weights: ModelFile, ranks: Mapping[str, int], dtype: torch.dtype = torch.bfloat16) -> None:
+    Computes by default in bfloat16 where the processor is quick in it, else in float32.
+    """
+
+    def __init__(self, weights: ModelFile, ranks: Mapping[str, int], dtype: torch.dtype | None = None) -> None:
         super().__init__()
-        self.dtype = dtype
-        make = _Maker(weights, ranks, dtype)
+        self.dtype = dtype or (torch.bfloat16 if quick_in_bfloat16(torch.device("cpu")) else torch.float32)
+        make = _Maker(weights, ranks, self.dtype)
         self.convolutions = nn.ModuleList([make.convolution("encoder/conv1", 1), make.convolution("encoder/conv2", 2)])
         self.listening = nn.ModuleList(_Layer(make, f"encoder/layer_{n}", cross=False) for n in range(_LAYERS))
         self.listened = make.norm("encoder/layer_norm")
@@ -38,7 +42,7 @@ class AdaptedWhisper(nn.Module):
         self.written = make.norm("decoder/layer_norm")
         self.register_buffer("times", make.tensor("encoder/position_encodings/encodings", torch.float32))
         self.register_buffer("places", make.tensor("decoder/position_encodings/encodings", torch.float32))
-        self.register_buffer("words", make.tensor("decoder/embeddings/weight", dtype))
+        self.register_buffer("words", make.tensor("decoder/embeddings/weight", self.dtype))
 
     def encode(self, features: Tensor) -> Tensor:
         """Encodes features (batch, 80, frames) to (batch, frames / 2, 512)."""

@@ -7,8 +7,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
+import numpy as np
+
 from errand_make.shapes import Model
-from errand_train.dataset.objects import make
+from errand_train.dataset.objects.draft import Draft
+from errand_train.dataset.objects.recipes import build, load_recipes
 from errand_train.models.__main__ import write_model
 from errand_train.models.appearance import Appearance
 from plant.models.catalogue import MODELS_FOLDER
@@ -42,8 +45,10 @@ FORMS: Final[Mapping[tuple[str, str], int]] = MappingProxyType(
 
 def write_forms(folder: Path) -> None:
     """Writes each form into `CLASS/FORM` below a folder. The same sources give the same bytes."""
+    recipes = {**load_recipes("classes"), **load_recipes("shipped_forms")}
     for (category, form), number in FORMS.items():
-        made, kind, _ = make(category, number)
+        draft = Draft(np.random.default_rng([number, *category.encode()]))
+        made, kind, _ = build(category, recipes[category], draft)
         model = Model(category, f"{category}.obj", made.collisions, made.mass, comment=f"{kind} {category}")
         write_model(folder / category / form, model, Appearance(made.mesh, made.pictures))
 

@@ -12,7 +12,8 @@ from errand_ros2.server import PERIOD_S, RobotServer, Served
 from errand_ros2.wire.node import Client, Node, Publisher
 from errand_ros2.wire.session import open_session
 
-IDLE_S, PATIENCE_S = 0.005, 20.0
+IDLE_S, CONNECTING_S, PATIENCE_S = 0.005, 0.2, 20.0
+"""Pauses of the server; longest wait for a message until both sides have found each other, and afterwards."""
 
 
 class LockStep(RobotClock):
@@ -22,7 +23,7 @@ class LockStep(RobotClock):
         self._build, self._place, self._ending = build, place, ExitStack()
         self._ready, self._stopping, self._failure = threading.Event(), threading.Event(), None
         super().__init__()
-        self._now_s, self._is_cut = 0.0, False
+        self._now_s, self._is_cut, self._patience_s = 0.0, False, CONNECTING_S
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
         self._ready.wait()
@@ -32,6 +33,7 @@ class LockStep(RobotClock):
         self.node = Node(session, "driver", f"/{name.lower()}")
         self.robot = Ros2Robot(name, self.node, self, described(file or served_file(kind)))
         assert self.until(lambda: not self.robot.missing()), self.robot.missing()
+        self._patience_s = PATIENCE_S
 
     def _serve(self):
         try:
@@ -73,7 +75,7 @@ class LockStep(RobotClock):
         return all_heard and self.server.motions.ended <= sum(each.ended for each in self.robot.actions.values())
 
     def _soon(self, true):
-        until_s = time.monotonic() + PATIENCE_S
+        until_s = time.monotonic() + self._patience_s
         while not self._is_cut and not true() and time.monotonic() < until_s:
             time.sleep(0.0005)
 

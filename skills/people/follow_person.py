@@ -250,7 +250,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         if answer == "yes":
             target.trust(one)
         elif one.track != target.seen.track:
-            self._strangers.add(one.track)
+            self._strangers |= {one.track} if answer == "no" else set()
         elif answer == "no" or self._silences + 1 >= self.options.silences:
             self._silences = 0
             target.reject(before)
@@ -267,7 +267,8 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         for one in sorted(near, key=lambda one: one.track != seen.track):
             stands = target.stands_still(now_s) if one.track == seen.track else math.hypot(*one.velocity_W) < _WALKS_M_S
             in_sight = self._is_clear(np.array([(here.x_m, here.y_m), one.place_W]))
-            if one.track not in self._strangers and is_addressed(one, near, here, still=stands, in_sight=in_sight):
+            asked = one.track in self._strangers and one.track != seen.track
+            if not asked and is_addressed(one, near, here, still=stands, in_sight=in_sight):
                 return one
         return None
 

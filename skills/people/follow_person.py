@@ -125,7 +125,6 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         super().begin(inputs)
         self._inputs, self._limit_s = inputs, self.context.clock.now() + inputs.time_limit_s
         self._outline, self._tries, self._silences = ArmFootprint(self.context).now(), 0, 0
-        self._strangers: set[int] = set()
         self._planned_s = self._aside_until_s = -math.inf
         self._aside, self._made_way = None, False
         self._company.watch = PeopleWatch(self.context, self.options.people)
@@ -224,53 +223,37 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         return False
 
     def _is_right(self, target: Target, before: SeenPerson) -> Routine[bool]:
-        """Asks for the name while the person is doubtful: the person, or who else alone would answer.
+        """Asks a doubtful person for their name, unless another person might answer.
 
-        The person is rejected when they say no, or are silent too often.
+        A person who says no, or is silent too often, is rejected.
         """
-        stands, asked = target.stands_still(self._now()), self._addressed(target)
+        here, seen, stands = self.context.pose(), target.seen, target.stands_still(self._now())
+        tracks = [one for one in self._company.watch.tracks() if one.stamp_s > self._now() - _IN_VIEW_S]
+        near = people_about(tracks, here, None, self.options.hearing_m, math.pi)
         if self._inputs.place_W is None:  # the person before the robot has no name
             target.doubted = None
-        if target.doubted is None or asked is None:
+        in_sight = self._is_clear(np.array([(here.x_m, here.y_m), seen.place_W]))
+        if target.doubted is None or not is_addressed(seen, near, here, still=stands, in_sight=in_sight):
             return True
         if stands:
             self._halt()
-            self._plan(self._turned(self.context.pose(), asked.place_W))
-            while self._goal is not None and not target.hidden_s(self._now()):
-                yield from self._tick(self._drive("turning to ask who it is"))
+            self._plan(self._turned(here, seen.place_W))
         answer = yield from self.ask_for_name(
             self._inputs.person,
             self.options.answer_s,
             tick=lambda: self._tick(self._drive("asking who it is")),
-            enough=lambda: asked.track == target.seen.track and not stands and target.hidden_s(self._now()) > 0.0,
+            enough=lambda: not stands and target.hidden_s(self._now()) > 0.0,
         )
-        one = self._addressed(target)
-        if answer is None or one is None or (answer != "yes" and one.track != asked.track):
+        if answer is None:
             return True
+        self._silences = self._silences + 1 if answer not in ("yes", "no") else 0
         if answer == "yes":
-            target.trust(one)
-        elif one.track != target.seen.track:
-            self._strangers |= {one.track} if answer == "no" else set()
-        elif answer == "no" or self._silences + 1 >= self.options.silences:
+            target.trust()
+        elif answer == "no" or self._silences >= self.options.silences:
             self._silences = 0
             target.reject(before)
             return False
-        else:
-            self._silences += 1
         return True
-
-    def _addressed(self, target: Target) -> SeenPerson | None:
-        """Who alone would answer a question now, and has not yet said no: the person rather than somebody else."""
-        here, seen, now_s = self.context.pose(), target.seen, self._now()
-        tracks = [one for one in self._company.watch.tracks() if one.stamp_s > now_s - _IN_VIEW_S]
-        near = people_about(tracks, here, None, self.options.hearing_m, math.pi)
-        for one in sorted(near, key=lambda one: one.track != seen.track):
-            stands = target.stands_still(now_s) if one.track == seen.track else math.hypot(*one.velocity_W) < _WALKS_M_S
-            in_sight = self._is_clear(np.array([(here.x_m, here.y_m), one.place_W]))
-            asked = one.track in self._strangers and one.track != seen.track
-            if not asked and is_addressed(one, near, here, still=stands, in_sight=in_sight):
-                return one
-        return None
 
     def _search(self, target: Target) -> Routine[None]:
         """Searches doors where a lost person was heading, then asks. Raises SkillFailure when they are not found."""

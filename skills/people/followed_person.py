@@ -45,13 +45,7 @@ _AHEAD_COUNTS_M = 1.5
 """Distance by which a door straight ahead of a lost person counts as nearer."""
 _SCAN_S = 0.2
 """Time between two scans, by which a view may be late."""
-_SCAN_PERIOD_S = 0.1
-"""Least time between two scans: somebody was in view at least this long for each scan that showed them."""
 _LINE_POINTS = 20
-_REMEMBERED_S = 20.0
-"""Time for which somebody else out of sight is expected again near where they went."""
-_STRAIGHT_S = 1.5
-"""Longest time over which somebody is taken to have walked as now."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +63,7 @@ class TargetOptions:
     sure_s: Delay = 1.0
     close_m: Length = 0.9
     again_m: Length = 0.8
-    again_m_s: Speed = 0.5
+    again_m_s: Speed = 0.7
     farthest_m: Length = 3.0
     still_s: Delay = 5.0
     still_m: Length = 0.5
@@ -157,9 +151,9 @@ class Target:
         self.doubted: SeenPerson | None = None
         self.longest_loss_s, self._near_s, self._walked_s = 0.0, first.stamp_s, first.stamp_s
         self._trail = [(here.x_m, here.y_m), first.place_W]
-        self._before: list[SeenPerson] = []
-        self._others: dict[int, SeenPerson] = {}
-        self._others_before: dict[int, SeenPerson] = {}
+        self._others: set[int] = set()
+        self._others_before: frozenset[int] = frozenset()
+        self._others_W: list[tuple[float, float]] = []
         self._places: deque[tuple[float, tuple[float, float]]] = deque([(first.stamp_s, first.place_W)])
 
     @property
@@ -199,8 +193,6 @@ class Target:
     def update(self, tracks: Sequence[SeenPerson], others: Sequence[SeenPerson], now_s: float) -> None:
         """Updates the person from the present tracks; `others` are tracks known to be other people."""
         self.longest_loss_s = max(self.longest_loss_s, now_s - self._near_s)
-        self._return_to_earlier(tracks, now_s)
-        self._others |= {each.track: each for each in tracks if each.track in self._others}
         one = next((one for one in tracks if one.track == self.seen.track), None)
         if one is None or now_s - one.stamp_s > self._options.hidden_s:
             one = self._again(tracks, now_s) or one
@@ -212,48 +204,27 @@ class Target:
                 self._trail = [(one.here_W.x_m, one.here_W.y_m)]
             if again or any(math.dist(each.place_W, one.place_W) < self._options.close_m for each in others):
                 self.doubt()
-            if one.track != self.seen.track:
-                self._before.append(self.seen)
             self.seen = one
             self._near_s = one.stamp_s if one.distance_m < _LOST_M else self._near_s
             self._note(one)
             apart = (each for each in tracks if math.dist(each.place_W, one.place_W) > _ONE_BODY_M)
-            self._others |= {each.track: each for each in apart if now_s - each.stamp_s < self._options.hidden_s}
+            self._others |= {each.track for each in apart if now_s - each.stamp_s < self._options.hidden_s}
 
     def doubt(self) -> None:
         """Marks the person in view as doubtful."""
         if self.doubted is None:
-            self.doubted, self._others_before = self.seen, dict(self._others)
+            self.doubted, self._others_before = self.seen, frozenset(self._others)
 
-    def trust(self, one: SeenPerson) -> None:
-        """Accepts somebody in view as the followed person."""
-        if one.track != self.seen.track:
-            away_s = one.stamp_s - one.scans * _SCAN_PERIOD_S - (self.doubted or self.seen).stamp_s
-            self.longest_loss_s = max(self.longest_loss_s, away_s)
-            self._others[self.seen.track] = self.seen
-            self._others.pop(one.track, None)
-            self.seen, self._trail, self._near_s = one, [(one.here_W.x_m, one.here_W.y_m)], one.stamp_s
+    def trust(self) -> None:
+        """Accepts the present person as the followed one."""
         self.doubted, self.farthest_m, self._walked_s = None, self._options.farthest_m, self.seen.stamp_s
-        self._before.clear()
 
     def reject(self, before: SeenPerson) -> None:
         """Marks the present person as another one; the followed person was last detected in `before`."""
-        self._others = {**self._others_before, self.seen.track: self.seen}
+        self._others = {*self._others_before, self.seen.track}
+        self._others_W.append(self.seen.place_W)
         self._near_s = before.stamp_s
         self.seen, self.doubted = replace(before, track=0), None
-        self._before.clear()
-
-    def _return_to_earlier(self, tracks: Sequence[SeenPerson], now_s: float) -> None:
-        """Returns to an earlier track of the person that is seen again: later ones are of somebody else."""
-        for number, before in enumerate(self._before):
-            again = next((each for each in tracks if each.track == before.track), before)
-            if again.stamp_s > before.stamp_s and math.dist(again.place_W, self.seen.place_W) > _ONE_BODY_M:
-                self._others |= {each.track: each for each in (*self._before[number + 1 :], self.seen)}
-                self._others.pop(again.track, None)
-                self.longest_loss_s = max(self.longest_loss_s, now_s - before.stamp_s)
-                self.seen, self._before = before, self._before[:number]
-                self._near_s = before.stamp_s
-                return
 
     def _note(self, one: SeenPerson) -> None:
         """Extends the trail to the person; removes a loop."""
@@ -272,33 +243,17 @@ class Target:
         options, expected_W = self._options, self.place_W(now_s)
         reach_m = min(options.again_m + options.again_m_s * self.hidden_s(now_s), self.farthest_m)
         new = [
-            each for each in people if each.stamp_s > self.seen.stamp_s and not self._is_other(each, expected_W, now_s)
-        ]
-        gap_s = min(now_s - self.seen.stamp_s, _STRAIGHT_S)
-        near = [
             each
-            for each in new
-            if math.dist(each.place_W, expected_W) <= reach_m
-            and math.dist(_place_before_W(each, gap_s), self.seen.place_W) <= reach_m
+            for each in people
+            if each.track not in self._others and each.stamp_s > self.seen.stamp_s and not self._was_rejected(each)
         ]
+        near = [each for each in new if math.dist(each.place_W, expected_W) <= reach_m]
         return min(near, key=lambda each: math.dist(each.place_W, expected_W), default=None)
 
-    def _is_other(self, one: SeenPerson, expected_W: tuple[float, float], now_s: float) -> bool:
-        """Returns whether a track is another person: a known one, or nearer to one out of sight than to expected_W."""
-        stands, off_m = math.hypot(*one.velocity_W) < _STANDS_M_S, math.dist(one.place_W, expected_W)
-        return one.track in self._others or any(
-            (stands and math.dist(one.place_W, other.place_W) < _ONE_BODY_M)
-            or (
-                self._options.hidden_s < now_s - other.stamp_s < _REMEMBERED_S
-                and math.dist(one.place_W, predicted_place_W(other, now_s)) < off_m
-            )
-            for other in self._others.values()
-        )
-
-
-def _place_before_W(one: SeenPerson, ago_s: float) -> tuple[float, float]:
-    """Position (x, y) at which somebody who walks as now was some time ago."""
-    return one.place_W[0] - ago_s * one.velocity_W[0], one.place_W[1] - ago_s * one.velocity_W[1]
+    def _was_rejected(self, one: SeenPerson) -> bool:
+        """Returns whether a person stands at the position of a rejected one."""
+        stands = math.hypot(*one.velocity_W) < _STANDS_M_S
+        return stands and any(math.dist(one.place_W, place_W) < _ONE_BODY_M for place_W in self._others_W)
 
 
 def poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, float, float]]:

@@ -38,8 +38,8 @@ def test_a_person_who_comes_back_takes_the_loop_off_the_trail():
 def test_a_person_seen_again_far_from_the_trail_begins_a_new_one():
     target = walked()
     target.farthest_m = 20.0
-    target.update([track(7, 8.0, 8.0, y=2.0)], (), 8.0)
-    assert target.trail.tolist() == [[0.0, 0.0], [8.0, 2.0]]
+    target.update([track(7, 9.0, 8.0, y=3.0)], (), 8.0)
+    assert target.trail.tolist() == [[0.0, 0.0], [9.0, 3.0]]
 
 
 # Predicted at x = 5.4 at 3.4 s -> track that is followed, and how long it has been hidden
@@ -80,7 +80,7 @@ def test_the_time_that_a_person_has_stood_begins_anew_when_they_are_trusted():
     for n in range(1, 152):
         target.update([track(1, 4.0, 2.0 + 0.1 * n, speed_m_s=0.0)], (), 2.0 + 0.1 * n)
     assert target.standing_s(17.1) == pytest.approx(10.6, abs=0.2)
-    target.trust(target.seen)
+    target.trust()
     assert target.standing_s(17.1) == pytest.approx(0.0, abs=0.2)
 
 
@@ -105,41 +105,6 @@ def test_somebody_rejected_is_not_taken_for_the_person_again(first, then, number
     assert number or target.seen.place_W == before.place_W
 
 
-def test_somebody_who_comes_from_elsewhere_is_not_the_person_again():
-    target = walked()
-    target.update([track(7, 4.9, 3.4, speed_m_s=-1.5)], (), 3.4)
-    assert target.seen.track == 1
-
-
-def test_a_new_track_near_somebody_else_out_of_sight_is_that_one():
-    # somebody beside the person is seen until 2.0 s -> at 3.4 s a new track 0.4 m from there, 1 m from the prediction
-    beside = track(2, 4.5, 2.0, y=1.2, speed_m_s=0.0)
-    target = walked(others=[beside])
-    target.update([track(7, 4.7, 3.4, y=0.9)], (), 3.4)
-    assert target.seen.track == 1
-
-
-def test_the_person_is_followed_again_when_their_own_track_comes_back():
-    # taken for somebody else from 3.4 s on -> back on the own track, which was out of sight for 1.5 s
-    target = walked()
-    target.update([track(7, 5.4, 3.4)], (), 3.4)
-    target.update([track(7, 5.5, 3.5), track(1, 4.3, 3.5, y=1.0)], (), 3.5)
-    assert target.seen.track == 1 and target.longest_loss_s == pytest.approx(1.5)
-    target.update([track(7, 5.6, 5.0)], (), 5.0)
-    assert target.seen.track == 1
-
-
-def test_somebody_else_who_says_that_they_are_the_person_is_followed():
-    # doubted since 2.0 s; the other was in 9 scans up to 6.0 s -> out of sight for 3.1 s
-    target = walked()
-    target.update([track(7, 4.9, 3.4)], (), 3.4)
-    other = track(8, 3.0, 6.0, y=2.0)
-    target.update([track(7, 4.9, 6.0), other], (), 6.0)
-    target.trust(other)
-    target.update([track(7, 4.9, 6.1), track(8, 3.1, 6.1, y=2.0)], (), 6.1)
-    assert (target.seen.track, target.doubted) == (8, None) and target.longest_loss_s == pytest.approx(3.1)
-
-
 def test_a_person_is_not_doubted_after_a_short_gap():
     target = walked()
     target.update([track(7, 2.9 + 2.0, 2.9)], (), 2.9)
@@ -150,7 +115,7 @@ def test_a_person_is_doubted_after_a_long_gap_or_a_close_crossing_until_trusted(
     target, before = walked(), walked().seen
     target.update([track(7, 5.4, 3.4)], (), 3.4)
     assert target.doubted.track == before.track
-    target.trust(target.seen)
+    target.trust()
     assert target.doubted is None
     other = track(2, 5.5, 3.5, y=0.5)
     target.update([track(7, 5.5, 3.5), other], (other,), 3.5)

@@ -1,101 +1,32 @@
 """Missions through Spot's API beside the same missions in process. Prints JSON at the end.
 
-    python -m tests.benchmarks.spot_missions [--missions fetch_drink,patrol] [--seed 1] [--seeds 1] [--api-only]
+    python -m tests.benchmarks.spot_missions [--missions fetch_drink,patrol] [--seed 1] [--seeds 1] [--served-only]
 
-Adapter and server run in lock-step, and the referee of the plant behind the server judges. Without `--missions`, all
-shipped missions of one robot run. `same` counts the pairs with equal outcome and equal verdict; with `--api-only` the
-run in process is left out.
+Without `--missions`, all shipped missions of one robot run. `same` counts the pairs with equal outcome and equal
+verdict; with `--served-only` the run in process is left out.
 """
-
-import time
-from dataclasses import replace
-from itertools import product
-from types import SimpleNamespace
 
 from lock_step import LockStep
 
 from errand_spot.perception import SpotPerception
 from errand_spot.server.identity import credentials
-from executive.app.prepare.from_request import prepare
-from executive.app.prepare.placed_robots import robot_stack
-from executive.app.runs.goal_conditions import verdict_of
-from executive.app.runs.one_run import run_request
-from executive.app.runs.real_robot import RealBackend
-from executive.app.runs.simulated import simulate
-from executive.mission.request import Request
-from skills.robot import ConnectedRobot
-from tests.benchmarks.errand_process import ROOT
 from tests.benchmarks.harness import benchmark
-
-MISSIONS = ROOT / "missions"
-SHIPPED = tuple(sorted(file.stem for file in MISSIONS.glob("*.yaml") if file.stem != "two_robots"))
-TIME_OF_DAY = "08:29"
-"""Missions that wait for a time begin shortly before it."""
-
-
-class Judged(RealBackend):
-    """Backend of a real robot, with the referee of the plant behind the server."""
-
-    def __init__(self, step, simulation, prepared):
-        stack = robot_stack(prepared.robots[step.robot.name])
-        super().__init__(ConnectedRobot(step.robot, step), prepared.world, stack, prepared.world.start)
-        self.referee = simulation.referee
-
-    def judge(self, tree, result, *, before=(), since_s=0.0):
-        return verdict_of(tree, result, self.referee.judge, before=before, since_s=since_s)
+from tests.benchmarks.served_missions import cases, run_pair, run_served, summary
 
 
 def through_api(request, folder, options=lambda _: {}):
-    """Runs a request through adapter and server in lock-step; the server's credentials lie in the folder.
+    """Runs a request through Spot's API; the server's credentials lie in the folder."""
 
-    `options` are more options of `run_request`.
-    """
-    prepared, made = prepare(request), []
-
-    def build():
-        made.append(simulate(prepared.world, prepared.robots, seed=request.seed, record=False))
-        return made[0].robots["Alice"], made[0].clock
-
-    step = LockStep(build, credentials(folder), SpotPerception({}))
-    try:
+    def lock_step(build):
+        step = LockStep(build, credentials(folder), SpotPerception({}))
         step.stand_up()
-        began_s = time.monotonic()
-        return _ended(run_request(prepared, Judged(step, made[0], prepared), **options(step)).report, began_s)
-    finally:
-        made.clear()
-        step.close()
+        return step
+
+    return run_served(request, lock_step, options)
 
 
-def _ended(report, began_s):
-    why, took_s = f"{report.message}; {report.seen.why}", round(time.monotonic() - began_s, 1)
-    ended = {"outcome": str(report.outcome), "verdict": report.seen.success, "why": why}
-    return SimpleNamespace(**ended, robot_s=round(report.sim_time_s, 1), took_s=took_s)
-
-
-def cases(missions: tuple[str, ...] = SHIPPED, seed: int = 1, seeds: int = 1, api_only: bool = False):
-    return product(missions, range(seed, seed + seeds), [api_only])
-
-
-def run_case(name, seed, api_only, folder):
-    what = {"sentence": name} if " " in name else {"file": MISSIONS / f"{name}.yaml"}
-    request = Request(**what, seed=seed, record=False, time_of_day=TIME_OF_DAY, out=folder / "run")
-    api, here = through_api(request, folder / "credentials"), None
-    if not api_only:
-        began_s = time.monotonic()
-        here = _ended(run_request(prepare(replace(request, out=folder / "in_process"))).report, began_s)
-    same = here is not None and (api.outcome, api.verdict) == (here.outcome, here.verdict)
-    return {"name": f"{name} {seed}", "same": same, "api": api, "in_process": here}
-
-
-def summary(pairs):
-    robot_s, took_s = (sum(getattr(each.api, name) for each in pairs) for name in ("robot_s", "took_s"))
-    return {
-        "same": sum(each.same for each in pairs),
-        "fulfilled": sum(bool(each.api.verdict) for each in pairs),
-        "of": len(pairs),
-        "robot_s_per_s": round(robot_s / took_s, 2),
-        "runs": {each.name: each for each in pairs},
-    }
+def run_case(name, seed, served_only, folder):
+    return run_pair(name, seed, served_only, folder, through_api)
 
 
 if __name__ == "__main__":

@@ -45,10 +45,8 @@ class Ros2:
             raise InputError(f"ros2://{address[:60]}: is no namespace of ROS 2", hint="write ros2://alice")
         place, description = Place.parse(self.network), load_description(self.file, self.kind)
         with open_session(place) as session:
-            clock, node = (
-                SimulatedClock() if description.file.sim_time else RobotClock(),
-                Node(session, _NAME, f"/{space}"),
-            )
+            clock = SimulatedClock() if description.file.sim_time else RobotClock()
+            node = Node(session, _NAME, f"/{space}")
             if isinstance(clock, SimulatedClock):
                 node.subscribe("/clock", "rosgraph_msgs/msg/Clock", clock.hear_clock)
             robot, ready = Ros2Robot(name, node, clock, description), Event()

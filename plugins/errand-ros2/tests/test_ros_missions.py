@@ -1,17 +1,15 @@
 """Missions through ROS 2: adapter and server in lock-step, judged by the plant's referee."""
 
-from contextlib import ExitStack
-
 import pytest
 
 pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
 
-from ros2_missions import MISSIONS, through_ros
+from ros2_missions import through_ros
 
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.control_state import Mode
-from executive.run.visitor import RunVisitor
+from tests.benchmarks.served_missions import MISSIONS, Cut
 
 
 @pytest.mark.mission
@@ -29,28 +27,13 @@ def test_a_mission_through_ros_is_fulfilled(what, tmp_path):
     assert (ended.outcome, ended.verdict) == ("success", True), ended
 
 
-class Cut(RunVisitor):
-    """Network that is cut from tick 100 to tick 190."""
-
-    def __init__(self, step, control):
-        self._step, self._control, self._cut, self.seen = step, control, ExitStack(), []
-
-    def tick(self, progress):
-        if progress.ticks == 100:
-            self._cut.enter_context(self._step.cut())
-        elif progress.ticks == 190:
-            self._cut.close()
-        if self.seen[-1:] != [said := (self._control.state.mode, self._control.state.reason)]:
-            self.seen.append(said)
-
-
 @pytest.mark.mission
 @pytest.mark.nightly
 def test_a_run_whose_robot_is_silent_for_a_while_goes_on_by_itself(tmp_path):
     control, cuts = Control(attended=True, pace=None), []
 
     def with_cut(step):
-        cuts.append(Cut(step, control))
+        cuts.append(Cut(step.cut, control, tick=100))
         return {"visitors": cuts, "control": control}
 
     ended = through_ros(Request(sentence="go to the kitchen", seed=3, record=False, out=tmp_path / "out"), with_cut)

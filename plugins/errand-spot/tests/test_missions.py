@@ -1,7 +1,5 @@
 """Missions through Spot's API: adapter and server in lock-step, judged by the plant's referee."""
 
-from contextlib import ExitStack
-
 import pytest
 
 pytest.importorskip("bosdyn.client", reason="not installed: pip install errand-spot")
@@ -24,7 +22,8 @@ from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.run.visitor import RunVisitor
-from tests.benchmarks.spot_missions import MISSIONS, through_api
+from tests.benchmarks.served_missions import MISSIONS, Cut
+from tests.benchmarks.spot_missions import through_api
 
 GRAPH_NAV = "graph-nav-service"
 FREE = "the lease was given back"
@@ -128,28 +127,14 @@ class Tablet(RunVisitor):
         self.poses[progress.ticks] = progress.robots["Alice"].pose
 
 
-class Cut(RunVisitor):
-    """Network that is cut from tick 140 to tick 230."""
-
-    def __init__(self, faults, control):
-        self._faults, self._control, self._cut, self.seen = faults, control, ExitStack(), []
-
-    def tick(self, progress):
-        if progress.ticks == 140:
-            self._cut.enter_context(self._faults.fault("*", Fault(code=grpc.StatusCode.UNAVAILABLE)))
-        elif progress.ticks == 230:
-            self._cut.close()
-        if self.seen[-1:] != [said := (self._control.state.mode, self._control.state.reason)]:
-            self.seen.append(said)
-
-
 @pytest.mark.mission
 @pytest.mark.nightly
 def test_a_run_whose_robot_is_silent_for_a_while_goes_on_by_itself(tmp_path):
     control, cuts = Control(attended=True, pace=None), []
 
     def with_cut(step):
-        cuts.append(Cut(step.server.faults, control))
+        silent = Fault(code=grpc.StatusCode.UNAVAILABLE)
+        cuts.append(Cut(lambda: step.server.faults.fault("*", silent), control, tick=140))
         return {"visitors": cuts, "control": control}
 
     request = Request(sentence="go to the kitchen", seed=3, record=False, out=tmp_path / "out")

@@ -130,7 +130,7 @@ class FollowPersonOptions:
     silences: Tries = 2
     doors: Tries = 3
     tries: Tries = 60
-    longest_loss_s: Delay = 20.0
+    longest_loss_s: Delay = 12.0
     max_speed_m_s: Speed = 1.2
     ahead_rad: Turn = 1.2
     turn_rad: Turn = 0.6

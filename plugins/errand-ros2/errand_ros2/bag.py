@@ -8,61 +8,43 @@ from __future__ import annotations
 
 import base64
 import json
-import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
-import rosbags.typesys.stores.ros2_humble as ros
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
 
+from errand_ros2 import messages
+from errand_ros2.messages import Fields
+from errand_ros2.wire.types import ros_types
 from executive.record.history import Event
 from executive.record.other_tools import body_frame, ros_name
 from skills.inputs.outside import writing
 
-MAP: Final = "map"
 GRID: Final = "map/grid"
-POSE: Final = "pose"
-PATH: Final = "path"
-SCAN: Final = "scan"
-JOINTS: Final = "joints"
-WALL: Final = "wall"
 VIEWER_COPIES: Final = frozenset({"detections/boxes", "map/zones", "transform"})
 """Topics of the log whose messages repeat others in a form that Foxglove draws."""
 TF: Final = "/tf"
 TF_STATIC: Final = "/tf_static"
 _ROOT: Final = "map"
 """Frame that other tools take for the fixed one; it equals the world frame."""
-_LONGEST_RANGE_M: Final = 100.0
-_LEAST_RANGE_M: Final = 0.05
-_LATCHED: Final = frozenset({f"/{MAP}", TF_STATIC})
+_LATCHED: Final = frozenset({"/map", TF_STATIC})
 """Topics whose last message stays for late listeners."""
 _VERSION: Final = 8
 """Version of the metadata that ROS 2 Humble and all later releases read."""
 _FOREVER: Final = QosTime(9223372036, 854775807)
 _QOS: Final = Qos(
-    history=QosHistory.KEEP_LAST,
-    depth=10,
-    reliability=QosReliability.RELIABLE,
-    durability=QosDurability.VOLATILE,
-    deadline=_FOREVER,
-    lifespan=_FOREVER,
-    liveliness=QosLiveliness.AUTOMATIC,
-    liveliness_lease_duration=_FOREVER,
-    avoid_ros_namespace_conventions=False,
+    *(QosHistory.KEEP_LAST, 10, QosReliability.RELIABLE, QosDurability.VOLATILE, _FOREVER, _FOREVER),
+    *(QosLiveliness.AUTOMATIC, _FOREVER, False),
 )
-_IDENTITY: Final = ros.geometry_msgs__msg__Transform(
-    ros.geometry_msgs__msg__Vector3(0.0, 0.0, 0.0), ros.geometry_msgs__msg__Quaternion(0.0, 0.0, 0.0, 1.0)
-)
+_HERE: Final = {"position": {}, "orientation": {"w": 1.0}}
 
-Data = Mapping[str, Any]
-Message = tuple[str, Any]
-"""Topic and message."""
+Message = tuple[str, str, Fields]
+"""Topic, type and fields."""
 
 
 def write_bag(events: Iterable[Event], folder: Path, name: str) -> int:
@@ -87,8 +69,8 @@ def write_bag_file(events: Iterable[Event], path: Path) -> int:
 
 
 def _write(events: Iterable[Event], bag: Path) -> int:
-    events, store = tuple(events), get_typestore(Stores.ROS2_HUMBLE)
-    starts_s = (each.data["start_s"] for each in events if each.topic == WALL and "start_s" in each.data)
+    events, types = tuple(events), ros_types()
+    starts_s = (each.data["start_s"] for each in events if each.topic == "wall" and "start_s" in each.data)
     converter = _Converter(next(starts_s, 0.0))
     writer = Writer(bag, version=_VERSION, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
@@ -96,13 +78,13 @@ def _write(events: Iterable[Event], bag: Path) -> int:
         connections: dict[str, Any] = {}
         for event in events:
             time_ns = round((converter.start_s + event.stamp_s) * 1e9)
-            for topic, message in converter.messages(event):
-                kind = message.__msgtype__
+            for topic, kind, fields in converter.messages(event):
                 if topic not in connections:
                     qos = _QOS._replace(durability=QosDurability.TRANSIENT_LOCAL) if topic in _LATCHED else _QOS
-                    added = writer.add_connection(topic, kind, typestore=store, offered_qos_profiles=[qos])
-                    connections[topic] = added
-                writer.write(connections[topic], time_ns, store.serialize_cdr(message, kind))
+                    added = writer.add_connection(topic, kind, typestore=types.store, offered_qos_profiles=[qos])
+                    connections[topic] = added, types.message(kind)
+                connection, message_type = connections[topic]
+                writer.write(connection, time_ns, message_type.encode(fields))
     return sum(writer.counts.values())
 
 
@@ -111,93 +93,53 @@ class _Converter:
     """Converts events to ROS 2 messages; `start_s` is the wall time (s since 1970) at which the robot's clock began."""
 
     start_s: float
-    statics: dict[str, ros.geometry_msgs__msg__TransformStamped] = field(default_factory=dict)
+    statics: dict[str, Fields] = field(default_factory=dict)
 
     def messages(self, event: Event) -> Iterator[Message]:
         """Iterates over the messages of an event; none for one that repeats another."""
-        data, robot = event.data, str(event.data.get("robot") or "")
+        data, topic, robot = event.data, event.topic, str(event.data.get("robot") or "")
         space = f"/{ros_name(robot)}" if robot else "/errand"
-        when, frame = self._stamp(data, event.stamp_s), str(data.get("frame_id", "world"))
-        header = ros.std_msgs__msg__Header(when, frame)
-        if event.topic in VIEWER_COPIES or (event.topic == MAP and "data" in data):  # the grid has the same map
+        own = data.get("timestamp")
+        stamp_s = self.start_s + (event.stamp_s if own is None else own["sec"] + own["nsec"] * 1e-9)
+        header = messages.header(stamp_s, str(data.get("frame_id", "world")))
+        if topic in VIEWER_COPIES or (topic == "map" and "data" in data):  # the grid has the same map
             return
         if not self.statics:
-            yield self._static(_transform(when, _ROOT, "world", _IDENTITY))
-        if event.topic == POSE:
-            pose = _pose(data["pose"])
-            yield f"{space}/{POSE}", ros.geometry_msgs__msg__PoseStamped(header, pose)
-            yield TF, ros.tf2_msgs__msg__TFMessage([_transform(when, frame, body_frame(robot), _moved(pose))])
-        elif event.topic == PATH:
-            poses = [ros.geometry_msgs__msg__PoseStamped(header, _pose(pose)) for pose in data["poses"]]
-            yield f"{space}/{PATH}", ros.nav_msgs__msg__Path(header, poses)
-        elif event.topic == JOINTS:
-            yield f"{space}/joint_states", _joint_state(header, data)
-        elif event.topic == SCAN:
+            yield self._static(messages.moved(messages.header(stamp_s, _ROOT), "world", _HERE))
+        if topic == "pose":
+            yield f"{space}/pose", "geometry_msgs/msg/PoseStamped", {"header": header, "pose": data["pose"]}
+            moved = messages.moved(header, body_frame(robot), data["pose"])
+            yield TF, "tf2_msgs/msg/TFMessage", {"transforms": [moved]}
+        elif topic == "path":
+            poses = [{"header": header, "pose": pose} for pose in data["poses"]]
+            yield f"{space}/path", "nav_msgs/msg/Path", {"header": header, "poses": poses}
+        elif topic == "joints":
+            columns = {"name": [joint["name"] for joint in data["joints"]]}
+            for what in ("position", "velocity", "effort"):
+                columns[what] = np.array([joint[what] for joint in data["joints"]], float)
+            yield f"{space}/joint_states", "sensor_msgs/msg/JointState", {"header": header, **columns}
+        elif topic == "scan":
             lidar = f"{ros_name(robot)}/lidar"
             if lidar not in self.statics:
-                yield self._static(_transform(when, body_frame(robot), lidar, _moved(_pose(data["pose"]))))
-            yield f"{space}/{SCAN}", _laser_scan(ros.std_msgs__msg__Header(when, lidar), data)
-        elif event.topic == GRID:
-            yield f"/{MAP}", _occupancy_grid(header, data)
+                yield self._static(messages.moved(messages.header(stamp_s, body_frame(robot)), lidar, data["pose"]))
+            ranges, ends = [value or np.nan for value in data["ranges"]], (data["start_angle"], data["end_angle"])
+            scan = messages.laser_scan(messages.header(stamp_s, lidar), ranges, *ends)
+            yield f"{space}/scan", "sensor_msgs/msg/LaserScan", scan
+        elif topic == GRID:
+            cells = np.frombuffer(base64.b64decode(data["data"]), np.int8)  # an unknown cell, 255 in the log, is -1
+            width, size_m = data["column_count"], data["cell_size"]["x"]
+            info = {"resolution": size_m, "width": width, "height": len(cells) // width}
+            info |= {"origin": data["pose"], "map_load_time": header["stamp"]}
+            yield "/map", "nav_msgs/msg/OccupancyGrid", {"header": header, "info": info, "data": cells}
         elif data.get("format") == "jpeg" and "data" in data:
             content = np.frombuffer(base64.b64decode(data["data"]), np.uint8)
-            picture = ros.sensor_msgs__msg__CompressedImage(header, data["format"], content)
-            yield f"{space}/{event.topic}/compressed", picture
+            picture = {"header": header, "format": "jpeg", "data": content}
+            yield f"{space}/{topic}/compressed", "sensor_msgs/msg/CompressedImage", picture
         else:
-            yield f"/errand/{event.topic}", ros.std_msgs__msg__String(json.dumps(data, ensure_ascii=False))
+            text = json.dumps(data, ensure_ascii=False)
+            yield f"/errand/{topic}", "std_msgs/msg/String", {"data": text}
 
-    def _stamp(self, data: Data, stamp_s: float) -> ros.builtin_interfaces__msg__Time:
-        own = data.get("timestamp")
-        time_s = self.start_s + (stamp_s if own is None else own["sec"] + own["nsec"] * 1e-9)
-        return ros.builtin_interfaces__msg__Time(*divmod(round(time_s * 1e9), 10**9))
-
-    def _static(self, transform: ros.geometry_msgs__msg__TransformStamped) -> Message:
+    def _static(self, transform: Fields) -> Message:
         """All static transforms, with a new one; listeners that come late get the last message alone."""
-        self.statics[transform.child_frame_id] = transform
-        return TF_STATIC, ros.tf2_msgs__msg__TFMessage(list(self.statics.values()))
-
-
-def _pose(pose: Data) -> ros.geometry_msgs__msg__Pose:
-    position = ros.geometry_msgs__msg__Point(**pose["position"])
-    return ros.geometry_msgs__msg__Pose(position, ros.geometry_msgs__msg__Quaternion(**pose["orientation"]))
-
-
-def _moved(pose: ros.geometry_msgs__msg__Pose) -> ros.geometry_msgs__msg__Transform:
-    """The transform that moves a frame to a pose."""
-    at = pose.position
-    return ros.geometry_msgs__msg__Transform(ros.geometry_msgs__msg__Vector3(at.x, at.y, at.z), pose.orientation)
-
-
-def _transform(
-    stamp: ros.builtin_interfaces__msg__Time, parent: str, child: str, moved: ros.geometry_msgs__msg__Transform
-) -> ros.geometry_msgs__msg__TransformStamped:
-    return ros.geometry_msgs__msg__TransformStamped(ros.std_msgs__msg__Header(stamp, parent), child, moved)
-
-
-def _occupancy_grid(header: ros.std_msgs__msg__Header, data: Data) -> ros.nav_msgs__msg__OccupancyGrid:
-    cells = np.frombuffer(base64.b64decode(data["data"]), np.int8)  # an unknown cell, 255 in the log, is -1
-    width, size_m = data["column_count"], data["cell_size"]["x"]
-    height, origin = len(cells) // width, _pose(data["pose"])
-    info = ros.nav_msgs__msg__MapMetaData(header.stamp, size_m, width, height, origin)
-    return ros.nav_msgs__msg__OccupancyGrid(header, info, cells)
-
-
-def _laser_scan(header: ros.std_msgs__msg__Header, data: Data) -> ros.sensor_msgs__msg__LaserScan:
-    ranges = np.array([value or math.inf for value in data["ranges"]], np.float32)
-    return ros.sensor_msgs__msg__LaserScan(
-        header,
-        angle_min=data["start_angle"],
-        angle_max=data["end_angle"],
-        angle_increment=(data["end_angle"] - data["start_angle"]) / max(len(ranges) - 1, 1),
-        time_increment=0.0,
-        scan_time=0.0,
-        range_min=_LEAST_RANGE_M,
-        range_max=_LONGEST_RANGE_M,
-        ranges=ranges,
-        intensities=np.zeros(0, np.float32),
-    )
-
-
-def _joint_state(header: ros.std_msgs__msg__Header, data: Data) -> ros.sensor_msgs__msg__JointState:
-    columns = (np.array([each[name] for each in data["joints"]], float) for name in ("position", "velocity", "effort"))
-    return ros.sensor_msgs__msg__JointState(header, [joint["name"] for joint in data["joints"]], *columns)
+        self.statics[transform["child_frame_id"]] = transform
+        return TF_STATIC, "tf2_msgs/msg/TFMessage", {"transforms": [*self.statics.values()]}

@@ -18,17 +18,15 @@ from typing import Any, Final
 
 import numpy as np
 from py_trees.behaviour import Behaviour
-from py_trees.common import Status
 
 from errand_ros2 import messages
-from errand_ros2.driving import TOPIC, Driving
+from errand_ros2.driving import Driving
 from errand_ros2.goals import Goals
-from errand_ros2.inputs import FRAMES, planar_pose
+from errand_ros2.inputs import FRAMES, TOPIC, planar_pose
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Node, Publisher
 from errand_ros2.wire.session import Place, open_session
-from errand_ros2.wire.types import ros_types
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.backend import Observe
 from executive.app.runs.conversations import Conversations
@@ -124,7 +122,7 @@ class Bridge(RunVisitor):
             events.put(_event("refused", {"message": why}))
 
         def hear(said: Any) -> None:
-            replies.put(messages.text(self._conversations.hear(said.data, name).text))
+            replies.put({"data": self._conversations.hear(said.data, name).text})
 
         driving = Driving(name, self._control)
         goals = Goals(node, prepared, self._control, self._grid, self._pool, refuse, self._hurry.set)
@@ -176,11 +174,10 @@ class Bridge(RunVisitor):
     def tick(self, progress: Progress) -> None:
         """Publishes what is due, sends commands of `/cmd_vel`, and waits for the wall clock."""
         now_s = progress.now_s
-        self._clock.put(messages.clock(now_s))
-        for name, own in self._robots.items():
+        self._clock.put({"clock": messages.time_of(now_s)})
+        for own in self._robots.values():
             if own.context is not None and own.topics is not None:
-                step = _step(progress, name) if own.goals.are_any else ("", "")
-                self._tick_robot(own, own.context, own.topics, step)
+                self._tick_robot(own, own.context, own.topics, progress)
         if now_s >= self._diagnostics_due_s:
             self._diagnostics_due_s = now_s + _DIAGNOSTICS_PERIOD_S
             for name, own in self._robots.items():
@@ -188,7 +185,7 @@ class Bridge(RunVisitor):
                     self._diagnostics.put(_diagnostics(now_s, name, own.context, progress))
         self._keep_pace(now_s)
 
-    def _tick_robot(self, own: _RobotBridge, context: SkillContext, topics: RobotTopics, step: tuple[str, str]) -> None:
+    def _tick_robot(self, own: _RobotBridge, context: SkillContext, topics: RobotTopics, progress: Progress) -> None:
         now_s = context.clock.now()
         while own.initial:
             _set_pose(context, own.initial.pop(0))
@@ -199,7 +196,7 @@ class Bridge(RunVisitor):
             own.pose.put(messages.pose_with_covariance(now_s, context.X_WB(), estimate.covariance))
         if own.is_active:
             own.driving.tick(context)
-            own.goals.tick(context, now_s, step)
+            own.goals.tick(context, progress)
 
     def mission_ended(self, end: MissionEnd) -> None:
         """Ends the goals of a robot whose mission has ended."""
@@ -233,25 +230,18 @@ class Bridge(RunVisitor):
 
 def _answer(what: str, call: Callable[[], None], hurry: Callable[[], None], _: Any) -> Any:
     """Calls a command of a service; returns the response, with the reason when it is refused."""
-    response = ros_types().service(_TRIGGER).response.make
     try:
         call()
         hurry()
     except ValueError as error:
-        return response(False, str(error))
-    return response(True, what)
+        return {"success": False, "message": str(error)}
+    return {"success": True, "message": what}
 
 
 def _event(topic: str, message: Mapping[str, Any]) -> Any:
     """Returns an event as text: its topic in the log, and its message in JSON."""
     values = {key: value for key, value in message.items() if key != "image"}
-    return messages.text(json.dumps({"topic": topic, **plain_values(values)}, ensure_ascii=False))
-
-
-def _step(progress: Progress, robot: str) -> tuple[str, str]:
-    """Returns the path id of the robot's running skill, and what it says."""
-    running = [(path, each.message) for path, each in progress.states[robot].items() if each.status is Status.RUNNING]
-    return running[-1] if running else ("", "")
+    return {"data": json.dumps({"topic": topic, **plain_values(values)}, ensure_ascii=False)}
 
 
 def _diagnostics(now_s: float, name: str, context: SkillContext, progress: Progress) -> Any:
@@ -263,7 +253,7 @@ def _diagnostics(now_s: float, name: str, context: SkillContext, progress: Progr
         "overruns": str(progress.overruns),
         "tick (ms)": f"{progress.tick_wall_s * 1e3:.1f}",
     }
-    return messages.diagnostics(now_s, name, robot.faults(), [*values.items()])
+    return messages.diagnostics(now_s, name, robot.faults(), values)
 
 
 def _set_pose(context: SkillContext, stamped: Any) -> None:

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from errand_ros2.inputs import velocity
+from errand_ros2.inputs import LIFE_S, TOPIC, HeardVelocity
 from executive.run.control import Control
 from skills.api import SkillContext
-from skills.inputs.errors import InputError
 from skills.navigate.base import Base
 from skills.navigate.follower import FollowerOptions
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m
 from skills.robot import FloatArray
 
-TOPIC: Final = "cmd_vel"
-LIFE_S: Final = 0.2
-"""Time (wall clock) after which a velocity no longer counts; then the robot stands."""
 RESUME_S: Final = 1.0
 """Time (wall clock) without velocities after which the mission goes on."""
 _REASON: Final = f"driven by {TOPIC}"
@@ -27,25 +23,18 @@ _REACTION_S, _BRAKING_M_S2, _SAMPLES = 0.4, 2.0, 6
 _TICK_S: Final = 0.05
 
 
-class Driving:
-    """Driver of one robot by velocities. Any thread may call `hear`; the run calls `tick`."""
+class Driving(HeardVelocity):
+    """Driver of one robot by velocities, which count on the wall clock. The run calls `tick`."""
 
     def __init__(self, robot_name: str, control: Control) -> None:
+        super().__init__(time.monotonic)
         self._name, self._control = robot_name, control
-        self._asked: tuple[tuple[float, float, float], float] = ((0.0, 0.0, 0.0), -math.inf)
         self._base: tuple[SkillContext, Base] | None = None
         self._driving, self._moved_s = False, -math.inf
 
-    def hear(self, twist: Any) -> None:
-        """Takes a velocity; one that is not finite stops the robot."""
-        try:
-            self._asked = (velocity(twist), time.monotonic())
-        except InputError:
-            self._asked = ((0.0, 0.0, 0.0), -math.inf)
-
     def tick(self, context: SkillContext) -> None:
         """Sends the command for the next tick, while velocities arrive."""
-        (asked, at_s), now_s = self._asked, time.monotonic()
+        (asked, at_s), now_s = self.last, time.monotonic()
         alive = now_s - at_s <= LIFE_S
         if alive and any(asked) and not self._driving:
             self._control.pause(_REASON, robot=self._name)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -17,17 +17,19 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
+from py_trees.common import Status
+
 from errand_ros2 import messages
 from errand_ros2.inputs import pose_on_map
 from errand_ros2.wire.actions import ActionServer, Goal, GoalStatus
 from errand_ros2.wire.node import Node
-from errand_ros2.wire.types import ros_types
 from executive.app.prepare.prepared import Prepared
 from executive.language.parser import load_parser
 from executive.mission.load import load_mission
 from executive.mission.resolve import mission_from_file
 from executive.run.control import Control
 from executive.run.outcome import Outcome
+from executive.run.visitor import Progress
 from executive.tree.compiler import CompiledTree
 from executive.words.mission import Mission
 from skills.api import SkillContext
@@ -36,6 +38,7 @@ from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 
 FEEDBACK_PERIOD_S: Final = 0.5
+_GOAL_POSE, _TO_POSE, _MISSION = "goal_pose", "navigate_to_pose", "run_mission"
 _STOP: Final = {"wait": {"seconds": 0.05}}
 _FAILED: Final = 9000
 """Error code of navigate_to_pose for any failure; its message has the cause."""
@@ -43,16 +46,16 @@ _FAILED: Final = 9000
 
 @dataclass
 class _Pursued:
-    """Goal that is pursued as a mission; the mission `stop` takes its place when it is cancelled.
+    """Goal of a topic or action that is pursued as a mission; the mission `stop` takes its place when it is cancelled.
 
     `goal` is None for one of the topic `goal_pose`.
     """
 
+    source: str
+    goal: Goal | None
+    poses: tuple[Pose2D, ...]
     mission: str
     stop: CompiledTree
-    server: ActionServer | None
-    goal: Goal | None
-    pose: Pose2D | None
     since_s: float | None = None
 
 
@@ -67,47 +70,42 @@ class Goals:
         grid: GridMap,
         pool: Executor,
         refuse: Callable[[str], None],
-        hurry: Callable[[], None] = lambda: None,
+        hurry: Callable[[], None],
     ) -> None:
         """`prepared` is the robot's part of the run; `pool` compiles goals, `refuse` tells why one is refused.
 
         `hurry` lets the next tick begin at once.
         """
-        self._hurry = hurry
-        self._prepared, self._control, self._grid, self._refuse = prepared, control, grid, refuse
+        self._prepared, self._control, self._grid = prepared, control, grid
+        self._refuse, self._hurry = refuse, hurry
         self._name = prepared.mission.robot_name
         self._numbers, self._lock = count(1), threading.RLock()
         self._pursued: dict[str, _Pursued] = {}
         self._frames: Mapping[str, Pose2D] = {}
         self._due_s = -math.inf
-        self._duration = ros_types().message("builtin_interfaces/msg/Duration").make
         self._odom = f"{node.namespace.strip('/')}/odom"
         make = partial(ActionServer, node, pool=pool, cancel=self._cancel)
-        self._navigate = make("navigate_to_pose", "nav2_msgs/action/NavigateToPose", accept=self._accept_pose)
-        self._run = make("run_mission", "errand_msgs/action/RunMission", accept=self._accept_mission)
+        self._actions = {
+            _TO_POSE: make(
+                _TO_POSE,
+                "nav2_msgs/action/NavigateToPose",
+                accept=lambda goal: self._accept(_TO_POSE, goal, [goal.message.pose]),
+            ),
+            _MISSION: make(
+                _MISSION, "errand_msgs/action/RunMission", accept=lambda goal: self._accept(_MISSION, goal, [])
+            ),
+        }
 
     def hear_pose(self, stamped: Any) -> None:
         """Drives to a pose of `goal_pose`; tells why it cannot."""
-        try:
-            pose = pose_on_map(stamped, self._grid, self._frames)
-            self._pursue(lambda name: self._to_pose(name, pose), None, None, pose)
-        except (InputError, ValueError) as error:
-            self._refuse(f"goal_pose is refused: {error}")
+        self._accept(_GOAL_POSE, None, [stamped])
 
-    def _accept_pose(self, goal: Goal) -> bool:
+    def _accept(self, source: str, goal: Goal | None, stamped: Sequence[Any]) -> bool:
+        """Pursues a goal of a topic or action; tells why it cannot."""
         try:
-            pose = pose_on_map(goal.message.pose, self._grid, self._frames)
-            self._pursue(lambda name: self._to_pose(name, pose), self._navigate, goal, pose)
+            self._pursue(source, goal, tuple(pose_on_map(each, self._grid, self._frames) for each in stamped))
         except (InputError, ValueError) as error:
-            self._refuse(f"navigate_to_pose is refused: {error}")
-            return False
-        return True
-
-    def _accept_mission(self, goal: Goal) -> bool:
-        try:
-            self._pursue(partial(self._mission, goal.message.sentence, goal.message.file), self._run, goal, None)
-        except (InputError, ValueError) as error:
-            self._refuse(f"run_mission is refused: {error}")
+            self._refuse(f"{source} is refused: {error}")
             return False
         return True
 
@@ -120,17 +118,17 @@ class Goals:
                     self._control.replace(found.stop, instead_of=found.mission)
                 self._hurry()
 
-    def _pursue(
-        self, mission: Callable[[str], Mission], server: ActionServer | None, goal: Goal | None, pose: Pose2D | None
-    ) -> None:
+    def _pursue(self, source: str, goal: Goal | None, poses: tuple[Pose2D, ...]) -> None:
         """Compiles a goal's mission, and lets it begin in place of the goal before. Raises InputError, ValueError."""
         if not self._control.state.missions.get(self._name):
             raise InputError(f"{self._name} has no mission any more", hint="send goals while its mission lasts")
         name = f"ros2 goal {next(self._numbers)}"
-        tree, stop = self._compiled(mission(name)), self._compiled(self._mission_of(f"{name} cancelled", _STOP))
+        asked = None if goal is None else goal.message
+        mission = self._asked(name, asked) if source == _MISSION else self._mission_of(name, *map(_drive_to, poses))
+        tree, stop = self._compiled(mission), self._compiled(self._mission_of(f"{name} cancelled", _STOP))
         with self._lock:
             before = next(reversed(self._pursued), None)
-            self._pursued[name] = _Pursued(name, stop, server, goal, pose)
+            self._pursued[name] = _Pursued(source, goal, poses, name, stop)
             try:
                 if before is None:
                     self._control.preempt(tree)
@@ -147,51 +145,36 @@ class Goals:
         world = self._prepared.world.name
         return Mission.model_validate({"name": name, "robot": self._name, "world": world, "steps": [*steps]})
 
-    def _to_pose(self, name: str, pose: Pose2D) -> Mission:
-        goal = {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_rad": pose.yaw_rad}
-        return self._mission_of(name, {"skill": "navigate", "with": {"goal": goal}})
-
-    def _mission(self, sentence: str, file: str, name: str) -> Mission:
+    def _asked(self, name: str, goal: Any) -> Mission:
         """Reads the mission of a sentence or a file, under another name. Raises InputError."""
-        if bool(sentence) == bool(file):
+        if bool(goal.sentence) == bool(goal.file):
             raise InputError("a mission is a sentence or a file", hint="fill in one of the two")
-        asked = self._mission_of(name, {"say": sentence}) if sentence else load_mission(Path(file))
+        asked = self._mission_of(name, {"say": goal.sentence}) if goal.sentence else load_mission(Path(goal.file))
         found = mission_from_file(asked, parser=load_parser(), knowledge=self._prepared.knowledge)
         return found.model_copy(update={"name": name, "robot": self._name})
 
-    @property
-    def are_any(self) -> bool:
-        """Returns whether a goal is pursued."""
-        return bool(self._pursued)
-
-    def tick(self, context: SkillContext, now_s: float, step: tuple[str, str]) -> None:
-        """Publishes feedback twice a second; `step` is the path id of the running node, and what it says."""
+    def tick(self, context: SkillContext, progress: Progress) -> None:
+        """Publishes feedback twice a second."""
         self._frames = {self._odom: Pose2D.from_transform(context.localiser.estimate().X_WO)}
-        if now_s < self._due_s:
+        if (now_s := context.clock.now()) < self._due_s:
             return
         self._due_s = now_s + FEEDBACK_PERIOD_S
         with self._lock:
             pursued = [*self._pursued.values()]
         for each in pursued:
-            if each.server is None or each.goal is None:
+            if each.goal is None:
                 continue
+            action = self._actions[each.source]
             if each.since_s is None:
                 each.since_s = now_s
-                each.server.begin(each.goal)
-            if each.server is self._run:
-                each.server.tell(each.goal, each.server.kind.feedback.make(*step))
+                action.begin(each.goal)
+            if each.source == _MISSION:
+                states = progress.states[self._name].items()
+                running = [(path, at.message) for path, at in states if at.status is Status.RUNNING]
+                path, message = running[-1] if running else ("", "")
+                action.tell(each.goal, step=path, message=message)
             else:
-                self._tell_distance(each, context, now_s)
-
-    def _tell_distance(self, each: _Pursued, context: SkillContext, now_s: float) -> None:
-        """Publishes feedback of navigate_to_pose; the distance is that of the straight line."""
-        assert each.server is not None and each.goal is not None and each.pose is not None and each.since_s is not None
-        here, took_s = context.pose(), now_s - each.since_s
-        left_m = math.hypot(each.pose.x_m - here.x_m, each.pose.y_m - here.y_m)
-        whole_s, part_s = divmod(took_s, 1.0)
-        pose = messages.pose_stamped(now_s, messages.MAP_FRAME, context.X_WB())
-        spent, left = self._duration(int(whole_s), int(part_s * 1e9)), self._duration(0, 0)
-        each.server.tell(each.goal, each.server.kind.feedback.make(pose, spent, left, 0, left_m))
+                action.tell(each.goal, **_feedback(each.poses, context, now_s, now_s - each.since_s))
 
     def message(self, message: Mapping[str, Any]) -> None:
         """Ends the goal whose mission ended, by the message of its outcome."""
@@ -209,14 +192,27 @@ class Goals:
             self._end(each, Outcome.CANCELLED, "CANCELLED", "the run has ended")
 
     def _end(self, each: _Pursued, outcome: Outcome, cause: str, words: str) -> None:
-        if each.server is None or each.goal is None:
+        if each.goal is None:
             return
         status = GoalStatus.SUCCEEDED if outcome is Outcome.SUCCESS else GoalStatus.ABORTED
         if status is GoalStatus.ABORTED and each.goal.status is GoalStatus.CANCELING:
             status, words = GoalStatus.CANCELED, "cancelled by its client"
-        if each.server is self._run:
-            result = each.server.kind.result.make(outcome.value, cause, words)
-        else:
-            code = 0 if status is GoalStatus.SUCCEEDED else _FAILED
-            result = each.server.kind.result.make(code, "" if code == 0 else f"{cause}: {words}")
-        each.server.end(each.goal, status, result)
+        failed = status is not GoalStatus.SUCCEEDED
+        result: dict[str, Any] = {"outcome": outcome.value, "cause": cause, "claim": words}
+        if each.source != _MISSION:
+            result = {"error_code": _FAILED if failed else 0, "error_msg": f"{cause}: {words}" if failed else ""}
+        self._actions[each.source].end(each.goal, status, **result)
+
+
+def _drive_to(pose: Pose2D) -> Mapping[str, Any]:
+    """Returns the step of a mission that drives to a pose."""
+    goal = {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_rad": pose.yaw_rad}
+    return {"skill": "navigate", "with": {"goal": goal}}
+
+
+def _feedback(poses: Sequence[Pose2D], context: SkillContext, now_s: float, took_s: float) -> Mapping[str, Any]:
+    """Returns the feedback of navigation; the distance is that of the straight line."""
+    here, (goal,) = context.pose(), poses
+    left_m = math.hypot(goal.x_m - here.x_m, goal.y_m - here.y_m)
+    pose = messages.pose_stamped(now_s, messages.MAP_FRAME, context.X_WB())
+    return {"current_pose": pose, "navigation_time": messages.time_of(took_s), "distance_remaining": left_m}

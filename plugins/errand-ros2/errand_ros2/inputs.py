@@ -1,12 +1,14 @@
-"""Reads poses on the map and velocities from messages of ROS 2; refuses numbers that are not finite."""
+"""Reads poses and velocities from messages of ROS 2; refuses numbers that are not finite."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RigidTransform
 
 from errand_ros2.messages import MAP_FRAME
 from skills.estimate.grid_map import GridMap
@@ -16,19 +18,26 @@ from skills.robot import Pose2D
 
 FRAMES: Final = frozenset({MAP_FRAME, "world"})
 """Names of the map's frame."""
+TOPIC: Final = "cmd_vel"
+LIFE_S: Final = 0.2
+"""Time after which a velocity no longer counts; then the robot stands."""
+STILL: Final = ((0.0, 0.0, 0.0), -math.inf)
 _SHORTEST_QUATERNION: Final = 0.1
 
 
-def planar_pose(pose: Any) -> Pose2D:
-    """Reads geometry_msgs/Pose. Raises InputError for numbers that are not finite, and for no rotation."""
-    at, turn = pose.position, pose.orientation
-    values = (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
-    if not all(math.isfinite(value) for value in values):
+def transform_of(at: Any, turn: Any) -> RigidTransform:
+    """Reads a position and a quaternion. Raises InputError for numbers that are not finite, and for no rotation."""
+    values = np.array([at.x, at.y, at.z, turn.w, turn.x, turn.y, turn.z], float)
+    if not np.isfinite(values).all():
         raise InputError("the pose has a number that is not finite", hint="send finite numbers")
-    if math.hypot(turn.x, turn.y, turn.z, turn.w) < _SHORTEST_QUATERNION:
+    if (length := float(np.linalg.norm(values[3:]))) < _SHORTEST_QUATERNION:
         raise InputError("the pose's quaternion is zero", hint="send w = 1 for no rotation")
-    yaw = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
-    return Pose2D(at.x, at.y, yaw)
+    return RigidTransform(Quaternion(values[3:] / length), values[:3])
+
+
+def planar_pose(pose: Any) -> Pose2D:
+    """Reads geometry_msgs/Pose, as `transform_of`."""
+    return Pose2D.from_transform(transform_of(pose.position, pose.orientation))
 
 
 def pose_on_map(stamped: Any, grid: GridMap, frames: Mapping[str, Pose2D]) -> Pose2D:
@@ -52,3 +61,18 @@ def velocity(twist: Any) -> tuple[float, float, float]:
     if not all(math.isfinite(value) for value in values):
         raise InputError("the velocity has a number that is not finite", hint="send finite numbers")
     return values
+
+
+class HeardVelocity:
+    """Last velocity of a topic, and when it came on the clock `now` (s). Any thread may call `hear`."""
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self.last = STILL
+
+    def hear(self, twist: Any) -> None:
+        """Takes a velocity; one that is not finite stops the robot."""
+        try:
+            self.last = velocity(twist), self._now()
+        except InputError:
+            self.last = STILL

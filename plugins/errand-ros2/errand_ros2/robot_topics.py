@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from errand_ros2 import messages
+from errand_ros2.messages import Fields
 from errand_ros2.wire.keys import LATCHED, SENSOR, Qos
-from errand_ros2.wire.node import Node, Publisher
+from errand_ros2.wire.node import Node
 from skills.robot import CameraCapabilities, Mount, NoImageError, Robot
 
 if TYPE_CHECKING:
@@ -17,6 +18,12 @@ IMAGE_PERIOD_S: Final = 0.2
 BATTERY_PERIOD_S: Final = 1.0
 _EPSILON_S: Final = 1e-6
 _TF: Final = "tf2_msgs/msg/TFMessage"
+_IMAGE, _INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
+_PICTURES: Final = {
+    False: {"image": _IMAGE, "camera_info": _INFO, "image/compressed": "sensor_msgs/msg/CompressedImage"},
+    True: {"depth": _IMAGE, "depth/camera_info": _INFO},
+}
+"""Topics of a camera, without and with depth."""
 
 
 class Frames:
@@ -25,34 +32,33 @@ class Frames:
     def __init__(self, node: Node) -> None:
         self._moving = node.publisher("/tf", _TF, Qos(depth=100))
         self._static = node.publisher("/tf_static", _TF, LATCHED)
-        self._fixed: dict[str, Any] = {}
+        self._fixed: dict[str, Fields] = {}
 
-    def move(self, every: Sequence[Any]) -> None:
+    def move(self, every: Sequence[Fields]) -> None:
         """Publishes transforms that change."""
-        self._moving.put(messages.transforms(every))
+        self._moving.put({"transforms": every})
 
-    def fix(self, *every: Any) -> None:
+    def fix(self, *every: Fields) -> None:
         """Publishes static transforms, unless they have been published."""
-        if any(each.child_frame_id not in self._fixed for each in every):
-            self._fixed |= {each.child_frame_id: each for each in every}
-            self._static.put(messages.transforms(self._fixed.values()))
+        if any(each["child_frame_id"] not in self._fixed for each in every):
+            self._fixed |= {each["child_frame_id"]: each for each in every}
+            self._static.put({"transforms": [*self._fixed.values()]})
 
 
 class _Camera:
     """Publishers of one camera; the plant renders only what a subscription asks for."""
 
     def __init__(self, node: Node, camera: CameraCapabilities, space: str) -> None:
-        self.camera, self.frame, base = camera, f"{space}/{camera.source}_camera", camera.source
-        self.image = node.publisher(f"{base}/image", "sensor_msgs/msg/Image", SENSOR)
-        self.info = node.publisher(f"{base}/camera_info", "sensor_msgs/msg/CameraInfo", SENSOR)
-        self.depth = node.publisher(f"{base}/depth", "sensor_msgs/msg/Image", SENSOR)
-        self.depth_info = node.publisher(f"{base}/depth/camera_info", "sensor_msgs/msg/CameraInfo", SENSOR)
+        self.camera, self.frame = camera, f"{space}/{camera.source}_camera"
+        self.out = {
+            depth: {name: node.publisher(f"{camera.source}/{name}", kind, SENSOR) for name, kind in topics.items()}
+            for depth, topics in _PICTURES.items()
+        }
         self._due_s = {True: 0.0, False: 0.0}
 
     def is_due(self, now_s: float, period_s: float, *, depth: bool) -> bool:
         """Returns whether a subscription waits for the picture, or the depth; the next one is due a period later."""
-        due = self._due_s[depth] <= now_s + _EPSILON_S
-        due = due and _heard(*((self.depth, self.depth_info) if depth else (self.image, self.info)))
+        due = self._due_s[depth] <= now_s + _EPSILON_S and any(each.is_heard for each in self.out[depth].values())
         self._due_s[depth] = now_s + period_s if due else self._due_s[depth]
         return due
 
@@ -73,8 +79,7 @@ class RobotTopics:
         self._robot, self._frames = robot, frames
         self._most_columns, self._image_period_s = most_columns, image_period_s
         space = node.namespace.strip("/")
-        self._space, self.odom, self.body = space, f"{space}/odom", f"{space}/body"
-        self._lidar = f"{space}/lidar"
+        self._odom_frame, self._body, self._lidar = (f"{space}/{each}" for each in ("odom", "body", "lidar"))
         self._odom = node.publisher("odom", "nav_msgs/msg/Odometry")
         self._joints = node.publisher("joint_states", "sensor_msgs/msg/JointState")
         self._imu = node.publisher("imu", "sensor_msgs/msg/Imu", SENSOR)
@@ -83,62 +88,56 @@ class RobotTopics:
         self._battery = node.publisher("battery_state", "sensor_msgs/msg/BatteryState")
         self._holding = node.publisher("gripper/holding", "std_msgs/msg/Bool")
         self._force = node.publisher("gripper/force", "geometry_msgs/msg/WrenchStamped")
-        description = node.publisher("robot_description", "std_msgs/msg/String", LATCHED)
         abilities = robot.capabilities()
-        description.put(messages.text(abilities.description))
+        node.publisher("robot_description", "std_msgs/msg/String", LATCHED).put({"data": abilities.description})
         self._cameras = [_Camera(node, each, space) for each in abilities.cameras]
         on_body = [each for each in self._cameras if each.camera.mount is Mount.BODY]
-        frames.fix(*(messages.transform(0.0, self.body, each.frame, each.camera.X_FC) for each in on_body))
-        self._last: dict[str, float] = {}
+        frames.fix(*(messages.transform(0.0, self._body, each.frame, each.camera.X_FC) for each in on_body))
+        self.stamps_s: dict[str, float] = {}
+        """Times of the last odometry and scan that were published, by topic."""
         self._battery_due_s = 0.0
 
     def publish(self, now_s: float, X_WO: RigidTransform | None) -> None:
         """Publishes the readings that are new, and with `X_WO` where the odometry's frame lies on the map."""
         odometry = self._robot.odometry()
-        moving = [messages.transform(odometry.stamp_s, self.odom, self.body, odometry.X_OB)]
+        stamp_s = self.stamps_s["odom"] = odometry.stamp_s
+        moving = [messages.transform(stamp_s, self._odom_frame, self._body, odometry.X_OB)]
         if X_WO is not None:
-            moving.append(messages.transform(odometry.stamp_s, messages.MAP_FRAME, self.odom, X_WO))
-        self._last["odom"] = odometry.stamp_s
-        self._odom.put(messages.odometry(odometry, self.odom, self.body))
+            moving.append(messages.transform(stamp_s, messages.MAP_FRAME, self._odom_frame, X_WO))
+        self._odom.put(messages.odometry(odometry, self._odom_frame, self._body))
         self._joints.put(messages.joint_state(self._robot.joints()))
         if self._robot.capabilities().gripper is not None:
             gripper = self._robot.gripper()
-            self._holding.put(messages.truth_value(gripper.holding))
-            self._force.put(messages.wrench(gripper.stamp_s, self.body, gripper.force_n))
+            self._holding.put({"data": gripper.holding})
+            force = {
+                "header": messages.header(gripper.stamp_s, self._body),
+                "wrench": {"force": {"z": gripper.force_n}},
+            }
+            self._force.put(force)
         if (imu := self._robot.imu()) is not None:
-            self._imu.put(messages.imu(imu, self.body))
+            self._imu.put(messages.imu(imu, self._body))
         self._publish_scan()
         if now_s >= self._battery_due_s - _EPSILON_S:
             self._battery_due_s = now_s + BATTERY_PERIOD_S
             self._battery.put(messages.battery(self._robot.battery()))
         self._frames.move([*moving, *self.publish_pictures(now_s)])
 
-    @property
-    def odometry_stamp_s(self) -> float:
-        """Time of the last odometry that was published."""
-        return self._last["odom"]
-
-    @property
-    def scan_stamp_s(self) -> float | None:
-        """Time of the last scan that was published."""
-        return self._last.get("scan")
-
-    def publish_pictures(self, now_s: float) -> list[Any]:
+    def publish_pictures(self, now_s: float) -> list[Fields]:
         """Publishes the pictures for which subscriptions wait; returns the transforms of moving cameras."""
         return [each for camera in self._cameras for each in self._publish_camera(camera, now_s)]
 
     def _publish_scan(self) -> None:
         scan = self._robot.scan()
-        if scan is None or scan.stamp_s == self._last.get("scan"):
+        if scan is None or scan.stamp_s == self.stamps_s.get("scan"):
             return
-        period_s = scan.stamp_s - self._last.get("scan", scan.stamp_s)
-        self._last["scan"] = scan.stamp_s
-        self._frames.fix(messages.transform(scan.stamp_s, self.body, self._lidar, scan.X_BL))
-        self._scan.put(messages.laser_scan(scan, self._lidar, max(0.0, period_s)))
+        period_s = scan.stamp_s - self.stamps_s.get("scan", scan.stamp_s)
+        self.stamps_s["scan"] = scan.stamp_s
+        self._frames.fix(messages.transform(scan.stamp_s, self._body, self._lidar, scan.X_BL))
+        self._scan.put(messages.level_scan(scan, self._lidar, max(0.0, period_s)))
         if self._points.is_heard:
-            self._points.put(messages.points(scan, self.body))
+            self._points.put(messages.points(scan, self._body))
 
-    def _publish_camera(self, at: _Camera, now_s: float) -> list[Any]:
+    def _publish_camera(self, at: _Camera, now_s: float) -> list[Fields]:
         """Publishes what subscriptions ask for; returns the transform of a camera that moves on the body."""
         visual, depth = (at.is_due(now_s, self._image_period_s, depth=each) for each in (False, True))
         if not (visual or depth):
@@ -149,16 +148,15 @@ class RobotTopics:
             return []
         most, stamp_s = self._most_columns, reading.stamp_s
         if visual:
-            at.info.put(messages.camera_info(stamp_s, at.frame, reading.intrinsics, most))
-            at.image.put(messages.picture(reading, at.frame, most))
+            out, picture = at.out[False], messages.picture(reading, at.frame, most)
+            out["camera_info"].put(messages.camera_info(stamp_s, at.frame, reading.intrinsics, most))
+            out["image"].put(picture)
+            if out["image/compressed"].is_heard:
+                out["image/compressed"].put(messages.compressed(picture))
         if depth:
-            at.depth_info.put(messages.camera_info(stamp_s, at.frame, reading.depth_intrinsics, most))
-            at.depth.put(messages.depth(reading, at.frame, most))
+            out = at.out[True]
+            out["depth/camera_info"].put(messages.camera_info(stamp_s, at.frame, reading.depth_intrinsics, most))
+            out["depth"].put(messages.depth(reading, at.frame, most))
         if at.camera.mount is Mount.BODY:
             return []
-        X_OC = reading.frames.pose(reading.camera_frame)
-        return [messages.transform(stamp_s, self.odom, at.frame, X_OC)]
-
-
-def _heard(*publishers: Publisher) -> bool:
-    return any(each.is_heard for each in publishers)
+        return [messages.transform(stamp_s, self._odom_frame, at.frame, reading.frames.pose(reading.camera_frame))]

@@ -6,26 +6,20 @@ import math
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Any, Final
 
 import numpy as np
-from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RollPitchYaw
 
+from errand_ros2.inputs import transform_of
 from errand_ros2.wire.actions import ActionServer, Goal, GoalStatus
 from errand_ros2.wire.node import Node
-from skills.robot import (
-    ArmTrajectory,
-    Clock,
-    CommandCause,
-    CommandId,
-    CommandState,
-    CommandStatus,
-    Lease,
-    Robot,
-)
+from skills.inputs.errors import InputError
+from skills.robot import ArmTrajectory, Clock, CommandCause, CommandId, CommandState, CommandStatus, Lease, Robot
 
 TRAJECTORY: Final = "control_msgs/action/FollowJointTrajectory"
 GRIPPER: Final = "control_msgs/action/GripperCommand"
@@ -41,10 +35,6 @@ _MOST_WORK: Final = 1000
 """Most work that is done between two steps."""
 _OBJECT: Final = 0.02
 """Share of the gripper's opening by which an object keeps it open."""
-
-
-Begin = Callable[[Any], CommandId]
-"""Function that begins the motion of a goal. Raises ValueError for a goal that is none."""
 
 
 class WorkQueue(Executor):
@@ -96,12 +86,12 @@ class ServedMotions:
         """Numbers of the messages heard, and of the goals ended."""
         can = robot.capabilities()
         if can.arm is not None:
-            self._serve(node, ARM_ACTION, TRAJECTORY, self._follow(can.arm.joint_names, self._move_arm))
+            self._serve(node, ARM_ACTION, TRAJECTORY, partial(self._follow, can.arm.joint_names, robot.move_arm))
         if can.head is not None:
-            self._serve(node, HEAD_ACTION, TRAJECTORY, self._follow(can.head.joint_names, self._point_head))
+            self._serve(node, HEAD_ACTION, TRAJECTORY, partial(self._follow, can.head.joint_names, self._point_head))
         if can.gripper is not None:
             self._serve(node, GRIPPER_ACTION, GRIPPER, self._grip)
-            node.subscribe(CARRY, "std_msgs/msg/Bool", self._later(lambda told: self._carry(told.data)))
+            node.subscribe(CARRY, "std_msgs/msg/Bool", self._later(lambda told: robot.carry(told.data, lease=lease)))
         self._height_m, self._thin = can.standing_height_m, _OBJECT * (can.gripper.widest if can.gripper else 1.0)
         node.subscribe(POSTURE, "geometry_msgs/msg/Pose", self._later(self._stand))
 
@@ -112,7 +102,9 @@ class ServedMotions:
 
         return hear
 
-    def _serve(self, node: Node, name: str, kind: str, begin: Begin) -> None:
+    def _serve(self, node: Node, name: str, kind: str, begin: Callable[[Any], CommandId]) -> None:
+        """Serves an action; `begin` begins the motion of a goal, and raises ValueError for a goal that is none."""
+
         def accept(goal: Goal) -> bool:
             try:
                 command = begin(goal.message)
@@ -123,9 +115,7 @@ class ServedMotions:
             self._served.append(_Served(server, goal, command))
             return True
 
-        def cancel(goal: Goal) -> None:
-            self._work.submit(self._cancel, goal)
-
+        cancel = partial(self._work.submit, self._cancel)
         server = ActionServer(node, name, kind, accept=accept, cancel=cancel, pool=self._work)
 
     def _cancel(self, goal: Goal) -> None:
@@ -133,20 +123,14 @@ class ServedMotions:
             if each.goal is goal:
                 self._robot.stop(lease=self._lease, only=each.command)
 
-    def _follow(self, names: tuple[str, ...], move: Callable[[ArmTrajectory, float], CommandId]) -> Begin:
-        """Returns a function that begins a trajectory of these joints by `move`, which takes also its latest end."""
+    def _follow(self, names: tuple[str, ...], move: Callable[..., CommandId], goal: Any) -> CommandId:
+        """Begins a trajectory of these joints by a verb of the robot."""
+        trajectory = trajectory_of(goal.trajectory, names)
+        until_s = self._clock.now() + float(trajectory.times_s[-1]) + _EXTRA_S
+        return move(trajectory, until_s=until_s, lease=self._lease)
 
-        def begin(goal: Any) -> CommandId:
-            trajectory = trajectory_of(goal.trajectory, names)
-            return move(trajectory, self._clock.now() + float(trajectory.times_s[-1]) + _EXTRA_S)
-
-        return begin
-
-    def _move_arm(self, trajectory: ArmTrajectory, until_s: float) -> CommandId:
-        return self._robot.move_arm(trajectory, until_s=until_s, lease=self._lease)
-
-    def _point_head(self, trajectory: ArmTrajectory, until_s: float) -> CommandId:
-        return self._robot.point_head(*trajectory.positions_rad[-1].tolist(), until_s=until_s, lease=self._lease)
+    def _point_head(self, trajectory: ArmTrajectory, **until: Any) -> CommandId:
+        return self._robot.point_head(*trajectory.positions_rad[-1].tolist(), **until)
 
     def _grip(self, goal: Any) -> CommandId:
         command, can, until_s = goal.command, self._robot.capabilities().gripper, self._clock.now() + _MOST_S
@@ -155,16 +139,11 @@ class ServedMotions:
         force_n = command.max_effort if command.max_effort > 0.0 else can.max_force_n
         return self._robot.set_gripper(command.position, force_n, until_s=until_s, lease=self._lease)
 
-    def _carry(self, holding: bool) -> None:
-        self._robot.carry(holding, lease=self._lease)
-
     def _stand(self, pose: Any) -> None:
         """Takes a height over the usual one and a pitch; what is not finite or no rotation is ignored."""
-        turn = pose.orientation
-        values = np.array([turn.w, turn.x, turn.y, turn.z, pose.position.z])
-        if np.all(np.isfinite(values)) and np.linalg.norm(values[:4]) > 0.1:
-            pitch_rad = RollPitchYaw(Quaternion(values[:4] / np.linalg.norm(values[:4]))).pitch_angle()
-            height_m, until_s = self._height_m + float(values[4]), self._clock.now() + _MOST_S
+        with suppress(InputError):
+            X, until_s = transform_of(pose.position, pose.orientation), self._clock.now() + _MOST_S
+            height_m, pitch_rad = self._height_m + float(X.translation()[2]), RollPitchYaw(X.rotation()).pitch_angle()
             self._robot.stand(height_m, pitch_rad, until_s=until_s, lease=self._lease)
 
     def tick(self) -> None:
@@ -178,18 +157,18 @@ class ServedMotions:
                 self._end(each, status)
 
     def _end(self, each: _Served, status: CommandStatus) -> None:
-        done, make = status.state is CommandState.DONE, each.server.kind.result.make
+        done = status.state is CommandState.DONE
         if each.server.kind.name == TRAJECTORY:
             code = 0 if done else INVALID_GOAL if status.cause is CommandCause.INVALID else PATH_VIOLATED
-            result = make(code, status.reason)
+            result = {"error_code": code, "error_string": status.reason}
         else:
-            reading = self._robot.gripper()
-            wanted = each.goal.message.command.position
+            reading, wanted = self._robot.gripper(), each.goal.message.command.position
             stalled = done and reading.opening - wanted > self._thin
-            result = make(reading.opening, reading.force_n, stalled, done and not stalled)
+            ends = {"stalled": stalled, "reached_goal": done and not stalled}
+            result = {"position": reading.opening, "effort": reading.force_n, **ends}
         cancelled = each.goal.status is GoalStatus.CANCELING
         final = GoalStatus.SUCCEEDED if done else GoalStatus.CANCELED if cancelled else GoalStatus.ABORTED
-        each.server.end(each.goal, final, result)
+        each.server.end(each.goal, final, **result)
         self.ended += 1
 
 

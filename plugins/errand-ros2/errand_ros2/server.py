@@ -15,8 +15,7 @@ from typing import Any, Final
 from pydrake.math import RigidTransform
 
 from errand_ros2 import messages
-from errand_ros2.driving import TOPIC
-from errand_ros2.inputs import velocity
+from errand_ros2.inputs import LIFE_S, TOPIC, HeardVelocity
 from errand_ros2.robot_topics import IMAGE_PERIOD_S, Frames, RobotTopics
 from errand_ros2.served_motions import ServedMotions, WorkQueue
 from errand_ros2.wire.keys import LATCHED
@@ -24,12 +23,9 @@ from errand_ros2.wire.node import Node
 from errand_ros2.wire.session import Session
 from executive.record.other_tools import ros_name
 from skills.estimate.grid_map import GridMap
-from skills.inputs.errors import InputError
 from skills.robot import Clock, CommandId, Robot
 
 PERIOD_S: Final = 0.05
-LIFE_S: Final = 0.2
-"""Time (of the clock `Served.life`) after which a velocity no longer counts; then the robot stands."""
 _EXPIRY_S: Final = 0.1
 _HOLDER: Final = "the server of ROS 2"
 _NODE: Final = "robot"
@@ -80,39 +76,30 @@ class RobotServer:
         self.heard = 0
         """Number of the velocities heard."""
         self._node.subscribe(TOPIC, "geometry_msgs/msg/Twist", self._hear)
-        self._asked: tuple[tuple[float, float, float], float] = ((0.0, 0.0, 0.0), -math.inf)
+        self._velocity = HeardVelocity(served.life)
         self._driving: CommandId | None = None
         self.late_s = 0.0
         """Longest delay behind the wall clock (s)."""
 
     def _hear(self, twist: Any) -> None:
-        """Takes a velocity within the robot's limits; one that is not finite stops the robot."""
-        self._asked = self._within_limits(twist)
+        self._velocity.hear(twist)
         self.heard += 1
-
-    def _within_limits(self, twist: Any) -> tuple[tuple[float, float, float], float]:
-        try:
-            vx, vy, wz = velocity(twist)
-        except InputError:
-            return (0.0, 0.0, 0.0), -math.inf
-        abilities = self._robot.capabilities()
-        share = min(1.0, abilities.max_speed_m_s / max(math.hypot(vx, vy), 1e-9))
-        turn = abilities.max_turn_rate_rad_s
-        return (share * vx, share * vy, max(-turn, min(turn, wz))), self._life()
 
     def step(self) -> None:
         """Commands the base, steps the clock by one period, and publishes the readings."""
-        asked, at_s = self._asked
+        (vx, vy, wz), at_s = self._velocity.last
         if self._life() - at_s <= LIFE_S:
-            until_s = self._clock.now() + _EXPIRY_S
-            self._driving = self._robot.drive(*asked, until_s=until_s, lease=self._lease)
+            abilities, until_s = self._robot.capabilities(), self._clock.now() + _EXPIRY_S
+            share = min(1.0, abilities.max_speed_m_s / max(math.hypot(vx, vy), 1e-9))
+            turn = max(-abilities.max_turn_rate_rad_s, min(abilities.max_turn_rate_rad_s, wz))
+            self._driving = self._robot.drive(share * vx, share * vy, turn, until_s=until_s, lease=self._lease)
         elif self._driving is not None:
             self._robot.stop(lease=self._lease, only=self._driving)
             self._driving = None
         self._clock.advance(PERIOD_S)
         self.motions.tick()
         now_s = self._clock.now()
-        self._time.put(messages.clock(now_s))
+        self._time.put({"clock": messages.time_of(now_s)})
         self.topics.publish(now_s, None)
         if self._truth is not None:
             self._true.put(messages.pose_stamped(now_s, messages.MAP_FRAME, self._truth()))

@@ -148,11 +148,7 @@ def tell(rows, limit_s):
 
 
 def cancel(count):
-    types = ros_types()
-    action, made = (
-        types.action("nav2_msgs/action/NavigateToPose"),
-        types.message("unique_identifier_msgs/msg/UUID").make,
-    )
+    types, action = ros_types(), ros_types().action("nav2_msgs/action/NavigateToPose")
 
     def client(place, bridge):
         with open_session(place) as session:
@@ -162,23 +158,21 @@ def cancel(count):
             watch.wait_for(-1.0, 120.0)
             for number in range(2 * count):
                 x, y, yaw = GOALS[number // 2 % 2]
-                goal = types.blank("nav2_msgs/action/NavigateToPose_Goal")
+                goal = types.make("nav2_msgs/action/NavigateToPose_Goal")
                 goal.pose.header.frame_id, at = "map", goal.pose.pose
                 at.position.x, at.position.y = x, y
                 at.orientation.w, at.orientation.z = math.cos(yaw / 2), math.sin(yaw / 2)
-                identity = made(np.frombuffer(uuid.uuid4().bytes, np.uint8))
-                assert send.call(action.send_goal.request.make(identity, goal), limit_s=20.0).accepted
+                identity = {"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)}
+                assert send.call({"goal_id": identity, "goal": goal}, limit_s=20.0).accepted
                 if number % 2 == 0:
                     watch.wait_for(0.25)
                     time.sleep(0.5)
-                    info = types.blank("action_msgs/msg/GoalInfo")
-                    info.goal_id = identity
                     now = time.monotonic(), watch.seen[-1][1]
-                    stop.call(action.cancel_goal.request.make(info), limit_s=5.0)
+                    stop.call({"goal_info": {"goal_id": identity}}, limit_s=5.0)
                     time.sleep(1.0)
                     rows.append(watch.still_after(*now))
                 else:
-                    ended = result.call(action.get_result.request.make(identity), limit_s=120.0)
+                    ended = result.call({"goal_id": identity}, limit_s=120.0)
                     reached += ended is not None and ended.status == 4
             sys.stdout.write(f"{reached} of {count} goals reached\n")
             tell(rows, 0.2)
@@ -194,7 +188,7 @@ from errand_ros2.wire.types import ros_types
 
 with open_session(Place(port=int(sys.argv[1]))) as session:
     kind = "geometry_msgs/msg/Twist"
-    publisher, twist = Node(session, "sender").publisher("/alice/cmd_vel", kind), ros_types().blank(kind)
+    publisher, twist = Node(session, "sender").publisher("/alice/cmd_vel", kind), ros_types().make(kind)
     twist.linear.x, twist.angular.z = 0.4 * int(sys.argv[2]), 0.5
     while True:
         publisher.put(twist)

@@ -69,8 +69,9 @@ class LockStep(RobotClock):
     def _has_arrived(self):
         """Whether the robot has heard all that the server published."""
         topics, seen = self.server.topics, self.robot
-        heard = [(topics.odometry_stamp_s, seen.odometry()), (topics.odometry_stamp_s, seen.joints())]
-        heard += [] if topics.scan_stamp_s is None else [(topics.scan_stamp_s, seen.scan())]
+        at_s = topics.stamps_s
+        heard = [(at_s["odom"], seen.odometry()), (at_s["odom"], seen.joints())]
+        heard += [(at_s["scan"], seen.scan())] if "scan" in at_s else []
         all_heard = all(each is not None and each.stamp_s >= at_s - 1e-6 for at_s, each in heard)
         return all_heard and self.server.motions.ended <= sum(each.ended for each in self.robot.actions.values())
 

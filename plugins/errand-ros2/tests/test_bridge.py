@@ -76,8 +76,7 @@ class RosClient:
         return [each for each in said if each["topic"] == topic]
 
     def call(self, name):
-        request = ros_types().service(TRIGGER).request.make()
-        return self.node.client(f"/alice/{name}", TRIGGER).call(request, limit_s=5.0)
+        return self.node.client(f"/alice/{name}", TRIGGER).call({}, limit_s=5.0)
 
     def publisher(self, topic, kind):
         made = self.node.publisher(topic, kind)
@@ -99,37 +98,34 @@ class ActionClient:
         self._cancel = Client(node, f"{base}/cancel_goal", self.kind.cancel_goal)
         self.feedback = []
         node.subscribe(f"{base}/feedback", self.kind.feedback_message.name, self.feedback.append)
-        made = ros_types().message("unique_identifier_msgs/msg/UUID").make
-        self.identity = made(np.frombuffer(uuid.uuid4().bytes, np.uint8))
-        self.goal = ros_types().blank(f"{kind}_Goal")
+        self.identity = {"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)}
+        self.goal = ros_types().make(f"{kind}_Goal")
 
     def send(self):
-        return self._send.call(self.kind.send_goal.request.make(self.identity, self.goal), limit_s=20.0).accepted
+        return self._send.call({"goal_id": self.identity, "goal": self.goal}, limit_s=20.0).accepted
 
     def result(self):
-        return self._result.call(self.kind.get_result.request.make(self.identity), limit_s=60.0)
+        return self._result.call({"goal_id": self.identity}, limit_s=60.0)
 
     def cancel(self):
-        info = ros_types().blank("action_msgs/msg/GoalInfo")
-        info.goal_id = self.identity
-        return self._cancel.call(self.kind.cancel_goal.request.make(info), limit_s=5.0).return_code
+        return self._cancel.call({"goal_info": {"goal_id": self.identity}}, limit_s=5.0).return_code
 
 
 def stamped(x, y, frame="map", w=1.0):
-    message = ros_types().blank(POSE)
+    message = ros_types().make(POSE)
     message.header.frame_id, message.pose.position.x, message.pose.position.y = frame, x, y
     message.pose.orientation.w = w
     return message
 
 
 def twist(x, wz=0.0):
-    message = ros_types().blank(TWIST)
+    message = ros_types().make(TWIST)
     message.linear.x, message.angular.z = x, wz
     return message
 
 
 def text(value):
-    return ros_types().message(STRING).make(value)
+    return {"data": value}
 
 
 @pytest.fixture
@@ -208,7 +204,7 @@ def test_a_client_of_an_older_distribution_gets_the_result_in_its_form(talk):
         action.goal.pose = stamped(0.3, 0.0)
         assert action.send()
         client = Client(ros.node, "/alice/navigate_to_pose/_action/get_result", older)
-        result = client.call(older.request.make(action.identity), limit_s=60.0)
+        result = client.call({"goal_id": action.identity}, limit_s=60.0)
         assert (result.status, result.result.error_code) == (GoalStatus.SUCCEEDED, 0)
         assert not hasattr(result.result, "error_msg")
 

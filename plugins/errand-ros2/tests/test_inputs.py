@@ -17,7 +17,7 @@ FRAMES = {"alice/odom": Pose2D(1.0, 0.0, math.pi / 2)}
 
 
 def stamped(frame, x, y, yaw=0.0):
-    message = ros_types().blank("geometry_msgs/msg/PoseStamped")
+    message = ros_types().make("geometry_msgs/msg/PoseStamped")
     message.header.frame_id, message.pose.position.x, message.pose.position.y = frame, x, y
     message.pose.orientation.w, message.pose.orientation.z = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
     return message
@@ -62,7 +62,7 @@ def test_a_quaternion_of_zeros_is_refused():
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("axis", ["x", "y", "wz"])
 def test_a_velocity_that_is_not_finite_is_refused(bad, axis):
-    twist = ros_types().blank("geometry_msgs/msg/Twist")
+    twist = ros_types().make("geometry_msgs/msg/Twist")
     setattr(twist.angular if axis == "wz" else twist.linear, "z" if axis == "wz" else axis, bad)
     with pytest.raises(InputError, match="not finite"):
         velocity(twist)

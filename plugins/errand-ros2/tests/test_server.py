@@ -78,7 +78,7 @@ def soon(condition, limit_s=5.0):
 
 
 def twist(x, wz=0.0):
-    message = ros_types().blank(TWIST)
+    message = ros_types().make(TWIST)
     message.linear.x, message.angular.z = x, wz
     return message
 

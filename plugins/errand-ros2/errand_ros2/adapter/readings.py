@@ -1,4 +1,4 @@
-"""Messages of ROS 2 as readings of the robot protocol. Functions raise ValueError for what cannot be used."""
+"""Messages of ROS 2 as readings of the robot protocol. `usable` drops what cannot be used."""
 
 from __future__ import annotations
 
@@ -10,25 +10,18 @@ from typing import Any, Final
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
 from errand_ros2.adapter.description import Description, LidarFile
+from errand_ros2.inputs import transform_of, velocity
+from skills.inputs.errors import InputError
 from skills.robot import Gripper, Imu, Intrinsics, Joints, Odometry, Scan
 
 _NEAREST_M: Final = 0.3
 _MOST_PIXELS: Final = 1 << 24
-_POINT_TYPES: Final = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
-_PIXELS: Final[dict[str, tuple[str, int]]] = {
-    "rgb8": ("u1", 3),
-    "bgr8": ("u1", 3),
-    "rgba8": ("u1", 4),
-    "bgra8": ("u1", 4),
-    "mono8": ("u1", 1),
-    "16UC1": ("u2", 1),
-    "mono16": ("u2", 1),
-    "32FC1": ("f4", 1),
-}
+_POINT_TYPES: Final = {7: "f4", 8: "f8"}
+_COLOURS: Final = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4}
+_CHANNEL: Final = {"mono8": "u1", "16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
 _MILLIMETRE_M: Final = 0.001
 
 
@@ -37,25 +30,11 @@ def stamp_of(header: Any) -> float:
     return float(header.stamp.sec) + 1e-9 * float(header.stamp.nanosec)
 
 
-def transform_of(at: Any, turn: Any) -> RigidTransform:
-    """Returns a position and a quaternion as a transform."""
-    p, q = np.array([at.x, at.y, at.z], float), np.array([turn.w, turn.x, turn.y, turn.z], float)
-    length = float(np.linalg.norm(q))
-    if not (np.isfinite(p).all() and math.isfinite(length) and length > 0.1):
-        raise ValueError("a pose is not finite, or has no rotation")
-    return RigidTransform(Quaternion(q / length), p)
-
-
 def odometry(message: Any, stamp_s: float, raised_m: float) -> Odometry:
     """Returns the dead reckoning of nav_msgs/Odometry; B lies `raised_m` above its child frame."""
     X_OB = transform_of(message.pose.pose.position, message.pose.pose.orientation)
-    twist = message.twist.twist
-    velocity = (float(twist.linear.x), float(twist.linear.y), float(twist.angular.z))
-    if not all(map(math.isfinite, velocity)):
-        raise ValueError("a velocity is not finite")
-    if raised_m:
-        X_OB = RigidTransform(X_OB.rotation(), X_OB.translation() + np.array([0.0, 0.0, raised_m]))
-    return Odometry(stamp_s, X_OB, velocity)
+    X_OB.set_translation(X_OB.translation() + [0.0, 0.0, raised_m])
+    return Odometry(stamp_s, X_OB, velocity(message.twist.twist))
 
 
 def between(before: Odometry, after: Odometry, stamp_s: float) -> RigidTransform:
@@ -72,13 +51,10 @@ def joints(message: Any, stamp_s: float, names: dict[str, str]) -> Joints:
     told = [names.get(each, each) for each in message.name]
     if len(message.position) != len(told) or not np.isfinite(message.position).all():
         raise ValueError("a joint has no finite position")
-    columns = []
-    for values in (message.position, message.velocity, message.effort):
-        finite = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-        columns.append(
-            dict(zip(told, (finite if len(finite) == len(told) else np.zeros(len(told))).tolist(), strict=True))
-        )
-    return Joints(stamp_s, *columns)
+    columns = (message.position, message.velocity, message.effort)
+    known = (values if len(values) == len(told) else np.zeros(len(told)) for values in columns)
+    finite = (np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0).tolist() for values in known)
+    return Joints(stamp_s, *(dict(zip(told, values, strict=True)) for values in finite))
 
 
 def merged(before: Joints | None, new: Joints) -> Joints:
@@ -118,17 +94,9 @@ def cloud_points(message: Any) -> NDArray[np.float64]:
     """Returns the finite points (N, 3) of sensor_msgs/PointCloud2, in its frame."""
     fields = {each.name: each for each in message.fields}
     order = ">" if message.is_bigendian else "<"
-    if not {"x", "y", "z"} <= fields.keys() or any(fields[axis].datatype not in (7, 8) for axis in "xyz"):
-        raise ValueError("the points have no x, y, z of floats")
-    kinds = [f"{order}{_POINT_TYPES[fields[axis].datatype]}" for axis in "xyz"]
-    kind = np.dtype(
-        {
-            "names": [*"xyz"],
-            "formats": kinds,
-            "offsets": [fields[axis].offset for axis in "xyz"],
-            "itemsize": message.point_step,
-        }
-    )
+    formats = [order + _POINT_TYPES[fields[axis].datatype] for axis in "xyz"]
+    layout = {"names": [*"xyz"], "formats": formats, "offsets": [fields[axis].offset for axis in "xyz"]}
+    kind = np.dtype({**layout, "itemsize": message.point_step})
     rows = np.asarray(message.data, np.uint8)
     if message.row_step != message.width * message.point_step:
         rows = rows.reshape(message.height, message.row_step)[:, : message.width * message.point_step].ravel()
@@ -169,10 +137,10 @@ def flat_scan(message: Any, stamp_s: float, X_BL: RigidTransform, X_OB: RigidTra
 
 def pixels(message: Any) -> NDArray[Any]:
     """Returns the pixels of sensor_msgs/Image: (H, W) grey or depth, or (H, W, 3) RGB."""
-    known = _PIXELS.get(message.encoding)
-    if known is None or not 0 < message.width * message.height <= _MOST_PIXELS:
-        raise ValueError(f"a picture of {message.width}x{message.height} {message.encoding[:20]!r}")
-    (name, channels), height, width = known, message.height, message.width
+    height, width, channels = message.height, message.width, _COLOURS.get(message.encoding, 1)
+    if not 0 < width * height <= _MOST_PIXELS:
+        raise ValueError(f"a picture of {width}x{height} pixels")
+    name = "u1" if message.encoding in _COLOURS else _CHANNEL[message.encoding]
     kind = np.dtype((">" if message.is_bigendian else "<") + name)
     rows = np.asarray(message.data, np.uint8)[: height * message.step].reshape(height, message.step)
     row_bytes = width * channels * kind.itemsize
@@ -210,5 +178,5 @@ def usable(read: Callable[..., Any], *args: Any) -> Any:
     """Returns what a function reads, None for what cannot be used."""
     try:
         return read(*args)
-    except (ValueError, IndexError, TypeError, OverflowError, KeyError, MemoryError):
+    except (InputError, ValueError, IndexError, TypeError, OverflowError, KeyError, MemoryError):
         return None

@@ -16,7 +16,6 @@ from errand_ros2.adapter.sensors import OLD_STATE_S, SensedRobot
 from errand_ros2.served_motions import GRIPPER, INVALID_GOAL, TRAJECTORY
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError, SentGoal
 from errand_ros2.wire.node import Node
-from errand_ros2.wire.types import ros_types
 from skills.command_table import CommandTable
 from skills.robot import (
     ArmTrajectory,
@@ -137,14 +136,13 @@ class Ros2Robot(SensedRobot):
         file = self._description.file.gripper
         if file is None or self._description.capabilities.gripper is None:
             return self.sit()
-        goal = ros_types().blank(f"{GRIPPER}_Goal")
-        goal.command.position, goal.command.max_effort = file.scale * opening, force_n
+        goal = {"command": {"position": file.scale * opening, "max_effort": force_n}}
         return self._act(GRIP, goal, until_s, lease, (opening, force_n))
 
     def carry(self, holding: bool, *, lease: Lease) -> None:
         """Tells the robot whether the gripper holds an object, if a topic is described for it."""
         if lease == self._current and self._carry is not None:
-            self._carry.put(messages.truth_value(holding))
+            self._carry.put({"data": holding})
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stops base, arm and head, or only the part of a command; the gripper keeps its force."""
@@ -252,11 +250,11 @@ class Ros2Robot(SensedRobot):
     # -- inside ------------------------------------------------------------------------------------------------------
 
     def _say(self, velocity: tuple[float, float, float]) -> None:
-        if not self._description.file.base.stamped:
-            self._velocity.put(messages.twist(velocity))
-        else:
-            stamp_s = self._clock.theirs(self._clock.now())
-            self._velocity.put(messages.twist_stamped(stamp_s, self.body_frame, velocity))
+        twist = messages.twist(velocity)
+        if self._description.file.base.stamped:
+            head = messages.header(self._clock.theirs(self._clock.now()), self.body_frame)
+            twist = {"header": head, "twist": twist}
+        self._velocity.put(twist)
 
     def _halt(self, part: str, status: CommandStatus) -> None:
         """Stops a part, if it has a command, and ends that."""
@@ -272,15 +270,12 @@ class Ros2Robot(SensedRobot):
 
     def _trajectory(self, names: tuple[str, ...], trajectory: ArmTrajectory) -> Any:
         """Returns the goal of a trajectory under the names of ROS, which begins when it arrives."""
-        goal, types = ros_types().blank(f"{TRAJECTORY}_Goal"), ros_types()
-        goal.trajectory.joint_names = [self._description.joint_in_ros(name) for name in names]
-        for time_s, positions in zip(trajectory.times_s.tolist(), trajectory.positions_rad, strict=True):
-            point = types.blank("trajectory_msgs/msg/JointTrajectoryPoint")
-            point.positions = np.asarray(positions, np.float64)
-            start = point.time_from_start
-            start.sec, start.nanosec = divmod(max(0, round(time_s * 1e9)), 10**9)
-            goal.trajectory.points.append(point)
-        return goal
+        points = [
+            {"positions": np.asarray(positions, np.float64), "time_from_start": messages.time_of(time_s)}
+            for time_s, positions in zip(trajectory.times_s.tolist(), trajectory.positions_rad, strict=True)
+        ]
+        joint_names = [self._description.joint_in_ros(name) for name in names]
+        return {"trajectory": {"joint_names": joint_names, "points": points}}
 
     def _act(self, part: str, goal: Any, until_s: float, lease: Lease, values: Iterable[float]) -> CommandId:
         """Sends the goal of an action, unless there is an objection."""

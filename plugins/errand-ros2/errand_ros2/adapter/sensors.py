@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -20,6 +20,7 @@ from pydrake.math import RigidTransform
 from errand_ros2.adapter import readings
 from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import CameraFile, Description
+from errand_ros2.inputs import planar_pose, transform_of
 from errand_ros2.wire.keys import LATCHED, SENSOR
 from errand_ros2.wire.node import Node
 from skills.geometry import compose, inverse
@@ -179,7 +180,7 @@ class SensedRobot:
 
     def _hear_fixed(self, message: Any) -> None:
         for each in message.transforms:
-            moved = readings.usable(readings.transform_of, each.transform.translation, each.transform.rotation)
+            moved = readings.usable(transform_of, each.transform.translation, each.transform.rotation)
             if moved is not None and len(self._fixed) < _KEPT:
                 self._fixed[each.child_frame_id.strip("/")] = (each.header.frame_id.strip("/"), moved)
 
@@ -213,11 +214,9 @@ class SensedRobot:
 
     def _hear_pose(self, message: Any) -> None:
         stamp_s = self._clock.ours(readings.stamp_of(message.header))
-        X_MB = readings.usable(readings.transform_of, message.pose.pose.position, message.pose.pose.orientation)
-        X_OB = self._X_OB(stamp_s)
-        if X_MB is not None and X_OB is not None:
-            X_MO = compose(Pose2D.from_transform(X_MB), inverse(Pose2D.from_transform(X_OB)))
-            self._place = OwnLocalisation(stamp_s, X_MO)
+        pose, X_OB = readings.usable(planar_pose, message.pose.pose), self._X_OB(stamp_s)
+        if pose is not None and X_OB is not None:
+            self._place = OwnLocalisation(stamp_s, compose(pose, inverse(Pose2D.from_transform(X_OB))))
 
     # -- frames ------------------------------------------------------------------------------------------------------
 
@@ -282,14 +281,35 @@ class SensedRobot:
             raise ValueError(f"there is no camera {source!r}")
         if depth and file.depth is None:
             raise NoImageError(f"{source}: the camera has no depth")
-        taken = Shots(
-            self._node, file, visual=visual, depth=depth, since_s=self._clock.now() - _EPSILON_S, ours=self._clock.ours
-        )
-        with taken:
-            found = taken.wait(_PICTURE_S)
+        found = self._take_one(file, visual=visual, depth=depth)
         if found is None:
             raise NoImageError(f"{source}: no picture came within {_PICTURE_S:g} s")
         return self._image(source, found, visual=visual, depth=depth)
+
+    def _take_one(self, file: CameraFile, *, visual: bool, depth: bool) -> Mapping[str, Any] | None:
+        """Returns messages of about one time, none from before this call; None when they do not come in time."""
+        since_s, new, found = self._clock.now() - _EPSILON_S, threading.Condition(), dict[str, Any]()
+        info, image = "sensor_msgs/msg/CameraInfo", "sensor_msgs/msg/Image"
+        wanted = {"info": (file.info, info), "image": (file.image, image)} if visual else {}
+        if depth:
+            wanted |= {"depth_info": (file.depth_info or file.info, info), "depth": (str(file.depth), image)}
+
+        def take(what: str, message: Any) -> None:
+            with new:
+                found[what] = message
+                new.notify()
+
+        def fits() -> bool:
+            if found.keys() != wanted.keys():
+                return False
+            stamps = [self._clock.ours(readings.stamp_of(found[each].header)) for each in found if "info" not in each]
+            return min(stamps) >= since_s and max(stamps) - min(stamps) <= _SAME_S
+
+        with ExitStack() as ends:
+            for what, (topic, kind) in wanted.items():
+                ends.callback(self._node.subscribe(topic, kind, partial(take, what), SENSOR))
+            with new:
+                return dict(found) if new.wait_for(fits, _PICTURE_S) else None
 
     def _image(self, source: str, found: Mapping[str, Any], *, visual: bool, depth: bool) -> Image:
         stamp_s = self._clock.ours(readings.stamp_of(found["image" if visual else "depth"].header))
@@ -302,52 +322,3 @@ class SensedRobot:
         colour = picture if picture.ndim == 3 else None
         grey = readings.grey_of(picture)
         return Image(stamp_s, source, f"{source}_camera", lenses[0], lenses[-1], colour, grey, far, frames)
-
-
-class Shots:
-    """Subscriptions for one picture, its depth, and their intrinsics; they end with the block."""
-
-    def __init__(
-        self, node: Node, file: CameraFile, *, visual: bool, depth: bool, since_s: float, ours: Callable[[float], float]
-    ) -> None:
-        self._since_s, self._ours = since_s, ours
-        self._new, self._ends = threading.Condition(), ExitStack()
-        self._found: dict[str, Any] = {}
-        self._wanted: dict[str, tuple[str, str]] = {}
-        info, image = "sensor_msgs/msg/CameraInfo", "sensor_msgs/msg/Image"
-        if visual:
-            self._wanted |= {"info": (file.info, info), "image": (file.image, image)}
-        if depth:
-            self._wanted |= {"depth_info": (file.depth_info or file.info, info), "depth": (str(file.depth), image)}
-        self._node = node
-
-    def __enter__(self) -> None:
-        for what, (topic, kind) in self._wanted.items():
-            self._ends.callback(self._node.subscribe(topic, kind, self._taker(what), SENSOR))
-
-    def __exit__(self, *_: object) -> None:
-        self._ends.close()
-
-    def _taker(self, what: str) -> Callable[[Any], None]:
-        def take(message: Any) -> None:
-            with self._new:
-                self._found[what] = message
-                self._new.notify()
-
-        return take
-
-    def wait(self, limit_s: float) -> Mapping[str, Any] | None:
-        """Returns messages of about one time, taken since the picture was asked for; None after the limit."""
-        until_s = time.monotonic() + limit_s
-        with self._new:
-            while not self._fits():
-                if (left_s := until_s - time.monotonic()) <= 0.0:
-                    return None
-                self._new.wait(left_s)
-            return dict(self._found)
-
-    def _fits(self) -> bool:
-        if self._found.keys() != self._wanted.keys():
-            return False
-        stamps = [self._ours(readings.stamp_of(self._found[what].header)) for what in self._found if "info" not in what]
-        return min(stamps) >= self._since_s and max(stamps) - min(stamps) <= _SAME_S

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from errand_ros2.wire.keys import Qos
+from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Client, Node, Request
 from errand_ros2.wire.types import older_types, ros_types
 
@@ -22,7 +22,8 @@ MOST_GOALS: Final = 64
 """Goals whose results are kept; older ones are forgotten."""
 _RESULT_S: Final = 3600.0
 """Time for which a client waits for a result."""
-_STATUS_QOS: Final = Qos(depth=1, transient_local=True)
+_REJECTED, _UNKNOWN_GOAL, _TERMINATED = 1, 2, 3
+"""Answers to a request to cancel goals (action_msgs/srv/CancelGoal)."""
 
 
 class GoalStatus(IntEnum):
@@ -42,25 +43,22 @@ class GoalStatus(IntEnum):
         return self >= GoalStatus.SUCCEEDED
 
 
-class CancelCode(IntEnum):
-    """Answer to a request to cancel goals (action_msgs/srv/CancelGoal)."""
-
-    NONE = 0
-    REJECTED = 1
-    UNKNOWN_GOAL = 2
-    TERMINATED = 3
-
-
 @dataclass
 class Goal:
-    """Goal of a client: its identity, its message, its status, and its result once it has ended."""
+    """Goal of a client: its UUID, its message, its status, and its result once it has ended."""
 
-    identity: bytes
+    identity: Any
     message: Any
     accepted_ns: int
     status: GoalStatus = GoalStatus.ACCEPTED
     result: Any = None
     waiting: list[Request] = field(default_factory=list)
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """Fields of action_msgs/msg/GoalInfo."""
+        sec, nanosec = divmod(self.accepted_ns, 10**9)
+        return {"goal_id": self.identity, "stamp": {"sec": sec, "nanosec": nanosec}}
 
 
 class ActionServer:
@@ -77,17 +75,12 @@ class ActionServer:
         pool: Executor,
     ) -> None:
         """`accept`, which the `pool` calls, returns whether a goal is pursued; `cancel` begins to end one."""
-        types, self._lock = ros_types(), threading.RLock()
-        self.kind = types.action(type_name)
+        self.kind, self._lock = ros_types().action(type_name), threading.RLock()
         self._accept, self._cancel = accept, cancel
         self._goals: dict[bytes, Goal] = {}
-        self._time = types.message("builtin_interfaces/msg/Time").make
-        self._uuid = types.message("unique_identifier_msgs/msg/UUID").make
-        self._info = types.message("action_msgs/msg/GoalInfo").make
-        self._goal_status = types.message("action_msgs/msg/GoalStatus").make
         base = f"{node.absolute(name)}/_action"
         self._feedback = node.publisher(f"{base}/feedback", self.kind.feedback_message.name)
-        self._status = node.publisher(f"{base}/status", self.kind.status.name, _STATUS_QOS)
+        self._status = node.publisher(f"{base}/status", self.kind.status.name, LATCHED)
         node.serve(f"{base}/send_goal", self.kind.send_goal, lambda request: _submit(pool, self._send_goal, request))
         node.serve(f"{base}/cancel_goal", self.kind.cancel_goal, self._cancel_goal)
         node.serve(f"{base}/get_result", self.kind.get_result, self._get_result)
@@ -98,16 +91,16 @@ class ActionServer:
         """Records that a goal is being pursued."""
         self._set(goal, GoalStatus.EXECUTING)
 
-    def tell(self, goal: Goal, feedback: Any) -> None:
-        """Publishes feedback on a goal."""
-        self._feedback.put(self.kind.feedback_message.make(self._uuid_of(goal), feedback))
+    def tell(self, goal: Goal, **feedback: Any) -> None:
+        """Publishes feedback on a goal by its fields."""
+        self._feedback.put({"goal_id": goal.identity, "feedback": feedback})
 
-    def end(self, goal: Goal, status: GoalStatus, result: Any) -> None:
-        """Ends a goal, and answers all clients that wait for its result. Idempotent."""
+    def end(self, goal: Goal, status: GoalStatus, **result: Any) -> None:
+        """Ends a goal, and answers all clients that wait for its result, whose fields are given. Idempotent."""
         with self._lock:
             if goal.status.is_final:
                 return
-            goal.result, waiting, goal.waiting = result, goal.waiting, []
+            goal.result, waiting, goal.waiting = self._result(**result), goal.waiting, []
             self._set(goal, status)
         for request in waiting:
             self._reply(request, goal)
@@ -117,13 +110,13 @@ class ActionServer:
             if goal.status.is_final:
                 return
             goal.status = status
-            every = [self._goal_status(self._info_of(each), each.status) for each in self._goals.values()]
-            self._status.put(self.kind.status.make(every))
+            every = [{"goal_info": each.info, "status": each.status} for each in self._goals.values()]
+            self._status.put({"status_list": every})
 
     def _send_goal(self, request: Request) -> None:
         """Accepts or rejects a goal."""
-        identity, now_ns = request.message.goal_id.uuid.tobytes(), time.time_ns()
-        goal = Goal(identity, request.message.goal, now_ns)
+        identity = request.message.goal_id.uuid.tobytes()
+        goal = Goal(request.message.goal_id, request.message.goal, time.time_ns())
         with self._lock:
             is_new = identity not in self._goals
             if is_new:
@@ -136,7 +129,7 @@ class ActionServer:
             if is_new and not accepted:
                 with self._lock:
                     self._goals.pop(identity, None)
-            request.reply(self.kind.send_goal.response.make(accepted, self._stamp(now_ns)))
+            request.reply({"accepted": accepted, "stamp": goal.info["stamp"]})
 
     def _forget(self) -> None:
         """Forgets the oldest goals that have ended."""
@@ -161,10 +154,8 @@ class ActionServer:
                 self._set(goal, GoalStatus.CANCELING)
         for goal in found:
             self._cancel(goal)
-        code = CancelCode.NONE if found else CancelCode.REJECTED
-        if any(identity) and not found:
-            code = CancelCode.UNKNOWN_GOAL if named is None else CancelCode.TERMINATED
-        request.reply(self.kind.cancel_goal.response.make(int(code), [self._info_of(goal) for goal in found]))
+        code = _REJECTED if not any(identity) else _UNKNOWN_GOAL if named is None else _TERMINATED
+        request.reply({"return_code": 0 if found else code, "goals_canceling": [goal.info for goal in found]})
 
     def _get_result(self, request: Request) -> None:
         """Answers with a goal's result, at once or when the goal ends."""
@@ -177,21 +168,11 @@ class ActionServer:
 
     def _reply(self, request: Request, goal: Goal | None) -> None:
         status = GoalStatus.UNKNOWN if goal is None else goal.status
-        result = None if goal is None else goal.result
-        request.reply(self.kind.get_result.response.make(int(status), result or self.blank_result()))
+        request.reply({"status": status, "result": self._result() if goal is None else goal.result})
 
-    def blank_result(self) -> Any:
-        """Returns a result whose fields are all empty."""
-        return ros_types().blank(self.kind.result.name)
-
-    def _stamp(self, stamp_ns: int) -> Any:
-        return self._time(*divmod(stamp_ns, 10**9))
-
-    def _uuid_of(self, goal: Goal) -> Any:
-        return self._uuid(np.frombuffer(goal.identity, np.uint8))
-
-    def _info_of(self, goal: Goal) -> Any:
-        return self._info(self._uuid_of(goal), self._stamp(goal.accepted_ns))
+    def _result(self, **fields: Any) -> Any:
+        """Returns a result in the form of the newest distribution; older clients get the fields that they know."""
+        return ros_types().make(self.kind.result.name, **fields)
 
 
 def _submit(pool: Executor, handle: Callable[[Request], None], request: Request) -> None:
@@ -223,12 +204,11 @@ class ActionClient:
         self._send = Client(node, f"{base}/send_goal", self.kind.send_goal)
         self._cancel = Client(node, f"{base}/cancel_goal", self.kind.cancel_goal)
         self._result = Client(node, f"{base}/get_result", self.kind.get_result)
-        self._uuid = ros_types().message("unique_identifier_msgs/msg/UUID").make
 
     def send(self, goal: Any, *, limit_s: float) -> SentGoal | None:
-        """Sends a goal; returns None when the server rejects it. Raises NoAnswerError."""
-        sent = SentGoal(self._uuid(np.frombuffer(uuid.uuid4().bytes, np.uint8)))
-        answer = self._send.call(self.kind.send_goal.request.make(sent.identity, goal), limit_s=limit_s)
+        """Sends a goal or its fields; returns None when the server rejects it. Raises NoAnswerError."""
+        sent = SentGoal({"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)})
+        answer = self._send.call({"goal_id": sent.identity, "goal": goal}, limit_s=limit_s)
         if answer is None:
             self.cancel(sent)
             raise NoAnswerError("the action's server does not answer")
@@ -239,11 +219,10 @@ class ActionClient:
             sent.result, self.ended = response.result, self.ended + 1
             sent.status = GoalStatus(response.status) if 0 <= response.status <= max(GoalStatus) else GoalStatus.ABORTED
 
-        self._result.ask(self.kind.get_result.request.make(sent.identity), take, limit_s=_RESULT_S)
+        self._result.ask({"goal_id": sent.identity}, take, limit_s=_RESULT_S)
         return sent
 
     def cancel(self, sent: SentGoal) -> None:
         """Asks the server to cancel a goal; does not wait."""
-        info = ros_types().blank("action_msgs/msg/GoalInfo")
-        info.goal_id = sent.identity
-        self._cancel.ask(self.kind.cancel_goal.request.make(info), lambda _: None, limit_s=_RESULT_S)
+        request = {"goal_info": {"goal_id": sent.identity}}
+        self._cancel.ask(request, lambda _: None, limit_s=_RESULT_S)

@@ -24,46 +24,34 @@ _CDR: Final = "application/cdr"
 MOST_BYTES: Final = 1 << 26
 """Longer messages are dropped."""
 
-Answer = Callable[[Any], Any]
-"""Function from a request to its response."""
-
 
 class Publisher:
     """Publisher of one topic. Late subscribers get the last messages if its quality of service says so."""
 
     def __init__(self, node: Node, topic: str, kind: MessageType, qos: Qos) -> None:
         self.kind, self.topic = kind, topic
-        self._key = node.key.data_key(topic, kind.key)
-        self._gid = node.declare(EntityKind.PUBLISHER, topic, kind.key, qos)
+        key, self._gid = node.key.data_key(topic, kind.key), node.declare(EntityKind.PUBLISHER, topic, kind.key, qos)
         self.sent = 0
         """Number of the messages sent."""
-        session, reliability = node.session.inner, zenoh.Reliability.RELIABLE
-        self._plain: zenoh.Publisher | None = None
-        self._cached: ext.AdvancedPublisher | None = None
+        session, how = node.session.inner, {"encoding": _CDR, "reliability": zenoh.Reliability.RELIABLE}
+        self._publisher: Any
         if qos.transient_local:
             cache = ext.CacheConfig(max_samples=qos.depth)
-            self._cached = ext.declare_advanced_publisher(
-                session, self._key, encoding=_CDR, reliability=reliability, cache=cache, publisher_detection=True
-            )
+            self._publisher = ext.declare_advanced_publisher(session, key, cache=cache, publisher_detection=True, **how)
         else:
-            self._plain = session.declare_publisher(self._key, encoding=_CDR, reliability=reliability)
+            self._publisher = session.declare_publisher(key, **how)
 
     @property
     def is_heard(self) -> bool:
         """Returns whether a subscription exists now, or one may come for the cached messages."""
-        if self._plain is None:
-            return True
-        status: Any = self._plain.matching_status  # an object with `matching`, other than its stub says
+        status = getattr(self._publisher, "matching_status", True)  # one with a cache has none
         return bool(getattr(status, "matching", status))
 
     def put(self, message: Any) -> None:
-        """Publishes a message."""
-        data = self.kind.encode(message)
+        """Publishes a message, or a mapping of its fields."""
         self.sent += 1
         attachment = Attachment(self.sent, time.time_ns(), self._gid).encoded()
-        to = self._plain or self._cached
-        assert to is not None
-        to.put(data, attachment=attachment)
+        self._publisher.put(self.kind.encode(message), attachment=attachment)
 
 
 class Request:
@@ -198,8 +186,8 @@ class Node:
 
         self._declared.append(self.session.inner.declare_queryable(key, asked, complete=True))
 
-    def answer(self, name: str, type_name: str, answer: Answer) -> None:
-        """Serves a service by a function that answers at once."""
+    def answer(self, name: str, type_name: str, answer: Callable[[Any], Any]) -> None:
+        """Serves a service by a function from a request to its response, or to a mapping of its fields."""
         self.serve(name, ros_types().service(type_name), lambda request: request.reply(answer(request.message)))
 
     def client(self, name: str, type_name: str) -> Client:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
 
 from errand_ros2.wire.keys import TypeKey, dds_name
 
@@ -40,21 +39,21 @@ class MalformedError(ValueError):
 
 @dataclass(frozen=True)
 class MessageType:
-    """Message type: its class, its name, its key, and how its messages are encoded."""
+    """Message type: its name, its key, and how its messages are encoded."""
 
     name: str
     key: TypeKey
-    make: Any
-    _store: Typestore
+    types: Types
 
     def encode(self, message: Any) -> bytes:
-        """Returns a message as CDR, in little-endian order with its header."""
-        return bytes(self._store.serialize_cdr(message, self.name))
+        """Returns a message, or a mapping of its fields, as CDR in little-endian order with its header."""
+        message = self.types.make(self.name, **message) if isinstance(message, Mapping) else message
+        return bytes(self.types.store.serialize_cdr(message, self.name))
 
     def decode(self, data: bytes) -> Any:
         """Reads a message. Raises MalformedError when the bytes are no message of this type."""
         try:
-            message = self._store.deserialize_cdr(data, self.name)
+            message = self.types.store.deserialize_cdr(data, self.name)
             fits = len(data) > _CHECKED_BYTES or len(data) - len(self.encode(message)) < _PADDING_BYTES
         except Exception as error:  # generated code: struct.error, IndexError, UnicodeDecodeError and others
             raise MalformedError(f"{len(data)} bytes are no {self.name} ({type(error).__name__})") from error
@@ -92,9 +91,9 @@ class Types:
 
     def __init__(self, folder: Path = INTERFACES) -> None:
         """Reads the interface files of a folder."""
-        self._store = get_typestore(Stores.ROS2_JAZZY)
-        for name, (constants, fields) in [*self._store.fielddefs.items()]:
-            self._store.fielddefs[name] = (constants, _without_char(fields))
+        self.store = get_typestore(Stores.ROS2_JAZZY)
+        for name, (constants, fields) in [*self.store.fielddefs.items()]:
+            self.store.fielddefs[name] = (constants, _without_char(fields))
         self._read: set[str] = set()
         for file in sorted(folder.glob("*/*/*.*"), key=lambda path: path.suffix != ".msg"):
             self._register(file)
@@ -105,7 +104,7 @@ class Types:
 
     def message(self, name: str) -> MessageType:
         """Returns a message type. Raises KeyError when it is unknown."""
-        return MessageType(name, self._key(name), self._store.types[name], self._store)
+        return MessageType(name, self._key(name), self)
 
     def service(self, name: str) -> ServiceType:
         """Returns a service type. Raises KeyError when it is unknown."""
@@ -125,26 +124,31 @@ class Types:
             self.message(f"{name}_Feedback"),
         )
 
-    def blank(self, name: str) -> Any:
-        """Returns a message whose fields are zero or empty. Raises KeyError for an unknown type."""
-        _, fields = self._store.fielddefs[name]
-        return self._store.types[name](**{field: self._blank_value(kind) for field, kind in fields})
+    def make(self, name: str, /, **values: Any) -> Any:
+        """Returns a message; mappings become messages, and what is left out is zero or empty.
 
-    def _blank_value(self, kind: Any) -> Any:
-        """Returns the zero of a field's type, as rosbags describes it."""
+        Raises KeyError for an unknown type, and TypeError for an unknown field.
+        """
+        _, fields = self.store.fielddefs[name]
+        made = {field: self._value(kind, values.get(field)) for field, kind in fields}
+        return self.store.types[name](**values | made)
+
+    def _value(self, kind: Any, given: Any) -> Any:
+        """Returns the value of a field of a type as rosbags describes it; None gives its zero."""
         node, what = kind
         if node == Nodetype.NAME:
-            return self.blank(what)
+            return self.make(what, **given or {}) if given is None or isinstance(given, Mapping) else given
         if node == Nodetype.BASE:
-            return {"string": "", "wstring": "", "bool": False}.get(what[0], 0.0 if "float" in what[0] else 0)
+            zero = {"string": "", "wstring": "", "bool": False}.get(what[0], 0.0 if "float" in what[0] else 0)
+            return zero if given is None else given
         of, length = what
         length = length if node == Nodetype.ARRAY else 0
         if of[0] == Nodetype.NAME or of[1][0] in ("string", "wstring"):
-            return [self._blank_value(of) for _ in range(length)]
-        return np.zeros(length, of[1][0].replace("byte", "uint8"))
+            return [self._value(of, each) for each in ([None] * length if given is None else given)]
+        return np.zeros(length, of[1][0].replace("byte", "uint8")) if given is None else given
 
     def _key(self, name: str) -> TypeKey:
-        return TypeKey(dds_name(name), self._store.hash_rihs01(name))
+        return TypeKey(dds_name(name), self.store.hash_rihs01(name))
 
     def _register(self, file: Path) -> None:
         """Registers the types of an interface file."""
@@ -152,7 +156,7 @@ class Types:
         self._read.add(name)
         parts = [part.strip() for part in _PARTS.split(file.read_text(encoding="utf-8"))]
         if file.suffix == ".msg":
-            self._store.register(get_types_from_msg(parts[0], name))
+            self.store.register(get_types_from_msg(parts[0], name))
         elif file.suffix == ".srv":
             self._register_service(name, *parts)
         else:
@@ -163,13 +167,13 @@ class Types:
         types |= get_types_from_msg(response, f"{name}_Response")
         types |= get_types_from_msg(_EVENT.format(name), f"{name}_Event")
         types |= get_types_from_msg(_SERVICE.format(name), name)
-        self._store.register(_as_service(types))
+        self.store.register(_as_service(types))
 
     def _register_action(self, name: str, goal: str, result: str, feedback: str) -> None:
         for suffix, text in (("Goal", goal), ("Result", result), ("Feedback", feedback)):
-            self._store.register(get_types_from_msg(text, f"{name}_{suffix}"))
+            self.store.register(get_types_from_msg(text, f"{name}_{suffix}"))
         message = f"{_UUID}\n{name}_Feedback feedback"
-        self._store.register(get_types_from_msg(message, f"{name}_FeedbackMessage"))
+        self.store.register(get_types_from_msg(message, f"{name}_FeedbackMessage"))
         accepted = "bool accepted\nbuiltin_interfaces/Time stamp"
         self._register_service(f"{name}_SendGoal", f"{_UUID}\n{name}_Goal goal", accepted)
         self._register_service(f"{name}_GetResult", _UUID, f"int8 status\n{name}_Result result")

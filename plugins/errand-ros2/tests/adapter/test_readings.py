@@ -14,7 +14,7 @@ HERE = RigidTransform()
 
 
 def blank(name):
-    return ros_types().blank(name)
+    return ros_types().make(name)
 
 
 def image(form, values, **changes):

@@ -45,7 +45,7 @@ def test_feedback_of_an_action_has_the_public_hash(types, name):
 
 def test_a_message_survives_encoding():
     kind = ros_types().message("geometry_msgs/msg/PoseStamped")
-    message = ros_types().blank(kind.name)
+    message = ros_types().make(kind.name)
     message.pose.position.x, message.header.frame_id = 2.5, "map"
     assert kind.decode(kind.encode(message)) == message
 
@@ -55,7 +55,7 @@ def test_a_message_survives_encoding():
 )
 def test_a_blank_message_can_be_encoded(name):
     kind = ros_types().message(name)
-    assert kind.encode(ros_types().blank(name))[:4] == b"\0\1\0\0"
+    assert kind.encode(ros_types().make(name))[:4] == b"\0\1\0\0"
 
 
 @pytest.mark.parametrize(

@@ -25,8 +25,7 @@ from errand_ros2.goals import Goals
 from errand_ros2.inputs import FRAMES, TOPIC, planar_pose
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.wire.keys import LATCHED
-from errand_ros2.wire.node import Node, Publisher
-from errand_ros2.wire.session import Place, open_session
+from errand_ros2.wire.node import Node, Place, Publisher, open_session
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.backend import Observe
 from executive.app.runs.conversations import Conversations
@@ -100,8 +99,6 @@ class Bridge(RunVisitor):
         self._node.subscribe(f"/{TOPIC}", "geometry_msgs/msg/Twist", first.driving.hear)
         self._diagnostics_due_s = 0.0
         self._begun: tuple[float, float] | None = None
-        self.late_s = 0.0
-        """Longest delay behind the wall clock (s)."""
 
     def _later(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
         """Returns a handler that works in the bridge's own thread, because it may take long."""
@@ -214,7 +211,6 @@ class Bridge(RunVisitor):
         wall_s = time.monotonic()
         begun_s, begun_wall_s = self._begun = self._begun or (now_s, wall_s)
         ahead_s = (now_s - begun_s) / self._pace - (wall_s - begun_wall_s)
-        self.late_s = max(self.late_s, -ahead_s)
         if ahead_s > 0.0:
             self._hurry.wait(ahead_s)
         elif ahead_s < -_LATE_S:

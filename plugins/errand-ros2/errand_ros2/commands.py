@@ -65,8 +65,8 @@ def serve_ros2(
     ] = None,
 ) -> None:
     """Serves a simulated robot in ROS 2, without navigation, until Ctrl-C."""
-    from errand_ros2.server import RobotServer, Served
-    from errand_ros2.wire.session import Place, open_session
+    from errand_ros2.server import RobotServer
+    from errand_ros2.wire.node import Place, open_session
     from executive.app.prepare.placed_robots import only_robot, refuse_blocked
     from executive.app.prepare.worlds import open_world
     from executive.app.runs.simulated import compile_first, simulate
@@ -90,10 +90,8 @@ def serve_ros2(
             session,
             simulation.robots[robot],
             simulation.clock,
-            Served(
-                grid=load_grid_map(opened.scan_map_path) if with_map else None,
-                truth=(lambda: simulation.engine.poses_W()[robot]) if truth else None,
-            ),
+            grid=load_grid_map(opened.scan_map_path) if with_map else None,
+            truth=(lambda: simulation.engine.poses_W()[robot]) if truth else None,
         )
         router = "the router is here" if session.is_router else "by its router"
         console.print(f"ROS 2: /{ros_name(robot)}, domain {at.domain}, {at.endpoint} ({router}; Ctrl-C ends it)")

@@ -14,7 +14,7 @@ from errand_ros2.messages import MAP_FRAME
 from skills.estimate.grid_map import GridMap
 from skills.geometry import compose
 from skills.inputs.errors import InputError
-from skills.robot import Pose2D
+from skills.robot import Capabilities, Pose2D
 
 FRAMES: Final = frozenset({MAP_FRAME, "world"})
 """Names of the map's frame."""
@@ -61,6 +61,13 @@ def velocity(twist: Any) -> tuple[float, float, float]:
     if not all(math.isfinite(value) for value in values):
         raise InputError("the velocity has a number that is not finite", hint="send finite numbers")
     return values
+
+
+def within_limits(velocity: tuple[float, float, float], can: Capabilities) -> tuple[float, float, float]:
+    """Returns a velocity of the base within its limits."""
+    vx, vy, wz = velocity
+    share, most = min(1.0, can.max_speed_m_s / max(math.hypot(vx, vy), 1e-9)), can.max_turn_rate_rad_s
+    return share * vx, share * vy, max(-most, min(wz, most))
 
 
 class HeardVelocity:

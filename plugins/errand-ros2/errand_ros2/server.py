@@ -1,4 +1,4 @@
-"""A simulated robot as a robot of ROS 2: its topics, `/clock`, `cmd_vel` with a watchdog, arm and gripper.
+"""A simulated robot as a robot of ROS 2: topics, `/clock`, `cmd_vel` with a watchdog, actions of arm, head and gripper.
 
 It does not navigate.
 """
@@ -8,46 +8,190 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
+from queue import Empty, SimpleQueue
 from threading import Event
 from typing import Any, Final
 
-from pydrake.math import RigidTransform
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
 
 from errand_ros2 import messages
-from errand_ros2.inputs import LIFE_S, TOPIC, HeardVelocity
+from errand_ros2.inputs import LIFE_S, TOPIC, HeardVelocity, transform_of, within_limits
 from errand_ros2.robot_topics import IMAGE_PERIOD_S, Frames, RobotTopics
-from errand_ros2.served_motions import ServedMotions, WorkQueue
+from errand_ros2.wire.actions import ActionServer, Goal, GoalStatus
 from errand_ros2.wire.keys import LATCHED
-from errand_ros2.wire.node import Node
-from errand_ros2.wire.session import Session
+from errand_ros2.wire.node import Node, Session
 from executive.record.other_tools import ros_name
 from skills.estimate.grid_map import GridMap
-from skills.robot import Clock, CommandId, Robot
+from skills.inputs.errors import InputError
+from skills.robot import ArmTrajectory, Clock, CommandCause, CommandId, CommandState, CommandStatus, Lease, Robot
 
 PERIOD_S: Final = 0.05
+TRAJECTORY: Final = "control_msgs/action/FollowJointTrajectory"
+GRIPPER: Final = "control_msgs/action/GripperCommand"
+ARM_ACTION: Final = "arm_controller/follow_joint_trajectory"
+HEAD_ACTION: Final = "head_controller/follow_joint_trajectory"
+GRIPPER_ACTION: Final = "gripper_controller/gripper_cmd"
+POSTURE, CARRY = "body_pose", "gripper/carry"
+INVALID_GOAL, PATH_VIOLATED = -1, -4
 _EXPIRY_S: Final = 0.1
-_HOLDER: Final = "the server of ROS 2"
-_NODE: Final = "robot"
 _LATE_S: Final = 0.5
-WHOLE: Final = 1 << 16
-"""Columns of pictures that are not reduced."""
+_WHOLE: Final = 1 << 16  # columns of pictures that are not reduced
+_EXTRA_S, _MOST_S = 5.0, 120.0
+"""Time that a trajectory may take longer, and the most that a gripper or posture takes."""
+_MOST_WORK: Final = 1000  # most work that is done between two steps
+_OBJECT: Final = 0.02  # share of the gripper's opening by which an object keeps it open
 
-Truth = Callable[[], RigidTransform]
-"""Function that returns the robot's true pose in the world."""
+
+class WorkQueue(Executor):
+    """Executor whose work is done by the thread that owns the robot, between its steps."""
+
+    def __init__(self) -> None:
+        self._given: SimpleQueue[Callable[[], None]] = SimpleQueue()
+
+    def submit(self, work: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        """Hands work over; the future has its result."""
+        future: Future[Any] = Future()
+
+        def done() -> None:
+            try:
+                future.set_result(work(*args, **options))
+            except Exception as error:
+                future.set_exception(error)
+
+        self._given.put(done)
+        return future
+
+    def work_for(self, limit_s: float) -> None:
+        """Does what was handed over, and what comes within a time (s, wall clock)."""
+        until_s = time.monotonic() + limit_s
+        for _ in range(_MOST_WORK):
+            try:
+                self._given.get(timeout=max(0.0, until_s - time.monotonic()))()
+            except Empty:
+                return
 
 
-@dataclass(frozen=True)
-class Served:
-    """Options of a server: further topics, and its times.
+@dataclass
+class _Served:
+    """Goal under way, with the command of the robot that pursues it."""
 
-    `grid` is published as `/map`, and `truth` under `/ground_truth`. `life` is the clock (s) by which velocities die.
-    """
+    server: ActionServer
+    goal: Goal
+    command: CommandId
 
-    grid: GridMap | None = None
-    truth: Truth | None = None
-    life: Callable[[], float] = time.monotonic
-    image_period_s: float = IMAGE_PERIOD_S
+
+class ServedMotions:
+    """Actions and topics of the robot's parts, which become commands in the thread that owns the robot."""
+
+    def __init__(self, node: Node, robot: Robot, clock: Clock, lease: Lease, work: WorkQueue) -> None:
+        """Declares the parts that the robot has."""
+        self._robot, self._clock, self._lease, self._work = robot, clock, lease, work
+        self._served: list[_Served] = []
+        self.ended = 0
+        """Number of the goals ended."""
+        can = robot.capabilities()
+        if can.arm is not None:
+            self._serve(node, ARM_ACTION, TRAJECTORY, partial(self._follow, can.arm.joint_names, robot.move_arm))
+        if can.head is not None:
+            self._serve(node, HEAD_ACTION, TRAJECTORY, partial(self._follow, can.head.joint_names, self._point_head))
+        if can.gripper is not None:
+            self._serve(node, GRIPPER_ACTION, GRIPPER, self._grip)
+            node.subscribe(CARRY, "std_msgs/msg/Bool", partial(work.submit, self._carry))
+        self._height_m, self._thin = can.standing_height_m, _OBJECT * (can.gripper.widest if can.gripper else 1.0)
+        node.subscribe(POSTURE, "geometry_msgs/msg/Pose", partial(work.submit, self._stand))
+
+    def _serve(self, node: Node, name: str, kind: str, begin: Callable[[Any], CommandId]) -> None:
+        """Serves an action; `begin` begins the motion of a goal, and raises ValueError for a goal that is none."""
+
+        def accept(goal: Goal) -> bool:
+            try:
+                command = begin(goal.message)
+            except ValueError:
+                return False
+            if self._robot.command_status(command).state is CommandState.REFUSED:
+                return False
+            self._served.append(_Served(server, goal, command))
+            return True
+
+        cancel = partial(self._work.submit, self._cancel)
+        server = ActionServer(node, name, kind, accept=accept, cancel=cancel, pool=self._work)
+
+    def _cancel(self, goal: Goal) -> None:
+        for each in self._served:
+            if each.goal is goal:
+                self._robot.stop(lease=self._lease, only=each.command)
+
+    def _follow(self, names: tuple[str, ...], move: Callable[..., CommandId], goal: Any) -> CommandId:
+        """Begins a trajectory of these joints by a verb of the robot."""
+        trajectory = trajectory_of(goal.trajectory, names)
+        until_s = self._clock.now() + float(trajectory.times_s[-1]) + _EXTRA_S
+        return move(trajectory, until_s=until_s, lease=self._lease)
+
+    def _point_head(self, trajectory: ArmTrajectory, **until: Any) -> CommandId:
+        return self._robot.point_head(*trajectory.positions_rad[-1].tolist(), **until)
+
+    def _grip(self, goal: Any) -> CommandId:
+        command, can, until_s = goal.command, self._robot.capabilities().gripper, self._clock.now() + _MOST_S
+        if can is None or not math.isfinite(command.position + command.max_effort):
+            raise ValueError("the opening or the force is not finite")
+        force_n = command.max_effort if command.max_effort > 0.0 else can.max_force_n
+        return self._robot.set_gripper(command.position, force_n, until_s=until_s, lease=self._lease)
+
+    def _carry(self, told: Any) -> None:
+        self._robot.carry(told.data, lease=self._lease)
+
+    def _stand(self, pose: Any) -> None:
+        """Takes a height over the usual one and a pitch; what is not finite or no rotation is ignored."""
+        with suppress(InputError):
+            X, until_s = transform_of(pose.position, pose.orientation), self._clock.now() + _MOST_S
+            height_m, pitch_rad = self._height_m + float(X.translation()[2]), RollPitchYaw(X.rotation()).pitch_angle()
+            self._robot.stand(height_m, pitch_rad, until_s=until_s, lease=self._lease)
+
+    def tick(self) -> None:
+        """Ends the goals whose commands have ended; call it after each step."""
+        for each in list(self._served):
+            if each.goal.status is GoalStatus.ACCEPTED:
+                each.server.begin(each.goal)
+            status = self._robot.command_status(each.command)
+            if status.state is not CommandState.RUNNING:
+                self._served.remove(each)
+                self._end(each, status)
+
+    def _end(self, each: _Served, status: CommandStatus) -> None:
+        done = status.state is CommandState.DONE
+        if each.server.kind.name == TRAJECTORY:
+            code = 0 if done else INVALID_GOAL if status.cause is CommandCause.INVALID else PATH_VIOLATED
+            result = {"error_code": code, "error_string": status.reason}
+        else:
+            reading, wanted = self._robot.gripper(), each.goal.message.command.position
+            stalled = done and reading.opening - wanted > self._thin
+            ends = {"stalled": stalled, "reached_goal": done and not stalled}
+            result = {"position": reading.opening, "effort": reading.force_n, **ends}
+        cancelled = each.goal.status is GoalStatus.CANCELING
+        final = GoalStatus.SUCCEEDED if done else GoalStatus.CANCELED if cancelled else GoalStatus.ABORTED
+        each.server.end(each.goal, final, **result)
+        self.ended += 1
+
+
+def trajectory_of(message: Any, names: tuple[str, ...]) -> ArmTrajectory:
+    """Reads trajectory_msgs/JointTrajectory, which begins now. Raises ValueError unless it moves just these joints."""
+    order = {name: number for number, name in enumerate(message.joint_names)}
+    if order.keys() != {*names} or len(message.joint_names) != len(names):
+        raise ValueError(f"the trajectory moves {', '.join(message.joint_names)}, not {', '.join(names)}")
+    if not message.points or any(len(point.positions) != len(names) for point in message.points):
+        raise ValueError("the trajectory has no points, or one without a position of each joint")
+    columns = [order[name] for name in names]
+    starts = [point.time_from_start for point in message.points]
+    times = np.array([each.sec + 1e-9 * each.nanosec for each in starts])
+    positions = np.array([np.asarray(point.positions)[columns] for point in message.points])
+    if not 0.0 <= times[0] <= times[-1] <= _MOST_S or not math.isfinite(float(positions.sum())):
+        raise ValueError(f"the trajectory does not lie within {_MOST_S:g} s")
+    return ArmTrajectory(times, positions)
 
 
 class RobotServer:
@@ -56,43 +200,45 @@ class RobotServer:
     The thread that does so owns the robot; `work` is what it does between the steps.
     """
 
-    def __init__(self, session: Session, robot: Robot, clock: Clock, served: Served | None = None) -> None:
-        """Takes the robot's lease."""
-        served = served or Served()
-        self._robot, self._clock, self._truth, self._life = robot, clock, served.truth, served.life
-        self._lease = robot.acquire_lease(_HOLDER)
-        space = f"/{ros_name(robot.name)}"
-        self._top, self._node = Node(session, _NODE), Node(session, _NODE, space)
-        self._time = self._top.publisher("/clock", "rosgraph_msgs/msg/Clock")
-        if (grid := served.grid) is not None:
-            self._map = self._top.publisher("/map", "nav_msgs/msg/OccupancyGrid", LATCHED)
-            self._map.put(messages.occupancy_grid(grid))
-        if served.truth is not None:
-            self._true = self._top.publisher(f"/ground_truth{space}/pose", "geometry_msgs/msg/PoseStamped")
-        self._frames, period_s = Frames(self._top), served.image_period_s
-        self.topics = RobotTopics(self._node, robot, self._frames, most_columns=WHOLE, image_period_s=period_s)
-        self.work = WorkQueue()
-        self.motions = ServedMotions(self._node, robot, clock, self._lease, self.work)
-        self.heard = 0
-        """Number of the velocities heard."""
-        self._node.subscribe(TOPIC, "geometry_msgs/msg/Twist", self._hear)
-        self._velocity = HeardVelocity(served.life)
-        self._driving: CommandId | None = None
-        self.late_s = 0.0
-        """Longest delay behind the wall clock (s)."""
+    def __init__(
+        self,
+        session: Session,
+        robot: Robot,
+        clock: Clock,
+        *,
+        grid: GridMap | None = None,
+        truth: Callable[[], RigidTransform] | None = None,
+        life: Callable[[], float] = time.monotonic,
+        image_period_s: float = IMAGE_PERIOD_S,
+    ) -> None:
+        """Takes the robot's lease.
 
-    def _hear(self, twist: Any) -> None:
-        self._velocity.hear(twist)
-        self.heard += 1
+        `grid` is published as `/map`, and the true pose under `/ground_truth`. `life` is the clock (s) by which
+        velocities die.
+        """
+        self._robot, self._clock, self._truth, self._life = robot, clock, truth, life
+        self._lease = robot.acquire_lease("the server of ROS 2")
+        space = f"/{ros_name(robot.name)}"
+        top, self.node = Node(session, "robot"), Node(session, "robot", space)
+        self._time = top.publisher("/clock", "rosgraph_msgs/msg/Clock")
+        if grid is not None:
+            top.publisher("/map", "nav_msgs/msg/OccupancyGrid", LATCHED).put(messages.occupancy_grid(grid))
+        if truth is not None:
+            self._true = top.publisher(f"/ground_truth{space}/pose", "geometry_msgs/msg/PoseStamped")
+        self._frames = Frames(top)
+        self.topics = RobotTopics(self.node, robot, self._frames, most_columns=_WHOLE, image_period_s=image_period_s)
+        self.work = WorkQueue()
+        self.motions = ServedMotions(self.node, robot, clock, self._lease, self.work)
+        self._velocity = HeardVelocity(life)
+        self.node.subscribe(TOPIC, "geometry_msgs/msg/Twist", self._velocity.hear)
+        self._driving: CommandId | None = None
 
     def step(self) -> None:
         """Commands the base, steps the clock by one period, and publishes the readings."""
-        (vx, vy, wz), at_s = self._velocity.last
+        asked, at_s = self._velocity.last
         if self._life() - at_s <= LIFE_S:
-            abilities, until_s = self._robot.capabilities(), self._clock.now() + _EXPIRY_S
-            share = min(1.0, abilities.max_speed_m_s / max(math.hypot(vx, vy), 1e-9))
-            turn = max(-abilities.max_turn_rate_rad_s, min(abilities.max_turn_rate_rad_s, wz))
-            self._driving = self._robot.drive(share * vx, share * vy, turn, until_s=until_s, lease=self._lease)
+            until_s, velocity = self._clock.now() + _EXPIRY_S, within_limits(asked, self._robot.capabilities())
+            self._driving = self._robot.drive(*velocity, until_s=until_s, lease=self._lease)
         elif self._driving is not None:
             self._robot.stop(lease=self._lease, only=self._driving)
             self._driving = None
@@ -116,11 +262,7 @@ class RobotServer:
         while not ended.is_set() and self._clock.now() < until_s:
             self.step()
             ahead_s = self._clock.now() - begun_s - (time.monotonic() - begun_wall_s)
-            self.late_s = max(self.late_s, -ahead_s)
-            if ahead_s > 0.0:
-                self.work.work_for(ahead_s)
-                continue
-            self.work.work_for(0.0)
+            self.work.work_for(max(0.0, ahead_s))
             if ahead_s < -_LATE_S:
                 begun_s, begun_wall_s = self._clock.now(), time.monotonic()
 

@@ -23,8 +23,7 @@ import numpy as np
 from errand_ros2.bridge import Bridge
 from errand_ros2.server import RobotServer
 from errand_ros2.wire.keys import Attachment
-from errand_ros2.wire.node import Client, Node
-from errand_ros2.wire.session import Place, open_session
+from errand_ros2.wire.node import Client, Node, Place, open_session
 from errand_ros2.wire.types import ros_types
 from executive.app.prepare.from_request import prepare
 from executive.app.prepare.placed_robots import only_robot
@@ -183,7 +182,7 @@ def cancel(count):
 SENDER = """
 import sys, time
 from errand_ros2.wire.node import Node
-from errand_ros2.wire.session import Place, open_session
+from errand_ros2.wire.node import Place, open_session
 from errand_ros2.wire.types import ros_types
 
 with open_session(Place(port=int(sys.argv[1]))) as session:

@@ -9,7 +9,7 @@ verdict; with `--served-only` the run in process is left out.
 from ros_client import free_port
 from ros_lock_step import LockStep
 
-from errand_ros2.wire.session import Place
+from errand_ros2.wire.node import Place
 from tests.benchmarks.harness import benchmark
 from tests.benchmarks.served_missions import cases, run_pair, run_served, summary
 

@@ -8,9 +8,8 @@ from contextlib import ExitStack, contextmanager
 from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import described, served_file
 from errand_ros2.adapter.robot import Ros2Robot
-from errand_ros2.server import PERIOD_S, RobotServer, Served
-from errand_ros2.wire.node import Client, Node, Publisher
-from errand_ros2.wire.session import open_session
+from errand_ros2.server import PERIOD_S, RobotServer
+from errand_ros2.wire.node import Client, Node, Publisher, open_session
 
 IDLE_S, CONNECTING_S, PATIENCE_S = 0.005, 0.2, 20.0
 """Pauses of the server; longest wait for a message until both sides have found each other, and afterwards."""
@@ -43,7 +42,7 @@ class LockStep(RobotClock):
             self._ready.set()
             return
         with open_session(self._place) as session:
-            self.server = RobotServer(session, robot, clock, Served(life=self.now, image_period_s=0.0))
+            self.server = RobotServer(session, robot, clock, life=self.now, image_period_s=0.0)
             self.served, self.clock = robot, clock
             self._now_s = clock.now()
             self._ready.set()
@@ -59,7 +58,7 @@ class LockStep(RobotClock):
     def advance(self, dt_s):
         """Steps the server once what was sent has arrived; then waits until what it published has."""
         server, robot = self.server, self.robot
-        self._soon(lambda: server.heard + server.motions.heard >= robot.sent)
+        self._soon(lambda: server.node.handled >= self.node.sent)
         for _ in range(max(1, round(dt_s / PERIOD_S))):
             self._now_s = round(self._now_s + PERIOD_S, 9)
             server.work.submit(server.step).result()

@@ -20,8 +20,7 @@ from ros_client import free_port
 from errand_ros2.bridge import Bridge, observe
 from errand_ros2.wire.actions import GoalStatus
 from errand_ros2.wire.keys import LATCHED, Attachment
-from errand_ros2.wire.node import Client, Node
-from errand_ros2.wire.session import Place, open_session
+from errand_ros2.wire.node import Client, Node, Place, open_session
 from errand_ros2.wire.types import older_types, ros_types
 from executive.app.prepare.from_request import prepare
 from executive.app.runs.one_run import run_request
@@ -76,7 +75,7 @@ class RosClient:
         return [each for each in said if each["topic"] == topic]
 
     def call(self, name):
-        return self.node.client(f"/alice/{name}", TRIGGER).call({}, limit_s=5.0)
+        return Client(self.node, f"/alice/{name}", ros_types().service(TRIGGER)).call({}, limit_s=5.0)
 
     def publisher(self, topic, kind):
         made = self.node.publisher(topic, kind)

@@ -16,10 +16,9 @@ from rosbags.typesys import Stores, get_typestore
 from zenoh import ext
 from zenoh_ros2_sdk import ROS2Subscriber
 
-from errand_ros2.server import PERIOD_S, RobotServer, Served
+from errand_ros2.server import PERIOD_S, RobotServer
 from errand_ros2.wire.keys import LATCHED
-from errand_ros2.wire.node import Node
-from errand_ros2.wire.session import Place, open_session
+from errand_ros2.wire.node import Node, Place, open_session
 from errand_ros2.wire.types import ros_types
 from plant.robots.spot.kind import spot_capabilities
 from skills.estimate.grid_map import GridMap
@@ -61,7 +60,7 @@ def served():
     robot = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=ROOM)
     place, grid = Place(port=free_port()), GridMap(np.zeros((30, 30), bool), 0.1, (-1.0, -1.0))
     with open_session(place) as session, open_session(place) as other:
-        server = RobotServer(session, robot, clock, Served(grid, robot.pose.transform))
+        server = RobotServer(session, robot, clock, grid=grid, truth=robot.pose.transform)
         thread = threading.Thread(target=server.run, args=(ended,))
         thread.start()
         yield SimpleNamespace(server=server, robot=robot, node=Node(other, "other"), place=place)

@@ -9,7 +9,7 @@ from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from errand_ros2.served_motions import ARM_ACTION, CARRY, GRIPPER_ACTION, HEAD_ACTION, POSTURE
+from errand_ros2.server import ARM_ACTION, CARRY, GRIPPER_ACTION, HEAD_ACTION, POSTURE
 from plant.robots.robot_kind import robot_kind, robot_kinds
 from skills.inputs.errors import InputError
 from skills.inputs.schema import first_error

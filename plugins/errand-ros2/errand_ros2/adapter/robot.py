@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import Any, Final
 
@@ -13,7 +12,8 @@ from errand_ros2 import messages
 from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import DRIVE_EXPIRY_S, Description, GripperFile
 from errand_ros2.adapter.sensors import OLD_STATE_S, SensedRobot
-from errand_ros2.served_motions import GRIPPER, INVALID_GOAL, TRAJECTORY
+from errand_ros2.inputs import within_limits
+from errand_ros2.server import GRIPPER, INVALID_GOAL, TRAJECTORY
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError, SentGoal
 from errand_ros2.wire.node import Node
 from skills.command_table import CommandTable
@@ -32,7 +32,7 @@ GONE_S: Final = 15.0
 _CALL_S: Final = 0.5
 _LEAST_POINT_S, _HEAD_RAD_S = 0.2, 1.0
 _REACHED_M, _REACHED_RAD = 0.02, 0.03
-BASE, POSTURE, ARM, HEAD, GRIP = "base", "posture", "arm", "head", "gripper"
+PARTS = BASE, POSTURE, ARM, HEAD, GRIP = "base", "posture", "arm", "head", "gripper"
 
 
 class Ros2Robot(SensedRobot):
@@ -55,11 +55,6 @@ class Ros2Robot(SensedRobot):
         self._lease_number = 0
         self._current: Lease | None = None
 
-    @property
-    def sent(self) -> int:
-        """Number of the messages sent to the robot's topics."""
-        return sum(each.sent for each in (self._velocity, self._posture, self._carry) if each is not None)
-
     def notes(self, address: str, endpoint: str) -> tuple[str, ...]:
         """Returns sentences for the report on what the robot does not tell."""
         file, grip = self._description.file, self._description.file.gripper
@@ -75,23 +70,19 @@ class Ros2Robot(SensedRobot):
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
         """Drives at a body-frame velocity until the clock reads `until_s`, at most 0.6 s."""
-        can, sideways = self._description.capabilities, vy != 0.0
-        if sideways and can.base_kind is BaseKind.DIFFERENTIAL:
+        can, now_s = self._description.capabilities, self._clock.now()
+        if vy != 0.0 and can.base_kind is BaseKind.DIFFERENTIAL:
             return self._commands.refuse("drive: this base cannot go sideways")
         if (refused := self._objection(BASE, lease, until_s, (vx, vy, wz))) is not None:
             return refused
-        share = min(1.0, can.max_speed_m_s / max(math.hypot(vx, vy), 1e-9))
-        most = can.max_turn_rate_rad_s
-        velocity = (share * vx, share * vy, min(max(wz, -most), most))
-        now_s = self._clock.now()
+        velocity = within_limits((vx, vy, wz), can)
         self._say(velocity)
         return self._commands.begin(BASE, velocity, now_s, min(until_s, now_s + DRIVE_EXPIRY_S))
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Holds the body origin at a height above the floor and a pitch."""
         can = self._description.capabilities
-        low, high = can.height_range_m
-        least, most = can.pitch_range_rad
+        (low, high), (least, most) = can.height_range_m, can.pitch_range_rad
         if self._posture is None:
             return self._commands.refuse("stand: the posture cannot be set", CommandCause.UNSUPPORTED)
         if (refused := self._objection(POSTURE, lease, until_s, (height_m, pitch_rad))) is not None:
@@ -124,12 +115,10 @@ class Ros2Robot(SensedRobot):
         (left, right), (up, down) = head.pan_range_rad, head.tilt_range_rad
         if not (left <= pan_rad <= right and up <= tilt_rad <= down):
             return self._commands.refuse(f"point_head: pan {pan_rad:.2f}, tilt {tilt_rad:.2f} rad is out of range")
-        now = self.joints().position_rad
-        far_rad = max(
-            abs(want - now.get(name, 0.0)) for want, name in zip((pan_rad, tilt_rad), head.joint_names, strict=True)
-        )
-        way = ArmTrajectory(np.array([max(_LEAST_POINT_S, far_rad / _HEAD_RAD_S)]), np.array([[pan_rad, tilt_rad]]))
-        return self._act(HEAD, self._trajectory(head.joint_names, way), until_s, lease, (pan_rad, tilt_rad))
+        goal_rad, now = np.array([pan_rad, tilt_rad]), self.joints().position_rad
+        far_rad = np.abs(goal_rad - [now.get(name, 0.0) for name in head.joint_names]).max()
+        motion = ArmTrajectory(np.array([max(_LEAST_POINT_S, far_rad / _HEAD_RAD_S)]), goal_rad[None, :])
+        return self._act(HEAD, self._trajectory(head.joint_names, motion), until_s, lease, goal_rad)
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Sends an opening and a force to the gripper's controller; done by its result."""
@@ -151,7 +140,7 @@ class Ros2Robot(SensedRobot):
         for part in (BASE, POSTURE, ARM, HEAD):
             active = self._commands.running(part)
             if only is None or (active is not None and active.id == only):
-                self._halt(part, CommandStatus(CommandState.STOPPED, "stopped by command", CommandCause.STOPPED))
+                self._halt(part, CommandState.STOPPED, "stopped by command", CommandCause.STOPPED)
         return self._commands.note(CommandState.DONE)
 
     def command_status(self, command: CommandId) -> CommandStatus:
@@ -194,13 +183,7 @@ class Ros2Robot(SensedRobot):
             return
         for part in list(self._unsure):  # it may be moving on since the robot fell silent
             self._stop_part(part, self._unsure.pop(part))
-        if (base := self._commands.running(BASE)) is not None:
-            if now_s < base.until_s:
-                self._say(base.goal)
-            else:
-                self._halt(BASE, CommandStatus(CommandState.DONE))
-        self._follow_posture(now_s)
-        for part in self.actions:
+        for part in PARTS:
             self._follow(part, now_s)
 
     def stopped_because(self) -> str:
@@ -209,43 +192,46 @@ class Ros2Robot(SensedRobot):
 
     def _fall_silent(self, silent_s: float) -> None:
         """Ends the running commands of a silent robot; their parts are stopped when it answers again."""
-        status = CommandStatus(CommandState.STOPPED, f"the last state is {silent_s:.1f} s old", CommandCause.NO_ANSWER)
-        for part in (BASE, POSTURE, ARM, HEAD):
+        for part in PARTS[:-1]:
             if (active := self._commands.running(part)) is not None:
-                self._halt(part, status)
+                self._halt(part, CommandState.STOPPED, _old(silent_s), CommandCause.NO_ANSWER)
                 self._unsure[part] = active.goal
 
-    def _follow_posture(self, now_s: float) -> None:
-        if (active := self._commands.running(POSTURE)) is None:
-            return
-        height_m, pitch_rad = active.goal
-        X_OB = self.odometry().X_OB
-        off_m = abs(float(X_OB.translation()[2]) - height_m)
-        off_rad = abs(RollPitchYaw(X_OB.rotation()).pitch_angle() - pitch_rad)
-        if off_m < _REACHED_M and off_rad < _REACHED_RAD:
-            self._commands.finish(POSTURE, CommandState.DONE)
-        elif now_s > active.until_s:
-            self._commands.finish(POSTURE, CommandState.STOPPED, "expired before it was done", CommandCause.LATE)
-
     def _follow(self, part: str, now_s: float) -> None:
+        """Renews the command of a part, or ends it when it has reached its goal or is late."""
         if (active := self._commands.running(part)) is None:
             return
-        sent: SentGoal = active.goal
-        if sent.status.is_final:
-            if part == GRIP and self._description.file.gripper is not None:
-                self._feel_result(self._description.file.gripper, sent.result)
-            state, reason, cause = _ended(part, sent)
-            self._commands.finish(part, state, reason, cause)
-        elif now_s > active.until_s:
-            self._halt(part, CommandStatus(CommandState.STOPPED, "expired before it was done", CommandCause.LATE))
+        if (end := self._end_of(part, active.goal)) is not None:
+            self._commands.finish(part, *end)
+        elif now_s < active.until_s:
+            if part == BASE:
+                self._say(active.goal)
+        elif part == BASE:
+            self._halt(part, CommandState.DONE)
+        else:
+            self._halt(part, CommandState.STOPPED, "expired before it was done", CommandCause.LATE)
+
+    def _end_of(self, part: str, goal: Any) -> tuple[CommandState, str, CommandCause] | None:
+        """Returns how the command of a part ended: state, reason and cause; None while it goes on."""
+        if part == BASE:
+            return None
+        if part == POSTURE:
+            X_OB = self.odometry().X_OB
+            off_m = abs(float(X_OB.translation()[2]) - goal[0])
+            off_rad = abs(RollPitchYaw(X_OB.rotation()).pitch_angle() - goal[1])
+            reached = off_m < _REACHED_M and off_rad < _REACHED_RAD
+            return (CommandState.DONE, "", CommandCause.NONE) if reached else None
+        if not goal.status.is_final:
+            return None
+        if part == GRIP and self._description.file.gripper is not None:
+            self._feel_result(self._description.file.gripper, goal.result)
+        return _ended(part, goal)
 
     def _feel_result(self, file: GripperFile, result: Any) -> None:
         """Takes what a gripper's result tells, where no topic does."""
-        self._feel(opening=result.position / file.scale)
-        if file.force is None:
-            self._feel(force_n=result.effort)
-        if file.holding is None:
-            self._feel(holding=bool(result.stalled))
+        untold = {"force_n": file.force is None, "holding": file.holding is None}
+        told = {"force_n": result.effort, "holding": bool(result.stalled)}
+        self._feel(opening=result.position / file.scale, **{each: told[each] for each in told if untold[each]})
 
     # -- inside ------------------------------------------------------------------------------------------------------
 
@@ -256,11 +242,11 @@ class Ros2Robot(SensedRobot):
             twist = {"header": head, "twist": twist}
         self._velocity.put(twist)
 
-    def _halt(self, part: str, status: CommandStatus) -> None:
+    def _halt(self, part: str, *end: Any) -> None:
         """Stops a part, if it has a command, and ends that."""
         if (active := self._commands.running(part)) is not None:
             self._stop_part(part, active.goal)
-            self._commands.finish(part, status.state, status.reason, status.cause)
+            self._commands.finish(part, *end)
 
     def _stop_part(self, part: str, goal: Any) -> None:
         if part == BASE:
@@ -304,8 +290,12 @@ class Ros2Robot(SensedRobot):
             late = f"{part}: expires at {until_s:.2f} s, and it is {now_s:.2f} s already"
             return self._commands.refuse(late, CommandCause.LATE)
         if silent_s > OLD_STATE_S:
-            return self._commands.refuse(f"{part}: the last state is {silent_s:.1f} s old", CommandCause.NO_ANSWER)
+            return self._commands.refuse(f"{part}: {_old(silent_s)}", CommandCause.NO_ANSWER)
         return None
+
+
+def _old(silent_s: float) -> str:
+    return f"the last state is {silent_s:.1f} s old"
 
 
 def _ended(part: str, sent: SentGoal) -> tuple[CommandState, str, CommandCause]:

@@ -84,7 +84,7 @@ class ActionServer:
         node.serve(f"{base}/send_goal", self.kind.send_goal, lambda request: _submit(pool, self._send_goal, request))
         node.serve(f"{base}/cancel_goal", self.kind.cancel_goal, self._cancel_goal)
         node.serve(f"{base}/get_result", self.kind.get_result, self._get_result)
-        if older_types().has(type_name):  # its result has fewer fields there, and so another key
+        if f"{type_name}_Result" in older_types().store.types:  # its result has fewer fields there, and so another key
             node.serve(f"{base}/get_result", older_types().service(f"{type_name}_GetResult"), self._get_result)
 
     def begin(self, goal: Goal) -> None:

@@ -6,28 +6,17 @@ import hashlib
 import re
 import struct
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Final
+from typing import Final, NamedTuple
 
 from skills.inputs.errors import InputError
 
 _ADMIN: Final = "@ros2_lv"
 _GID_BYTES: Final = 16
-_HEAD: Final = struct.Struct("<qqB")
+_ATTACHMENT: Final = struct.Struct("<qqB16s")
 _NAME: Final = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 _TYPE: Final = re.compile(r"(?P<package>\w+)/(?P<kind>msg|srv|action)/(?P<name>\w+)")
-MOST_DOMAIN: Final = 232
-"""Largest ROS domain."""
-
-
-class EntityKind(StrEnum):
-    """Kind of an entity in the graph of ROS 2."""
-
-    NODE = "NN"
-    PUBLISHER = "MP"
-    SUBSCRIPTION = "MS"
-    SERVICE = "SS"
-    CLIENT = "SC"
+NODE, PUBLISHER, SUBSCRIPTION, SERVICE, CLIENT = "NN", "MP", "MS", "SS", "SC"
+"""Kinds of entities in the graph of ROS 2."""
 
 
 @dataclass(frozen=True)
@@ -44,18 +33,9 @@ class Qos:
         return f"{reliability}:{durability}:,{self.depth}:,:,:,,"
 
 
-LATCHED: Final = Qos(depth=1, transient_local=True)
-"""Late subscribers get the last message, as of `/map`."""
-SENSOR: Final = Qos(depth=5, reliable=False)
-"""Messages of sensors, which may be lost."""
-
-
-@dataclass(frozen=True)
-class TypeKey:
-    """Type as key expressions name it: its name in DDS and its RIHS01 hash."""
-
-    dds_name: str
-    type_hash: str
+USUAL: Final = Qos()
+LATCHED: Final = Qos(depth=1, transient_local=True)  # late subscribers get the last message, as of `/map`
+SENSOR: Final = Qos(depth=5, reliable=False)  # messages may be lost
 
 
 @dataclass(frozen=True)
@@ -68,26 +48,22 @@ class NodeKey:
     namespace: str
     name: str
 
-    def token(self) -> str:
-        """Returns the node's liveliness token."""
-        return "/".join(self._parts(self.number, EntityKind.NODE))
+    def token(self, number: int | None = None, kind: str = NODE, *of_type: str) -> str:
+        """Returns the liveliness token of the node, or of one of its entities."""
+        number = self.number if number is None else number
+        head = (_ADMIN, str(self.domain), self.session, str(self.number), str(number), kind)
+        return "/".join((*head, "%", _mangled(self.namespace) or "%", self.name, *of_type))
 
-    def entity_token(self, kind: EntityKind, number: int, name: str, type_key: TypeKey, qos: Qos) -> str:
+    def entity_token(self, kind: str, number: int, name: str, type_key: str, qos: Qos) -> str:
         """Returns the liveliness token of one of the node's publishers, subscriptions, services or clients."""
-        of_type = (mangled(name), type_key.dds_name, type_key.type_hash, qos.text())
-        return "/".join((*self._parts(number, kind), *of_type))
+        return self.token(number, kind, _mangled(name), type_key, qos.text())
 
-    def _parts(self, number: int, kind: EntityKind) -> tuple[str, ...]:
-        head = (_ADMIN, str(self.domain), self.session, str(self.number), str(number))
-        return (*head, kind.value, "%", mangled(self.namespace) or "%", self.name)
-
-    def data_key(self, name: str, type_key: TypeKey) -> str:
-        """Returns the key expression of a topic or service."""
-        return f"{self.domain}/{name.strip('/')}/{type_key.dds_name}/{type_key.type_hash}"
+    def data_key(self, name: str, type_key: str) -> str:
+        """Returns the key expression of a topic or service; `type_key` is DDS_NAME/HASH of its type."""
+        return f"{self.domain}/{name.strip('/')}/{type_key}"
 
 
-@dataclass(frozen=True)
-class Attachment:
+class Attachment(NamedTuple):
     """Attachment of a message: its number, the time (ns since 1970) when it was sent, and the sender's identity."""
 
     number: int
@@ -96,17 +72,14 @@ class Attachment:
 
     def encoded(self) -> bytes:
         """Returns the attachment as bytes."""
-        return _HEAD.pack(self.number, self.stamp_ns, len(self.gid)) + self.gid
+        return _ATTACHMENT.pack(self.number, self.stamp_ns, _GID_BYTES, self.gid)
 
     @classmethod
     def decoded(cls, data: bytes) -> Attachment:
         """Reads an attachment. Raises ValueError when it is malformed."""
-        if len(data) != _HEAD.size + _GID_BYTES:
+        if len(data) != _ATTACHMENT.size or (found := _ATTACHMENT.unpack(data))[2] != _GID_BYTES:
             raise ValueError(f"an attachment of {len(data)} bytes")
-        number, stamp_ns, length = _HEAD.unpack_from(data)
-        if length != _GID_BYTES:
-            raise ValueError(f"an identity of {length} bytes")
-        return cls(number, stamp_ns, data[_HEAD.size :])
+        return cls(found[0], found[1], found[3])
 
 
 def gid_of(token: str) -> bytes:
@@ -114,8 +87,7 @@ def gid_of(token: str) -> bytes:
     return hashlib.blake2b(token.encode(), digest_size=_GID_BYTES).digest()
 
 
-def mangled(name: str) -> str:
-    """Returns a name as one chunk of a key expression."""
+def _mangled(name: str) -> str:
     return name.replace("/", "%")
 
 

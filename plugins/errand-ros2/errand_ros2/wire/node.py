@@ -1,38 +1,122 @@
-"""Nodes of ROS 2: publishers, subscriptions, services and clients over a Zenoh session.
+"""Sessions of Zenoh, and nodes of ROS 2 in them: publishers, subscriptions, services and clients.
 
+A session is the router of this machine, or a client of a router that runs already.
 Zenoh calls handlers in threads of its own. A message that cannot be decoded is dropped and counted.
 """
 
 from __future__ import annotations
 
+import json
 import logging
+import re
+import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import count
 from typing import Any, Final
 
 import zenoh
 from zenoh import ext
 
-from errand_ros2.wire.keys import Attachment, EntityKind, Qos, TypeKey, gid_of, topic_name
-from errand_ros2.wire.session import Session
+from errand_ros2.wire.keys import (
+    CLIENT,
+    PUBLISHER,
+    SERVICE,
+    SUBSCRIPTION,
+    USUAL,
+    Attachment,
+    NodeKey,
+    Qos,
+    gid_of,
+    topic_name,
+)
 from errand_ros2.wire.types import MalformedError, MessageType, ServiceType, ros_types
+from skills.inputs.errors import InputError
 
 _LOG: Final = logging.getLogger(__name__)
 _CDR: Final = "application/cdr"
-MOST_BYTES: Final = 1 << 26
-"""Longer messages are dropped."""
+MOST_BYTES: Final = 1 << 26  # longer messages are dropped
+PORT: Final = 7447
+"""Port of rmw_zenoh's router."""
+_PLACE: Final = re.compile(r"(?P<domain>\d{1,9})?(@(?P<host>[\w.-]+|\[[\w:.%]+\])?(:(?P<port>\d{1,5}))?)?")
+_MOST_DOMAIN, _MOST_PORT = 232, 65535
+_LOOK_S: Final = 0.5
+
+
+@dataclass(frozen=True)
+class Place:
+    """ROS domain, and the address of the Zenoh router."""
+
+    domain: int = 0
+    host: str = "127.0.0.1"
+    port: int = PORT
+
+    @classmethod
+    def parse(cls, text: str) -> Place:
+        """Reads `[DOMAIN][@HOST[:PORT]]`; what is left out has its usual value. Raises InputError."""
+        found = _PLACE.fullmatch(text)
+        hint = "write [DOMAIN][@HOST[:PORT]], as in 0 or 42@192.168.1.5:7447"
+        if found is None:
+            raise InputError(f"'{text[:60]}' is no ROS domain", hint=hint)
+        place = cls(int(found["domain"] or 0), found["host"] or cls.host, int(found["port"] or cls.port))
+        if place.domain > _MOST_DOMAIN or not 0 < place.port <= _MOST_PORT:
+            raise InputError(f"'{text[:60]}': domains go to {_MOST_DOMAIN}, ports from 1 to {_MOST_PORT}", hint=hint)
+        return place
+
+    @property
+    def endpoint(self) -> str:
+        """Address as Zenoh writes it."""
+        return f"tcp/{self.host}:{self.port}"
+
+
+class Session:
+    """Open session; nodes and their publishers, subscriptions and services get their numbers here."""
+
+    def __init__(self, inner: zenoh.Session, place: Place, is_router: bool) -> None:
+        self.inner, self.place, self.is_router = inner, place, is_router
+        self.numbers = count()
+        self.liveliness = inner.liveliness()
+
+
+@contextmanager
+def open_session(place: Place) -> Iterator[Session]:
+    """Opens a session, which becomes the router if none answers on this machine. Raises InputError.
+
+    A session that is a client waits for its router again when the router restarts.
+    """
+    client, endpoints = _answers(place), {"endpoints": [place.endpoint]}
+    how = {"mode": "client", "connect": endpoints} if client else {"mode": "router", "listen": endpoints}
+    how |= {"scouting": {"multicast": {"enabled": False}}}
+    how |= {"timestamping": {"enabled": True, "drop_future_timestamp": False}}  # which caches need
+    try:
+        opened = zenoh.open(zenoh.Config.from_json5(json.dumps(how)))
+    except zenoh.ZError as error:
+        why = str(error).partition("\n")[0][:80]
+        what = f"no Zenoh router answers at {place.host}:{place.port}, and none can listen there ({why})"
+        raise InputError(what, hint="start it, name another port, or leave @HOST out") from error
+    with opened as inner:
+        yield Session(inner, place, is_router=not client)
+
+
+def _answers(place: Place) -> bool:
+    try:
+        socket.create_connection((place.host.strip("[]"), place.port), _LOOK_S).close()
+    except (OSError, UnicodeError):
+        return False
+    return True
 
 
 class Publisher:
     """Publisher of one topic. Late subscribers get the last messages if its quality of service says so."""
 
     def __init__(self, node: Node, topic: str, kind: MessageType, qos: Qos) -> None:
-        self.kind, self.topic = kind, topic
-        key, self._gid = node.key.data_key(topic, kind.key), node.declare(EntityKind.PUBLISHER, topic, kind.key, qos)
-        self.sent = 0
-        """Number of the messages sent."""
+        self._kind = kind
+        key, self._gid = node.key.data_key(topic, kind.key), node.declare(PUBLISHER, topic, kind.key, qos)
+        self._node = node
+        self._numbers = count(1)
         session, how = node.session.inner, {"encoding": _CDR, "reliability": zenoh.Reliability.RELIABLE}
         self._publisher: Any
         if qos.transient_local:
@@ -49,9 +133,9 @@ class Publisher:
 
     def put(self, message: Any) -> None:
         """Publishes a message, or a mapping of its fields."""
-        self.sent += 1
-        attachment = Attachment(self.sent, time.time_ns(), self._gid).encoded()
-        self._publisher.put(self.kind.encode(message), attachment=attachment)
+        self._node.sent += 1
+        attachment = Attachment(next(self._numbers), time.time_ns(), self._gid).encoded()
+        self._publisher.put(self._kind.encode(message), attachment=attachment)
 
 
 class Request:
@@ -79,15 +163,13 @@ class Client:
 
     def __init__(self, node: Node, name: str, kind: ServiceType) -> None:
         self._kind, self._key = kind, node.key.data_key(name, kind.key)
-        self._gid, self._numbers = node.declare(EntityKind.CLIENT, name, kind.key, Qos()), count(1)
+        self._gid, self._numbers = node.declare(CLIENT, name, kind.key, USUAL), count(1)
         self._session = node.session.inner
 
     def call(self, request: Any, *, limit_s: float) -> Any:
         """Returns the service's response; None when no service answers within the limit (s)."""
-        for reply in self._session.get(self._key, **self._options(request, limit_s)):
-            if (response := self._response(reply)) is not None:
-                return response
-        return None
+        responses = map(self._response, self._session.get(self._key, **self._options(request, limit_s)))
+        return next((each for each in responses if each is not None), None)
 
     def ask(self, request: Any, take: Callable[[Any], None], *, limit_s: float) -> None:
         """Calls `take` with the service's response when it comes, in a thread of Zenoh."""
@@ -118,38 +200,40 @@ class Node:
     def __init__(self, session: Session, name: str, namespace: str = "/") -> None:
         """Declares the node. Raises InputError for a namespace that ROS 2 does not allow."""
         self.session, self.namespace = session, "/" if namespace == "/" else topic_name(namespace)
-        self.key = session.node_key(name, self.namespace)
-        self.dropped = 0
-        """Messages that could not be decoded."""
+        zid, number = str(session.inner.zid()), next(session.numbers)
+        self.key = NodeKey(session.place.domain, zid, number, self.namespace, name)
+        self.sent, self.handled, self.dropped = 0, 0, 0
+        """Numbers of the messages that were published, handled, and could not be decoded."""
         self._declared: list[Any] = [session.liveliness.declare_token(self.key.token())]
 
     def absolute(self, name: str) -> str:
         """Returns the absolute name of a topic or service. Raises InputError."""
         return topic_name(name if name.startswith("/") else f"{self.namespace.rstrip('/')}/{name}")
 
-    def declare(self, kind: EntityKind, name: str, type_key: TypeKey, qos: Qos) -> bytes:
+    def declare(self, kind: str, name: str, type_key: str, qos: Qos) -> bytes:
         """Declares an entity of the node; returns its identity."""
         token = self.key.entity_token(kind, next(self.session.numbers), name, type_key, qos)
         self._declared.append(self.session.liveliness.declare_token(token))
         return gid_of(token)
 
-    def publisher(self, topic: str, type_name: str, qos: Qos | None = None) -> Publisher:
+    def publisher(self, topic: str, type_name: str, qos: Qos = USUAL) -> Publisher:
         """Returns a publisher of a topic."""
-        made = Publisher(self, self.absolute(topic), ros_types().message(type_name), qos or Qos())
+        made = Publisher(self, self.absolute(topic), ros_types().message(type_name), qos)
         self._declared.append(made)  # Zenoh ends what nobody refers to
         return made
 
     def subscribe(
-        self, topic: str, type_name: str, handle: Callable[[Any], None], qos: Qos | None = None
+        self, topic: str, type_name: str, handle: Callable[[Any], None], qos: Qos = USUAL
     ) -> Callable[[], None]:
         """Calls `handle` with each message of a topic; returns a function that ends the subscription."""
-        name, kind, qos = self.absolute(topic), ros_types().message(type_name), qos or Qos()
-        self.declare(EntityKind.SUBSCRIPTION, name, kind.key, qos)
+        name, kind, qos = self.absolute(topic), ros_types().message(type_name), qos
+        self.declare(SUBSCRIPTION, name, kind.key, qos)
         token = self._declared[-1]
 
         def received(sample: zenoh.Sample) -> None:
             if (message := self._decoded(kind, sample.payload)) is not None:
                 self.guarded(lambda: handle(message), name)
+                self.handled += 1
 
         key, session = self.key.data_key(name, kind.key), self.session.inner
         subscriber: Any
@@ -171,7 +255,7 @@ class Node:
         """Calls `handle` with each request for a service; it may answer later."""
         name = self.absolute(name)
         key = self.key.data_key(name, kind.key)
-        self.declare(EntityKind.SERVICE, name, kind.key, Qos())
+        self.declare(SERVICE, name, kind.key, USUAL)
 
         def asked(query: zenoh.Query) -> None:
             try:
@@ -189,10 +273,6 @@ class Node:
     def answer(self, name: str, type_name: str, answer: Callable[[Any], Any]) -> None:
         """Serves a service by a function from a request to its response, or to a mapping of its fields."""
         self.serve(name, ros_types().service(type_name), lambda request: request.reply(answer(request.message)))
-
-    def client(self, name: str, type_name: str) -> Client:
-        """Returns a client of a service."""
-        return Client(self, self.absolute(name), ros_types().service(type_name))
 
     def _decoded(self, kind: MessageType, payload: zenoh.ZBytes | None) -> Any:
         """Decodes a message; counts it and returns None if it is malformed."""

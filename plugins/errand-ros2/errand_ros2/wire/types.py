@@ -16,7 +16,7 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from errand_ros2.wire.keys import TypeKey, dds_name
+from errand_ros2.wire.keys import dds_name
 
 if TYPE_CHECKING:
     from rosbags.interfaces.typing import Typesdict
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 INTERFACES: Final = Path(__file__).parents[1] / "interfaces"
 """Folder of the interface files that rosbags lacks, as PACKAGE/KIND/NAME.KIND."""
 OLDER: Final = INTERFACES.with_name("interfaces_before_kilted")
-"""Folder of the interface files that distributions before Kilted have in another form."""
 _PARTS: Final = re.compile(r"^---$", re.MULTILINE)
 _EVENT: Final = "service_msgs/msg/ServiceEventInfo info\n{0}_Request[<=1] request\n{0}_Response[<=1] response"
 _SERVICE: Final = "{0}_Request request_message\n{0}_Response response_message\n{0}_Event event_message"
@@ -42,7 +41,7 @@ class MessageType:
     """Message type: its name, its key, and how its messages are encoded."""
 
     name: str
-    key: TypeKey
+    key: str
     types: Types
 
     def encode(self, message: Any) -> bytes:
@@ -67,7 +66,7 @@ class ServiceType:
     """Service type: its key, and the types of its request and response."""
 
     name: str
-    key: TypeKey
+    key: str
     request: MessageType
     response: MessageType
 
@@ -94,13 +93,8 @@ class Types:
         self.store = get_typestore(Stores.ROS2_JAZZY)
         for name, (constants, fields) in [*self.store.fielddefs.items()]:
             self.store.fielddefs[name] = (constants, _without_char(fields))
-        self._read: set[str] = set()
         for file in sorted(folder.glob("*/*/*.*"), key=lambda path: path.suffix != ".msg"):
             self._register(file)
-
-    def has(self, name: str) -> bool:
-        """Returns whether the folder has an interface file of this name."""
-        return name in self._read
 
     def message(self, name: str) -> MessageType:
         """Returns a message type. Raises KeyError when it is unknown."""
@@ -147,13 +141,12 @@ class Types:
             return [self._value(of, each) for each in ([None] * length if given is None else given)]
         return np.zeros(length, of[1][0].replace("byte", "uint8")) if given is None else given
 
-    def _key(self, name: str) -> TypeKey:
-        return TypeKey(dds_name(name), self.store.hash_rihs01(name))
+    def _key(self, name: str) -> str:
+        return f"{dds_name(name)}/{self.store.hash_rihs01(name)}"
 
     def _register(self, file: Path) -> None:
         """Registers the types of an interface file."""
         name = f"{file.parts[-3]}/{file.parts[-2]}/{file.stem}"
-        self._read.add(name)
         parts = [part.strip() for part in _PARTS.split(file.read_text(encoding="utf-8"))]
         if file.suffix == ".msg":
             self.store.register(get_types_from_msg(parts[0], name))

@@ -9,7 +9,7 @@ pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
 from ros_client import free_port
 from ros_lock_step import LockStep
 
-from errand_ros2.wire.session import Place
+from errand_ros2.wire.node import Place
 from plant.robots.spot.kind import spot_capabilities
 from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock

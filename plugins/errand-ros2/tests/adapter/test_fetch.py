@@ -7,7 +7,7 @@ import pytest
 from ros_client import free_port
 from ros_lock_step import LockStep
 
-from errand_ros2.wire.session import Place
+from errand_ros2.wire.node import Place
 from plant.robots.robot_kind import robot_kind
 from skills.robot import CommandCause, CommandState
 from skills.testing.blocks import ROOM

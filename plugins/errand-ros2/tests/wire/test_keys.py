@@ -2,10 +2,10 @@
 
 import pytest
 
-from errand_ros2.wire.keys import Attachment, EntityKind, NodeKey, Qos, TypeKey, dds_name, gid_of, topic_name
+from errand_ros2.wire.keys import SUBSCRIPTION, Attachment, NodeKey, Qos, dds_name, gid_of, topic_name
 from skills.inputs.errors import InputError
 
-CHATTER = TypeKey("std_msgs::msg::dds_::String_", "RIHS01_df66")
+CHATTER = "std_msgs::msg::dds_::String_/RIHS01_df66"
 NODE = NodeKey(2, "aac3178e146ba6f1fc6e6a4085e77f21", 0, "/", "listener")
 
 
@@ -14,15 +14,15 @@ def test_a_node_has_the_token_of_the_design_page():
 
 
 def test_a_subscription_has_the_token_of_the_design_page():
-    token = NODE.entity_token(EntityKind.SUBSCRIPTION, 10, "/chatter", CHATTER, Qos())
+    token = NODE.entity_token(SUBSCRIPTION, 10, "/chatter", CHATTER, Qos())
     head = "@ros2_lv/2/aac3178e146ba6f1fc6e6a4085e77f21/0/10/MS/%/%/listener"
-    assert token == f"{head}/%chatter/{CHATTER.dds_name}/{CHATTER.type_hash}/::,10:,:,:,,"
+    assert token == f"{head}/%chatter/{CHATTER}/::,10:,:,:,,"
 
 
 def test_a_namespace_is_one_chunk_of_the_token_and_a_path_of_the_key():
     node = NodeKey(0, "s", 1, "/robot1", "talker")
     assert "/NN/%/%robot1/talker" in node.token()
-    assert node.data_key("/robot1/chatter", CHATTER) == f"0/robot1/chatter/{CHATTER.dds_name}/{CHATTER.type_hash}"
+    assert node.data_key("/robot1/chatter", CHATTER) == f"0/robot1/chatter/{CHATTER}"
 
 
 @pytest.mark.parametrize(

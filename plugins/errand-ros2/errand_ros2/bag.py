@@ -30,12 +30,9 @@ VIEWER_COPIES: Final = frozenset({"detections/boxes", "map/zones", "transform"})
 """Topics of the log whose messages repeat others in a form that Foxglove draws."""
 TF: Final = "/tf"
 TF_STATIC: Final = "/tf_static"
-_ROOT: Final = "map"
-"""Frame that other tools take for the fixed one; it equals the world frame."""
-_LATCHED: Final = frozenset({"/map", TF_STATIC})
-"""Topics whose last message stays for late listeners."""
-_VERSION: Final = 8
-"""Version of the metadata that ROS 2 Humble and all later releases read."""
+_ROOT: Final = "map"  # frame that other tools take for the fixed one; it equals the world frame
+_LATCHED: Final = frozenset({"/map", TF_STATIC})  # topics whose last message stays for late listeners
+_VERSION: Final = 8  # version of the metadata that ROS 2 Humble and all later releases read
 _FOREVER: Final = QosTime(9223372036, 854775807)
 _QOS: Final = Qos(
     *(QosHistory.KEEP_LAST, 10, QosReliability.RELIABLE, QosDurability.VOLATILE, _FOREVER, _FOREVER),

@@ -45,8 +45,7 @@ _TRIGGER: Final = "std_srvs/srv/Trigger"
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
 _DIAGNOSTICS_PERIOD_S, _POSE_PERIOD_S = 1.0, 0.5
-_LATE_S: Final = 0.5
-"""Delay that a run does not catch up with."""
+_LATE_S: Final = 0.5  # delay that a run does not catch up with
 
 
 def observe(value: str) -> Observe:

@@ -12,11 +12,10 @@ import typer
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, start_pose
 from executive.cli.output import console_for, new_folder
-from executive.record.history import History, read_history
+from executive.record.history import read_history
 from skills.inputs.errors import InputError
 from skills.quantities import Delay, Seed
 
-_FILE_SUFFIX: Final = ".mcap"
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 
 ros2 = typer.Typer(name="ros2", help="Logs as ROS 2 bags.", no_args_is_help=True, rich_markup_mode=None)
@@ -34,19 +33,16 @@ def bag(
     robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
 ) -> None:
     """Writes a ROS 2 bag: map, transforms, scans, joint states, poses, paths and pictures."""
-    history = read_history(file)
-    history = history if robot is None else history.of_robot(robot)
-    typer.echo(f"{_write(history, out)} messages in {out}", err=True)
-
-
-def _write(history: History, out: Path) -> int:
-    """Writes a bag, or one file; returns the number of messages."""
     from errand_ros2.bag import write_bag, write_bag_file
 
-    if out.suffix == _FILE_SUFFIX:
-        return write_bag_file(history.events, out)
-    with new_folder(out) as folder:
-        return write_bag(history.events, folder, out.resolve().name)
+    history = read_history(file)
+    history = history if robot is None else history.of_robot(robot)
+    if out.suffix == ".mcap":
+        count = write_bag_file(history.events, out)
+    else:
+        with new_folder(out) as folder:
+            count = write_bag(history.events, folder, out.resolve().name)
+    typer.echo(f"{count} messages in {out}", err=True)
 
 
 def serve_ros2(
@@ -65,20 +61,19 @@ def serve_ros2(
     ] = None,
 ) -> None:
     """Serves a simulated robot in ROS 2, without navigation, until Ctrl-C."""
+    from errand_ros2.adapter.description import capabilities_of
     from errand_ros2.server import RobotServer
     from errand_ros2.wire.node import Place, open_session
     from executive.app.prepare.placed_robots import only_robot, refuse_blocked
     from executive.app.prepare.worlds import open_world
     from executive.app.runs.simulated import compile_first, simulate
     from executive.record.other_tools import ros_name
-    from plant.robots.robot_kind import robot_kinds
     from skills.estimate.grid_map import load_grid_map
 
     at, opened = Place.parse(place), open_world(world)
     if not _NAME.fullmatch(robot):
         raise InputError(f"'{robot[:60]}' is not a name for a robot", hint="use letters and digits, as in Alice")
-    if kind not in (known := robot_kinds()):
-        raise InputError(f"there is no kind of robot '{kind[:60]}'", hint=f"known: {', '.join(sorted(known))}")
+    capabilities_of(kind)
     placed = only_robot(robot, opened, seed=seed, start=start_pose(start), kind=kind)
     if start is not None:
         refuse_blocked(opened, placed.start)

@@ -39,9 +39,9 @@ from skills.robot import Pose2D
 
 FEEDBACK_PERIOD_S: Final = 0.5
 _GOAL_POSE, _TO_POSE, _MISSION = "goal_pose", "navigate_to_pose", "run_mission"
+_ACTIONS: Final = {_TO_POSE: "nav2_msgs/action/NavigateToPose", _MISSION: "errand_msgs/action/RunMission"}
 _STOP: Final = {"wait": {"seconds": 0.05}}
-_FAILED: Final = 9000
-"""Error code of navigate_to_pose for any failure; its message has the cause."""
+_FAILED: Final = 9000  # error code of navigate_to_pose for any failure; its message has the cause
 
 
 @dataclass
@@ -86,19 +86,15 @@ class Goals:
         self._odom = f"{node.namespace.strip('/')}/odom"
         make = partial(ActionServer, node, pool=pool, cancel=self._cancel)
         self._actions = {
-            _TO_POSE: make(
-                _TO_POSE,
-                "nav2_msgs/action/NavigateToPose",
-                accept=lambda goal: self._accept(_TO_POSE, goal, [goal.message.pose]),
-            ),
-            _MISSION: make(
-                _MISSION, "errand_msgs/action/RunMission", accept=lambda goal: self._accept(_MISSION, goal, [])
-            ),
+            name: make(name, kind, accept=partial(self._accept_goal, name)) for name, kind in _ACTIONS.items()
         }
 
     def hear_pose(self, stamped: Any) -> None:
         """Drives to a pose of `goal_pose`; tells why it cannot."""
         self._accept(_GOAL_POSE, None, [stamped])
+
+    def _accept_goal(self, action: str, goal: Goal) -> bool:
+        return self._accept(action, goal, [goal.message.pose] if action == _TO_POSE else [])
 
     def _accept(self, source: str, goal: Goal | None, stamped: Sequence[Any]) -> bool:
         """Pursues a goal of a topic or action; tells why it cannot."""

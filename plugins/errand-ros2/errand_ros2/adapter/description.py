@@ -124,35 +124,22 @@ class Description:
 
 
 DRIVE_EXPIRY_S: Final = 0.6
-_RINGED: Final = frozenset({"spot"})
-"""Kinds whose LiDAR has the rings of `LidarFile`; of others one ring is used."""
+_RINGED: Final = frozenset({"spot"})  # kinds whose LiDAR has the rings of `LidarFile`; of others one ring is used
 
 
 def served_file(kind: str) -> RobotFile:
     """Returns the description of a robot that `errand serve-ros2` serves."""
-    can = _capabilities(kind)
-    return RobotFile(
-        kind=kind,
-        sim_time=True,
-        base=BaseFile(posture=POSTURE),
-        lidar=LidarFile(points="points") if kind in _RINGED else LidarFile(scan="scan"),
-        imu="imu",
-        battery="battery_state",
-        cameras={
-            each.source: CameraFile(
-                image=f"{each.source}/image",
-                info=f"{each.source}/camera_info",
-                depth=f"{each.source}/depth",
-                depth_info=f"{each.source}/depth/camera_info",
-            )
-            for each in can.cameras
-        },
-        arm=ArmFile(action=ARM_ACTION) if can.arm else None,
-        head=ArmFile(action=HEAD_ACTION) if can.head else None,
-        gripper=GripperFile(action=GRIPPER_ACTION, holding="gripper/holding", force="gripper/force", carry=CARRY)
-        if can.gripper
-        else None,
-    )
+    can, gripper = capabilities_of(kind), {"holding": "gripper/holding", "force": "gripper/force", "carry": CARRY}
+    actions = {"arm": ARM_ACTION, "head": HEAD_ACTION, "gripper": GRIPPER_ACTION}
+    parts = {part: {"action": action} for part, action in actions.items() if getattr(can, part)}
+    if can.gripper:
+        parts["gripper"] |= gripper
+    topics = {"image": "image", "info": "camera_info", "depth": "depth", "depth_info": "depth/camera_info"}
+    cameras = {each.source: {key: f"{each.source}/{topic}" for key, topic in topics.items()} for each in can.cameras}
+    lidar = {"points": "points"} if kind in _RINGED else {"scan": "scan"}
+    sensors = {"lidar": lidar, "imu": "imu", "battery": "battery_state", "cameras": cameras}
+    told = {"kind": kind, "sim_time": True, "base": {"posture": POSTURE}}
+    return RobotFile.model_validate({**told, **sensors, **parts})
 
 
 def load_description(path: Path | None, kind: str) -> Description:
@@ -170,18 +157,18 @@ def load_description(path: Path | None, kind: str) -> Description:
 
 def described(file: RobotFile, source: YamlSource | None = None) -> Description:
     """Returns a file with the capabilities of its kind. Raises InputError for what does not fit together."""
-    can = _capabilities(file.kind)
+    can = capabilities_of(file.kind)
     wrong = {
-        ("lidar",): (file.lidar.points is None) == (file.lidar.scan is None) and "names points or scan, one of the two",
-        ("arm",): file.arm is not None and can.arm is None and f"a {file.kind} has no arm",
-        ("head",): file.head is not None and can.head is None and f"a {file.kind} has no head",
-        ("gripper",): file.gripper is not None and can.gripper is None and f"a {file.kind} has no gripper",
-        ("cameras",): bool({*file.cameras} - {each.source for each in can.cameras})
-        and f"a {file.kind} has the cameras {', '.join(each.source for each in can.cameras)}",
+        part: f"a {file.kind} has no {part}"
+        for part in ("arm", "head", "gripper")
+        if getattr(file, part) is not None and getattr(can, part) is None
     }
-    for path, what in wrong.items():
-        if what:
-            raise source.error(path, what) if source else InputError(f"{path[0]}: {what}")
+    if (file.lidar.points is None) == (file.lidar.scan is None):
+        wrong["lidar"] = "names points or scan, one of the two"
+    if not file.cameras.keys() <= (known := {each.source: each for each in can.cameras}).keys():
+        wrong["cameras"] = f"a {file.kind} has the cameras {', '.join(known)}"
+    for part, what in wrong.items():
+        raise source.error((part,), what) if source else InputError(f"{part}: {what}")
     arm = can.arm if file.arm else None
     kept = replace(
         can,
@@ -197,7 +184,8 @@ def described(file: RobotFile, source: YamlSource | None = None) -> Description:
     return Description(file, kept)
 
 
-def _capabilities(kind: str) -> Capabilities:
+def capabilities_of(kind: str) -> Capabilities:
+    """Returns the capabilities of an installed kind of robot. Raises InputError."""
     if kind not in (known := robot_kinds()):
         raise InputError(f"there is no kind of robot '{kind[:60]}'", hint=f"known: {', '.join(sorted(known))}")
     return robot_kind(kind).capabilities()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
 import cv2
@@ -12,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
-from errand_ros2.adapter.description import Description, LidarFile
+from errand_ros2.adapter.description import LidarFile
 from errand_ros2.inputs import transform_of, velocity
 from skills.inputs.errors import InputError
-from skills.robot import Gripper, Imu, Intrinsics, Joints, Odometry, Scan
+from skills.robot import Imu, Intrinsics, Joints, Odometry, Scan
 
 _NEAREST_M: Final = 0.3
 _MOST_PIXELS: Final = 1 << 24
@@ -69,25 +68,6 @@ def imu(message: Any, stamp_s: float) -> Imu:
     """Returns sensor_msgs/Imu, in the axes of its frame."""
     w, a = message.angular_velocity, message.linear_acceleration
     return Imu(stamp_s, (w.x, w.y, w.z), (a.x, a.y, a.z))
-
-
-@dataclass(frozen=True)
-class Felt:
-    """Readings of a gripper: its opening at the end of the last command, its force, and whether it holds an object."""
-
-    opening: float = 0.0
-    force_n: float = 0.0
-    holding: bool = False
-
-
-def gripper(description: Description, now: Joints, felt: Felt) -> Gripper:
-    """Returns the gripper by its finger joints, or without their positions as it felt."""
-    can = description.capabilities.gripper
-    if can is None:
-        return Gripper(now.stamp_s, 0.0, 0.0, False)
-    shares = [(now.position_rad[name], share) for name, share in can.finger_joints if name in now.position_rad]
-    opening = float(np.mean([position / share for position, share in shares])) if shares else felt.opening
-    return Gripper(now.stamp_s, max(0.0, opening), felt.force_n, felt.holding)
 
 
 def cloud_points(message: Any) -> NDArray[np.float64]:

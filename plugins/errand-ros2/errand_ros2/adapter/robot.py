@@ -66,8 +66,6 @@ class Ros2Robot(SensedRobot):
         who = f"Robot of ROS 2 at {address}, by {endpoint}."
         return (who, *(text for text, holds in untold.items() if holds))
 
-    # -- act ---------------------------------------------------------------------------------------------------------
-
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
         """Drives at a body-frame velocity until the clock reads `until_s`, at most 0.6 s."""
         can, now_s = self._description.capabilities, self._clock.now()
@@ -147,8 +145,6 @@ class Ros2Robot(SensedRobot):
         """Returns the last known status of a command. Raises KeyError for an unknown id."""
         return self._commands.status(command)
 
-    # -- own ---------------------------------------------------------------------------------------------------------
-
     def lease_holder(self) -> Lease | None:
         """Valid lease within this program; ROS 2 has none."""
         return self._current
@@ -172,8 +168,6 @@ class Ros2Robot(SensedRobot):
         if lease == self._current:
             self.stop(lease=lease)
             self._current = None
-
-    # -- upkeep ------------------------------------------------------------------------------------------------------
 
     def poll(self) -> None:
         """Renews the velocity, follows the actions, and ends what is late; call it once a tick."""
@@ -232,8 +226,6 @@ class Ros2Robot(SensedRobot):
         untold = {"force_n": file.force is None, "holding": file.holding is None}
         told = {"force_n": result.effort, "holding": bool(result.stalled)}
         self._feel(opening=result.position / file.scale, **{each: told[each] for each in told if untold[each]})
-
-    # -- inside ------------------------------------------------------------------------------------------------------
 
     def _say(self, velocity: tuple[float, float, float]) -> None:
         twist = messages.twist(velocity)

@@ -66,8 +66,8 @@ class SensedRobot:
         self._scan: Scan | None = None
         self._imu: Imu | None = None
         self._place: OwnLocalisation | None = None
-        self._felt = readings.Felt()
-        self._charge: tuple[float, float] | None = None
+        self._felt = Gripper(0.0, 0.0, 0.0, False)
+        self._battery: Battery | None = None
         node.subscribe(file.odometry.topic, "nav_msgs/msg/Odometry", self._hear_odometry)
         node.subscribe("/tf_static", "tf2_msgs/msg/TFMessage", self._hear_fixed, LATCHED)
         self._hear(file.joints, "sensor_msgs/msg/JointState", self._hear_joints)
@@ -83,8 +83,6 @@ class SensedRobot:
     def _hear(self, topic: str | None, kind: str, handle: Callable[[Any], None]) -> None:
         if topic is not None:
             self._node.subscribe(topic, kind, handle, SENSOR)
-
-    # -- verbs -------------------------------------------------------------------------------------------------------
 
     @property
     def name(self) -> str:
@@ -119,12 +117,15 @@ class SensedRobot:
 
     def gripper(self) -> Gripper:
         """Latest gripper state."""
-        return readings.gripper(self._description, self.joints(), self._felt)
+        now, can = self.joints(), self._description.capabilities.gripper
+        fingers = [(now.position_rad.get(name), share) for name, share in (can.finger_joints if can else ())]
+        openings = [position / share for position, share in fingers if position is not None]
+        opening = float(np.mean(openings)) if openings else self._felt.opening
+        return replace(self._felt, stamp_s=now.stamp_s, opening=max(0.0, opening))
 
     def battery(self) -> Battery:
         """Latest battery state; full when no topic tells."""
-        stamp_s, charge = self._charge or (self._clock.now(), 1.0)
-        return Battery(stamp_s, charge)
+        return self._battery or Battery(self._clock.now(), 1.0)
 
     def faults(self) -> tuple[str, ...]:
         """Returns a fault while the robot is silent."""
@@ -153,7 +154,8 @@ class SensedRobot:
         with self._lock:
             self._felt = replace(self._felt, **changes)
 
-    # -- handlers ----------------------------------------------------------------------------------------------------
+    def _stamp(self, message: Any) -> float:
+        return self._clock.ours(readings.stamp_of(message.header))
 
     def _hear_odometry(self, message: Any) -> None:
         raised_m, stamp_s = self._description.file.odometry.raised, readings.stamp_of(message.header)
@@ -173,7 +175,7 @@ class SensedRobot:
 
     def _hear_joints(self, message: Any) -> None:
         with self._lock:
-            stamp_s = self._clock.ours(readings.stamp_of(message.header))
+            stamp_s = self._stamp(message)
             read = readings.usable(readings.joints, message, stamp_s, self._names)
             if read is not None and (not self._joints or stamp_s > self._joints[-1].stamp_s - _SAME_S):
                 self._joints.append(readings.merged(self._joints[-1] if self._joints else None, read))
@@ -186,7 +188,7 @@ class SensedRobot:
 
     def _hear_points(self, message: Any) -> None:
         X_BF, X_BL = self._X_BF(message.header.frame_id.strip("/")), self._X_BF(self._lidar_frame)
-        stamp_s = self._clock.ours(readings.stamp_of(message.header))
+        stamp_s = self._stamp(message)
         points_F, X_OB = readings.usable(readings.cloud_points, message), self._X_OB(stamp_s)
         if points_F is None or X_BF is None or X_BL is None or X_OB is None:
             return
@@ -194,31 +196,28 @@ class SensedRobot:
         self._scan = readings.cloud_scan(points_L, self._description.file.lidar, stamp_s, X_BL, X_OB)
 
     def _hear_scan(self, message: Any) -> None:
-        stamp_s = self._clock.ours(readings.stamp_of(message.header))
+        stamp_s = self._stamp(message)
         X_BL, X_OB = self._X_BF(message.header.frame_id.strip("/")), self._X_OB(stamp_s)
         if X_BL is not None and X_OB is not None:
             self._scan = readings.usable(readings.flat_scan, message, stamp_s, X_BL, X_OB) or self._scan
 
     def _hear_imu(self, message: Any) -> None:
-        self._imu = readings.imu(message, self._clock.ours(readings.stamp_of(message.header)))
+        self._imu = readings.imu(message, self._stamp(message))
 
     def _hear_force(self, message: Any) -> None:
         force = message.wrench.force
-        told = math.sqrt(force.x**2 + force.y**2 + force.z**2)
-        if math.isfinite(told):
-            self._feel(force_n=told)
+        if math.isfinite(force_n := math.hypot(force.x, force.y, force.z)):
+            self._feel(force_n=force_n)
 
     def _hear_battery(self, message: Any) -> None:
         if 0.0 <= message.percentage <= 1.0:
-            self._charge = (self._clock.ours(readings.stamp_of(message.header)), float(message.percentage))
+            self._battery = Battery(self._stamp(message), float(message.percentage))
 
     def _hear_pose(self, message: Any) -> None:
-        stamp_s = self._clock.ours(readings.stamp_of(message.header))
+        stamp_s = self._stamp(message)
         pose, X_OB = readings.usable(planar_pose, message.pose.pose), self._X_OB(stamp_s)
         if pose is not None and X_OB is not None:
             self._place = OwnLocalisation(stamp_s, compose(pose, inverse(Pose2D.from_transform(X_OB))))
-
-    # -- frames ------------------------------------------------------------------------------------------------------
 
     @property
     def _lidar_frame(self) -> str:
@@ -272,8 +271,6 @@ class SensedRobot:
                 edges[f"{camera.source}_camera"] = (parents[camera.mount], camera.X_FC)
         return FrameTree(edges)
 
-    # -- pictures ----------------------------------------------------------------------------------------------------
-
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         """Subscribes for one picture with depth. Raises ValueError and NoImageError."""
         file = self._description.file.cameras.get(source)
@@ -302,7 +299,7 @@ class SensedRobot:
         def fits() -> bool:
             if found.keys() != wanted.keys():
                 return False
-            stamps = [self._clock.ours(readings.stamp_of(found[each].header)) for each in found if "info" not in each]
+            stamps = [self._stamp(found[each]) for each in found if "info" not in each]
             return min(stamps) >= since_s and max(stamps) - min(stamps) <= _SAME_S
 
         with ExitStack() as ends:
@@ -312,7 +309,7 @@ class SensedRobot:
                 return dict(found) if new.wait_for(fits, _PICTURE_S) else None
 
     def _image(self, source: str, found: Mapping[str, Any], *, visual: bool, depth: bool) -> Image:
-        stamp_s = self._clock.ours(readings.stamp_of(found["image" if visual else "depth"].header))
+        stamp_s = self._stamp(found["image" if visual else "depth"])
         frames = self.frames_at(stamp_s)
         picture = readings.usable(readings.pixels, found["image"]) if visual else np.zeros((0, 0), np.uint8)
         far = readings.usable(readings.depth_m, found["depth"]) if depth else np.zeros((0, 0), np.float32)

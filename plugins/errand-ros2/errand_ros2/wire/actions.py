@@ -20,8 +20,7 @@ from errand_ros2.wire.types import older_types, ros_types
 
 MOST_GOALS: Final = 64
 """Goals whose results are kept; older ones are forgotten."""
-_RESULT_S: Final = 3600.0
-"""Time for which a client waits for a result."""
+_RESULT_S: Final = 3600.0  # time for which a client waits for a result
 _REJECTED, _UNKNOWN_GOAL, _TERMINATED = 1, 2, 3
 """Answers to a request to cancel goals (action_msgs/srv/CancelGoal)."""
 

@@ -156,17 +156,17 @@ class Types:
             self._register_action(name, *parts)
 
     def _register_service(self, name: str, request: str, response: str) -> None:
-        types: Typesdict = get_types_from_msg(request, f"{name}_Request")
-        types |= get_types_from_msg(response, f"{name}_Response")
-        types |= get_types_from_msg(_EVENT.format(name), f"{name}_Event")
-        types |= get_types_from_msg(_SERVICE.format(name), name)
+        types: Typesdict = {}
+        texts = {"_Request": request, "_Response": response, "_Event": _EVENT.format(name), "": _SERVICE.format(name)}
+        for suffix, text in texts.items():
+            types |= get_types_from_msg(text, name + suffix)
         self.store.register(_as_service(types))
 
     def _register_action(self, name: str, goal: str, result: str, feedback: str) -> None:
-        for suffix, text in (("Goal", goal), ("Result", result), ("Feedback", feedback)):
-            self.store.register(get_types_from_msg(text, f"{name}_{suffix}"))
-        message = f"{_UUID}\n{name}_Feedback feedback"
-        self.store.register(get_types_from_msg(message, f"{name}_FeedbackMessage"))
+        texts = {"_Goal": goal, "_Result": result, "_Feedback": feedback}
+        texts["_FeedbackMessage"] = f"{_UUID}\n{name}_Feedback feedback"
+        for suffix, text in texts.items():
+            self.store.register(get_types_from_msg(text, name + suffix))
         accepted = "bool accepted\nbuiltin_interfaces/Time stamp"
         self._register_service(f"{name}_SendGoal", f"{_UUID}\n{name}_Goal goal", accepted)
         self._register_service(f"{name}_GetResult", _UUID, f"int8 status\n{name}_Result result")

@@ -55,10 +55,7 @@ def write_bag(events: Iterable[Event], folder: Path, name: str) -> int:
 
 
 def write_bag_file(events: Iterable[Event], path: Path) -> int:
-    """Writes the events as one MCAP file of ROS 2; returns the number of messages.
-
-    Raises InputError when it cannot be written.
-    """
+    """Writes the events as one MCAP file of ROS 2; returns the number of messages. Raises InputError."""
     with writing(path), TemporaryDirectory(dir=path.parent, prefix=f".{path.name}-") as folder:
         count = write_bag(events, Path(folder), path.stem)
         (Path(folder) / f"{path.stem}.mcap").replace(path)

@@ -1,7 +1,6 @@
-"""Bridge between a run and ROS 2, for `errand run ... --ros2 [DOMAIN]`.
+"""Bridge between a run and ROS 2, for `errand run ... --ros2 [DOMAIN]`; the run goes at the pace of the wall clock.
 
-Publishes what the robots sense, where they are and what they do; takes goals, velocities, sentences and services. The
-run goes at the pace of the wall clock.
+Publishes what the robots sense, where they are and what they do; takes goals, velocities, sentences and services.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ from errand_ros2 import messages
 from errand_ros2.driving import Driving
 from errand_ros2.goals import Goals
 from errand_ros2.inputs import FRAMES, TOPIC, planar_pose
+from errand_ros2.messages import Fields
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Node, Place, Publisher, open_session
@@ -41,7 +41,6 @@ from skills.inputs.errors import InputError
 NAME: Final = "errand"
 """Name of all nodes."""
 _PATH, _OUTCOME = "path", "outcome"
-_TRIGGER: Final = "std_srvs/srv/Trigger"
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
 _DIAGNOSTICS_PERIOD_S, _POSE_PERIOD_S = 1.0, 0.5
@@ -74,12 +73,9 @@ class _RobotBridge:
 class Bridge(RunVisitor):
     """Visitor of one run that is a system of ROS 2."""
 
-    def __init__(self, prepared: Prepared, control: Control, place: Place, *, pace: float | None = 1.0) -> None:
-        """Opens the session. The run goes at most `pace` times as fast as the wall clock (None: without a limit).
-
-        Raises InputError when no session can be opened.
-        """
-        self._open, self._pace, self._control = ExitStack(), pace, control
+    def __init__(self, prepared: Prepared, control: Control, place: Place) -> None:
+        """Opens the session. Raises InputError."""
+        self._open, self._control = ExitStack(), control
         self._hurry = threading.Event()
         self.session = self._open.enter_context(open_session(place))
         self._pool = self._open.enter_context(ThreadPoolExecutor(1, thread_name_prefix="errand-ros2"))
@@ -127,24 +123,27 @@ class Bridge(RunVisitor):
         node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
         node.subscribe(TOPIC, "geometry_msgs/msg/Twist", driving.hear)
         node.subscribe("say", "std_msgs/msg/String", self._later(hear))
-        for what, call in self._commands(name).items():
-            node.answer(what, _TRIGGER, partial(_answer, what, call, self._hurry.set))
+        for what in ("pause", "resume", "cancel", "step"):
+            node.answer(what, "std_srvs/srv/Trigger", partial(self._obey, name, what))
         return own
 
-    def _commands(self, name: str) -> Mapping[str, Callable[[], None]]:
-        """Returns the robot's services, which take and return std_srvs/Trigger."""
+    def _obey(self, name: str, what: str, _: Any) -> Fields:
+        """Answers a service by its command to a robot, or by the reason why it is refused."""
         control = self._control
-
-        def resume() -> None:
-            control.resume(robot=name)
-            control.resume()
-
-        return {
-            "pause": partial(control.pause, "paused by ROS 2", robot=name),
-            "resume": resume,
-            "cancel": partial(control.cancel, "cancelled by ROS 2", robot=name),
-            "step": control.step,
-        }
+        try:
+            if what == "pause":
+                control.pause("paused by ROS 2", robot=name)
+            elif what == "cancel":
+                control.cancel("cancelled by ROS 2", robot=name)
+            elif what == "step":
+                control.step()
+            else:
+                control.resume(robot=name)
+                control.resume()
+        except ValueError as error:
+            return {"success": False, "message": str(error)}
+        self._hurry.set()
+        return {"success": True, "message": what}
 
     def mission_begun(self, nodes: Sequence[Behaviour], context: SkillContext) -> None:
         """Takes the context of a robot's new mission; publishes the robot's description and cameras at the first."""
@@ -201,15 +200,10 @@ class Bridge(RunVisitor):
         own.goals.end()
 
     def _keep_pace(self, now_s: float) -> None:
-        """Waits until the wall clock has come as far as the robot's clock, or a request is in a hurry.
-
-        Forgets a delay that is too long.
-        """
-        if self._pace is None:
-            return
+        """Waits for the wall clock, unless a request is in a hurry; forgets a delay that is too long."""
         wall_s = time.monotonic()
         begun_s, begun_wall_s = self._begun = self._begun or (now_s, wall_s)
-        ahead_s = (now_s - begun_s) / self._pace - (wall_s - begun_wall_s)
+        ahead_s = now_s - begun_s - (wall_s - begun_wall_s)
         if ahead_s > 0.0:
             self._hurry.wait(ahead_s)
         elif ahead_s < -_LATE_S:
@@ -221,16 +215,6 @@ class Bridge(RunVisitor):
         for own in self._robots.values():
             own.goals.end()
         self._open.close()
-
-
-def _answer(what: str, call: Callable[[], None], hurry: Callable[[], None], _: Any) -> Any:
-    """Calls a command of a service; returns the response, with the reason when it is refused."""
-    try:
-        call()
-        hurry()
-    except ValueError as error:
-        return {"success": False, "message": str(error)}
-    return {"success": True, "message": what}
 
 
 def _event(topic: str, message: Mapping[str, Any]) -> Any:

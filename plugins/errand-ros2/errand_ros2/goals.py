@@ -46,10 +46,7 @@ _FAILED: Final = 9000  # error code of navigate_to_pose for any failure; its mes
 
 @dataclass
 class _Pursued:
-    """Goal of a topic or action that is pursued as a mission; the mission `stop` takes its place when it is cancelled.
-
-    `goal` is None for one of the topic `goal_pose`.
-    """
+    """Goal that is pursued as a mission, whose place `stop` takes when it is cancelled; None: of the topic."""
 
     source: str
     goal: Goal | None
@@ -72,10 +69,7 @@ class Goals:
         refuse: Callable[[str], None],
         hurry: Callable[[], None],
     ) -> None:
-        """`prepared` is the robot's part of the run; `pool` compiles goals, `refuse` tells why one is refused.
-
-        `hurry` lets the next tick begin at once.
-        """
+        """`pool` compiles goals, `refuse` tells why one is refused, `hurry` lets the next tick begin at once."""
         self._prepared, self._control, self._grid = prepared, control, grid
         self._refuse, self._hurry = refuse, hurry
         self._name = prepared.mission.robot_name

@@ -1,7 +1,4 @@
-"""Fields of messages of ROS 2 from a robot's readings; those that are left out are zero.
-
-Stamps are those of the robot's clock, which `/clock` publishes.
-"""
+"""Fields of messages of ROS 2 from a robot's readings, with the stamps of its clock; what is left out is zero."""
 
 from __future__ import annotations
 

@@ -120,11 +120,13 @@ class RobotTopics:
         if now_s >= self._battery_due_s - _EPSILON_S:
             self._battery_due_s = now_s + BATTERY_PERIOD_S
             self._battery.put(messages.battery(self._robot.battery()))
-        self._frames.move([*moving, *self.publish_pictures(now_s)])
+        self._frames.move(moving)
+        self.publish_pictures(now_s)
 
-    def publish_pictures(self, now_s: float) -> list[Fields]:
-        """Publishes the pictures for which subscriptions wait; returns the transforms of moving cameras."""
-        return [each for camera in self._cameras for each in self._publish_camera(camera, now_s)]
+    def publish_pictures(self, now_s: float) -> None:
+        """Publishes the pictures for which subscriptions wait."""
+        for camera in self._cameras:
+            self._publish_camera(camera, now_s)
 
     def _publish_scan(self) -> None:
         scan = self._robot.scan()
@@ -137,16 +139,19 @@ class RobotTopics:
         if self._points.is_heard:
             self._points.put(messages.points(scan, self._body))
 
-    def _publish_camera(self, at: _Camera, now_s: float) -> list[Fields]:
-        """Publishes what subscriptions ask for; returns the transform of a camera that moves on the body."""
+    def _publish_camera(self, at: _Camera, now_s: float) -> None:
+        """Publishes what subscriptions ask for, and the transform of a camera that moves on the body."""
         visual, depth = (at.is_due(now_s, self._image_period_s, depth=each) for each in (False, True))
         if not (visual or depth):
-            return []
+            return
         try:
             reading = self._robot.image(at.camera.source, visual=visual, depth=depth)
         except NoImageError:
-            return []
+            return
         most, stamp_s = self._most_columns, reading.stamp_s
+        if at.camera.mount is not Mount.BODY:
+            X_OC = reading.frames.pose(reading.camera_frame)
+            self._frames.move([messages.transform(stamp_s, self._odom_frame, at.frame, X_OC)])
         if visual:
             out, picture = at.out[False], messages.picture(reading, at.frame, most)
             out["camera_info"].put(messages.camera_info(stamp_s, at.frame, reading.intrinsics, most))
@@ -157,6 +162,3 @@ class RobotTopics:
             out = at.out[True]
             out["depth/camera_info"].put(messages.camera_info(stamp_s, at.frame, reading.depth_intrinsics, most))
             out["depth"].put(messages.depth(reading, at.frame, most))
-        if at.camera.mount is Mount.BODY:
-            return []
-        return [messages.transform(stamp_s, self._odom_frame, at.frame, reading.frames.pose(reading.camera_frame))]

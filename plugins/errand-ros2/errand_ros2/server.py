@@ -1,7 +1,4 @@
-"""A simulated robot as a robot of ROS 2: topics, `/clock`, `cmd_vel` with a watchdog, actions of arm, head and gripper.
-
-It does not navigate.
-"""
+"""A simulated robot of ROS 2, which does not navigate: topics, `cmd_vel` with a watchdog, actions of its parts."""
 
 from __future__ import annotations
 
@@ -10,7 +7,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from queue import Empty, SimpleQueue
 from threading import Event
@@ -76,22 +72,13 @@ class WorkQueue(Executor):
                 return
 
 
-@dataclass
-class _Served:
-    """Goal under way, with the command of the robot that pursues it."""
-
-    server: ActionServer
-    goal: Goal
-    command: CommandId
-
-
 class ServedMotions:
     """Actions and topics of the robot's parts, which become commands in the thread that owns the robot."""
 
     def __init__(self, node: Node, robot: Robot, clock: Clock, lease: Lease, work: WorkQueue) -> None:
         """Declares the parts that the robot has."""
         self._robot, self._clock, self._lease, self._work = robot, clock, lease, work
-        self._served: list[_Served] = []
+        self._served: list[tuple[ActionServer, Goal, CommandId]] = []  # goals under way, with their commands
         self.ended = 0
         """Number of the goals ended."""
         can = robot.capabilities()
@@ -115,16 +102,16 @@ class ServedMotions:
                 return False
             if self._robot.command_status(command).state is CommandState.REFUSED:
                 return False
-            self._served.append(_Served(server, goal, command))
+            self._served.append((server, goal, command))
             return True
 
         cancel = partial(self._work.submit, self._cancel)
         server = ActionServer(node, name, kind, accept=accept, cancel=cancel, pool=self._work)
 
     def _cancel(self, goal: Goal) -> None:
-        for each in self._served:
-            if each.goal is goal:
-                self._robot.stop(lease=self._lease, only=each.command)
+        for _, each, command in self._served:
+            if each is goal:
+                self._robot.stop(lease=self._lease, only=command)
 
     def _follow(self, names: tuple[str, ...], move: Callable[..., CommandId], goal: Any) -> CommandId:
         """Begins a trajectory of these joints by a verb of the robot."""
@@ -154,27 +141,27 @@ class ServedMotions:
 
     def tick(self) -> None:
         """Ends the goals whose commands have ended; call it after each step."""
-        for each in list(self._served):
-            if each.goal.status is GoalStatus.ACCEPTED:
-                each.server.begin(each.goal)
-            status = self._robot.command_status(each.command)
+        for server, goal, command in list(self._served):
+            if goal.status is GoalStatus.ACCEPTED:
+                server.begin(goal)
+            status = self._robot.command_status(command)
             if status.state is not CommandState.RUNNING:
-                self._served.remove(each)
-                self._end(each, status)
+                self._served.remove((server, goal, command))
+                self._end(server, goal, status)
 
-    def _end(self, each: _Served, status: CommandStatus) -> None:
+    def _end(self, server: ActionServer, goal: Goal, status: CommandStatus) -> None:
         done = status.state is CommandState.DONE
-        if each.server.kind.name == TRAJECTORY:
+        if server.kind.name == TRAJECTORY:
             code = 0 if done else INVALID_GOAL if status.cause is CommandCause.INVALID else PATH_VIOLATED
             result = {"error_code": code, "error_string": status.reason}
         else:
-            reading, wanted = self._robot.gripper(), each.goal.message.command.position
+            reading, wanted = self._robot.gripper(), goal.message.command.position
             stalled = done and reading.opening - wanted > self._thin
             ends = {"stalled": stalled, "reached_goal": done and not stalled}
             result = {"position": reading.opening, "effort": reading.force_n, **ends}
-        cancelled = each.goal.status is GoalStatus.CANCELING
+        cancelled = goal.status is GoalStatus.CANCELING
         final = GoalStatus.SUCCEEDED if done else GoalStatus.CANCELED if cancelled else GoalStatus.ABORTED
-        each.server.end(each.goal, final, **result)
+        server.end(goal, final, **result)
         self.ended += 1
 
 
@@ -225,8 +212,8 @@ class RobotServer:
             top.publisher("/map", "nav_msgs/msg/OccupancyGrid", LATCHED).put(messages.occupancy_grid(grid))
         if truth is not None:
             self._true = top.publisher(f"/ground_truth{space}/pose", "geometry_msgs/msg/PoseStamped")
-        self._frames = Frames(top)
-        self.topics = RobotTopics(self.node, robot, self._frames, most_columns=_WHOLE, image_period_s=image_period_s)
+        frames, camera = Frames(top), {"most_columns": _WHOLE, "image_period_s": image_period_s}
+        self.topics = RobotTopics(self.node, robot, frames, **camera)
         self.work = WorkQueue()
         self.motions = ServedMotions(self.node, robot, clock, self._lease, self.work)
         self._velocity = HeardVelocity(life)
@@ -249,11 +236,6 @@ class RobotServer:
         self.topics.publish(now_s, None)
         if self._truth is not None:
             self._true.put(messages.pose_stamped(now_s, messages.MAP_FRAME, self._truth()))
-
-    def show(self) -> None:
-        """Publishes the pictures that are due, without a step."""
-        if moved := self.topics.publish_pictures(self._clock.now()):
-            self._frames.move(moved)
 
     def run(self, ended: Event, limit_s: float | None = None) -> None:
         """Steps the robot at the pace of the wall clock, until `ended` or a time (s, robot's clock)."""

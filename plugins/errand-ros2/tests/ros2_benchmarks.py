@@ -24,7 +24,7 @@ from errand_ros2.bridge import Bridge
 from errand_ros2.server import RobotServer
 from errand_ros2.wire.keys import Attachment
 from errand_ros2.wire.node import Client, Node, Place, open_session
-from errand_ros2.wire.types import ros_types
+from errand_ros2.wire.types import ActionType, ros_types
 from executive.app.prepare.from_request import prepare
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import open_world
@@ -147,7 +147,7 @@ def tell(rows, limit_s):
 
 
 def cancel(count):
-    types, action = ros_types(), ros_types().action("nav2_msgs/action/NavigateToPose")
+    types, action = ros_types(), ActionType(ros_types(), "nav2_msgs/action/NavigateToPose")
 
     def client(place, bridge):
         with open_session(place) as session:
@@ -183,7 +183,7 @@ SENDER = """
 import sys, time
 from errand_ros2.wire.node import Node
 from errand_ros2.wire.node import Place, open_session
-from errand_ros2.wire.types import ros_types
+from errand_ros2.wire.types import ActionType, ros_types
 
 with open_session(Place(port=int(sys.argv[1]))) as session:
     kind = "geometry_msgs/msg/Twist"

@@ -48,7 +48,7 @@ class LockStep(RobotClock):
             self._ready.set()
             while not self._stopping.is_set():
                 self.server.work.work_for(IDLE_S)
-                self.server.show()
+                self.server.topics.publish_pictures(clock.now())
         del robot, clock, self.served, self.clock, self._build, self.server
         gc.collect()  # a renderer ends in the thread in which it began
 

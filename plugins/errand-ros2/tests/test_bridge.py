@@ -21,7 +21,7 @@ from errand_ros2.bridge import Bridge, observe
 from errand_ros2.wire.actions import GoalStatus
 from errand_ros2.wire.keys import LATCHED, Attachment
 from errand_ros2.wire.node import Client, Node, Place, open_session
-from errand_ros2.wire.types import older_types, ros_types
+from errand_ros2.wire.types import ActionType, older_types, ros_types
 from executive.app.prepare.from_request import prepare
 from executive.app.runs.one_run import run_request
 from executive.mission.request import Request
@@ -90,7 +90,7 @@ class ActionClient:
     """Client of an action, which sends one goal."""
 
     def __init__(self, client, name, kind):
-        self.kind, node = ros_types().action(kind), client.node
+        self.kind, node = ActionType(ros_types(), kind), client.node
         base = f"/alice/{name}/_action"
         self._send = Client(node, f"{base}/send_goal", self.kind.send_goal)
         self._result = Client(node, f"{base}/get_result", self.kind.get_result)
@@ -356,7 +356,7 @@ def test_random_bytes_on_every_input_move_nothing(talk, capfd):
         for _ in range(500):
             for key in keys:
                 ros.node.session.inner.put(key, chance.bytes(int(chance.integers(0, 47))))
-        action, base = types.action(NAVIGATE), "/alice/navigate_to_pose/_action"
+        action, base = ActionType(types, NAVIGATE), "/alice/navigate_to_pose/_action"
         names = {"send_goal": action.send_goal, "cancel_goal": action.cancel_goal, "get_result": action.get_result}
         attachment = Attachment(1, 2, bytes(16)).encoded()
         for name, kind in names.items():

@@ -16,7 +16,7 @@ import numpy as np
 
 from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Client, Node, Request
-from errand_ros2.wire.types import older_types, ros_types
+from errand_ros2.wire.types import ActionType, older_types, ros_types
 
 MOST_GOALS: Final = 64
 """Goals whose results are kept; older ones are forgotten."""
@@ -74,7 +74,7 @@ class ActionServer:
         pool: Executor,
     ) -> None:
         """`accept`, which the `pool` calls, returns whether a goal is pursued; `cancel` begins to end one."""
-        self.kind, self._lock = ros_types().action(type_name), threading.RLock()
+        self.kind, self._lock = ActionType(ros_types(), type_name), threading.RLock()
         self._accept, self._cancel = accept, cancel
         self._goals: dict[bytes, Goal] = {}
         base = f"{node.absolute(name)}/_action"
@@ -171,7 +171,7 @@ class ActionServer:
 
     def _result(self, **fields: Any) -> Any:
         """Returns a result in the form of the newest distribution; older clients get the fields that they know."""
-        return ros_types().make(self.kind.result.name, **fields)
+        return ros_types().make(f"{self.kind.name}_Result", **fields)
 
 
 def _submit(pool: Executor, handle: Callable[[Request], None], request: Request) -> None:
@@ -197,12 +197,12 @@ class ActionClient:
     """Client of one action."""
 
     def __init__(self, node: Node, name: str, type_name: str) -> None:
-        self.kind, base = ros_types().action(type_name), f"{node.absolute(name)}/_action"
+        kind, base = ActionType(ros_types(), type_name), f"{node.absolute(name)}/_action"
         self.ended = 0
         """Number of the goals whose result has come."""
-        self._send = Client(node, f"{base}/send_goal", self.kind.send_goal)
-        self._cancel = Client(node, f"{base}/cancel_goal", self.kind.cancel_goal)
-        self._result = Client(node, f"{base}/get_result", self.kind.get_result)
+        self._send = Client(node, f"{base}/send_goal", kind.send_goal)
+        self._cancel = Client(node, f"{base}/cancel_goal", kind.cancel_goal)
+        self._result = Client(node, f"{base}/get_result", kind.get_result)
 
     def send(self, goal: Any, *, limit_s: float) -> SentGoal | None:
         """Sends a goal or its fields; returns None when the server rejects it. Raises NoAnswerError."""

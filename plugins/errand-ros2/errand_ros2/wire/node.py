@@ -1,6 +1,5 @@
 """Sessions of Zenoh, and nodes of ROS 2 in them: publishers, subscriptions, services and clients.
 
-A session is the router of this machine, or a client of a router that runs already.
 Zenoh calls handlers in threads of its own. A message that cannot be decoded is dropped and counted.
 """
 
@@ -10,7 +9,6 @@ import json
 import logging
 import re
 import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -138,24 +136,21 @@ class Publisher:
         self._publisher.put(self._kind.encode(message), attachment=attachment)
 
 
+@dataclass(frozen=True)
 class Request:
-    """Request of a client, which is answered at once or later, and only once."""
+    """Request of a client, which is answered once, at once or later."""
 
-    def __init__(self, message: Any, query: zenoh.Query, key: str, head: Attachment, kind: MessageType) -> None:
-        self.message = message
-        self._query: zenoh.Query | None = query
-        self._key, self._head, self._kind = key, head, kind
-        self._lock = threading.Lock()
+    message: Any
+    query: zenoh.Query
+    key: str
+    head: Attachment
+    kind: MessageType
 
     def reply(self, response: Any) -> None:
-        """Sends the response; a second one is dropped."""
-        with self._lock:
-            query, self._query = self._query, None
-        if query is None:
-            return
-        attachment = Attachment(self._head.number, time.time_ns(), self._head.gid).encoded()
-        with query:
-            query.reply(self._key, self._kind.encode(response), encoding=_CDR, attachment=attachment)
+        """Sends the response, or a mapping of its fields."""
+        attachment = Attachment(self.head.number, time.time_ns(), self.head.gid).encoded()
+        with self.query:
+            self.query.reply(self.key, self.kind.encode(response), encoding=_CDR, attachment=attachment)
 
 
 class Client:

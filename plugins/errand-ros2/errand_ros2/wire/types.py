@@ -71,18 +71,15 @@ class ServiceType:
     response: MessageType
 
 
-@dataclass(frozen=True)
 class ActionType:
-    """Action type: the services and messages of which `rosidl` makes it."""
+    """Action type: the services and messages of which `rosidl` makes it. Raises KeyError when it is unknown."""
 
-    name: str
-    send_goal: ServiceType
-    get_result: ServiceType
-    cancel_goal: ServiceType
-    feedback_message: MessageType
-    status: MessageType
-    result: MessageType
-    feedback: MessageType
+    def __init__(self, types: Types, name: str) -> None:
+        self.name = name
+        self.send_goal, self.get_result = (types.service(f"{name}_{part}") for part in ("SendGoal", "GetResult"))
+        self.cancel_goal = types.service("action_msgs/srv/CancelGoal")
+        self.feedback_message = types.message(f"{name}_FeedbackMessage")
+        self.status = types.message("action_msgs/msg/GoalStatusArray")
 
 
 class Types:
@@ -104,19 +101,6 @@ class Types:
         """Returns a service type. Raises KeyError when it is unknown."""
         request, response = (self.message(f"{name}_{part}") for part in ("Request", "Response"))
         return ServiceType(name, self._key(name), request, response)
-
-    def action(self, name: str) -> ActionType:
-        """Returns an action type. Raises KeyError when it is unknown."""
-        return ActionType(
-            name,
-            self.service(f"{name}_SendGoal"),
-            self.service(f"{name}_GetResult"),
-            self.service("action_msgs/srv/CancelGoal"),
-            self.message(f"{name}_FeedbackMessage"),
-            self.message("action_msgs/msg/GoalStatusArray"),
-            self.message(f"{name}_Result"),
-            self.message(f"{name}_Feedback"),
-        )
 
     def make(self, name: str, /, **values: Any) -> Any:
         """Returns a message; mappings become messages, and what is left out is zero or empty.

@@ -10,7 +10,7 @@ from errand_ros2.adapter.description import served_file
 from errand_ros2.adapter.sensors import SILENT_S
 from errand_ros2.server import GRIPPER, TRAJECTORY
 from errand_ros2.wire.keys import Attachment
-from errand_ros2.wire.types import ros_types
+from errand_ros2.wire.types import ActionType, ros_types
 from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError
 
 
@@ -212,7 +212,7 @@ def test_random_bytes_on_every_topic_and_service_move_nothing(step, capfd):
                 session.put(key, data)
     attachment = Attachment(1, 2, bytes(16)).encoded()
     for name, kind in ((file.arm.action, TRAJECTORY), (file.gripper.action, GRIPPER)):
-        action = types.action(kind)
+        action = ActionType(types, kind)
         for part in ("send_goal", "cancel_goal", "get_result"):
             key = step.node.key.data_key(f"{space}/{name}/_action/{part}", getattr(action, part).key)
             for _ in range(20):

@@ -38,8 +38,13 @@ from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 
 FEEDBACK_PERIOD_S: Final = 0.5
-_GOAL_POSE, _TO_POSE, _MISSION = "goal_pose", "navigate_to_pose", "run_mission"
-_ACTIONS: Final = {_TO_POSE: "nav2_msgs/action/NavigateToPose", _MISSION: "errand_msgs/action/RunMission"}
+_MISSION: Final = "run_mission"
+_ACTIONS: Final = {
+    "navigate_to_pose": "nav2_msgs/action/NavigateToPose",
+    "navigate_through_poses": "nav2_msgs/action/NavigateThroughPoses",
+    _MISSION: "errand_msgs/action/RunMission",
+}
+_PASSED_M: Final = 0.3  # distance from a pose at which it counts as passed
 _STOP: Final = {"wait": {"seconds": 0.05}}
 _FAILED: Final = 9000  # error code of navigate_to_pose for any failure; its message has the cause
 
@@ -54,6 +59,7 @@ class _Pursued:
     mission: str
     stop: CompiledTree
     since_s: float | None = None
+    passed: int = 0
 
 
 class Goals:
@@ -85,10 +91,14 @@ class Goals:
 
     def hear_pose(self, stamped: Any) -> None:
         """Drives to a pose of `goal_pose`; tells why it cannot."""
-        self._accept(_GOAL_POSE, None, [stamped])
+        self._accept("goal_pose", None, [stamped])
 
     def _accept_goal(self, action: str, goal: Goal) -> bool:
-        return self._accept(action, goal, [goal.message.pose] if action == _TO_POSE else [])
+        message = goal.message
+        if action == _MISSION:
+            return self._accept(action, goal, [])
+        poses = [message.pose] if hasattr(message, "pose") else getattr(message.poses, "goals", message.poses)
+        return self._accept(action, goal, poses)
 
     def _accept(self, source: str, goal: Goal | None, stamped: Sequence[Any]) -> bool:
         """Pursues a goal of a topic or action; tells why it cannot."""
@@ -164,7 +174,7 @@ class Goals:
                 path, message = running[-1] if running else ("", "")
                 action.tell(each.goal, step=path, message=message)
             else:
-                action.tell(each.goal, **_feedback(each.poses, context, now_s, now_s - each.since_s))
+                action.tell(each.goal, **_feedback(each, context, now_s))
 
     def message(self, message: Mapping[str, Any]) -> None:
         """Ends the goal whose mission ended, by the message of its outcome."""
@@ -200,9 +210,15 @@ def _drive_to(pose: Pose2D) -> Mapping[str, Any]:
     return {"skill": "navigate", "with": {"goal": goal}}
 
 
-def _feedback(poses: Sequence[Pose2D], context: SkillContext, now_s: float, took_s: float) -> Mapping[str, Any]:
-    """Returns the feedback of navigation; the distance is that of the straight line."""
-    here, (goal,) = context.pose(), poses
-    left_m = math.hypot(goal.x_m - here.x_m, goal.y_m - here.y_m)
-    pose = messages.pose_stamped(now_s, messages.MAP_FRAME, context.X_WB())
-    return {"current_pose": pose, "navigation_time": messages.time_of(took_s), "distance_remaining": left_m}
+def _feedback(each: _Pursued, context: SkillContext, now_s: float) -> Mapping[str, Any]:
+    """Returns the feedback of navigation; the distance is that of the straight lines between the poses."""
+    here = (context.pose().x_m, context.pose().y_m)
+    left = [(pose.x_m, pose.y_m) for pose in each.poses[each.passed :]]
+    if len(left) > 1 and math.dist(here, left[0]) < _PASSED_M:
+        each.passed, left = each.passed + 1, left[1:]
+    feedback = {
+        "current_pose": messages.pose_stamped(now_s, messages.MAP_FRAME, context.X_WB()),
+        "navigation_time": messages.time_of(now_s - (each.since_s or now_s)),
+        "distance_remaining": sum(map(math.dist, [here, *left], left)),
+    }
+    return feedback | ({"number_of_poses_remaining": len(left)} if len(each.poses) > 1 else {})

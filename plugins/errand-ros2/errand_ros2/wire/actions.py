@@ -16,7 +16,7 @@ import numpy as np
 
 from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Client, Node, Request
-from errand_ros2.wire.types import ActionType, older_types, ros_types
+from errand_ros2.wire.types import ActionType, older_services, ros_types
 
 MOST_GOALS: Final = 64
 """Goals whose results are kept; older ones are forgotten."""
@@ -80,11 +80,11 @@ class ActionServer:
         base = f"{node.absolute(name)}/_action"
         self._feedback = node.publisher(f"{base}/feedback", self.kind.feedback_message.name)
         self._status = node.publisher(f"{base}/status", self.kind.status.name, LATCHED)
-        node.serve(f"{base}/send_goal", self.kind.send_goal, lambda request: _submit(pool, self._send_goal, request))
         node.serve(f"{base}/cancel_goal", self.kind.cancel_goal, self._cancel_goal)
-        node.serve(f"{base}/get_result", self.kind.get_result, self._get_result)
-        if f"{type_name}_Result" in older_types().store.types:  # its result has fewer fields there, and so another key
-            node.serve(f"{base}/get_result", older_types().service(f"{type_name}_GetResult"), self._get_result)
+        for kind in (self.kind.send_goal, *older_services(self.kind.send_goal)):
+            node.serve(f"{base}/send_goal", kind, lambda request: _submit(pool, self._send_goal, request))
+        for kind in (self.kind.get_result, *older_services(self.kind.get_result)):
+            node.serve(f"{base}/get_result", kind, self._get_result)
 
     def begin(self, goal: Goal) -> None:
         """Records that a goal is being pursued."""
@@ -191,6 +191,7 @@ class SentGoal:
     identity: Any
     status: GoalStatus = GoalStatus.EXECUTING
     result: Any = None
+    ended: threading.Event = field(default_factory=threading.Event)
 
 
 class ActionClient:
@@ -217,6 +218,7 @@ class ActionClient:
         def take(response: Any) -> None:
             sent.result, self.ended = response.result, self.ended + 1
             sent.status = GoalStatus(response.status) if 0 <= response.status <= max(GoalStatus) else GoalStatus.ABORTED
+            sent.ended.set()
 
         self._result.ask({"goal_id": sent.identity}, take, limit_s=_RESULT_S)
         return sent

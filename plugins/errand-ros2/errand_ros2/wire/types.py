@@ -178,6 +178,13 @@ def ros_types() -> Types:
     return Types()
 
 
+def older_services(service: ServiceType) -> list[ServiceType]:
+    """Returns the form that a service has in distributions before Kilted, if it is another."""
+    types = older_types()
+    older = [types.service(service.name)] if f"{service.name}_Request" in types.store.types else []
+    return [each for each in older if each.key != service.key]
+
+
 @cache
 def older_types() -> Types:
     """Returns the types that distributions before Kilted have in another form."""

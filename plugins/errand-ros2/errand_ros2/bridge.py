@@ -43,6 +43,12 @@ NAME: Final = "errand"
 _PATH, _OUTCOME = "path", "outcome"
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
+_TOPICS: Final = {
+    "events": "std_msgs/msg/String",
+    "reply": "std_msgs/msg/String",
+    "plan": "nav_msgs/msg/Path",
+    "amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
+}
 _DIAGNOSTICS_PERIOD_S, _POSE_PERIOD_S = 1.0, 0.5
 _LATE_S: Final = 0.5  # delay that a run does not catch up with
 
@@ -60,9 +66,7 @@ class _RobotBridge:
     node: Node
     driving: Driving
     goals: Goals
-    events: Publisher
-    plan: Publisher
-    pose: Publisher
+    out: Mapping[str, Publisher]
     context: SkillContext | None = None
     topics: RobotTopics | None = None
     is_active: bool = False
@@ -106,19 +110,17 @@ class Bridge(RunVisitor):
     def _robot(self, prepared: Prepared) -> _RobotBridge:
         name = prepared.mission.robot_name
         node = Node(self.session, NAME, f"/{ros_name(name)}")
-        events, replies = (node.publisher(topic, "std_msgs/msg/String") for topic in ("events", "reply"))
-        plan = node.publisher("plan", "nav_msgs/msg/Path")
-        pose = node.publisher("amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped")
+        out = {topic: node.publisher(topic, kind) for topic, kind in _TOPICS.items()}
 
         def refuse(why: str) -> None:
-            events.put(_event("refused", {"message": why}))
+            out["events"].put(_event("refused", {"message": why}))
 
         def hear(said: Any) -> None:
-            replies.put({"data": self._conversations.hear(said.data, name).text})
+            out["reply"].put({"data": self._conversations.hear(said.data, name).text})
 
         driving = Driving(name, self._control)
         goals = Goals(node, prepared, self._control, self._grid, self._pool, refuse, self._hurry.set)
-        own = _RobotBridge(node, driving, goals, events, plan, pose)
+        own = _RobotBridge(node, driving, goals, out)
         node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", self._later(goals.hear_pose))
         node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
         node.subscribe(TOPIC, "geometry_msgs/msg/Twist", driving.hear)
@@ -159,9 +161,9 @@ class Bridge(RunVisitor):
         if own is None:
             return message
         if topic == _PATH and own.context is not None:
-            own.plan.put(messages.path(own.context.clock.now(), message["poses"]))
+            own.out["plan"].put(messages.path(own.context.clock.now(), message["poses"]))
         elif topic in _EVENTS:
-            own.events.put(_event(topic, message))
+            own.out["events"].put(_event(topic, message))
         if topic == _OUTCOME:
             own.goals.message(message)
         return message
@@ -188,7 +190,7 @@ class Bridge(RunVisitor):
         topics.publish(now_s, estimate.X_WO if estimate.localised else None)
         if estimate.localised and now_s >= own.pose_due_s:
             own.pose_due_s = now_s + _POSE_PERIOD_S
-            own.pose.put(messages.pose_with_covariance(now_s, context.X_WB(), estimate.covariance))
+            own.out["amcl_pose"].put(messages.pose_with_covariance(now_s, context.X_WB(), estimate.covariance))
         if own.is_active:
             own.driving.tick(context)
             own.goals.tick(context, progress)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from pydrake.math import RigidTransform
 
 from errand_ros2 import messages
 from errand_ros2.messages import Fields
 from errand_ros2.wire.keys import LATCHED, SENSOR, Qos
 from errand_ros2.wire.node import Node
 from skills.robot import CameraCapabilities, Mount, NoImageError, Robot
-
-if TYPE_CHECKING:
-    from pydrake.math import RigidTransform
 
 IMAGE_PERIOD_S: Final = 0.2
 BATTERY_PERIOD_S: Final = 1.0

@@ -24,7 +24,7 @@ from errand_ros2.wire.node import Node, Session
 from executive.record.other_tools import ros_name
 from skills.estimate.grid_map import GridMap
 from skills.inputs.errors import InputError
-from skills.robot import ArmTrajectory, Clock, CommandCause, CommandId, CommandState, CommandStatus, Lease, Robot
+from skills.robot import ArmTrajectory, Capabilities, Clock, CommandCause, CommandId, CommandState, CommandStatus, Robot
 
 PERIOD_S: Final = 0.05
 TRAJECTORY: Final = "control_msgs/action/FollowJointTrajectory"
@@ -72,115 +72,6 @@ class WorkQueue(Executor):
                 return
 
 
-class ServedMotions:
-    """Actions and topics of the robot's parts, which become commands in the thread that owns the robot."""
-
-    def __init__(self, node: Node, robot: Robot, clock: Clock, lease: Lease, work: WorkQueue) -> None:
-        """Declares the parts that the robot has."""
-        self._robot, self._clock, self._lease, self._work = robot, clock, lease, work
-        self._served: list[tuple[ActionServer, Goal, CommandId]] = []  # goals under way, with their commands
-        self.ended = 0
-        """Number of the goals ended."""
-        can = robot.capabilities()
-        if can.arm is not None:
-            self._serve(node, ARM_ACTION, TRAJECTORY, partial(self._follow, can.arm.joint_names, robot.move_arm))
-        if can.head is not None:
-            self._serve(node, HEAD_ACTION, TRAJECTORY, partial(self._follow, can.head.joint_names, self._point_head))
-        if can.gripper is not None:
-            self._serve(node, GRIPPER_ACTION, GRIPPER, self._grip)
-            node.subscribe(CARRY, "std_msgs/msg/Bool", partial(work.submit, self._carry))
-        self._height_m, self._thin = can.standing_height_m, _OBJECT * (can.gripper.widest if can.gripper else 1.0)
-        node.subscribe(POSTURE, "geometry_msgs/msg/Pose", partial(work.submit, self._stand))
-
-    def _serve(self, node: Node, name: str, kind: str, begin: Callable[[Any], CommandId]) -> None:
-        """Serves an action; `begin` begins the motion of a goal, and raises ValueError for a goal that is none."""
-
-        def accept(goal: Goal) -> bool:
-            try:
-                command = begin(goal.message)
-            except ValueError:
-                return False
-            if self._robot.command_status(command).state is CommandState.REFUSED:
-                return False
-            self._served.append((server, goal, command))
-            return True
-
-        cancel = partial(self._work.submit, self._cancel)
-        server = ActionServer(node, name, kind, accept=accept, cancel=cancel, pool=self._work)
-
-    def _cancel(self, goal: Goal) -> None:
-        for _, each, command in self._served:
-            if each is goal:
-                self._robot.stop(lease=self._lease, only=command)
-
-    def _follow(self, names: tuple[str, ...], move: Callable[..., CommandId], goal: Any) -> CommandId:
-        """Begins a trajectory of these joints by a verb of the robot."""
-        trajectory = trajectory_of(goal.trajectory, names)
-        until_s = self._clock.now() + float(trajectory.times_s[-1]) + _EXTRA_S
-        return move(trajectory, until_s=until_s, lease=self._lease)
-
-    def _point_head(self, trajectory: ArmTrajectory, **until: Any) -> CommandId:
-        return self._robot.point_head(*trajectory.positions_rad[-1].tolist(), **until)
-
-    def _grip(self, goal: Any) -> CommandId:
-        command, can, until_s = goal.command, self._robot.capabilities().gripper, self._clock.now() + _MOST_S
-        if can is None or not math.isfinite(command.position + command.max_effort):
-            raise ValueError("the opening or the force is not finite")
-        force_n = command.max_effort if command.max_effort > 0.0 else can.max_force_n
-        return self._robot.set_gripper(command.position, force_n, until_s=until_s, lease=self._lease)
-
-    def _carry(self, told: Any) -> None:
-        self._robot.carry(told.data, lease=self._lease)
-
-    def _stand(self, pose: Any) -> None:
-        """Takes a height over the usual one and a pitch; what is not finite or no rotation is ignored."""
-        with suppress(InputError):
-            X, until_s = transform_of(pose.position, pose.orientation), self._clock.now() + _MOST_S
-            height_m, pitch_rad = self._height_m + float(X.translation()[2]), RollPitchYaw(X.rotation()).pitch_angle()
-            self._robot.stand(height_m, pitch_rad, until_s=until_s, lease=self._lease)
-
-    def tick(self) -> None:
-        """Ends the goals whose commands have ended; call it after each step."""
-        for server, goal, command in list(self._served):
-            if goal.status is GoalStatus.ACCEPTED:
-                server.begin(goal)
-            status = self._robot.command_status(command)
-            if status.state is not CommandState.RUNNING:
-                self._served.remove((server, goal, command))
-                self._end(server, goal, status)
-
-    def _end(self, server: ActionServer, goal: Goal, status: CommandStatus) -> None:
-        done = status.state is CommandState.DONE
-        if server.kind.name == TRAJECTORY:
-            code = 0 if done else INVALID_GOAL if status.cause is CommandCause.INVALID else PATH_VIOLATED
-            result = {"error_code": code, "error_string": status.reason}
-        else:
-            reading, wanted = self._robot.gripper(), goal.message.command.position
-            stalled = done and reading.opening - wanted > self._thin
-            ends = {"stalled": stalled, "reached_goal": done and not stalled}
-            result = {"position": reading.opening, "effort": reading.force_n, **ends}
-        cancelled = goal.status is GoalStatus.CANCELING
-        final = GoalStatus.SUCCEEDED if done else GoalStatus.CANCELED if cancelled else GoalStatus.ABORTED
-        server.end(goal, final, **result)
-        self.ended += 1
-
-
-def trajectory_of(message: Any, names: tuple[str, ...]) -> ArmTrajectory:
-    """Reads trajectory_msgs/JointTrajectory, which begins now. Raises ValueError unless it moves just these joints."""
-    order = {name: number for number, name in enumerate(message.joint_names)}
-    if order.keys() != {*names} or len(message.joint_names) != len(names):
-        raise ValueError(f"the trajectory moves {', '.join(message.joint_names)}, not {', '.join(names)}")
-    if not message.points or any(len(point.positions) != len(names) for point in message.points):
-        raise ValueError("the trajectory has no points, or one without a position of each joint")
-    columns = [order[name] for name in names]
-    starts = [point.time_from_start for point in message.points]
-    times = np.array([each.sec + 1e-9 * each.nanosec for each in starts])
-    positions = np.array([np.asarray(point.positions)[columns] for point in message.points])
-    if not 0.0 <= times[0] <= times[-1] <= _MOST_S or not math.isfinite(float(positions.sum())):
-        raise ValueError(f"the trajectory does not lie within {_MOST_S:g} s")
-    return ArmTrajectory(times, positions)
-
-
 class RobotServer:
     """Serves one robot. Call `step` once a period, or `run`; both step the robot's clock.
 
@@ -215,10 +106,26 @@ class RobotServer:
         frames, camera = Frames(top), {"most_columns": _WHOLE, "image_period_s": image_period_s}
         self.topics = RobotTopics(self.node, robot, frames, **camera)
         self.work = WorkQueue()
-        self.motions = ServedMotions(self.node, robot, clock, self._lease, self.work)
         self._velocity = HeardVelocity(life)
         self.node.subscribe(TOPIC, "geometry_msgs/msg/Twist", self._velocity.hear)
         self._driving: CommandId | None = None
+        self._goals: list[tuple[ActionServer, Goal, CommandId]] = []  # under way, with their commands
+        self.ended = 0
+        """Number of the goals ended."""
+        self._serve_parts(robot.capabilities())
+
+    def _serve_parts(self, can: Capabilities) -> None:
+        """Serves the parts that the robot has."""
+        if can.arm is not None:
+            move_arm = partial(self._follow, can.arm.joint_names, self._robot.move_arm)
+            self._serve(ARM_ACTION, TRAJECTORY, move_arm)
+        if can.head is not None:
+            self._serve(HEAD_ACTION, TRAJECTORY, partial(self._follow, can.head.joint_names, self._point_head))
+        if can.gripper is not None:
+            self._serve(GRIPPER_ACTION, GRIPPER, self._grip)
+            self.node.subscribe(CARRY, "std_msgs/msg/Bool", partial(self.work.submit, self._carry))
+        self._height_m, self._thin = can.standing_height_m, _OBJECT * (can.gripper.widest if can.gripper else 1.0)
+        self.node.subscribe(POSTURE, "geometry_msgs/msg/Pose", partial(self.work.submit, self._stand))
 
     def step(self) -> None:
         """Commands the base, steps the clock by one period, and publishes the readings."""
@@ -230,7 +137,7 @@ class RobotServer:
             self._robot.stop(lease=self._lease, only=self._driving)
             self._driving = None
         self._clock.advance(PERIOD_S)
-        self.motions.tick()
+        self._follow_goals()
         now_s = self._clock.now()
         self._time.put({"clock": messages.time_of(now_s)})
         self.topics.publish(now_s, None)
@@ -252,3 +159,91 @@ class RobotServer:
         """Stops the robot and returns its lease."""
         self._robot.stop(lease=self._lease)
         self._robot.return_lease(self._lease)
+
+    def _serve(self, name: str, kind: str, begin: Callable[[Any], CommandId]) -> None:
+        """Serves an action; `begin` begins the motion of a goal, and raises ValueError for a goal that is none."""
+
+        def accept(goal: Goal) -> bool:
+            try:
+                command = begin(goal.message)
+            except ValueError:
+                return False
+            if self._robot.command_status(command).state is CommandState.REFUSED:
+                return False
+            self._goals.append((server, goal, command))
+            return True
+
+        cancel = partial(self.work.submit, self._cancel)
+        server = ActionServer(self.node, name, kind, accept=accept, cancel=cancel, pool=self.work)
+
+    def _cancel(self, goal: Goal) -> None:
+        for _, each, command in self._goals:
+            if each is goal:
+                self._robot.stop(lease=self._lease, only=command)
+
+    def _follow(self, names: tuple[str, ...], move: Callable[..., CommandId], goal: Any) -> CommandId:
+        """Begins a trajectory of these joints by a verb of the robot."""
+        trajectory = trajectory_of(goal.trajectory, names)
+        until_s = self._clock.now() + float(trajectory.times_s[-1]) + _EXTRA_S
+        return move(trajectory, until_s=until_s, lease=self._lease)
+
+    def _point_head(self, trajectory: ArmTrajectory, **until: Any) -> CommandId:
+        return self._robot.point_head(*trajectory.positions_rad[-1].tolist(), **until)
+
+    def _grip(self, goal: Any) -> CommandId:
+        command, can, until_s = goal.command, self._robot.capabilities().gripper, self._clock.now() + _MOST_S
+        if can is None or not math.isfinite(command.position + command.max_effort):
+            raise ValueError("the opening or the force is not finite")
+        force_n = command.max_effort if command.max_effort > 0.0 else can.max_force_n
+        return self._robot.set_gripper(command.position, force_n, until_s=until_s, lease=self._lease)
+
+    def _carry(self, told: Any) -> None:
+        self._robot.carry(told.data, lease=self._lease)
+
+    def _stand(self, pose: Any) -> None:
+        """Takes a height over the usual one and a pitch; what is not finite or no rotation is ignored."""
+        with suppress(InputError):
+            X, until_s = transform_of(pose.position, pose.orientation), self._clock.now() + _MOST_S
+            height_m, pitch_rad = self._height_m + float(X.translation()[2]), RollPitchYaw(X.rotation()).pitch_angle()
+            self._robot.stand(height_m, pitch_rad, until_s=until_s, lease=self._lease)
+
+    def _follow_goals(self) -> None:
+        """Ends the goals whose commands have ended."""
+        for server, goal, command in list(self._goals):
+            if goal.status is GoalStatus.ACCEPTED:
+                server.begin(goal)
+            status = self._robot.command_status(command)
+            if status.state is not CommandState.RUNNING:
+                self._goals.remove((server, goal, command))
+                self._end(server, goal, status)
+
+    def _end(self, server: ActionServer, goal: Goal, status: CommandStatus) -> None:
+        done = status.state is CommandState.DONE
+        if server.kind.name == TRAJECTORY:
+            code = 0 if done else INVALID_GOAL if status.cause is CommandCause.INVALID else PATH_VIOLATED
+            result = {"error_code": code, "error_string": status.reason}
+        else:
+            reading, wanted = self._robot.gripper(), goal.message.command.position
+            stalled = done and reading.opening - wanted > self._thin
+            ends = {"stalled": stalled, "reached_goal": done and not stalled}
+            result = {"position": reading.opening, "effort": reading.force_n, **ends}
+        cancelled = goal.status is GoalStatus.CANCELING
+        final = GoalStatus.SUCCEEDED if done else GoalStatus.CANCELED if cancelled else GoalStatus.ABORTED
+        server.end(goal, final, **result)
+        self.ended += 1
+
+
+def trajectory_of(message: Any, names: tuple[str, ...]) -> ArmTrajectory:
+    """Reads trajectory_msgs/JointTrajectory, which begins now. Raises ValueError unless it moves just these joints."""
+    order = {name: number for number, name in enumerate(message.joint_names)}
+    if order.keys() != {*names} or len(message.joint_names) != len(names):
+        raise ValueError(f"the trajectory moves {', '.join(message.joint_names)}, not {', '.join(names)}")
+    if not message.points or any(len(point.positions) != len(names) for point in message.points):
+        raise ValueError("the trajectory has no points, or one without a position of each joint")
+    columns = [order[name] for name in names]
+    starts = [point.time_from_start for point in message.points]
+    times = np.array([each.sec + 1e-9 * each.nanosec for each in starts])
+    positions = np.array([np.asarray(point.positions)[columns] for point in message.points])
+    if not 0.0 <= times[0] <= times[-1] <= _MOST_S or not math.isfinite(float(positions.sum())):
+        raise ValueError(f"the trajectory does not lie within {_MOST_S:g} s")
+    return ArmTrajectory(times, positions)

@@ -10,16 +10,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from errand_ros2.wire.keys import dds_name
-
-if TYPE_CHECKING:
-    from rosbags.interfaces.typing import Typesdict
 
 INTERFACES: Final = Path(__file__).parents[1] / "interfaces"
 """Folder of the interface files that rosbags lacks, as PACKAGE/KIND/NAME.KIND."""
@@ -140,7 +137,7 @@ class Types:
             self._register_action(name, *parts)
 
     def _register_service(self, name: str, request: str, response: str) -> None:
-        types: Typesdict = {}
+        types: dict[str, Any] = {}
         texts = {"_Request": request, "_Response": response, "_Event": _EVENT.format(name), "": _SERVICE.format(name)}
         for suffix, text in texts.items():
             types |= get_types_from_msg(text, name + suffix)

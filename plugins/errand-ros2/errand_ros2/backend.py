@@ -58,7 +58,7 @@ class Ros2:
                 if ready.is_set() and (why := robot.stopped_because()):
                     raise RobotStoppedError(why)
 
-            clock.after.append(look)
+            clock.after = look
             try:
                 yield ConnectedRobot(robot, clock, ready.set, robot.notes(f"ros2://{space}", session.place.endpoint))
             finally:
@@ -68,9 +68,6 @@ class Ros2:
 def _missing(robot: Ros2Robot, clock: RobotClock) -> str:
     """Waits for the first readings; returns the topic on which nothing was heard, empty when all are there."""
     until_s = time.monotonic() + _PATIENCE_S
-    while True:
-        silent = isinstance(clock, SimulatedClock) and not clock.is_heard
-        missing = "/clock" if silent else robot.missing()
-        if not missing or time.monotonic() > until_s:
-            return missing
+    while (missing := robot.missing() if clock.is_heard else "/clock") and time.monotonic() < until_s:
         Event().wait(_TICK_S)
+    return missing

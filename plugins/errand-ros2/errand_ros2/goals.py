@@ -205,7 +205,6 @@ class Goals:
 
 
 def _drive_to(pose: Pose2D) -> Mapping[str, Any]:
-    """Returns the step of a mission that drives to a pose."""
     goal = {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_rad": pose.yaw_rad}
     return {"skill": "navigate", "with": {"goal": goal}}
 

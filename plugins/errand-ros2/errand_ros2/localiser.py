@@ -38,7 +38,6 @@ class OwnPose:
 
     def __init__(self, options: Ros2Pose) -> None:
         self._options, self._X_WM = options, Pose2D(*options.map_pose)
-        self._covariance = np.diag(np.square(options.sigma))
         self._last: OwnLocalisation | None = None
         self._heard_at = Pose2D(0.0, 0.0, 0.0)
         self._stamp_s, self._localised = -math.inf, False
@@ -46,8 +45,8 @@ class OwnPose:
     def estimate(self) -> LocalisationEstimate:
         """The latest pose; `localised` while it counts."""
         X_WO = self._X_WM if self._last is None else compose(self._X_WM, self._last.X_SO)
-        health = float(self._localised)
-        return LocalisationEstimate(self._stamp_s, X_WO.transform(), self._covariance.copy(), self._localised, health)
+        shape, localised = np.diag(np.square(self._options.sigma)), self._localised
+        return LocalisationEstimate(self._stamp_s, X_WO.transform(), shape, localised, float(localised))
 
     def update(self, robot: Robot) -> None:
         """Reads the robot's pose. Raises InputError for a robot that does not localise itself."""

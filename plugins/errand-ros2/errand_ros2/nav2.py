@@ -73,7 +73,6 @@ class Nav2:
         return np.stack([np.interp(at_m, way_m, column) for column in rows.T], axis=1)
 
     def _ask(self, goal: dict[str, Any]) -> Any:
-        """Returns the result of Nav2's action."""
         with open_session(Place.parse(self.network)) as session:
             client = ActionClient(Node(session, "errand_planner"), self.action, _ACTION)
             try:

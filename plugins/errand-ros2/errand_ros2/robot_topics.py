@@ -8,7 +8,7 @@ from typing import Final
 from pydrake.math import RigidTransform
 
 from errand_ros2 import messages
-from errand_ros2.messages import Fields
+from errand_ros2.messages import MOST_COLUMNS, Fields
 from errand_ros2.wire.keys import LATCHED, SENSOR, Qos
 from errand_ros2.wire.node import Node
 from skills.robot import CameraCapabilities, Mount, NoImageError, Robot
@@ -66,17 +66,11 @@ class RobotTopics:
     """Publishers of one robot's readings. `publish` reads the robot, and must be called where its verbs may be."""
 
     def __init__(
-        self,
-        node: Node,
-        robot: Robot,
-        frames: Frames,
-        *,
-        most_columns: int = messages.MOST_COLUMNS,
-        image_period_s: float = IMAGE_PERIOD_S,
+        self, node: Node, robot: Robot, frames: Frames, columns: int = MOST_COLUMNS, period_s: float = IMAGE_PERIOD_S
     ) -> None:
         """The last part of the node's namespace names the robot's frames."""
         self._robot, self._frames = robot, frames
-        self._most_columns, self._image_period_s = most_columns, image_period_s
+        self._most_columns, self._image_period_s = columns, period_s
         space = node.namespace.strip("/")
         self._odom_frame, self._body, self._lidar = (f"{space}/{each}" for each in ("odom", "body", "lidar"))
         self._odom = node.publisher("odom", "nav_msgs/msg/Odometry")

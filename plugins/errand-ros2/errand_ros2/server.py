@@ -103,8 +103,7 @@ class RobotServer:
             top.publisher("/map", "nav_msgs/msg/OccupancyGrid", LATCHED).put(messages.occupancy_grid(grid))
         if truth is not None:
             self._true = top.publisher(f"/ground_truth{space}/pose", "geometry_msgs/msg/PoseStamped")
-        frames, camera = Frames(top), {"most_columns": _WHOLE, "image_period_s": image_period_s}
-        self.topics = RobotTopics(self.node, robot, frames, **camera)
+        self.topics = RobotTopics(self.node, robot, Frames(top), _WHOLE, image_period_s)
         self.work = WorkQueue()
         self._velocity = HeardVelocity(life)
         self.node.subscribe(TOPIC, "geometry_msgs/msg/Twist", self._velocity.hear)
@@ -115,7 +114,6 @@ class RobotServer:
         self._serve_parts(robot.capabilities())
 
     def _serve_parts(self, can: Capabilities) -> None:
-        """Serves the parts that the robot has."""
         if can.arm is not None:
             move_arm = partial(self._follow, can.arm.joint_names, self._robot.move_arm)
             self._serve(ARM_ACTION, TRAJECTORY, move_arm)

@@ -61,7 +61,7 @@ def test_a_bag_needs_a_name(log_file):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("300", "'300': domains go to 232"),
+        ("300", "'300' is no ROS domain: domains go to 232"),
         ("0@:0", "ports from 1 to 65535"),
         ("here", "'here' is no ROS domain"),
         ("--robot 1a", "'1a' is not a name for a robot"),

@@ -23,12 +23,15 @@ class RobotClock:
     `jumps` counts, this begins again. `advance` calls `after` after each wait.
     """
 
+    is_heard = True
+    """Whether the clock runs."""
+
     def __init__(self) -> None:
         self._began_s, self._due_s = time.monotonic(), 0.0
         self._behind: deque[tuple[float, float]] = deque()
         self._behind_s, self._last_s = 0.0, -math.inf
         self.jumps = 0
-        self.after: list[Callable[[], None]] = []
+        self.after: Callable[[], None] = lambda: None
 
     def now(self) -> float:
         """Seconds since the connection was made."""
@@ -38,8 +41,7 @@ class RobotClock:
         """Waits until dt_s have passed since the last advance; a late program goes on at once."""
         self._due_s = max(self._due_s + dt_s, self.now() - dt_s)
         self._wait_until(self._due_s)
-        for each in self.after:
-            each()
+        self.after()
 
     def _wait_until(self, due_s: float) -> None:
         Event().wait(max(0.0, due_s - self.now()))
@@ -74,6 +76,7 @@ class SimulatedClock(RobotClock):
         super().__init__()
         self._told = threading.Condition()
         self._stamp_s, self._heard_s, self._base_s = 0.0, math.inf, 0.0
+        self.is_heard = False
 
     def hear_clock(self, message: Any) -> None:
         """Takes rosgraph_msgs/Clock."""
@@ -84,13 +87,8 @@ class SimulatedClock(RobotClock):
                 self.jumps += 1
                 self._base_s = now_s - stamp_s
             self._behind_s = max(self._base_s, now_s - stamp_s)
-            self._stamp_s, self._heard_s = stamp_s, time.monotonic()
+            self._stamp_s, self._heard_s, self.is_heard = stamp_s, time.monotonic(), True
             self._told.notify_all()
-
-    @property
-    def is_heard(self) -> bool:
-        """Returns whether `/clock` was heard."""
-        return math.isfinite(self._heard_s)
 
     def now(self) -> float:
         """Time of `/clock`."""

@@ -39,7 +39,6 @@ class Ros2Robot(SensedRobot):
     """Robot of ROS 2. Implements `skills.robot.Robot`."""
 
     def __init__(self, name: str, node: Node, clock: RobotClock, description: Description) -> None:
-        """Subscribes, and declares the publishers and action clients that the description names."""
         super().__init__(name, node, clock, description)
         file = description.file
         kind = "TwistStamped" if file.base.stamped else "Twist"
@@ -215,7 +214,7 @@ class Ros2Robot(SensedRobot):
             off_rad = abs(RollPitchYaw(X_OB.rotation()).pitch_angle() - goal[1])
             reached = off_m < _REACHED_M and off_rad < _REACHED_RAD
             return (CommandState.DONE, "", CommandCause.NONE) if reached else None
-        if not goal.status.is_final:
+        if not goal.ended.is_set():
             return None
         if part == GRIP and self._description.file.gripper is not None:
             self._feel_result(self._description.file.gripper, goal.result)
@@ -291,7 +290,6 @@ def _old(silent_s: float) -> str:
 
 
 def _ended(part: str, sent: SentGoal) -> tuple[CommandState, str, CommandCause]:
-    """Returns how a goal ended: its state, the reason and the cause."""
     if sent.status is GoalStatus.SUCCEEDED or (part == GRIP and getattr(sent.result, "stalled", False)):
         stalled = part == GRIP and sent.result.stalled
         return CommandState.DONE, "stopped by an object in the gripper" if stalled else "", CommandCause.NONE

@@ -54,7 +54,6 @@ class SensedRobot:
     """Robot that senses: the verbs of `skills.robot.Robot` for that."""
 
     def __init__(self, name: str, node: Node, clock: RobotClock, description: Description) -> None:
-        """Subscribes to the topics that the description names."""
         self._name, self._node, self._clock, self._description = name, node, clock, description
         self._space, file = node.namespace.strip("/"), description.file
         self._names = {theirs: ours for ours, theirs in file.joint_names.items()}
@@ -150,7 +149,6 @@ class SensedRobot:
         return ""
 
     def _feel(self, **changes: Any) -> None:
-        """Changes what the gripper told."""
         with self._lock:
             self._felt = replace(self._felt, **changes)
 

@@ -25,21 +25,8 @@ _REJECTED, _UNKNOWN_GOAL, _TERMINATED = 1, 2, 3
 """Answers to a request to cancel goals (action_msgs/srv/CancelGoal)."""
 
 
-class GoalStatus(IntEnum):
-    """Status of a goal (action_msgs/msg/GoalStatus)."""
-
-    UNKNOWN = 0
-    ACCEPTED = 1
-    EXECUTING = 2
-    CANCELING = 3
-    SUCCEEDED = 4
-    CANCELED = 5
-    ABORTED = 6
-
-    @property
-    def is_final(self) -> bool:
-        """Returns whether the goal has ended."""
-        return self >= GoalStatus.SUCCEEDED
+GoalStatus = IntEnum("GoalStatus", "UNKNOWN ACCEPTED EXECUTING CANCELING SUCCEEDED CANCELED ABORTED", start=0)
+"""Status of a goal (action_msgs/msg/GoalStatus); from SUCCEEDED on it has ended."""
 
 
 @dataclass
@@ -54,6 +41,11 @@ class Goal:
     waiting: list[Request] = field(default_factory=list)
 
     @property
+    def has_ended(self) -> bool:
+        """Returns whether the status is final."""
+        return self.status >= GoalStatus.SUCCEEDED
+
+    @property
     def info(self) -> dict[str, Any]:
         """Fields of action_msgs/msg/GoalInfo."""
         sec, nanosec = divmod(self.accepted_ns, 10**9)
@@ -64,27 +56,20 @@ class ActionServer:
     """Server of one action. All methods are thread-safe."""
 
     def __init__(
-        self,
-        node: Node,
-        name: str,
-        type_name: str,
-        *,
-        accept: Callable[[Goal], bool],
-        cancel: Callable[[Goal], None],
-        pool: Executor,
+        self, node: Node, name: str, kind: str, pool: Executor, accept: Callable[..., bool], cancel: Callable[..., Any]
     ) -> None:
         """`accept`, which the `pool` calls, returns whether a goal is pursued; `cancel` begins to end one."""
-        self.kind, self._lock = ActionType(ros_types(), type_name), threading.RLock()
+        self.kind, self._lock = ActionType(ros_types(), kind), threading.RLock()
         self._accept, self._cancel = accept, cancel
         self._goals: dict[bytes, Goal] = {}
         base = f"{node.absolute(name)}/_action"
         self._feedback = node.publisher(f"{base}/feedback", self.kind.feedback_message.name)
         self._status = node.publisher(f"{base}/status", self.kind.status.name, LATCHED)
         node.serve(f"{base}/cancel_goal", self.kind.cancel_goal, self._cancel_goal)
-        for kind in (self.kind.send_goal, *older_services(self.kind.send_goal)):
-            node.serve(f"{base}/send_goal", kind, lambda request: _submit(pool, self._send_goal, request))
-        for kind in (self.kind.get_result, *older_services(self.kind.get_result)):
-            node.serve(f"{base}/get_result", kind, self._get_result)
+        for each in (self.kind.send_goal, *older_services(self.kind.send_goal)):
+            node.serve(f"{base}/send_goal", each, lambda request: _submit(pool, self._send_goal, request))
+        for each in (self.kind.get_result, *older_services(self.kind.get_result)):
+            node.serve(f"{base}/get_result", each, self._get_result)
 
     def begin(self, goal: Goal) -> None:
         """Records that a goal is being pursued."""
@@ -97,7 +82,7 @@ class ActionServer:
     def end(self, goal: Goal, status: GoalStatus, **result: Any) -> None:
         """Ends a goal, and answers all clients that wait for its result, whose fields are given. Idempotent."""
         with self._lock:
-            if goal.status.is_final:
+            if goal.has_ended:
                 return
             goal.result, waiting, goal.waiting = self._result(**result), goal.waiting, []
             self._set(goal, status)
@@ -106,14 +91,13 @@ class ActionServer:
 
     def _set(self, goal: Goal, status: GoalStatus) -> None:
         with self._lock:
-            if goal.status.is_final:
+            if goal.has_ended:
                 return
             goal.status = status
             every = [{"goal_info": each.info, "status": each.status} for each in self._goals.values()]
             self._status.put({"status_list": every})
 
     def _send_goal(self, request: Request) -> None:
-        """Accepts or rejects a goal."""
         identity = request.message.goal_id.uuid.tobytes()
         goal = Goal(request.message.goal_id, request.message.goal, time.time_ns())
         with self._lock:
@@ -131,8 +115,7 @@ class ActionServer:
             request.reply({"accepted": accepted, "stamp": goal.info["stamp"]})
 
     def _forget(self) -> None:
-        """Forgets the oldest goals that have ended."""
-        ended = [each for each, goal in self._goals.items() if goal.status.is_final]
+        ended = [each for each, goal in self._goals.items() if goal.has_ended]
         for identity in ended[: max(0, len(self._goals) - MOST_GOALS + 1)]:
             del self._goals[identity]
 
@@ -148,7 +131,7 @@ class ActionServer:
                 for goal in self._goals.values()
                 if every or goal is named or (until_ns > 0 and goal.accepted_ns <= until_ns)
             ]
-            found = [goal for goal in asked if not goal.status.is_final]
+            found = [goal for goal in asked if not goal.has_ended]
             for goal in found:
                 self._set(goal, GoalStatus.CANCELING)
         for goal in found:
@@ -160,7 +143,7 @@ class ActionServer:
         """Answers with a goal's result, at once or when the goal ends."""
         with self._lock:
             goal = self._goals.get(request.message.goal_id.uuid.tobytes())
-            if goal is not None and not goal.status.is_final:
+            if goal is not None and not goal.has_ended:
                 goal.waiting = [*goal.waiting[-MOST_GOALS:], request]
                 return
         self._reply(request, goal)

@@ -55,14 +55,12 @@ class Place:
     @classmethod
     def parse(cls, text: str) -> Place:
         """Reads `[DOMAIN][@HOST[:PORT]]`; what is left out has its usual value. Raises InputError."""
-        found = _PLACE.fullmatch(text)
-        hint = "write [DOMAIN][@HOST[:PORT]], as in 0 or 42@192.168.1.5:7447"
-        if found is None:
-            raise InputError(f"'{text[:60]}' is no ROS domain", hint=hint)
-        place = cls(int(found["domain"] or 0), found["host"] or cls.host, int(found["port"] or cls.port))
-        if place.domain > _MOST_DOMAIN or not 0 < place.port <= _MOST_PORT:
-            raise InputError(f"'{text[:60]}': domains go to {_MOST_DOMAIN}, ports from 1 to {_MOST_PORT}", hint=hint)
-        return place
+        if (found := _PLACE.fullmatch(text)) is not None:
+            place = cls(int(found["domain"] or 0), found["host"] or cls.host, int(found["port"] or cls.port))
+            if place.domain <= _MOST_DOMAIN and 0 < place.port <= _MOST_PORT:
+                return place
+        what = f"'{text[:60]}' is no ROS domain: domains go to {_MOST_DOMAIN}, ports from 1 to {_MOST_PORT}"
+        raise InputError(what, hint="write [DOMAIN][@HOST[:PORT]], as in 0 or 42@192.168.1.5:7447")
 
     @property
     def endpoint(self) -> str:

@@ -83,7 +83,6 @@ class Types:
     """All known types by name; `ros_types()` returns the shared ones."""
 
     def __init__(self, folder: Path = INTERFACES) -> None:
-        """Reads the interface files of a folder."""
         self.store = get_typestore(Stores.ROS2_JAZZY)
         for name, (constants, fields) in [*self.store.fielddefs.items()]:
             self.store.fielddefs[name] = (constants, _without_char(fields))
@@ -126,7 +125,6 @@ class Types:
         return f"{dds_name(name)}/{self.store.hash_rihs01(name)}"
 
     def _register(self, file: Path) -> None:
-        """Registers the types of an interface file."""
         name = f"{file.parts[-3]}/{file.parts[-2]}/{file.stem}"
         parts = [part.strip() for part in _PARTS.split(file.read_text(encoding="utf-8"))]
         if file.suffix == ".msg":

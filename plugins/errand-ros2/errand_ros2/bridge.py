@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -80,7 +81,7 @@ class Bridge(RunVisitor):
     def __init__(self, prepared: Prepared, control: Control, place: Place) -> None:
         """Opens the session. Raises InputError."""
         self._open, self._control = ExitStack(), control
-        self._hurry = threading.Event()
+        self._hurry, self._halting = threading.Event(), deque[str]()
         self.session = self._open.enter_context(open_session(place))
         self._pool = self._open.enter_context(ThreadPoolExecutor(1, thread_name_prefix="errand-ros2"))
         self._node = Node(self.session, NAME)
@@ -119,7 +120,7 @@ class Bridge(RunVisitor):
             out["reply"].put({"data": self._conversations.hear(said.data, name).text})
 
         driving = Driving(name, self._control)
-        goals = Goals(node, prepared, self._control, self._grid, self._pool, refuse, self._hurry.set)
+        goals = Goals(node, prepared, self._control, self._grid, self._pool, refuse, partial(self._halt, name))
         own = _RobotBridge(node, driving, goals, out)
         node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", self._later(goals.hear_pose))
         node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
@@ -135,8 +136,10 @@ class Bridge(RunVisitor):
         try:
             if what == "pause":
                 control.pause("paused by ROS 2", robot=name)
+                self._halt(name)
             elif what == "cancel":
                 control.cancel("cancelled by ROS 2", robot=name)
+                self._halt(name)
             elif what == "step":
                 control.step()
             else:
@@ -146,6 +149,11 @@ class Bridge(RunVisitor):
             return {"success": False, "message": str(error)}
         self._hurry.set()
         return {"success": True, "message": what}
+
+    def _halt(self, name: str) -> None:
+        """Lets a robot stop before its clock's next step, and the run go on at once."""
+        self._halting.append(name)
+        self._hurry.set()
 
     def mission_begun(self, nodes: Sequence[Behaviour], context: SkillContext) -> None:
         """Takes the context of a robot's new mission; publishes the robot's description and cameras at the first."""
@@ -181,6 +189,10 @@ class Bridge(RunVisitor):
                 if own.context is not None:
                     self._diagnostics.put(_diagnostics(now_s, name, own.context, progress))
         self._keep_pace(now_s)
+        while self._halting:
+            own = self._robots[self._halting.popleft()]
+            if own.context is not None and own.is_active:
+                own.context.robot.stop(lease=own.context.lease)
 
     def _tick_robot(self, own: _RobotBridge, context: SkillContext, topics: RobotTopics, progress: Progress) -> None:
         now_s = context.clock.now()

@@ -73,11 +73,11 @@ class Goals:
         grid: GridMap,
         pool: Executor,
         refuse: Callable[[str], None],
-        hurry: Callable[[], None],
+        halt: Callable[[], None],
     ) -> None:
-        """`pool` compiles goals, `refuse` tells why one is refused, `hurry` lets the next tick begin at once."""
+        """`pool` compiles goals, `refuse` tells why one is refused, `halt` stops the robot at once."""
         self._prepared, self._control, self._grid = prepared, control, grid
-        self._refuse, self._hurry = refuse, hurry
+        self._refuse, self._halt = refuse, halt
         self._name = prepared.mission.robot_name
         self._numbers, self._lock = count(1), threading.RLock()
         self._pursued: dict[str, _Pursued] = {}
@@ -110,13 +110,13 @@ class Goals:
         return True
 
     def _cancel(self, goal: Goal) -> None:
-        """Ends a goal's mission; the robot stops at the next tick."""
+        """Ends a goal's mission; the robot stops at once."""
         with self._lock:
             found = next((each for each in self._pursued.values() if each.goal is goal), None)
             if found is not None:
                 with suppress(ValueError):  # it is being cancelled already
                     self._control.replace(found.stop, instead_of=found.mission)
-                self._hurry()
+                self._halt()
 
     def _pursue(self, source: str, goal: Goal | None, poses: tuple[Pose2D, ...]) -> None:
         """Compiles a goal's mission, and lets it begin in place of the goal before. Raises InputError, ValueError."""

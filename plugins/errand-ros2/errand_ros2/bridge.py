@@ -5,11 +5,9 @@ Publishes what the robots sense, where they are and what they do; takes goals, v
 
 from __future__ import annotations
 
-import json
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -22,15 +20,14 @@ from py_trees.behaviour import Behaviour
 from errand_ros2 import messages
 from errand_ros2.driving import Driving
 from errand_ros2.goals import Goals
-from errand_ros2.inputs import FRAMES, TOPIC, planar_pose
 from errand_ros2.messages import Fields
+from errand_ros2.readings import FRAMES, TOPIC, planar_pose
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Node, Place, Publisher, open_session
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.backend import Observe
 from executive.app.runs.conversations import Conversations
-from executive.record.event_log import plain_values
 from executive.record.other_tools import ros_name
 from executive.run.control import Control
 from executive.run.outcome import RunResult
@@ -45,7 +42,6 @@ _PATH, _OUTCOME = "path", "outcome"
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
 _TOPICS: Final = {
-    "events": "std_msgs/msg/String",
     "reply": "std_msgs/msg/String",
     "plan": "nav_msgs/msg/Path",
     "amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
@@ -81,7 +77,7 @@ class Bridge(RunVisitor):
     def __init__(self, prepared: Prepared, control: Control, place: Place) -> None:
         """Opens the session. Raises InputError."""
         self._open, self._control = ExitStack(), control
-        self._hurry, self._halting = threading.Event(), deque[str]()
+        self._hurry = threading.Event()
         self.session = self._open.enter_context(open_session(place))
         self._pool = self._open.enter_context(ThreadPoolExecutor(1, thread_name_prefix="errand-ros2"))
         self._node = Node(self.session, NAME)
@@ -94,38 +90,28 @@ class Bridge(RunVisitor):
         self._conversations = Conversations(prepared, control)
         self._robots = {each.mission.robot_name: self._robot(each) for each in prepared.all}
         first = next(iter(self._robots.values()))  # RViz's buttons and teleoperation send without a namespace
-        self._node.subscribe("/goal_pose", "geometry_msgs/msg/PoseStamped", self._later(first.goals.hear_pose))
+        hear_pose = self._node.later(self._pool, first.goals.hear_pose)
+        self._node.subscribe("/goal_pose", "geometry_msgs/msg/PoseStamped", hear_pose)
         self._node.subscribe("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", first.initial.append)
         self._node.subscribe(f"/{TOPIC}", "geometry_msgs/msg/Twist", first.driving.hear)
         self._diagnostics_due_s = 0.0
         self._begun: tuple[float, float] | None = None
-
-    def _later(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Returns a handler that works in the bridge's own thread, because it may take long."""
-
-        def work(message: Any) -> None:
-            self._pool.submit(self._node.guarded, lambda: handle(message), "a message")
-
-        return work
 
     def _robot(self, prepared: Prepared) -> _RobotBridge:
         name = prepared.mission.robot_name
         node = Node(self.session, NAME, f"/{ros_name(name)}")
         out = {topic: node.publisher(topic, kind) for topic, kind in _TOPICS.items()}
 
-        def refuse(why: str) -> None:
-            out["events"].put(_event("refused", {"message": why}))
-
         def hear(said: Any) -> None:
             out["reply"].put({"data": self._conversations.hear(said.data, name).text})
 
         driving = Driving(name, self._control)
-        goals = Goals(node, prepared, self._control, self._grid, self._pool, refuse, partial(self._halt, name))
+        goals = Goals(node, prepared, self._control, self._grid, self._pool, self._hurry)
         own = _RobotBridge(node, driving, goals, out)
-        node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", self._later(goals.hear_pose))
+        node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", node.later(self._pool, goals.hear_pose))
         node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
         node.subscribe(TOPIC, "geometry_msgs/msg/Twist", driving.hear)
-        node.subscribe("say", "std_msgs/msg/String", self._later(hear))
+        node.subscribe("say", "std_msgs/msg/String", node.later(self._pool, hear))
         for what in ("pause", "resume", "cancel", "step"):
             node.answer(what, "std_srvs/srv/Trigger", partial(self._obey, name, what))
         return own
@@ -136,10 +122,8 @@ class Bridge(RunVisitor):
         try:
             if what == "pause":
                 control.pause("paused by ROS 2", robot=name)
-                self._halt(name)
             elif what == "cancel":
                 control.cancel("cancelled by ROS 2", robot=name)
-                self._halt(name)
             elif what == "step":
                 control.step()
             else:
@@ -147,13 +131,10 @@ class Bridge(RunVisitor):
                 control.resume()
         except ValueError as error:
             return {"success": False, "message": str(error)}
+        if what in ("pause", "cancel"):
+            self._robots[name].goals.halt()
         self._hurry.set()
         return {"success": True, "message": what}
-
-    def _halt(self, name: str) -> None:
-        """Lets a robot stop before its clock's next step, and the run go on at once."""
-        self._halting.append(name)
-        self._hurry.set()
 
     def mission_begun(self, nodes: Sequence[Behaviour], context: SkillContext) -> None:
         """Takes the context of a robot's new mission; publishes the robot's description and cameras at the first."""
@@ -171,7 +152,7 @@ class Bridge(RunVisitor):
         if topic == _PATH and own.context is not None:
             own.out["plan"].put(messages.path(own.context.clock.now(), message["poses"]))
         elif topic in _EVENTS:
-            own.out["events"].put(_event(topic, message))
+            own.goals.events.put(messages.event(topic, message))
         if topic == _OUTCOME:
             own.goals.message(message)
         return message
@@ -187,12 +168,13 @@ class Bridge(RunVisitor):
             self._diagnostics_due_s = now_s + _DIAGNOSTICS_PERIOD_S
             for name, own in self._robots.items():
                 if own.context is not None:
-                    self._diagnostics.put(_diagnostics(now_s, name, own.context, progress))
+                    self._put_diagnostics(name, own.context, progress)
         self._keep_pace(now_s)
-        while self._halting:
-            own = self._robots[self._halting.popleft()]
-            if own.context is not None and own.is_active:
-                own.context.robot.stop(lease=own.context.lease)
+        for own in self._robots.values():
+            if own.goals.halting:
+                own.goals.halting = False
+                if own.context is not None and own.is_active:
+                    own.context.robot.stop(lease=own.context.lease)
 
     def _tick_robot(self, own: _RobotBridge, context: SkillContext, topics: RobotTopics, progress: Progress) -> None:
         now_s = context.clock.now()
@@ -206,6 +188,17 @@ class Bridge(RunVisitor):
         if own.is_active:
             own.driving.tick(context)
             own.goals.tick(context, progress)
+
+    def _put_diagnostics(self, name: str, context: SkillContext, progress: Progress) -> None:
+        estimate, robot = context.localiser.estimate(), context.robot
+        values = {
+            "battery": f"{robot.battery().charge:.3f}",
+            "localised": str(estimate.localised),
+            "localisation health": f"{estimate.health:.3f}",
+            "overruns": str(progress.overruns),
+            "tick (ms)": f"{progress.tick_wall_s * 1e3:.1f}",
+        }
+        self._diagnostics.put(messages.diagnostics(progress.now_s, name, robot.faults(), values))
 
     def mission_ended(self, end: MissionEnd) -> None:
         """Ends the goals of a robot whose mission has ended."""
@@ -229,24 +222,6 @@ class Bridge(RunVisitor):
         for own in self._robots.values():
             own.goals.end()
         self._open.close()
-
-
-def _event(topic: str, message: Mapping[str, Any]) -> Any:
-    """Returns an event as text: its topic in the log, and its message in JSON."""
-    values = {key: value for key, value in message.items() if key != "image"}
-    return {"data": json.dumps({"topic": topic, **plain_values(values)}, ensure_ascii=False)}
-
-
-def _diagnostics(now_s: float, name: str, context: SkillContext, progress: Progress) -> Any:
-    estimate, robot = context.localiser.estimate(), context.robot
-    values = {
-        "battery": f"{robot.battery().charge:.3f}",
-        "localised": str(estimate.localised),
-        "localisation health": f"{estimate.health:.3f}",
-        "overruns": str(progress.overruns),
-        "tick (ms)": f"{progress.tick_wall_s * 1e3:.1f}",
-    }
-    return messages.diagnostics(now_s, name, robot.faults(), values)
 
 
 def _set_pose(context: SkillContext, stamped: Any) -> None:

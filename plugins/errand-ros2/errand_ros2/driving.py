@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from errand_ros2.inputs import LIFE_S, TOPIC, HeardVelocity
+from errand_ros2.readings import LIFE_S, TOPIC, HeardVelocity
 from executive.run.control import Control
 from skills.api import SkillContext
 from skills.navigate.base import Base
@@ -42,7 +42,9 @@ class Driving(HeardVelocity):
             return
         if not self._driving:
             return
-        base = self._base_of(context)
+        if self._base is None or self._base[0] is not context:
+            self._base = (context, Base(context))
+        base = self._base[1]
         if alive and any(asked):
             self._moved_s = now_s
             self._drive(base, context, np.array(asked))
@@ -51,11 +53,6 @@ class Driving(HeardVelocity):
         if now_s - max(at_s, self._moved_s) > RESUME_S:
             self._driving = False
             self._control.resume(robot=self._name)
-
-    def _base_of(self, context: SkillContext) -> Base:
-        if self._base is None or self._base[0] is not context:
-            self._base = (context, Base(context))
-        return self._base[1]
 
     def _drive(self, base: Base, context: SkillContext, wanted: FloatArray) -> None:
         """Drives towards a velocity within the base's limits, slower or not at all near obstacles."""

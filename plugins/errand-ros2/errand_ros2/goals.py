@@ -1,14 +1,13 @@
-"""Goals from ROS 2 for one robot during a run: `goal_pose`, and the actions `navigate_to_pose` and `run_mission`.
+"""Goals from ROS 2 for one robot during a run, of the topic `goal_pose` and of actions.
 
-A goal becomes a mission that interrupts the robot's present one, which goes on afterwards. A new goal takes the place
-of the one before.
+A goal becomes a mission that interrupts the present one, which goes on afterwards; a new goal replaces the one before.
 """
 
 from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -20,7 +19,7 @@ from typing import Any, Final
 from py_trees.common import Status
 
 from errand_ros2 import messages
-from errand_ros2.inputs import pose_on_map
+from errand_ros2.readings import pose_on_map
 from errand_ros2.wire.actions import ActionServer, Goal, GoalStatus
 from errand_ros2.wire.node import Node
 from executive.app.prepare.prepared import Prepared
@@ -66,18 +65,12 @@ class Goals:
     """Goals of one robot. Requests come from threads of Zenoh; the run calls `tick`, `message` and `end`."""
 
     def __init__(
-        self,
-        node: Node,
-        prepared: Prepared,
-        control: Control,
-        grid: GridMap,
-        pool: Executor,
-        refuse: Callable[[str], None],
-        halt: Callable[[], None],
+        self, node: Node, prepared: Prepared, control: Control, grid: GridMap, pool: Executor, hurry: threading.Event
     ) -> None:
-        """`pool` compiles goals, `refuse` tells why one is refused, `halt` stops the robot at once."""
-        self._prepared, self._control, self._grid = prepared, control, grid
-        self._refuse, self._halt = refuse, halt
+        """`pool` compiles goals; `hurry` lets the run go on at once."""
+        self._prepared, self._control, self._grid, self._hurry = prepared, control, grid, hurry
+        self.events = node.publisher("events", "std_msgs/msg/String")
+        self.halting = False  # whether the robot must stop before its clock's next step
         self._name = prepared.mission.robot_name
         self._numbers, self._lock = count(1), threading.RLock()
         self._pursued: dict[str, _Pursued] = {}
@@ -105,7 +98,7 @@ class Goals:
         try:
             self._pursue(source, goal, tuple(pose_on_map(each, self._grid, self._frames) for each in stamped))
         except (InputError, ValueError) as error:
-            self._refuse(f"{source} is refused: {error}")
+            self.events.put(messages.event("refused", {"message": f"{source} is refused: {error}"}))
             return False
         return True
 
@@ -116,7 +109,12 @@ class Goals:
             if found is not None:
                 with suppress(ValueError):  # it is being cancelled already
                     self._control.replace(found.stop, instead_of=found.mission)
-                self._halt()
+                self.halt()
+
+    def halt(self) -> None:
+        """Lets the robot stop at once."""
+        self.halting = True
+        self._hurry.set()
 
     def _pursue(self, source: str, goal: Goal | None, poses: tuple[Pose2D, ...]) -> None:
         """Compiles a goal's mission, and lets it begin in place of the goal before. Raises InputError, ValueError."""

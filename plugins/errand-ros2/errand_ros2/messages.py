@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import cv2
 import numpy as np
 
+from executive.record.event_log import plain_values
 from skills.estimate.grid_map import GridMap
 from skills.robot import Battery, FloatArray, Image, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
@@ -204,3 +206,9 @@ def diagnostics(now_s: float, robot: str, faults: Sequence[str], values: Mapping
     pairs = [{"key": key, "value": value} for key, value in values.items()]
     status = {"level": 2 if faults else 0, "name": f"errand: {robot}", "hardware_id": robot, "values": pairs}
     return {"header": header(now_s), "status": [{**status, "message": "; ".join(faults) or "OK"}]}
+
+
+def event(topic: str, message: Mapping[str, Any]) -> Fields:
+    """Returns an event of the log as text: its topic, and its message in JSON."""
+    values = {key: value for key, value in message.items() if key != "image"}
+    return {"data": json.dumps({"topic": topic, **plain_values(values)}, ensure_ascii=False)}

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from errand_ros2.inputs import planar_pose
 from errand_ros2.messages import MAP_FRAME, pose_stamped
+from errand_ros2.readings import planar_pose
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError
 from errand_ros2.wire.node import Node, Place, open_session
 from skills.api import FreeSpace, PlanningError
@@ -81,6 +81,6 @@ class Nav2:
                 raise PlanningError(f"no Nav2 answers on {self.action}") from error
             if sent is None or not sent.ended.wait(self.limit_s):
                 raise PlanningError(f"Nav2 on {self.action} does not plan within {self.limit_s:g} s")
-            if sent.status is not GoalStatus.SUCCEEDED:
-                raise PlanningError(f"Nav2 finds no path: {sent.result.error_msg[:200] or sent.result.error_code}")
-            return sent.result
+        if sent.status is not GoalStatus.SUCCEEDED:
+            raise PlanningError(f"Nav2 finds no path: {sent.result.error_msg[:200] or sent.result.error_code}")
+        return sent.result

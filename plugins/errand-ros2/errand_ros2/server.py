@@ -16,7 +16,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from errand_ros2 import messages
-from errand_ros2.inputs import LIFE_S, TOPIC, HeardVelocity, transform_of, within_limits
+from errand_ros2.readings import LIFE_S, TOPIC, HeardVelocity, transform_of, within_limits
 from errand_ros2.robot_topics import IMAGE_PERIOD_S, Frames, RobotTopics
 from errand_ros2.wire.actions import ActionServer, Goal, GoalStatus
 from errand_ros2.wire.keys import LATCHED
@@ -109,8 +109,7 @@ class RobotServer:
         self.node.subscribe(TOPIC, "geometry_msgs/msg/Twist", self._velocity.hear)
         self._driving: CommandId | None = None
         self._goals: list[tuple[ActionServer, Goal, CommandId]] = []  # under way, with their commands
-        self.ended = 0
-        """Number of the goals ended."""
+        self.ended = 0  # number of the goals ended
         self._serve_parts(robot.capabilities())
 
     def _serve_parts(self, can: Capabilities) -> None:

@@ -23,8 +23,7 @@ class RobotClock:
     `jumps` counts, this begins again. `advance` calls `after` after each wait.
     """
 
-    is_heard = True
-    """Whether the clock runs."""
+    is_heard = True  # whether the clock runs
 
     def __init__(self) -> None:
         self._began_s, self._due_s = time.monotonic(), 0.0

@@ -10,11 +10,11 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from errand_ros2 import messages
 from errand_ros2.adapter.clocks import RobotClock
-from errand_ros2.adapter.description import DRIVE_EXPIRY_S, Description, GripperFile
+from errand_ros2.adapter.description import DRIVE_EXPIRY_S, Description
 from errand_ros2.adapter.sensors import OLD_STATE_S, SensedRobot
-from errand_ros2.inputs import within_limits
+from errand_ros2.readings import within_limits
 from errand_ros2.server import GRIPPER, INVALID_GOAL, TRAJECTORY
-from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError, SentGoal
+from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError
 from errand_ros2.wire.node import Node
 from skills.command_table import CommandTable
 from skills.robot import (
@@ -216,15 +216,18 @@ class Ros2Robot(SensedRobot):
             return (CommandState.DONE, "", CommandCause.NONE) if reached else None
         if not goal.ended.is_set():
             return None
-        if part == GRIP and self._description.file.gripper is not None:
-            self._feel_result(self._description.file.gripper, goal.result)
-        return _ended(part, goal)
-
-    def _feel_result(self, file: GripperFile, result: Any) -> None:
-        """Takes what a gripper's result tells, where no topic does."""
-        untold = {"force_n": file.force is None, "holding": file.holding is None}
-        told = {"force_n": result.effort, "holding": bool(result.stalled)}
-        self._feel(opening=result.position / file.scale, **{each: told[each] for each in told if untold[each]})
+        stalled, result = part == GRIP and goal.result.stalled, goal.result
+        if (file := self._description.file.gripper) is not None and part == GRIP:
+            untold = {"force_n": file.force is None, "holding": file.holding is None}
+            told = {"force_n": result.effort, "holding": bool(stalled)}
+            self._feel(opening=result.position / file.scale, **{each: told[each] for each in told if untold[each]})
+        if goal.status is GoalStatus.SUCCEEDED or stalled:
+            return CommandState.DONE, "stopped by an object in the gripper" if stalled else "", CommandCause.NONE
+        if goal.status is GoalStatus.CANCELED:
+            return CommandState.STOPPED, "cancelled by the controller", CommandCause.STOPPED
+        reason = str(getattr(result, "error_string", ""))[:200] or "the controller gave up"
+        invalid = getattr(result, "error_code", 0) == INVALID_GOAL
+        return CommandState.STOPPED, reason, CommandCause.INVALID if invalid else CommandCause.BLOCKED
 
     def _say(self, velocity: tuple[float, float, float]) -> None:
         twist = messages.twist(velocity)
@@ -287,14 +290,3 @@ class Ros2Robot(SensedRobot):
 
 def _old(silent_s: float) -> str:
     return f"the last state is {silent_s:.1f} s old"
-
-
-def _ended(part: str, sent: SentGoal) -> tuple[CommandState, str, CommandCause]:
-    if sent.status is GoalStatus.SUCCEEDED or (part == GRIP and getattr(sent.result, "stalled", False)):
-        stalled = part == GRIP and sent.result.stalled
-        return CommandState.DONE, "stopped by an object in the gripper" if stalled else "", CommandCause.NONE
-    if sent.status is GoalStatus.CANCELED:
-        return CommandState.STOPPED, "cancelled by the controller", CommandCause.STOPPED
-    reason = str(getattr(sent.result, "error_string", ""))[:200] or "the controller gave up"
-    invalid = getattr(sent.result, "error_code", 0) == INVALID_GOAL
-    return CommandState.STOPPED, reason, CommandCause.INVALID if invalid else CommandCause.BLOCKED

@@ -17,10 +17,10 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform
 
-from errand_ros2.adapter import readings
+from errand_ros2 import readings
 from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import CameraFile, Description
-from errand_ros2.inputs import planar_pose, transform_of
+from errand_ros2.readings import planar_pose, transform_of
 from errand_ros2.wire.keys import LATCHED, SENSOR
 from errand_ros2.wire.node import Node
 from skills.geometry import compose, inverse
@@ -191,7 +191,9 @@ class SensedRobot:
         if points_F is None or X_BF is None or X_BL is None or X_OB is None:
             return
         points_L = (X_BL.inverse() @ X_BF @ points_F.T).T if len(points_F) else points_F
-        self._scan = readings.cloud_scan(points_L, self._description.file.lidar, stamp_s, X_BL, X_OB)
+        file = self._description.file.lidar
+        elevations = np.radians(np.linspace(file.lowest, file.highest, file.rings))
+        self._scan = readings.cloud_scan(points_L, elevations, file.columns, stamp_s, X_BL, X_OB)
 
     def _hear_scan(self, message: Any) -> None:
         stamp_s = self._stamp(message)

@@ -7,7 +7,6 @@ import time
 import uuid
 from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, Final
@@ -67,7 +66,7 @@ class ActionServer:
         self._status = node.publisher(f"{base}/status", self.kind.status.name, LATCHED)
         node.serve(f"{base}/cancel_goal", self.kind.cancel_goal, self._cancel_goal)
         for each in (self.kind.send_goal, *older_services(self.kind.send_goal)):
-            node.serve(f"{base}/send_goal", each, lambda request: _submit(pool, self._send_goal, request))
+            node.serve(f"{base}/send_goal", each, node.later(pool, self._send_goal))
         for each in (self.kind.get_result, *older_services(self.kind.get_result)):
             node.serve(f"{base}/get_result", each, self._get_result)
 
@@ -157,12 +156,6 @@ class ActionServer:
         return ros_types().make(f"{self.kind.name}_Result", **fields)
 
 
-def _submit(pool: Executor, handle: Callable[[Request], None], request: Request) -> None:
-    """Lets the pool handle a request; drops it when the pool is closed."""
-    with suppress(RuntimeError):
-        pool.submit(handle, request)
-
-
 class NoAnswerError(RuntimeError):
     """Error of a server that does not answer in time: the goal may be pursued."""
 
@@ -182,8 +175,7 @@ class ActionClient:
 
     def __init__(self, node: Node, name: str, type_name: str) -> None:
         kind, base = ActionType(ros_types(), type_name), f"{node.absolute(name)}/_action"
-        self.ended = 0
-        """Number of the goals whose result has come."""
+        self.ended = 0  # number of the goals whose result has come
         self._send = Client(node, f"{base}/send_goal", kind.send_goal)
         self._cancel = Client(node, f"{base}/cancel_goal", kind.cancel_goal)
         self._result = Client(node, f"{base}/get_result", kind.get_result)

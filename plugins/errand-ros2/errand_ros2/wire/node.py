@@ -11,7 +11,8 @@ import re
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import Executor
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 from typing import Any, Final
@@ -276,6 +277,15 @@ class Node:
         except MalformedError:
             self.dropped += 1
             return None
+
+    def later(self, pool: Executor, handle: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Returns a handler that lets a pool handle what comes, because it may take long, until the pool is closed."""
+
+        def hear(message: Any) -> None:
+            with suppress(RuntimeError):
+                pool.submit(self.guarded, lambda: handle(message), "a message")
+
+        return hear
 
     def guarded(self, handle: Callable[[], None], name: str) -> None:
         """Calls a handler; a defect of it becomes one line in the log."""

@@ -84,9 +84,8 @@ class Types:
 
     def __init__(self, folder: Path = INTERFACES) -> None:
         self.store = get_typestore(Stores.ROS2_JAZZY)
-        for name, (constants, fields) in [*self.store.fielddefs.items()]:
-            self.store.fielddefs[name] = (constants, _without_char(fields))
-        for file in sorted(folder.glob("*/*/*.*"), key=lambda path: path.suffix != ".msg"):
+        files = [*INTERFACES.glob("*/msg/*.msg"), *folder.glob("*/*/*.*")]
+        for file in sorted(files, key=lambda path: path.suffix != ".msg"):
             self._register(file)
 
     def message(self, name: str) -> MessageType:
@@ -128,6 +127,7 @@ class Types:
         name = f"{file.parts[-3]}/{file.parts[-2]}/{file.stem}"
         parts = [part.strip() for part in _PARTS.split(file.read_text(encoding="utf-8"))]
         if file.suffix == ".msg":
+            self.store.fielddefs.pop(name, None)
             self.store.register(get_types_from_msg(parts[0], name))
         elif file.suffix == ".srv":
             self._register_service(name, *parts)
@@ -149,13 +149,6 @@ class Types:
         accepted = "bool accepted\nbuiltin_interfaces/Time stamp"
         self._register_service(f"{name}_SendGoal", f"{_UUID}\n{name}_Goal goal", accepted)
         self._register_service(f"{name}_GetResult", _UUID, f"int8 status\n{name}_Result result")
-
-
-def _without_char(value: Any) -> Any:
-    """Replaces `char` by `uint8`, as which ROS 2 hashes and encodes it."""
-    if value == (Nodetype.BASE, ("char", 0)):
-        return (Nodetype.BASE, ("uint8", 0))
-    return type(value)(map(_without_char, value)) if isinstance(value, tuple | list) else value
 
 
 def _as_service(value: Any) -> Any:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from errand_ros2.adapter import readings
-from errand_ros2.adapter.description import LidarFile
+from errand_ros2 import readings
 from errand_ros2.wire.types import ros_types
 
 HERE = RigidTransform()
@@ -96,7 +95,7 @@ def test_a_cloud_with_other_fields_gives_its_finite_points(datatype):
 
 def test_a_cloud_becomes_rings_of_a_revolution():
     far = readings.cloud_scan(
-        np.array([[2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]), LidarFile(points="p", rings=31), 1.0, HERE, HERE
+        np.array([[2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]), np.radians(np.linspace(-15.0, 15.0, 31)), 900, 1.0, HERE, HERE
     )
     assert far.ranges_m.shape == (31, 900)
     assert far.ranges_m[15, 450] == pytest.approx(2.0)

@@ -1,27 +1,96 @@
-"""Messages of ROS 2 as readings of the robot protocol. `usable` drops what cannot be used."""
+"""Reads poses, velocities and readings of a robot from messages of ROS 2; `usable` drops what cannot be used."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
-from errand_ros2.adapter.description import LidarFile
-from errand_ros2.inputs import transform_of, velocity
+from errand_ros2.messages import MAP_FRAME
+from skills.estimate.grid_map import GridMap
+from skills.geometry import compose
 from skills.inputs.errors import InputError
-from skills.robot import Imu, Intrinsics, Joints, Odometry, Scan
+from skills.robot import Capabilities, FloatArray, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
+FRAMES: Final = frozenset({MAP_FRAME, "world"})
+"""Names of the map's frame."""
+TOPIC: Final = "cmd_vel"
+LIFE_S: Final = 0.2
+"""Time after which a velocity no longer counts; then the robot stands."""
+STILL: Final = ((0.0, 0.0, 0.0), -math.inf)
+_SHORTEST_QUATERNION: Final = 0.1
 _NEAREST_M: Final = 0.3
 _MOST_PIXELS: Final = 1 << 24
 _POINT_TYPES: Final = {7: "f4", 8: "f8"}
 _COLOURS: Final = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4}
 _CHANNEL: Final = {"mono8": "u1", "16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
 _MILLIMETRE_M: Final = 0.001
+
+
+def transform_of(at: Any, turn: Any) -> RigidTransform:
+    """Reads a position and a quaternion. Raises InputError for numbers that are not finite, and for no rotation."""
+    values = np.array([at.x, at.y, at.z, turn.w, turn.x, turn.y, turn.z], float)
+    if not np.isfinite(values).all():
+        raise InputError("the pose has a number that is not finite", hint="send finite numbers")
+    if (length := float(np.linalg.norm(values[3:]))) < _SHORTEST_QUATERNION:
+        raise InputError("the pose's quaternion is zero", hint="send w = 1 for no rotation")
+    return RigidTransform(Quaternion(values[3:] / length), values[:3])
+
+
+def planar_pose(pose: Any) -> Pose2D:
+    """Reads geometry_msgs/Pose, as `transform_of`."""
+    return Pose2D.from_transform(transform_of(pose.position, pose.orientation))
+
+
+def pose_on_map(stamped: Any, grid: GridMap, frames: Mapping[str, Pose2D]) -> Pose2D:
+    """Reads geometry_msgs/PoseStamped as a pose on the map; `frames` are the poses of other frames on it.
+
+    Raises InputError for an unknown frame, a pose off the map, and what `planar_pose` refuses.
+    """
+    frame, pose = stamped.header.frame_id.strip("/"), planar_pose(stamped.pose)
+    if frame not in FRAMES and frame not in frames:
+        raise InputError(f"there is no frame '{frame[:60]}'", hint=f"known: {', '.join(sorted({*FRAMES, *frames}))}")
+    placed = pose if frame in FRAMES else compose(frames[frame], pose)
+    least = np.array(grid.origin_m)
+    if not (np.all(least <= (placed.x_m, placed.y_m)) and np.all((placed.x_m, placed.y_m) <= least + grid.size_m)):
+        raise InputError(f"({placed.x_m:.6g}, {placed.y_m:.6g}) is not on the map", hint="name a pose on it")
+    return placed
+
+
+def velocity(twist: Any) -> tuple[float, float, float]:
+    """Reads geometry_msgs/Twist as vx, vy (m/s), wz (rad/s). Raises InputError for numbers that are not finite."""
+    values = (twist.linear.x, twist.linear.y, twist.angular.z)
+    if not all(math.isfinite(value) for value in values):
+        raise InputError("the velocity has a number that is not finite", hint="send finite numbers")
+    return values
+
+
+def within_limits(velocity: tuple[float, float, float], can: Capabilities) -> tuple[float, float, float]:
+    """Returns a velocity of the base within its limits."""
+    vx, vy, wz = velocity
+    share, most = min(1.0, can.max_speed_m_s / max(math.hypot(vx, vy), 1e-9)), can.max_turn_rate_rad_s
+    return share * vx, share * vy, max(-most, min(wz, most))
+
+
+class HeardVelocity:
+    """Last velocity of a topic, and when it came on the clock `now` (s). Any thread may call `hear`."""
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self.last = STILL
+
+    def hear(self, twist: Any) -> None:
+        """Takes a velocity; one that is not finite stops the robot."""
+        try:
+            self.last = velocity(twist), self._now()
+        except InputError:
+            self.last = STILL
 
 
 def stamp_of(header: Any) -> float:
@@ -86,21 +155,25 @@ def cloud_points(message: Any) -> NDArray[np.float64]:
 
 
 def cloud_scan(
-    points_L: NDArray[np.float64], file: LidarFile, stamp_s: float, X_BL: RigidTransform, X_OB: RigidTransform
+    points_L: FloatArray,
+    elevations: FloatArray,
+    count: int,
+    stamp_s: float,
+    X_BL: RigidTransform,
+    X_OB: RigidTransform,
 ) -> Scan:
-    """Returns points (N, 3) in the lidar's frame as a revolution; the nearest of a ring and column counts."""
+    """Returns points (N, 3) in the lidar's frame as a revolution; `count` columns, in each the nearest of a ring."""
     far_m = np.linalg.norm(points_L, axis=1)
     points_L, far_m = points_L[far_m > _NEAREST_M], far_m[far_m > _NEAREST_M]
-    elevations = np.radians(np.linspace(file.lowest, file.highest, file.rings))
     found = np.arcsin(np.clip(points_L[:, 2] / far_m, -1.0, 1.0))
     rings = np.rint((found - elevations[0]) / (elevations[1] - elevations[0])).astype(int)
     turn = np.arctan2(points_L[:, 1], points_L[:, 0])
-    columns = np.rint((turn + np.pi) / (2.0 * np.pi) * file.columns).astype(int) % file.columns
-    ranges: NDArray[np.float32] = np.full((file.rings, file.columns), np.inf, dtype=np.float32)
-    inside = (rings >= 0) & (rings < file.rings)
-    np.minimum.at(ranges, (rings[inside], columns[inside]), far_m[inside].astype(np.float32))
+    column = np.rint((turn + np.pi) / (2.0 * np.pi) * count).astype(int) % count
+    ranges: NDArray[np.float32] = np.full((len(elevations), count), np.inf, dtype=np.float32)
+    inside = (rings >= 0) & (rings < len(elevations))
+    np.minimum.at(ranges, (rings[inside], column[inside]), far_m[inside].astype(np.float32))
     ranges[np.isinf(ranges)] = np.nan
-    azimuths = (-np.pi + np.arange(file.columns) * (2.0 * np.pi / file.columns)).astype(np.float64)
+    azimuths = (-np.pi + np.arange(count) * (2.0 * np.pi / count)).astype(np.float64)
     return Scan(stamp_s, ranges, elevations, azimuths, X_BL, X_OB)
 
 

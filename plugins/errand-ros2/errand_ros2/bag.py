@@ -40,8 +40,7 @@ _QOS: Final = Qos(
 )
 _HERE: Final = {"position": {}, "orientation": {"w": 1.0}}
 
-Message = tuple[str, str, Fields]
-"""Topic, type and fields."""
+Message = tuple[str, str, Fields]  # topic, type and fields
 
 
 def write_bag(events: Iterable[Event], folder: Path, name: str) -> int:

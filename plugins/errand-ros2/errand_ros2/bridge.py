@@ -1,7 +1,4 @@
-"""Bridge between a run and ROS 2, for `errand run ... --ros2 [DOMAIN]`; the run goes at the pace of the wall clock.
-
-Publishes what the robots sense, where they are and what they do; takes goals, velocities, sentences and services.
-"""
+"""Bridge between a run, which goes at the pace of the wall clock, and ROS 2: `errand run ... --ros2 [DOMAIN]`."""
 
 from __future__ import annotations
 
@@ -36,9 +33,7 @@ from skills.api import LocalisationEstimate, SearchingLocaliser, SkillContext
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 
-NAME: Final = "errand"
-"""Name of all nodes."""
-_PATH, _OUTCOME = "path", "outcome"
+NAME: Final = "errand"  # name of all nodes
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
 _TOPICS: Final = {
@@ -149,11 +144,11 @@ class Bridge(RunVisitor):
         own = own or (next(iter(self._robots.values())) if len(self._robots) == 1 else None)
         if own is None:
             return message
-        if topic == _PATH and own.context is not None:
+        if topic == "path" and own.context is not None:
             own.out["plan"].put(messages.path(own.context.clock.now(), message["poses"]))
         elif topic in _EVENTS:
             own.goals.events.put(messages.event(topic, message))
-        if topic == _OUTCOME:
+        if topic == "outcome":
             own.goals.message(message)
         return message
 

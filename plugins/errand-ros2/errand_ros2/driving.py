@@ -16,8 +16,7 @@ from skills.navigate.follower import FollowerOptions
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m
 from skills.robot import FloatArray
 
-RESUME_S: Final = 1.0
-"""Time (wall clock) without velocities after which the mission goes on."""
+RESUME_S: Final = 1.0  # time (wall clock) without velocities after which the mission goes on
 _REASON: Final = f"driven by {TOPIC}"
 _REACTION_S, _BRAKING_M_S2, _SAMPLES = 0.4, 2.0, 6
 _TICK_S: Final = 0.05

@@ -19,12 +19,10 @@ if TYPE_CHECKING:
 
 MAP_FRAME: Final = "map"
 LEAST_RANGE_M, MOST_RANGE_M = 0.05, 100.0
-MOST_COLUMNS: Final = 320
-"""Raw pictures of a run are reduced to at most so many columns."""
+MOST_COLUMNS: Final = 320  # raw pictures of a run are reduced to at most so many columns
 _UNKNOWN: Final = np.array([-1.0, *[0.0] * 8])  # covariance of what is not measured
 _FLOAT32: Final = 7
-Fields = dict[str, Any]
-"""Values of a message by field."""
+Fields = dict[str, Any]  # values of a message by field
 
 
 def time_of(stamp_s: float) -> Fields:

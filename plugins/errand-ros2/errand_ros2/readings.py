@@ -18,11 +18,9 @@ from skills.geometry import compose
 from skills.inputs.errors import InputError
 from skills.robot import Capabilities, FloatArray, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
-FRAMES: Final = frozenset({MAP_FRAME, "world"})
-"""Names of the map's frame."""
+FRAMES: Final = frozenset({MAP_FRAME, "world"})  # names of the map's frame
 TOPIC: Final = "cmd_vel"
-LIFE_S: Final = 0.2
-"""Time after which a velocity no longer counts; then the robot stands."""
+LIFE_S: Final = 0.2  # time after which a velocity no longer counts; then the robot stands
 STILL: Final = ((0.0, 0.0, 0.0), -math.inf)
 _SHORTEST_QUATERNION: Final = 0.1
 _NEAREST_M: Final = 0.3

@@ -65,12 +65,10 @@ class _Camera:
 class RobotTopics:
     """Publishers of one robot's readings. `publish` reads the robot, and must be called where its verbs may be."""
 
-    def __init__(
-        self, node: Node, robot: Robot, frames: Frames, columns: int = MOST_COLUMNS, period_s: float = IMAGE_PERIOD_S
-    ) -> None:
+    def __init__(self, node: Node, robot: Robot, frames: Frames, most_columns: int = MOST_COLUMNS) -> None:
         """The last part of the node's namespace names the robot's frames."""
         self._robot, self._frames = robot, frames
-        self._most_columns, self._image_period_s = columns, period_s
+        self._most_columns, self.image_period_s = most_columns, IMAGE_PERIOD_S
         space = node.namespace.strip("/")
         self._odom_frame, self._body, self._lidar = (f"{space}/{each}" for each in ("odom", "body", "lidar"))
         self._odom = node.publisher("odom", "nav_msgs/msg/Odometry")
@@ -134,7 +132,7 @@ class RobotTopics:
 
     def _publish_camera(self, at: _Camera, now_s: float) -> None:
         """Publishes what subscriptions ask for, and the transform of a camera that moves on the body."""
-        visual, depth = (at.is_due(now_s, self._image_period_s, depth=each) for each in (False, True))
+        visual, depth = (at.is_due(now_s, self.image_period_s, depth=each) for each in (False, True))
         if not (visual or depth):
             return
         try:

@@ -17,7 +17,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from errand_ros2 import messages
 from errand_ros2.readings import LIFE_S, TOPIC, HeardVelocity, transform_of, within_limits
-from errand_ros2.robot_topics import IMAGE_PERIOD_S, Frames, RobotTopics
+from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.wire.actions import ActionServer, Goal, GoalStatus
 from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Node, Session
@@ -37,8 +37,7 @@ INVALID_GOAL, PATH_VIOLATED = -1, -4
 _EXPIRY_S: Final = 0.1
 _LATE_S: Final = 0.5
 _WHOLE: Final = 1 << 16  # columns of pictures that are not reduced
-_EXTRA_S, _MOST_S = 5.0, 120.0
-"""Time that a trajectory may take longer, and the most that a gripper or posture takes."""
+_EXTRA_S, _MOST_S = 5.0, 120.0  # time that a trajectory may take longer, and the most that a gripper or posture takes
 _MOST_WORK: Final = 1000  # most work that is done between two steps
 _OBJECT: Final = 0.02  # share of the gripper's opening by which an object keeps it open
 
@@ -73,10 +72,7 @@ class WorkQueue(Executor):
 
 
 class RobotServer:
-    """Serves one robot. Call `step` once a period, or `run`; both step the robot's clock.
-
-    The thread that does so owns the robot; `work` is what it does between the steps.
-    """
+    """Serves one robot. The thread that calls `step` or `run` owns it, and does its `work` between the steps."""
 
     def __init__(
         self,
@@ -87,13 +83,8 @@ class RobotServer:
         grid: GridMap | None = None,
         truth: Callable[[], RigidTransform] | None = None,
         life: Callable[[], float] = time.monotonic,
-        image_period_s: float = IMAGE_PERIOD_S,
     ) -> None:
-        """Takes the robot's lease.
-
-        `grid` is published as `/map`, and the true pose under `/ground_truth`. `life` is the clock (s) by which
-        velocities die.
-        """
+        """Takes the robot's lease. Publishes `grid` and the true pose, too; velocities die by the clock `life` (s)."""
         self._robot, self._clock, self._truth, self._life = robot, clock, truth, life
         self._lease = robot.acquire_lease("the server of ROS 2")
         space = f"/{ros_name(robot.name)}"
@@ -103,7 +94,7 @@ class RobotServer:
             top.publisher("/map", "nav_msgs/msg/OccupancyGrid", LATCHED).put(messages.occupancy_grid(grid))
         if truth is not None:
             self._true = top.publisher(f"/ground_truth{space}/pose", "geometry_msgs/msg/PoseStamped")
-        self.topics = RobotTopics(self.node, robot, Frames(top), _WHOLE, image_period_s)
+        self.topics = RobotTopics(self.node, robot, Frames(top), _WHOLE)
         self.work = WorkQueue()
         self._velocity = HeardVelocity(life)
         self.node.subscribe(TOPIC, "geometry_msgs/msg/Twist", self._velocity.hear)
@@ -237,10 +228,8 @@ def trajectory_of(message: Any, names: tuple[str, ...]) -> ArmTrajectory:
         raise ValueError(f"the trajectory moves {', '.join(message.joint_names)}, not {', '.join(names)}")
     if not message.points or any(len(point.positions) != len(names) for point in message.points):
         raise ValueError("the trajectory has no points, or one without a position of each joint")
-    columns = [order[name] for name in names]
-    starts = [point.time_from_start for point in message.points]
-    times = np.array([each.sec + 1e-9 * each.nanosec for each in starts])
-    positions = np.array([np.asarray(point.positions)[columns] for point in message.points])
+    times = np.array([point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec for point in message.points])
+    positions = np.array([point.positions for point in message.points])[:, [order[name] for name in names]]
     if not 0.0 <= times[0] <= times[-1] <= _MOST_S or not math.isfinite(float(positions.sum())):
         raise ValueError(f"the trajectory does not lie within {_MOST_S:g} s")
     return ArmTrajectory(times, positions)

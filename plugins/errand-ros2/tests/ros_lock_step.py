@@ -42,7 +42,8 @@ class LockStep(RobotClock):
             self._ready.set()
             return
         with open_session(self._place) as session:
-            self.server = RobotServer(session, robot, clock, life=self.now, image_period_s=0.0)
+            self.server = RobotServer(session, robot, clock, life=self.now)
+            self.server.topics.image_period_s = 0.0
             self.served, self.clock = robot, clock
             self._now_s = clock.now()
             self._ready.set()

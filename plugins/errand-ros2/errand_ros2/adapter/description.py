@@ -20,8 +20,6 @@ Topic = Annotated[
     str, Field(min_length=1, max_length=200, pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")
 ]
 """Name of a topic or action, below the robot's namespace unless it begins with a slash."""
-Frame = Annotated[str, Field(min_length=1, max_length=200)]
-"""Name of a frame."""
 
 
 class Part(BaseModel):
@@ -52,7 +50,7 @@ class LidarFile(Part):
 
     points: Topic | None = None
     scan: Topic | None = None
-    frame: Frame | None = None
+    frame: Annotated[str, Field(min_length=1, max_length=200)] | None = None
     rings: int = Field(default=16, ge=2, le=256)
     lowest: float = Field(default=-15.0, ge=-90.0, lt=90.0)
     highest: float = Field(default=15.0, gt=-90.0, le=90.0)
@@ -98,8 +96,7 @@ class RobotFile(Part):
     base: BaseFile = BaseFile()
     odometry: OdometryFile = OdometryFile()
     joints: Topic | None = "joint_states"
-    joint_names: Mapping[str, str] = {}
-    """Names of joints in ROS by Errand's names, where they differ."""
+    joint_names: Mapping[str, str] = {}  # names in ROS by Errand's names, where they differ
     lidar: LidarFile
     imu: Topic | None = None
     battery: Topic | None = None
@@ -107,8 +104,7 @@ class RobotFile(Part):
     arm: ArmFile | None = None
     head: ArmFile | None = None
     gripper: GripperFile | None = None
-    pose: Topic | None = None
-    """Topic of the robot's own localisation, such as amcl_pose."""
+    pose: Topic | None = None  # the robot's own localisation, such as amcl_pose
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,4 @@
-"""Sensors of a robot of ROS 2: what its topics said last, on the clock of the robot protocol.
-
-Handlers run in threads of Zenoh; readings are immutable and replaced as a whole.
-"""
+"""Sensors of a robot of ROS 2: what its topics said last. Handlers run in threads of Zenoh."""
 
 from __future__ import annotations
 

@@ -17,11 +17,9 @@ from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Client, Node, Request
 from errand_ros2.wire.types import ActionType, older_services, ros_types
 
-MOST_GOALS: Final = 64
-"""Goals whose results are kept; older ones are forgotten."""
+MOST_GOALS: Final = 64  # goals whose results are kept; older ones are forgotten
 _RESULT_S: Final = 3600.0  # time for which a client waits for a result
-_REJECTED, _UNKNOWN_GOAL, _TERMINATED = 1, 2, 3
-"""Answers to a request to cancel goals (action_msgs/srv/CancelGoal)."""
+_REJECTED, _UNKNOWN_GOAL, _TERMINATED = 1, 2, 3  # answers to a request to cancel goals (action_msgs/srv/CancelGoal)
 
 
 GoalStatus = IntEnum("GoalStatus", "UNKNOWN ACCEPTED EXECUTING CANCELING SUCCEEDED CANCELED ABORTED", start=0)

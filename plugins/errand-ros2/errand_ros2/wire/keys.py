@@ -15,8 +15,7 @@ _GID_BYTES: Final = 16
 _ATTACHMENT: Final = struct.Struct("<qqB16s")
 _NAME: Final = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 _TYPE: Final = re.compile(r"(?P<package>\w+)/(?P<kind>msg|srv|action)/(?P<name>\w+)")
-NODE, PUBLISHER, SUBSCRIPTION, SERVICE, CLIENT = "NN", "MP", "MS", "SS", "SC"
-"""Kinds of entities in the graph of ROS 2."""
+NODE, PUBLISHER, SUBSCRIPTION, SERVICE, CLIENT = "NN", "MP", "MS", "SS", "SC"  # kinds of entities in the graph of ROS 2
 
 
 @dataclass(frozen=True)

@@ -38,8 +38,7 @@ from skills.inputs.errors import InputError
 _LOG: Final = logging.getLogger(__name__)
 _CDR: Final = "application/cdr"
 MOST_BYTES: Final = 1 << 26  # longer messages are dropped
-PORT: Final = 7447
-"""Port of rmw_zenoh's router."""
+PORT: Final = 7447  # port of rmw_zenoh's router
 _PLACE: Final = re.compile(r"(?P<domain>\d{1,9})?(@(?P<host>[\w.-]+|\[[\w:.%]+\])?(:(?P<port>\d{1,5}))?)?")
 _MOST_DOMAIN, _MOST_PORT = 232, 65535
 _LOOK_S: Final = 0.5

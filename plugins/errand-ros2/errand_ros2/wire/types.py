@@ -1,7 +1,4 @@
-"""Message and service types of ROS 2 with their RIHS01 hashes: those of rosbags, and those of `interfaces`.
-
-rosbags has messages only. Services and actions are written there as messages, as `rosidl` expands them.
-"""
+"""Types of ROS 2 with their RIHS01 hashes, of rosbags and of `interfaces`; services and actions become messages."""
 
 from __future__ import annotations
 

@@ -123,11 +123,7 @@ class ActionServer:
         with self._lock:
             named = self._goals.get(identity)
             every = until_ns == 0 and not any(identity)
-            asked = [
-                goal
-                for goal in self._goals.values()
-                if every or goal is named or (until_ns > 0 and goal.accepted_ns <= until_ns)
-            ]
+            asked = [each for each in self._goals.values() if every or each is named or each.accepted_ns <= until_ns]
             found = [goal for goal in asked if not goal.has_ended]
             for goal in found:
                 self._set(goal, GoalStatus.CANCELING)

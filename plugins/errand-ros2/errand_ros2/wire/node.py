@@ -229,12 +229,8 @@ class Node:
                 self.handled += 1
 
         key, session = self.key.data_key(name, kind.key), self.session.inner
-        subscriber: Any
-        if qos.transient_local:
-            history = ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth)
-            subscriber = ext.declare_advanced_subscriber(session, key, received, history=history)
-        else:
-            subscriber = session.declare_subscriber(key, received)
+        history = ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth) if qos.transient_local else None
+        subscriber = ext.declare_advanced_subscriber(session, key, received, history=history)
         self._declared.append(subscriber)
 
         def end() -> None:

@@ -39,6 +39,7 @@ _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "erro
 _TOPICS: Final = {
     "reply": "std_msgs/msg/String",
     "plan": "nav_msgs/msg/Path",
+    "detections": "vision_msgs/msg/Detection2DArray",
     "amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
 }
 _DIAGNOSTICS_PERIOD_S, _POSE_PERIOD_S = 1.0, 0.5
@@ -146,6 +147,9 @@ class Bridge(RunVisitor):
             return message
         if topic == "path" and own.context is not None:
             own.out["plan"].put(messages.path(own.context.clock.now(), message["poses"]))
+        elif topic == "detections":
+            head = messages.header(message["stamp_s"], f"{own.node.namespace.strip('/')}/{message['source']}_camera")
+            own.out["detections"].put(messages.detections(head, message["detections"]))
         elif topic in _EVENTS:
             own.goals.events.put(messages.event(topic, message))
         if topic == "outcome":

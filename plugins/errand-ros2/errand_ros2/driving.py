@@ -17,7 +17,6 @@ from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_cleara
 from skills.robot import FloatArray
 
 RESUME_S: Final = 1.0  # time (wall clock) without velocities after which the mission goes on
-_REASON: Final = f"driven by {TOPIC}"
 _REACTION_S, _BRAKING_M_S2, _SAMPLES = 0.4, 2.0, 6
 _TICK_S: Final = 0.05
 
@@ -36,7 +35,7 @@ class Driving(HeardVelocity):
         (asked, at_s), now_s = self.last, time.monotonic()
         alive = now_s - at_s <= LIFE_S
         if alive and any(asked) and not self._driving:
-            self._control.pause(_REASON, robot=self._name)
+            self._control.pause(f"driven by {TOPIC}", robot=self._name)
             self._driving = True  # the run stands still from its next tick on
             return
         if not self._driving:
@@ -63,8 +62,7 @@ class Driving(HeardVelocity):
         towards = base.last_velocity + np.clip(wanted - base.last_velocity, -change, change)
         for share in (1.0, 0.5, 0.25):
             if is_clear(context, share * towards):
-                vx, vy, wz = (share * towards).tolist()
-                base.drive((vx, vy, wz))
+                base.drive(tuple((share * towards).tolist()))
                 return
         base.stop()
 

@@ -88,10 +88,8 @@ class Goals:
 
     def _accept_goal(self, action: str, goal: Goal) -> bool:
         message = goal.message
-        if action == _MISSION:
-            return self._accept(action, goal, [])
-        poses = [message.pose] if hasattr(message, "pose") else getattr(message.poses, "goals", message.poses)
-        return self._accept(action, goal, poses)
+        poses = [message.pose] if hasattr(message, "pose") else getattr(message, "poses", [])
+        return self._accept(action, goal, getattr(poses, "goals", poses))
 
     def _accept(self, source: str, goal: Goal | None, stamped: Sequence[Any]) -> bool:
         """Pursues a goal of a topic or action; tells why it cannot."""

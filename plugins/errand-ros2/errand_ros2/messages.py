@@ -206,6 +206,18 @@ def diagnostics(now_s: float, robot: str, faults: Sequence[str], values: Mapping
     return {"header": header(now_s), "status": [{**status, "message": "; ".join(faults) or "OK"}]}
 
 
+def detections(head: Fields, found: Iterable[Mapping[str, Any]]) -> Fields:
+    """Returns detections in a picture, in its pixels (vision_msgs/Detection2DArray)."""
+    every = []
+    for each in found:
+        u0, v0, u1, v1 = each["box"]
+        center = {"position": {"x": 0.5 * (u0 + u1), "y": 0.5 * (v0 + v1)}}
+        result = {"hypothesis": {"class_id": each["class_name"], "score": each["score"]}}
+        box = {"center": center, "size_x": float(u1 - u0), "size_y": float(v1 - v0)}
+        every.append({"header": head, "results": [result], "bbox": box})
+    return {"header": head, "detections": every}
+
+
 def event(topic: str, message: Mapping[str, Any]) -> Fields:
     """Returns an event of the log as text: its topic, and its message in JSON."""
     values = {key: value for key, value in message.items() if key != "image"}

@@ -54,11 +54,9 @@ class Nav2:
     def _poses(self, start: Pose2D, goal: Pose2D) -> FloatArray:
         """Poses (N, 3) of Nav2's path in the world, from the start to the goal."""
         X_WM = Pose2D(*self.map_pose)
-        ends = {
-            name: pose_stamped(0.0, MAP_FRAME, compose(inverse(X_WM), pose).transform())
-            for name, pose in (("start", start), ("goal", goal))
-        }
-        result = self._ask({**ends, "use_start": True, "planner_id": self.planner_id})
+        poses_M = [compose(inverse(X_WM), pose).transform() for pose in (start, goal)]
+        here, there = (pose_stamped(0.0, MAP_FRAME, X_MB) for X_MB in poses_M)
+        result = self._ask({"start": here, "goal": there, "use_start": True, "planner_id": self.planner_id})
         try:
             found = [compose(X_WM, planar_pose(each.pose)) for each in result.path.poses]
         except InputError as error:

@@ -38,6 +38,7 @@ TWIST, POSE, STRING, TRIGGER = (
     *("std_msgs/msg/String", "std_srvs/srv/Trigger"),
 )
 NAVIGATE, RUN = "nav2_msgs/action/NavigateToPose", "errand_msgs/action/RunMission"
+THROUGH = "nav2_msgs/action/NavigateThroughPoses"
 HEARD = {
     "/clock": "rosgraph_msgs/msg/Clock",
     "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
@@ -59,8 +60,8 @@ class RoomBackend(ScriptedBackend):
 class RosClient:
     """Another program: what it hears by topic, and goals that it sends."""
 
-    def __init__(self, session, robot):
-        self.node, self.robot, self.heard = Node(session, "client"), robot, defaultdict(list)
+    def __init__(self, session, robot, bridge):
+        self.node, self.robot, self.bridge, self.heard = Node(session, "client"), robot, bridge, defaultdict(list)
         for topic, kind in HEARD.items():
             self.node.subscribe(topic, kind, self.heard[topic].append)
 
@@ -141,7 +142,7 @@ def talk(tmp_path):
         def client():
             try:
                 with open_session(place) as session:
-                    ros = RosClient(session, backend.robot)
+                    ros = RosClient(session, backend.robot, bridge)
                     ros.soon(lambda: ros.heard["/alice/odom"])
                     says(ros)
             except BaseException as error:
@@ -206,6 +207,52 @@ def test_a_client_of_an_older_distribution_gets_the_result_in_its_form(talk):
         result = client.call({"goal_id": action.identity}, limit_s=60.0)
         assert (result.status, result.result.error_code) == (GoalStatus.SUCCEEDED, 0)
         assert not hasattr(result.result, "error_msg")
+
+    talk(says)
+
+
+def test_a_goal_of_navigate_through_poses_passes_them_in_order(talk):
+    def says(ros):
+        action = ActionClient(ros, "navigate_through_poses", THROUGH)
+        action.goal.poses.goals = [stamped(0.6, -1.2), stamped(-0.6, -1.2), stamped(-0.6, 1.2)]
+        assert action.send()
+        result = action.result()
+        assert (result.status, result.result.error_code) == (GoalStatus.SUCCEEDED, 0)
+        assert math.hypot(ros.robot.pose.x_m + 0.6, ros.robot.pose.y_m - 1.2) < 0.15
+        left = [each.feedback.number_of_poses_remaining for each in action.feedback]
+        assert left == sorted(left, reverse=True) and {1, 2, 3} == {*left}
+        far_m = [each.feedback.distance_remaining for each in action.feedback]
+        assert far_m[0] > 3.5 and far_m[-1] < 1.5
+
+    talk(says)
+
+
+def test_a_client_of_jazzy_sends_poses_in_its_form(talk):
+    def says(ros):
+        send = older_types().service(f"{THROUGH}_SendGoal")
+        identity = {"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)}
+        client = Client(ros.node, "/alice/navigate_through_poses/_action/send_goal", send)
+        poses = [stamped(0.3, 0.0), stamped(0.3, -0.3)]
+        assert client.call({"goal_id": identity, "goal": {"poses": poses}}, limit_s=20.0).accepted
+        ros.soon(lambda: ros.events("outcome"), 60.0)
+        assert ros.robot.pose.y_m == pytest.approx(-0.3, abs=0.1)
+
+    talk(says)
+
+
+def test_detections_are_boxes_in_pixels(talk):
+    def says(ros):
+        heard = []
+        ros.node.subscribe("/alice/detections", "vision_msgs/msg/Detection2DArray", heard.append)
+        ros.soon(lambda: ros.bridge._robots["Alice"].out["detections"].is_heard)
+        found = [{"class_name": "coke", "score": 0.9, "box": [10, 20, 30, 60], "class_id": 3, "surface": ""}]
+        ros.bridge.message("detections", {"stamp_s": 2.5, "source": "hand", "detections": found, "image": None})
+        ros.soon(lambda: heard)
+        assert (heard[0].header.frame_id, heard[0].header.stamp.nanosec) == ("alice/hand_camera", 500_000_000)
+        (each,) = heard[0].detections
+        assert (each.results[0].hypothesis.class_id, each.results[0].hypothesis.score) == ("coke", 0.9)
+        assert (each.bbox.center.position.x, each.bbox.center.position.y) == (20.0, 40.0)
+        assert (each.bbox.size_x, each.bbox.size_y) == (20.0, 40.0)
 
     talk(says)
 

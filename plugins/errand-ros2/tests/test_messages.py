@@ -2,6 +2,7 @@
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
@@ -68,6 +69,18 @@ def test_a_picture_is_reduced_with_its_intrinsics(colour, encoding, row):
     assert (picture.width, picture.height, picture.encoding, picture.step) == (320, 240, encoding, row)
     assert len(picture.data) == row * 240
     assert (info.width, info.k[0], info.k[2], info.p[5]) == (320, 160.0, 159.0, 161.0)
+
+
+@pytest.mark.parametrize(("colour", "shape"), [(True, (240, 320, 3)), (False, (240, 320))])
+def test_a_compressed_picture_shows_the_same(colour, shape):
+    reading = image_of(colour)
+    if colour:
+        reading.colour[:] = (200, 100, 50)
+    told = decoded("sensor_msgs/msg/CompressedImage", messages.compressed(messages.picture(reading, "c")))
+    assert told.format == f"{'rgb8' if colour else 'mono8'}; jpeg compressed"
+    pixels = cv2.imdecode(told.data, cv2.IMREAD_UNCHANGED)
+    assert pixels.shape == shape
+    assert np.abs(pixels.astype(int) - np.array([50, 100, 200] if colour else 7)).max() <= 3
 
 
 def test_unknown_depth_is_nan():

@@ -42,6 +42,10 @@ TOPICS = {
     "/ground_truth/alice/pose": "geometry_msgs/msg/PoseStamped",
     **{f"/alice/{each.source}/image": IMAGE for each in spot_capabilities().cameras},
     **{f"/alice/{each.source}/depth": IMAGE for each in spot_capabilities().cameras},
+    **{
+        f"/alice/{each.source}/image/compressed": "sensor_msgs/msg/CompressedImage"
+        for each in spot_capabilities().cameras
+    },
     **{f"/alice/{each.source}/camera_info": INFO for each in spot_capabilities().cameras},
     **{f"/alice/{each.source}/depth/camera_info": INFO for each in spot_capabilities().cameras},
 }

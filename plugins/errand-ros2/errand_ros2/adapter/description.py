@@ -73,10 +73,7 @@ class ArmFile(Part):
 
 
 class GripperFile(Part):
-    """Gripper: its action; `scale` from the opening to the action's position; topics of what it feels.
-
-    Without `holding`, a gripper that stalled holds an object.
-    """
+    """Gripper: its action; `scale` from the opening to the action's position; topics of what it feels, if any."""
 
     action: Topic
     scale: float = Field(default=1.0, gt=0.0)
@@ -86,10 +83,7 @@ class GripperFile(Part):
 
 
 class RobotFile(Part):
-    """A robot of ROS 2; `kind` names the installed kind of robot whose sizes count.
-
-    `sim_time`: stamps are those of `/clock`, which the run follows.
-    """
+    """A robot of ROS 2 of an installed kind, whose sizes count; with `sim_time` the run follows `/clock`."""
 
     kind: str = "spot"
     sim_time: bool = False

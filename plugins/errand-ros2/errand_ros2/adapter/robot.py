@@ -57,13 +57,10 @@ class Ros2Robot(SensedRobot):
     def notes(self, address: str, endpoint: str) -> tuple[str, ...]:
         """Returns sentences for the report on what the robot does not tell."""
         file, grip = self._description.file, self._description.file.gripper
-        untold = {
-            "No topic tells the battery's charge: it counts as full.": file.battery is None,
-            "A gripper that stalled counts as holding an object.": grip is not None and grip.holding is None,
-            "The scan has one ring.": file.lidar.scan is not None,
-        }
-        who = f"Robot of ROS 2 at {address}, by {endpoint}."
-        return (who, *(text for text, holds in untold.items() if holds))
+        battery = [] if file.battery else ["No topic tells the battery's charge: it counts as full."]
+        holding = ["A gripper that stalled counts as holding an object."] if grip and not grip.holding else []
+        rings = ["The scan has one ring."] if file.lidar.scan else []
+        return (f"Robot of ROS 2 at {address}, by {endpoint}.", *battery, *holding, *rings)
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
         """Drives at a body-frame velocity until the clock reads `until_s`, at most 0.6 s."""

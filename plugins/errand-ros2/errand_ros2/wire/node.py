@@ -1,7 +1,4 @@
-"""Sessions of Zenoh, and nodes of ROS 2 in them: publishers, subscriptions, services and clients.
-
-Zenoh calls handlers in threads of its own. A message that cannot be decoded is dropped and counted.
-"""
+"""Sessions of Zenoh, and nodes of ROS 2 in them. Zenoh calls handlers in threads of its own."""
 
 from __future__ import annotations
 

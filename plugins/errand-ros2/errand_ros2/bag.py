@@ -107,7 +107,7 @@ class _Converter:
             poses = [{"header": header, "pose": pose} for pose in data["poses"]]
             yield f"{space}/path", "nav_msgs/msg/Path", {"header": header, "poses": poses}
         elif topic == "joints":
-            columns = {"name": [joint["name"] for joint in data["joints"]]}
+            columns: dict[str, Any] = {"name": [joint["name"] for joint in data["joints"]]}
             for what in ("position", "velocity", "effort"):
                 columns[what] = np.array([joint[what] for joint in data["joints"]], float)
             yield f"{space}/joint_states", "sensor_msgs/msg/JointState", {"header": header, **columns}

@@ -103,8 +103,8 @@ def level_scan(reading: Scan, frame: str, period_s: float) -> Fields:
     """Returns the ring of a scan that is nearest to the horizontal."""
     ring = int(np.argmin(np.abs(reading.elevations_rad)))
     ranges = reading.ranges_m[ring] * np.float32(math.cos(reading.elevations_rad[ring]))
-    ends = (float(reading.azimuths_rad[end]) for end in (0, -1))
-    return laser_scan(header(reading.stamp_s, frame), ranges, *ends, period_s=period_s)
+    first_rad, last_rad = float(reading.azimuths_rad[0]), float(reading.azimuths_rad[-1])
+    return laser_scan(header(reading.stamp_s, frame), ranges, first_rad, last_rad, period_s)
 
 
 def points(reading: Scan, frame: str) -> Fields:

@@ -142,8 +142,8 @@ def cloud_points(message: Any) -> NDArray[np.float64]:
     fields = {each.name: each for each in message.fields}
     order = ">" if message.is_bigendian else "<"
     formats = [order + _POINT_TYPES[fields[axis].datatype] for axis in "xyz"]
-    layout = {"names": [*"xyz"], "formats": formats, "offsets": [fields[axis].offset for axis in "xyz"]}
-    kind = np.dtype({**layout, "itemsize": message.point_step})
+    layout: Any = {"names": [*"xyz"], "formats": formats, "offsets": [fields[axis].offset for axis in "xyz"]}
+    kind = np.dtype(layout | {"itemsize": message.point_step})
     rows = np.asarray(message.data, np.uint8)
     if message.row_step != message.width * message.point_step:
         rows = rows.reshape(message.height, message.row_step)[:, : message.width * message.point_step].ravel()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Final
 
 from pydrake.math import RigidTransform
@@ -29,13 +28,9 @@ class Frames:
     """Publisher of `/tf`, and of `/tf_static`, whose one message has the static transforms of all robots."""
 
     def __init__(self, node: Node) -> None:
-        self._moving = node.publisher("/tf", _TF, Qos(depth=100))
+        self.moving = node.publisher("/tf", _TF, Qos(depth=100))
         self._static = node.publisher("/tf_static", _TF, LATCHED)
         self._fixed: dict[str, Fields] = {}
-
-    def move(self, every: Sequence[Fields]) -> None:
-        """Publishes transforms that change."""
-        self._moving.put({"transforms": every})
 
     def fix(self, *every: Fields) -> None:
         """Publishes static transforms, unless they have been published."""
@@ -111,7 +106,7 @@ class RobotTopics:
         if now_s >= self._battery_due_s - _EPSILON_S:
             self._battery_due_s = now_s + BATTERY_PERIOD_S
             self._battery.put(messages.battery(self._robot.battery()))
-        self._frames.move(moving)
+        self._frames.moving.put({"transforms": moving})
         self.publish_pictures(now_s)
 
     def publish_pictures(self, now_s: float) -> None:
@@ -142,7 +137,8 @@ class RobotTopics:
         most, stamp_s = self._most_columns, reading.stamp_s
         if at.camera.mount is not Mount.BODY:
             X_OC = reading.frames.pose(reading.camera_frame)
-            self._frames.move([messages.transform(stamp_s, self._odom_frame, at.frame, X_OC)])
+            moved = messages.transform(stamp_s, self._odom_frame, at.frame, X_OC)
+            self._frames.moving.put({"transforms": [moved]})
         if visual:
             out, picture = at.out[False], messages.picture(reading, at.frame, most)
             out["camera_info"].put(messages.camera_info(stamp_s, at.frame, reading.intrinsics, most))

@@ -108,10 +108,6 @@ class Description:
     file: RobotFile
     capabilities: Capabilities
 
-    def joint_in_ros(self, name: str) -> str:
-        """Returns the name in ROS of a joint."""
-        return self.file.joint_names.get(name, name)
-
 
 DRIVE_EXPIRY_S: Final = 0.6
 _RINGED: Final = frozenset({"spot"})  # kinds whose LiDAR has the rings of `LidarFile`; of others one ring is used

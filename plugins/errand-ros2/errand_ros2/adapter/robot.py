@@ -148,7 +148,7 @@ class Ros2Robot(SensedRobot):
     def acquire_lease(self, holder: str) -> Lease:
         """Takes the lease within this program. Raises LeaseError when another has it."""
         if self._current is not None:
-            raise LeaseError(f"{self._name}: the lease is held by {self._current.holder!r}")
+            raise LeaseError(f"{self.name}: the lease is held by {self._current.holder!r}")
         return self.take_lease(holder)
 
     def take_lease(self, holder: str) -> Lease:
@@ -156,7 +156,7 @@ class Ros2Robot(SensedRobot):
         if self._current is not None:
             self.stop(lease=self._current)
         self._lease_number += 1
-        self._current = Lease(self._name, holder, self._lease_number)
+        self._current = Lease(self.name, holder, self._lease_number)
         return self._current
 
     def return_lease(self, lease: Lease) -> None:
@@ -193,12 +193,11 @@ class Ros2Robot(SensedRobot):
             return
         if (end := self._end_of(part, active.goal)) is not None:
             self._commands.finish(part, *end)
-        elif now_s < active.until_s:
-            if part == BASE:
-                self._say(active.goal)
+        elif part == BASE and now_s < active.until_s:
+            self._say(active.goal)
         elif part == BASE:
             self._halt(part, CommandState.DONE)
-        else:
+        elif now_s > active.until_s:
             self._halt(part, CommandState.STOPPED, "expired before it was done", CommandCause.LATE)
 
     def _end_of(self, part: str, goal: Any) -> tuple[CommandState, str, CommandCause] | None:
@@ -251,8 +250,8 @@ class Ros2Robot(SensedRobot):
             {"positions": np.asarray(positions, np.float64), "time_from_start": messages.time_of(time_s)}
             for time_s, positions in zip(trajectory.times_s.tolist(), trajectory.positions_rad, strict=True)
         ]
-        joint_names = [self._description.joint_in_ros(name) for name in names]
-        return {"trajectory": {"joint_names": joint_names, "points": points}}
+        in_ros = self._description.file.joint_names
+        return {"trajectory": {"joint_names": [in_ros.get(name, name) for name in names], "points": points}}
 
     def _act(self, part: str, goal: Any, until_s: float, lease: Lease, values: Iterable[float]) -> CommandId:
         """Sends the goal of an action, unless there is an objection."""

@@ -51,8 +51,9 @@ class SensedRobot:
     """Robot that senses: the verbs of `skills.robot.Robot` for that."""
 
     def __init__(self, name: str, node: Node, clock: RobotClock, description: Description) -> None:
-        self._name, self._node, self._clock, self._description = name, node, clock, description
-        self._space, file = node.namespace.strip("/"), description.file
+        self.name, self._node, self._clock, self._description = name, node, clock, description
+        file = description.file
+        self._lidar_frame = file.lidar.frame or f"{node.namespace.strip('/')}/lidar"
         self._names = {theirs: ours for ours, theirs in file.joint_names.items()}
         self._lock = threading.RLock()
         self._odometry: deque[Odometry] = deque(maxlen=_KEPT)
@@ -79,11 +80,6 @@ class SensedRobot:
     def _hear(self, topic: str | None, kind: str, handle: Callable[[Any], None]) -> None:
         if topic is not None:
             self._node.subscribe(topic, kind, handle, SENSOR)
-
-    @property
-    def name(self) -> str:
-        """Name of the robot."""
-        return self._name
 
     def capabilities(self) -> Capabilities:
         """Capabilities of the described robot."""
@@ -215,10 +211,6 @@ class SensedRobot:
         pose, X_OB = readings.usable(planar_pose, message.pose.pose), self._X_OB(stamp_s)
         if pose is not None and X_OB is not None:
             self._place = OwnLocalisation(stamp_s, compose(pose, inverse(Pose2D.from_transform(X_OB))))
-
-    @property
-    def _lidar_frame(self) -> str:
-        return self._description.file.lidar.frame or f"{self._space}/lidar"
 
     def _X_BF(self, frame: str) -> RigidTransform | None:
         """Pose of a fixed frame in the body; None when no static transforms lead there."""

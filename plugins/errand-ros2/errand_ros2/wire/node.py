@@ -106,12 +106,11 @@ class Publisher:
     """Publisher of one topic. Late subscribers get the last messages if its quality of service says so."""
 
     def __init__(self, node: Node, topic: str, kind: MessageType, qos: Qos) -> None:
-        self._kind = kind
+        self._node, self._kind, self._numbers = node, kind, count(1)
         key, self._gid = node.key.data_key(topic, kind.key), node.declare(PUBLISHER, topic, kind.key, qos)
-        self._node = node
-        self._numbers = count(1)
-        session, how = node.session.inner, {"encoding": _CDR, "reliability": zenoh.Reliability.RELIABLE}
+        how: dict[str, Any] = {"encoding": _CDR, "reliability": zenoh.Reliability.RELIABLE}
         self._publisher: Any
+        session = node.session.inner
         if qos.transient_local:
             cache = ext.CacheConfig(max_samples=qos.depth)
             self._publisher = ext.declare_advanced_publisher(session, key, cache=cache, publisher_detection=True, **how)
@@ -213,10 +212,10 @@ class Node:
         return made
 
     def subscribe(
-        self, topic: str, type_name: str, handle: Callable[[Any], None], qos: Qos = USUAL
+        self, topic: str, type_name: str, handle: Callable[[Any], Any], qos: Qos = USUAL
     ) -> Callable[[], None]:
         """Calls `handle` with each message of a topic; returns a function that ends the subscription."""
-        name, kind, qos = self.absolute(topic), ros_types().message(type_name), qos
+        name, kind = self.absolute(topic), ros_types().message(type_name)
         self.declare(SUBSCRIPTION, name, kind.key, qos)
         token = self._declared[-1]
 

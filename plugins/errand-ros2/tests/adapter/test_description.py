@@ -34,8 +34,7 @@ def test_the_page_describes_three_robots_in_the_form_of_the_files():
 def test_fetch_of_the_page_fits_the_installed_kind(tmp_path):
     (tmp_path / "robot.yaml").write_text(yaml.safe_dump(OF_THE_PAGE[2]))
     description = load_description(tmp_path / "robot.yaml", "spot")
-    assert description.joint_in_ros("elbow_flex") == "elbow_flex_joint"
-    assert description.joint_in_ros("left_wheel") == "left_wheel"
+    assert description.file.joint_names["elbow_flex"] == "elbow_flex_joint"
     joints = description.capabilities.description
     assert all(f'name="{name}"' in joints for name in description.file.joint_names)
 

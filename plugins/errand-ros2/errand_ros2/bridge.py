@@ -29,20 +29,22 @@ from executive.record.other_tools import ros_name
 from executive.run.control import Control
 from executive.run.outcome import RunResult
 from executive.run.visitor import MissionEnd, Progress, RunVisitor
-from skills.api import LocalisationEstimate, SearchingLocaliser, SkillContext
+from skills.api import LocalisationEstimate, ParticleView, SearchingLocaliser, SkillContext
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 
-NAME: Final = "errand"  # name of all nodes
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
+_COSTMAP, _PARTICLES = "local_costmap/costmap", "particle_cloud"
 _TOPICS: Final = {
     "reply": "std_msgs/msg/String",
     "plan": "nav_msgs/msg/Path",
     "detections": "vision_msgs/msg/Detection2DArray",
     "amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
+    _COSTMAP: "nav_msgs/msg/OccupancyGrid",
+    _PARTICLES: "nav2_msgs/msg/ParticleCloud",
 }
-_DIAGNOSTICS_PERIOD_S, _POSE_PERIOD_S = 1.0, 0.5
+_DIAGNOSTICS_PERIOD_S, _POSE_PERIOD_S, _MOST_PARTICLES = 1.0, 0.5, 200
 _LATE_S: Final = 0.5  # delay that a run does not catch up with
 
 
@@ -76,7 +78,7 @@ class Bridge(RunVisitor):
         self._hurry = threading.Event()
         self.session = self._open.enter_context(open_session(place))
         self._pool = self._open.enter_context(ThreadPoolExecutor(1, thread_name_prefix="errand-ros2"))
-        self._node = Node(self.session, NAME)
+        self._node = Node(self.session, "errand")
         self._clock = self._node.publisher("/clock", "rosgraph_msgs/msg/Clock")
         self._map = self._node.publisher("/map", "nav_msgs/msg/OccupancyGrid", LATCHED)
         self._diagnostics = self._node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
@@ -95,7 +97,7 @@ class Bridge(RunVisitor):
 
     def _robot(self, prepared: Prepared) -> _RobotBridge:
         name = prepared.mission.robot_name
-        node = Node(self.session, NAME, f"/{ros_name(name)}")
+        node = Node(self.session, "errand", f"/{ros_name(name)}")
         out = {topic: node.publisher(topic, kind) for topic, kind in _TOPICS.items()}
 
         def hear(said: Any) -> None:
@@ -184,6 +186,11 @@ class Bridge(RunVisitor):
         if estimate.localised and now_s >= own.pose_due_s:
             own.pose_due_s = now_s + _POSE_PERIOD_S
             own.out["amcl_pose"].put(messages.pose_with_covariance(now_s, context.X_WB(), estimate.covariance))
+            if own.out[_COSTMAP].is_heard:
+                here = context.pose()
+                own.out[_COSTMAP].put(messages.costmap(now_s, context.costmap, (here.x_m, here.y_m)))
+            if isinstance(context.localiser, ParticleView) and own.out[_PARTICLES].is_heard:
+                own.out[_PARTICLES].put(messages.particles(now_s, context.localiser.particles_W(_MOST_PARTICLES)))
         if own.is_active:
             own.driving.tick(context)
             own.goals.tick(context, progress)

@@ -5,23 +5,23 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
+from pydrake.math import RigidTransform
 
 from executive.record.event_log import plain_values
+from skills.api import FreeSpace
 from skills.estimate.grid_map import GridMap
 from skills.robot import Battery, FloatArray, Image, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
-
-if TYPE_CHECKING:
-    from pydrake.math import RigidTransform
 
 MAP_FRAME: Final = "map"
 LEAST_RANGE_M, MOST_RANGE_M = 0.05, 100.0
 MOST_COLUMNS: Final = 320  # raw pictures of a run are reduced to at most so many columns
 _UNKNOWN: Final = np.array([-1.0, *[0.0] * 8])  # covariance of what is not measured
 _FLOAT32: Final = 7
+_CELL_M, _HALF_M, _DECAY_M = 0.1, 3.0, 0.3  # cells and half the side of a costmap; where costs fall to 1/e
 Fields = dict[str, Any]  # values of a message by field
 
 
@@ -191,6 +191,21 @@ def grid_of(stamp_s: float, cells: Any, resolution_m: float, origin_m: Sequence[
     (rows, columns), origin = cells.shape, {"position": vector((*origin_m, 0.0)), "orientation": {"w": 1.0}}
     info = {"resolution": resolution_m, "width": columns, "height": rows, "origin": origin}
     return {"header": header(stamp_s, MAP_FRAME), "info": info, "data": cells.ravel()}
+
+
+def costmap(stamp_s: float, free: FreeSpace, centre_m: Sequence[float]) -> Fields:
+    """Returns costs about a point by clearance: 100 in obstacles, less the farther away."""
+    steps_m = np.arange(0.5 * _CELL_M - _HALF_M, _HALF_M, _CELL_M)
+    points = np.stack(np.meshgrid(centre_m[0] + steps_m, centre_m[1] + steps_m), axis=-1)
+    clearance_m = free.clearance_m(points.reshape(-1, 2)).reshape(points.shape[:2])
+    costs = np.where(clearance_m <= 0.0, 100.0, 98.0 * np.exp(-clearance_m / _DECAY_M))
+    return grid_of(stamp_s, costs.astype(np.int8), _CELL_M, [value - _HALF_M for value in centre_m])
+
+
+def particles(stamp_s: float, poses: FloatArray) -> Fields:
+    """Returns poses (N, 3) of equal weight as nav2_msgs/ParticleCloud."""
+    every = [{"pose": pose(Pose2D(*row).transform()), "weight": 1.0 / len(poses)} for row in poses.tolist()]
+    return {"header": header(stamp_s, MAP_FRAME), "particles": every}
 
 
 def path(stamp_s: float, poses: Iterable[Sequence[float]]) -> Fields:

@@ -111,7 +111,8 @@ class RobotServer:
             self._serve(HEAD_ACTION, TRAJECTORY, partial(self._follow, can.head.joint_names, self._point_head))
         if can.gripper is not None:
             self._serve(GRIPPER_ACTION, GRIPPER, self._grip)
-            self.node.subscribe(CARRY, "std_msgs/msg/Bool", partial(self.work.submit, self._carry))
+            carry = partial(self._robot.carry, lease=self._lease)
+            self.node.subscribe(CARRY, "std_msgs/msg/Bool", lambda told: self.work.submit(carry, told.data))
         self._height_m, self._thin = can.standing_height_m, _OBJECT * (can.gripper.widest if can.gripper else 1.0)
         self.node.subscribe(POSTURE, "geometry_msgs/msg/Pose", partial(self.work.submit, self._stand))
 
@@ -184,9 +185,6 @@ class RobotServer:
             raise ValueError("the opening or the force is not finite")
         force_n = command.max_effort if command.max_effort > 0.0 else can.max_force_n
         return self._robot.set_gripper(command.position, force_n, until_s=until_s, lease=self._lease)
-
-    def _carry(self, told: Any) -> None:
-        self._robot.carry(told.data, lease=self._lease)
 
     def _stand(self, pose: Any) -> None:
         """Takes a height over the usual one and a pitch; what is not finite or no rotation is ignored."""

@@ -47,14 +47,23 @@ HEARD = {
     "/alice/events": STRING,
     "/alice/reply": STRING,
     "/alice/odom": "nav_msgs/msg/Odometry",
+    "/alice/local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
+    "/alice/particle_cloud": "nav2_msgs/msg/ParticleCloud",
 }
+
+
+class CloudPlace(KnownPlace):
+    """A localiser with particles."""
+
+    def particles_W(self, most):
+        return np.array([[0.5, 0.0, 0.0], [0.7, 0.0, 0.0]])
 
 
 class RoomBackend(ScriptedBackend):
     """A scripted robot that knows the small room's walls."""
 
     def entry(self, tree, durable):
-        return RunEntry(tree, self.robot, KnownPlace(), BlockCostmap(ROOM))
+        return RunEntry(tree, self.robot, CloudPlace(), BlockCostmap(ROOM))
 
 
 class RosClient:
@@ -176,6 +185,8 @@ def test_a_run_publishes_clock_pose_plan_map_events_and_diagnostics(talk):
         assert ros.heard["/diagnostics"][-1].status[0].hardware_id == "Alice"
         assert ros.heard["/alice/plan"][-1].poses[-1].pose.position.y == pytest.approx(-1.2, abs=0.1)
         assert ros.heard["/alice/amcl_pose"][-1].pose.pose.position.y == pytest.approx(-1.2, abs=0.1)
+        assert max(ros.heard["/alice/local_costmap/costmap"][-1].data) == 100
+        assert [each.pose.position.x for each in ros.heard["/alice/particle_cloud"][-1].particles] == [0.5, 0.7]
         assert late["/map"][0].info.resolution == pytest.approx(0.025)
         assert "<robot" in late["/alice/robot_description"][0].data
 

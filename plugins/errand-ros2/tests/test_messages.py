@@ -11,6 +11,8 @@ from errand_ros2 import messages
 from errand_ros2.wire.types import ros_types
 from skills.estimate.grid_map import GridMap
 from skills.robot import FrameTree, Image, Intrinsics, Odometry, Pose2D, Scan
+from skills.testing.blocks import Block
+from skills.testing.estimators import BlockCostmap
 
 RANGES = np.array([[1.0] * 3, [2.0, math.nan, 3.0]], np.float32)
 LENS = Intrinsics(640, 480, 320.0, 322.0, 318.0, 240.0)
@@ -95,6 +97,23 @@ def test_a_map_has_free_occupied_and_unknown_cells():
     grid = decoded("nav_msgs/msg/OccupancyGrid", messages.occupancy_grid(GridMap(occupied, 0.5, (-1.0, -2.0), unknown)))
     assert grid.data.tolist() == [0, 100, 0, 0, 0, -1]
     assert (grid.info.width, grid.info.height, grid.info.origin.position.y) == (3, 2, -2.0)
+
+
+def test_a_costmap_costs_most_in_obstacles_and_less_away_from_them():
+    free = BlockCostmap([Block(2.0, 0.95, 2.4, 1.45)])
+    grid = decoded("nav_msgs/msg/OccupancyGrid", messages.costmap(1.0, free, (1.0, 1.0)))
+    costs = grid.data.reshape(grid.info.height, grid.info.width)
+    assert (costs.shape, grid.info.origin.position.x, grid.info.origin.position.y) == ((60, 60), -2.0, -2.0)
+    assert costs[31, 41] == 100  # (2.15, 1.15)
+    assert 0 <= costs[31, 10] < 5 < costs[31, 36] < costs[31, 38] < 100
+
+
+def test_particles_have_equal_weights():
+    cloud = decoded(
+        "nav2_msgs/msg/ParticleCloud", messages.particles(0.0, np.array([[1.0, 2.0, math.pi], [3.0, 4.0, 0.0]]))
+    )
+    assert [each.weight for each in cloud.particles] == [0.5, 0.5]
+    assert (cloud.particles[0].pose.position.y, cloud.particles[0].pose.orientation.z) == pytest.approx((2.0, 1.0))
 
 
 def test_odometry_has_velocities_in_the_body():

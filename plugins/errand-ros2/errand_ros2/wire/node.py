@@ -38,7 +38,6 @@ MOST_BYTES: Final = 1 << 26  # longer messages are dropped
 PORT: Final = 7447  # port of rmw_zenoh's router
 _PLACE: Final = re.compile(r"(?P<domain>\d{1,9})?(@(?P<host>[\w.-]+|\[[\w:.%]+\])?(:(?P<port>\d{1,5}))?)?")
 _MOST_DOMAIN, _MOST_PORT = 232, 65535
-_LOOK_S: Final = 0.5
 
 
 @dataclass(frozen=True)
@@ -96,7 +95,7 @@ def open_session(place: Place) -> Iterator[Session]:
 
 def _answers(place: Place) -> bool:
     try:
-        socket.create_connection((place.host.strip("[]"), place.port), _LOOK_S).close()
+        socket.create_connection((place.host.strip("[]"), place.port), timeout=0.5).close()
     except (OSError, UnicodeError):
         return False
     return True

@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,11 +15,16 @@ from errand_ros2 import messages
 from errand_ros2.nav2 import Nav2
 from errand_ros2.wire.actions import ActionServer, GoalStatus
 from errand_ros2.wire.node import Node, Place, open_session
+from executive.testing.bench import SkillBench
 from plant.robots.spot.kind import spot_capabilities
-from skills.api import PlanningError
+from skills.api import PlanningError, Running, Succeeded
 from skills.navigate.footprint import Footprint
+from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
+from skills.stack import default_stack
+from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap
+from skills.testing.robot import ScriptedRobot
 
 START, GOAL = Pose2D(0.0, 0.0, 1.5), Pose2D(2.0, 0.0, -3.0)
 FOOTPRINT = Footprint.of(spot_capabilities())
@@ -79,6 +85,24 @@ def test_nav2_plans_on_its_own_map():
 def test_a_path_that_cannot_be_used_is_a_planning_error(poses, options, why):
     with nav2(poses, **options) as (made, _), pytest.raises(PlanningError, match=why):
         plan(made(limit_s=0.5))
+
+
+def test_the_robot_drives_along_the_path_of_nav2():
+    clock, seen = VirtualClock(), []
+    bench = SkillBench(ScriptedRobot(clock, capabilities=spot_capabilities()), clock)
+    detour = [(0.0, 0.0, 0.8), (0.5, 0.5, 0.8), (1.0, 1.0, 0.0), (1.5, 0.5, -0.8), (2.0, 0.0, -0.8)]
+    with nav2(detour) as (made, goals):
+        context = replace(bench.context(), stack=replace(default_stack(), planner=made()))
+        skill = Navigate(context)
+        skill.begin(NavigateInputs(Pose2D(2.0, 0.0, 0.0)))
+        while isinstance(step := skill.step(), Running) and clock.now() < 60.0:
+            seen.append(bench.robot.pose)
+            clock.advance(0.05)
+        skill.end()
+    assert isinstance(step, Succeeded)
+    assert len(goals) == 1
+    assert max(pose.y_m for pose in seen) == pytest.approx(1.0, abs=0.15)
+    assert seen[-1].x_m == pytest.approx(2.0, abs=0.1)
 
 
 def test_no_nav2_is_a_planning_error():

@@ -1,7 +1,6 @@
 """Converts an event log to a ROS 2 bag (MCAP with CDR messages) that RViz, Foxglove and `ros2 bag` read.
 
-The map, transforms, laser scans, joint states, poses, paths and pictures become the usual message types; all others
-become `std_msgs/String` with their JSON. Times are those of the wall clock, if the log states when it began.
+What has no usual message type becomes JSON. Times are those of the wall clock, if the log states when it began.
 """
 
 from __future__ import annotations
@@ -107,9 +106,8 @@ class _Converter:
             poses = [{"header": header, "pose": pose} for pose in data["poses"]]
             yield f"{space}/path", "nav_msgs/msg/Path", {"header": header, "poses": poses}
         elif topic == "joints":
-            columns: dict[str, Any] = {"name": [joint["name"] for joint in data["joints"]]}
-            for what in ("position", "velocity", "effort"):
-                columns[what] = np.array([joint[what] for joint in data["joints"]], float)
+            parts = ("name", "position", "velocity", "effort")
+            columns = {what: [joint[what] for joint in data["joints"]] for what in parts}
             yield f"{space}/joint_states", "sensor_msgs/msg/JointState", {"header": header, **columns}
         elif topic == "scan":
             lidar = f"{ros_name(robot)}/lidar"

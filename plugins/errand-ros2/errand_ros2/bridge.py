@@ -20,29 +20,34 @@ from errand_ros2.goals import Goals
 from errand_ros2.messages import Fields
 from errand_ros2.readings import FRAMES, TOPIC, planar_pose
 from errand_ros2.robot_topics import Frames, RobotTopics
-from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Node, Place, Publisher, open_session
+from errand_ros2.wire.types import LATCHED
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.backend import Observe
 from executive.app.runs.conversations import Conversations
+from executive.record.announce import announce
 from executive.record.other_tools import ros_name
 from executive.run.control import Control
 from executive.run.outcome import RunResult
 from executive.run.visitor import MissionEnd, Progress, RunVisitor
+from executive.tree.compiler import CompiledTree
 from skills.api import LocalisationEstimate, ParticleView, SearchingLocaliser, SkillContext
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
+from skills.robot import Clock
 
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
-_COSTMAP, _PARTICLES = "local_costmap/costmap", "particle_cloud"
 _TOPICS: Final = {
     "reply": "std_msgs/msg/String",
     "plan": "nav_msgs/msg/Path",
     "detections": "vision_msgs/msg/Detection2DArray",
     "amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
-    _COSTMAP: "nav_msgs/msg/OccupancyGrid",
-    _PARTICLES: "nav2_msgs/msg/ParticleCloud",
+    "task_channel": "errand_msgs/msg/TaskMessage",
+    "object_to_detect": "errand_msgs/msg/ObjectToDetect",
+    "object_destination": "errand_msgs/msg/ObjectDestination",
+    "local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
+    "particle_cloud": "nav2_msgs/msg/ParticleCloud",
 }
 _DIAGNOSTICS_PERIOD_S, _POSE_PERIOD_S, _MOST_PARTICLES = 1.0, 0.5, 200
 _LATE_S: Final = 0.5  # delay that a run does not catch up with
@@ -63,6 +68,7 @@ class _RobotBridge:
     goals: Goals
     out: Mapping[str, Publisher]
     context: SkillContext | None = None
+    tree: CompiledTree | None = None
     topics: RobotTopics | None = None
     is_active: bool = False
     pose_due_s: float = 0.0
@@ -154,6 +160,9 @@ class Bridge(RunVisitor):
             own.out["detections"].put(messages.detections(head, message["detections"]))
         elif topic in _EVENTS:
             own.goals.events.put(messages.event(topic, message))
+        name = {"taskChannel": "task_channel"}.get(topic, topic)
+        if (kind := _TOPICS.get(name, "")).startswith("errand_msgs/"):
+            own.out[name].put(messages.typed(kind, message))
         if topic == "outcome":
             own.goals.message(message)
         return message
@@ -177,8 +186,15 @@ class Bridge(RunVisitor):
                 if own.context is not None and own.is_active:
                     own.context.robot.stop(lease=own.context.lease)
 
+    def _announce(self, tree: CompiledTree, clock: Clock, prepared: Prepared) -> None:
+        publish: Any = self.message
+        announce(publish, clock, tree.robot_name, tree.commands, prepared.knowledge, world=prepared.world.name, seed=0)
+
     def _tick_robot(self, own: _RobotBridge, context: SkillContext, topics: RobotTopics, progress: Progress) -> None:
-        now_s = context.clock.now()
+        clock, now_s, tree = context.clock, context.clock.now(), progress.trees.get(context.robot.name)
+        if tree is not None and tree is not own.tree:
+            own.tree = tree
+            self._node.guarded(partial(self._announce, tree, clock, own.goals.prepared), "a command")
         while own.initial:
             _set_pose(context, own.initial.pop(0))
         estimate = context.localiser.estimate()
@@ -186,11 +202,11 @@ class Bridge(RunVisitor):
         if estimate.localised and now_s >= own.pose_due_s:
             own.pose_due_s = now_s + _POSE_PERIOD_S
             own.out["amcl_pose"].put(messages.pose_with_covariance(now_s, context.X_WB(), estimate.covariance))
-            if own.out[_COSTMAP].is_heard:
+            if own.out["local_costmap/costmap"].is_heard:
                 here = context.pose()
-                own.out[_COSTMAP].put(messages.costmap(now_s, context.costmap, (here.x_m, here.y_m)))
-            if isinstance(context.localiser, ParticleView) and own.out[_PARTICLES].is_heard:
-                own.out[_PARTICLES].put(messages.particles(now_s, context.localiser.particles_W(_MOST_PARTICLES)))
+                own.out["local_costmap/costmap"].put(messages.costmap(now_s, context.costmap, (here.x_m, here.y_m)))
+            if isinstance(context.localiser, ParticleView) and own.out["particle_cloud"].is_heard:
+                own.out["particle_cloud"].put(messages.particles(now_s, context.localiser.particles_W(_MOST_PARTICLES)))
         if own.is_active:
             own.driving.tick(context)
             own.goals.tick(context, progress)

@@ -68,7 +68,7 @@ class Goals:
         self, node: Node, prepared: Prepared, control: Control, grid: GridMap, pool: Executor, hurry: threading.Event
     ) -> None:
         """`pool` compiles goals; `hurry` lets the run go on at once."""
-        self._prepared, self._control, self._grid, self._hurry = prepared, control, grid, hurry
+        self.prepared, self._control, self._grid, self._hurry = prepared, control, grid, hurry
         self.events = node.publisher("events", "std_msgs/msg/String")
         self.halting = False  # whether the robot must stop before its clock's next step
         self._name = prepared.mission.robot_name
@@ -135,10 +135,10 @@ class Goals:
                 raise
 
     def _compiled(self, mission: Mission) -> CompiledTree:
-        return replace(self._prepared, others=()).with_mission(mission).tree
+        return replace(self.prepared, others=()).with_mission(mission).tree
 
     def _mission_of(self, name: str, *steps: Mapping[str, Any]) -> Mission:
-        world = self._prepared.world.name
+        world = self.prepared.world.name
         return Mission.model_validate({"name": name, "robot": self._name, "world": world, "steps": [*steps]})
 
     def _asked(self, name: str, goal: Any) -> Mission:
@@ -146,7 +146,7 @@ class Goals:
         if bool(goal.sentence) == bool(goal.file):
             raise InputError("a mission is a sentence or a file", hint="fill in one of the two")
         asked = self._mission_of(name, {"say": goal.sentence}) if goal.sentence else load_mission(Path(goal.file))
-        found = mission_from_file(asked, parser=load_parser(), knowledge=self._prepared.knowledge)
+        found = mission_from_file(asked, parser=load_parser(), knowledge=self.prepared.knowledge)
         return found.model_copy(update={"name": name, "robot": self._name})
 
     def tick(self, context: SkillContext, progress: Progress) -> None:

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from pydrake.math import RigidTransform
 
+from errand_ros2.wire.types import ros_types
 from executive.record.event_log import plain_values
 from skills.api import FreeSpace
 from skills.estimate.grid_map import GridMap
@@ -81,7 +82,7 @@ def joint_state(reading: Joints) -> Fields:
     """Returns the joints' positions, velocities and efforts."""
     names = [*reading.position_rad]
     columns = {"position": reading.position_rad, "velocity": reading.velocity_rad_s, "effort": reading.effort_nm}
-    values = {what: np.array([column.get(name, 0.0) for name in names]) for what, column in columns.items()}
+    values = {what: [column.get(name, 0.0) for name in names] for what, column in columns.items()}
     return {"header": header(reading.stamp_s), "name": names, **values}
 
 
@@ -231,6 +232,12 @@ def detections(head: Fields, found: Iterable[Mapping[str, Any]]) -> Fields:
         box = {"center": center, "size_x": float(u1 - u0), "size_y": float(v1 - v0)}
         every.append({"header": head, "results": [result], "bbox": box})
     return {"header": head, "detections": every}
+
+
+def typed(kind: str, message: Mapping[str, Any]) -> Fields:
+    """Returns those fields of a message of the log that a type has."""
+    names = [name for name, _ in ros_types().store.fielddefs[kind][1]]
+    return {**{name: message[name] for name in names if name in message}, "stamp": time_of(message["stamp"])}
 
 
 def event(topic: str, message: Mapping[str, Any]) -> Fields:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -18,7 +19,7 @@ from skills.inputs.errors import InputError
 from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.navigate.path import Path, progress_m
 from skills.quantities import Angle, Coordinate, Duration, Length
-from skills.robot import FloatArray, Pose2D
+from skills.robot import Pose2D
 
 _ACTION: Final = "nav2_msgs/action/ComputePathToPose"
 _STEP_M: Final = 0.05
@@ -45,14 +46,9 @@ class Nav2:
     ) -> Callable[[], Path]:
         """Returns a function that asks Nav2 and raises PlanningError; Nav2 does not know zones and speed limits."""
 
-        def plan() -> Path:
-            poses = self._poses(start, goal)
-            return Path(poses, footprint_clearance_m(costmap, footprint, poses))
+        return partial(self._plan, costmap, footprint, start, goal)
 
-        return plan
-
-    def _poses(self, start: Pose2D, goal: Pose2D) -> FloatArray:
-        """Poses (N, 3) of Nav2's path in the world, from the start to the goal."""
+    def _plan(self, costmap: FreeSpace, footprint: Footprint, start: Pose2D, goal: Pose2D) -> Path:
         X_WM = Pose2D(*self.map_pose)
         poses_M = [compose(inverse(X_WM), pose).transform() for pose in (start, goal)]
         here, there = (pose_stamped(0.0, MAP_FRAME, X_MB) for X_MB in poses_M)
@@ -68,7 +64,8 @@ class Nav2:
         rows[:, 2] = np.unwrap(rows[:, 2])
         way_m = progress_m(rows)
         at_m = np.append(np.arange(0.0, way_m[-1], _STEP_M), way_m[-1])
-        return np.stack([np.interp(at_m, way_m, column) for column in rows.T], axis=1)
+        poses = np.stack([np.interp(at_m, way_m, column) for column in rows.T], axis=1)
+        return Path(poses, footprint_clearance_m(costmap, footprint, poses))
 
     def _ask(self, goal: dict[str, Any]) -> Any:
         with open_session(Place.parse(self.network)) as session:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Final
 
 from pydrake.math import RigidTransform
 
 from errand_ros2 import messages
 from errand_ros2.messages import MOST_COLUMNS, Fields
-from errand_ros2.wire.keys import LATCHED, SENSOR, Qos
 from errand_ros2.wire.node import Node
-from skills.robot import CameraCapabilities, Mount, NoImageError, Robot
+from errand_ros2.wire.types import LATCHED, SENSOR, Qos
+from skills.robot import CameraCapabilities, Image, Mount, NoImageError, Robot
 
 IMAGE_PERIOD_S: Final = 0.2
 BATTERY_PERIOD_S: Final = 1.0
@@ -39,22 +40,14 @@ class Frames:
             self._static.put({"transforms": [*self._fixed.values()]})
 
 
-class _Camera:
-    """Publishers of one camera; the plant renders only what a subscription asks for."""
+class _Stream:
+    """Publishers of one camera's pictures, or of its depth; the plant renders only what a subscription asks for."""
 
-    def __init__(self, node: Node, camera: CameraCapabilities, space: str) -> None:
-        self.camera, self.frame = camera, f"{space}/{camera.source}_camera"
-        self.out = {
-            depth: {name: node.publisher(f"{camera.source}/{name}", kind, SENSOR) for name, kind in topics.items()}
-            for depth, topics in _PICTURES.items()
-        }
-        self._due_s = {True: 0.0, False: 0.0}
-
-    def is_due(self, now_s: float, period_s: float, *, depth: bool) -> bool:
-        """Returns whether a subscription waits for the picture, or the depth; the next one is due a period later."""
-        due = self._due_s[depth] <= now_s + _EPSILON_S and any(each.is_heard for each in self.out[depth].values())
-        self._due_s[depth] = now_s + period_s if due else self._due_s[depth]
-        return due
+    def __init__(self, node: Node, camera: CameraCapabilities, depth: bool) -> None:
+        self.camera, self.depth, self.due_s = camera, depth, 0.0
+        self.frame = f"{node.namespace.strip('/')}/{camera.source}_camera"
+        topics = {name: (f"{camera.source}/{name}", kind) for name, kind in _PICTURES[depth].items()}
+        self.out = {name: node.publisher(*topic, SENSOR) for name, topic in topics.items()}
 
 
 class RobotTopics:
@@ -76,8 +69,8 @@ class RobotTopics:
         self._force = node.publisher("gripper/force", "geometry_msgs/msg/WrenchStamped")
         abilities = robot.capabilities()
         node.publisher("robot_description", "std_msgs/msg/String", LATCHED).put({"data": abilities.description})
-        self._cameras = [_Camera(node, each, space) for each in abilities.cameras]
-        on_body = [each for each in self._cameras if each.camera.mount is Mount.BODY]
+        self._streams = [_Stream(node, each, depth) for each in abilities.cameras for depth in (False, True)]
+        on_body = [each for each in self._streams if each.camera.mount is Mount.BODY]
         frames.fix(*(messages.transform(0.0, self._body, each.frame, each.camera.X_FC) for each in on_body))
         self.stamps_s: dict[str, float] = {}
         """Times of the last odometry and scan that were published, by topic."""
@@ -111,8 +104,12 @@ class RobotTopics:
 
     def publish_pictures(self, now_s: float) -> None:
         """Publishes the pictures for which subscriptions wait."""
-        for camera in self._cameras:
-            self._publish_camera(camera, now_s)
+        for stream in self._streams:
+            if now_s >= stream.due_s - _EPSILON_S and any(each.is_heard for each in stream.out.values()):
+                stream.due_s = now_s + self.image_period_s
+                with suppress(NoImageError):
+                    reading = self._robot.image(stream.camera.source, visual=not stream.depth, depth=stream.depth)
+                    self._publish_picture(stream, reading)
 
     def _publish_scan(self) -> None:
         scan = self._robot.scan()
@@ -125,27 +122,19 @@ class RobotTopics:
         if self._points.is_heard:
             self._points.put(messages.points(scan, self._body))
 
-    def _publish_camera(self, at: _Camera, now_s: float) -> None:
-        """Publishes what subscriptions ask for, and the transform of a camera that moves on the body."""
-        visual, depth = (at.is_due(now_s, self.image_period_s, depth=each) for each in (False, True))
-        if not (visual or depth):
-            return
-        try:
-            reading = self._robot.image(at.camera.source, visual=visual, depth=depth)
-        except NoImageError:
-            return
-        most, stamp_s = self._most_columns, reading.stamp_s
+    def _publish_picture(self, at: _Stream, reading: Image) -> None:
+        """Publishes a picture or depth, and the transform of a camera that moves on the body."""
+        most, stamp_s, out = self._most_columns, reading.stamp_s, at.out
         if at.camera.mount is not Mount.BODY:
             X_OC = reading.frames.pose(reading.camera_frame)
             moved = messages.transform(stamp_s, self._odom_frame, at.frame, X_OC)
             self._frames.moving.put({"transforms": [moved]})
-        if visual:
-            out, picture = at.out[False], messages.picture(reading, at.frame, most)
-            out["camera_info"].put(messages.camera_info(stamp_s, at.frame, reading.intrinsics, most))
-            out["image"].put(picture)
-            if out["image/compressed"].is_heard:
-                out["image/compressed"].put(messages.compressed(picture))
-        if depth:
-            out = at.out[True]
+        if at.depth:
             out["depth/camera_info"].put(messages.camera_info(stamp_s, at.frame, reading.depth_intrinsics, most))
             out["depth"].put(messages.depth(reading, at.frame, most))
+            return
+        picture = messages.picture(reading, at.frame, most)
+        out["camera_info"].put(messages.camera_info(stamp_s, at.frame, reading.intrinsics, most))
+        out["image"].put(picture)
+        if out["image/compressed"].is_heard:
+            out["image/compressed"].put(messages.compressed(picture))

@@ -19,8 +19,8 @@ from errand_ros2 import messages
 from errand_ros2.readings import LIFE_S, TOPIC, HeardVelocity, transform_of, within_limits
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.wire.actions import ActionServer, Goal, GoalStatus
-from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Node, Session
+from errand_ros2.wire.types import LATCHED
 from executive.record.other_tools import ros_name
 from skills.estimate.grid_map import GridMap
 from skills.inputs.errors import InputError

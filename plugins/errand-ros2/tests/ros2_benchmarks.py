@@ -22,9 +22,8 @@ import numpy as np
 
 from errand_ros2.bridge import Bridge
 from errand_ros2.server import RobotServer
-from errand_ros2.wire.keys import Attachment
 from errand_ros2.wire.node import Client, Node, Place, open_session
-from errand_ros2.wire.types import ActionType, ros_types
+from errand_ros2.wire.types import ActionType, Attachment, ros_types
 from executive.app.prepare.from_request import prepare
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import open_world

@@ -19,9 +19,8 @@ from ros_client import free_port
 
 from errand_ros2.bridge import Bridge, observe
 from errand_ros2.wire.actions import GoalStatus
-from errand_ros2.wire.keys import LATCHED, Attachment
 from errand_ros2.wire.node import Client, Node, Place, open_session
-from errand_ros2.wire.types import ActionType, older_types, ros_types
+from errand_ros2.wire.types import LATCHED, ActionType, Attachment, older_types, ros_types
 from executive.app.prepare.from_request import prepare
 from executive.app.runs.one_run import run_request
 from executive.mission.request import Request
@@ -264,6 +263,33 @@ def test_detections_are_boxes_in_pixels(talk):
         assert (each.results[0].hypothesis.class_id, each.results[0].hypothesis.score) == ("coke", 0.9)
         assert (each.bbox.center.position.x, each.bbox.center.position.y) == (20.0, 40.0)
         assert (each.bbox.size_x, each.bbox.size_y) == (20.0, 40.0)
+
+    talk(says)
+
+
+def test_commands_and_wanted_objects_are_typed_messages(talk):
+    def says(ros):
+        heard, kinds = defaultdict(list), {"task_channel": "TaskMessage", "object_to_detect": "ObjectToDetect"}
+        kinds["object_destination"] = "ObjectDestination"
+        for topic, kind in kinds.items():
+            ros.node.subscribe(f"/alice/{topic}", f"errand_msgs/msg/{kind}", heard[topic].append)
+            ros.soon(lambda topic=topic: ros.bridge._robots["Alice"].out[topic].is_heard)
+        action = ActionClient(ros, "run_mission", RUN)
+        action.goal.sentence = "go to the table"
+        assert action.send()
+        ros.soon(lambda: heard["task_channel"])
+        task = heard["task_channel"][0]
+        assert (task.robot_name, task.mission_count, task.task_count, task.cmd_type) == ("Alice", 1, 1, 0)
+        assert (task.item_type.tolist(), task.obj_type.tolist()) == ([0], [0])
+        assert math.isfinite(task.goal_x)
+        told = {"stamp": 2.5, "robot_name": "Alice", "class_id": [3, 4], "class_name": ["coke", "beer"]}
+        ros.bridge.message("object_to_detect", told)
+        place = {f"goal_{axis}": value for axis, value in zip("xyz", (1.0, 2.0, 0.5), strict=True)}
+        ros.bridge.message("object_destination", {"stamp": 2.5, "sequence": 2500, "class_name": "coke", **place})
+        ros.soon(lambda: heard["object_destination"])
+        wanted, found = heard["object_to_detect"][0], heard["object_destination"][0]
+        assert (wanted.class_id.tolist(), wanted.class_name, wanted.stamp.sec) == ([3, 4], ["coke", "beer"], 2)
+        assert (found.class_name, found.sequence, found.goal_y) == ("coke", 2500, 2.0)
 
     talk(says)
 

@@ -17,9 +17,8 @@ from zenoh import ext
 from zenoh_ros2_sdk import ROS2Subscriber
 
 from errand_ros2.server import PERIOD_S, RobotServer
-from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Node, Place, open_session
-from errand_ros2.wire.types import ros_types
+from errand_ros2.wire.types import LATCHED, ros_types
 from plant.robots.spot.kind import spot_capabilities
 from skills.estimate.grid_map import GridMap
 from skills.testing.blocks import ROOM

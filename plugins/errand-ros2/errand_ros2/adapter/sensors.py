@@ -18,8 +18,8 @@ from errand_ros2 import readings
 from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import CameraFile, Description
 from errand_ros2.readings import planar_pose, transform_of
-from errand_ros2.wire.keys import LATCHED, SENSOR
 from errand_ros2.wire.node import Node
+from errand_ros2.wire.types import LATCHED, SENSOR
 from skills.geometry import compose, inverse
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import (

@@ -13,9 +13,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Client, Node, Request
-from errand_ros2.wire.types import ActionType, older_services, ros_types
+from errand_ros2.wire.types import LATCHED, ActionType, older_services, ros_types
 
 MOST_GOALS: Final = 64  # goals whose results are kept; older ones are forgotten
 _RESULT_S: Final = 3600.0  # time for which a client waits for a result

@@ -17,19 +17,22 @@ from typing import Any, Final
 import zenoh
 from zenoh import ext
 
-from errand_ros2.wire.keys import (
+from errand_ros2.wire.types import (
     CLIENT,
     PUBLISHER,
     SERVICE,
     SUBSCRIPTION,
     USUAL,
     Attachment,
+    MalformedError,
+    MessageType,
     NodeKey,
     Qos,
+    ServiceType,
     gid_of,
+    ros_types,
     topic_name,
 )
-from errand_ros2.wire.types import MalformedError, MessageType, ServiceType, ros_types
 from skills.inputs.errors import InputError
 
 _LOG: Final = logging.getLogger(__name__)

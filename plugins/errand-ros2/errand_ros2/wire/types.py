@@ -1,20 +1,28 @@
-"""Types of ROS 2 with their RIHS01 hashes, of rosbags and of `interfaces`; services and actions become messages."""
+"""Keys, attachments and type hashes as the design page of rmw_zenoh defines them; types of rosbags and `interfaces`."""
 
 from __future__ import annotations
 
+import hashlib
 import re
+import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from errand_ros2.wire.keys import dds_name
+from skills.inputs.errors import InputError
 
+_ADMIN: Final = "@ros2_lv"
+_GID_BYTES: Final = 16
+_ATTACHMENT: Final = struct.Struct("<qqB16s")
+_NAME: Final = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+_TYPE: Final = re.compile(r"(?P<package>\w+)/(?P<kind>msg|srv|action)/(?P<name>\w+)")
+NODE, PUBLISHER, SUBSCRIPTION, SERVICE, CLIENT = "NN", "MP", "MS", "SS", "SC"  # kinds of entities in the graph of ROS 2
 INTERFACES: Final = Path(__file__).parents[1] / "interfaces"
 """Folder of the interface files that rosbags lacks, as PACKAGE/KIND/NAME.KIND."""
 OLDER: Final = INTERFACES.with_name("interfaces_before_kilted")
@@ -24,6 +32,92 @@ _SERVICE: Final = "{0}_Request request_message\n{0}_Response response_message\n{
 _CHECKED_BYTES, _PADDING_BYTES = 4096, 8
 """Messages up to so many bytes, as all commands are, must have no bytes behind them but padding."""
 _UUID: Final = "unique_identifier_msgs/UUID goal_id"
+
+
+@dataclass(frozen=True)
+class Qos:
+    """Quality of service: how many messages are kept, whether late subscribers get them, and reliability."""
+
+    depth: int = 10
+    transient_local: bool = False
+    reliable: bool = True
+
+    def text(self) -> str:
+        """Returns the compact form of liveliness tokens, in which defaults are left out."""
+        reliability, durability = "" if self.reliable else "2", "1" if self.transient_local else ""
+        return f"{reliability}:{durability}:,{self.depth}:,:,:,,"
+
+
+USUAL: Final = Qos()
+LATCHED: Final = Qos(depth=1, transient_local=True)  # late subscribers get the last message, as of `/map`
+SENSOR: Final = Qos(depth=5, reliable=False)  # messages may be lost
+
+
+@dataclass(frozen=True)
+class NodeKey:
+    """Node: its domain, session, number within the session, namespace and name."""
+
+    domain: int
+    session: str
+    number: int
+    namespace: str
+    name: str
+
+    def token(self, number: int | None = None, kind: str = NODE, *of_type: str) -> str:
+        """Returns the liveliness token of the node, or of one of its entities."""
+        number = self.number if number is None else number
+        head = (_ADMIN, str(self.domain), self.session, str(self.number), str(number), kind)
+        return "/".join((*head, "%", _mangled(self.namespace) or "%", self.name, *of_type))
+
+    def entity_token(self, kind: str, number: int, name: str, type_key: str, qos: Qos) -> str:
+        """Returns the liveliness token of one of the node's publishers, subscriptions, services or clients."""
+        return self.token(number, kind, _mangled(name), type_key, qos.text())
+
+    def data_key(self, name: str, type_key: str) -> str:
+        """Returns the key expression of a topic or service; `type_key` is DDS_NAME/HASH of its type."""
+        return f"{self.domain}/{name.strip('/')}/{type_key}"
+
+
+class Attachment(NamedTuple):
+    """Attachment of a message: its number, the time (ns since 1970) when it was sent, and the sender's identity."""
+
+    number: int
+    stamp_ns: int
+    gid: bytes
+
+    def encoded(self) -> bytes:
+        """Returns the attachment as bytes."""
+        return _ATTACHMENT.pack(self.number, self.stamp_ns, _GID_BYTES, self.gid)
+
+    @classmethod
+    def decoded(cls, data: bytes) -> Attachment:
+        """Reads an attachment. Raises ValueError when it is malformed."""
+        if len(data) != _ATTACHMENT.size or (found := _ATTACHMENT.unpack(data))[2] != _GID_BYTES:
+            raise ValueError(f"an attachment of {len(data)} bytes")
+        return cls(found[0], found[1], found[3])
+
+
+def gid_of(token: str) -> bytes:
+    """Returns the identity of an entity, which no other has: a hash of its liveliness token."""
+    return hashlib.blake2b(token.encode(), digest_size=_GID_BYTES).digest()
+
+
+def _mangled(name: str) -> str:
+    return name.replace("/", "%")
+
+
+def dds_name(ros_name: str) -> str:
+    """Returns the name in DDS of a type such as `std_msgs/msg/String`. Raises ValueError when it is no type."""
+    if (found := _TYPE.fullmatch(ros_name)) is None:
+        raise ValueError(f"'{ros_name}' is no type of ROS 2")
+    return f"{found['package']}::{found['kind']}::dds_::{found['name']}_"
+
+
+def topic_name(name: str) -> str:
+    """Returns a topic's absolute name. Raises InputError when ROS 2 does not allow it."""
+    if _NAME.fullmatch(name) is None:
+        raise InputError(f"'{name[:60]}' is no name of ROS 2", hint="use letters, digits, _ and /, as in robot/scan")
+    return f"/{name.strip('/')}"
 
 
 class MalformedError(ValueError):
@@ -115,7 +209,8 @@ class Types:
         length = length if node == Nodetype.ARRAY else 0
         if of[0] == Nodetype.NAME or of[1][0] in ("string", "wstring"):
             return [self._value(of, each) for each in ([None] * length if given is None else given)]
-        return np.zeros(length, of[1][0].replace("byte", "uint8")) if given is None else given
+        dtype = of[1][0].replace("byte", "uint8")
+        return np.zeros(length, dtype) if given is None else np.asarray(given, dtype)
 
     def _key(self, name: str) -> str:
         return f"{dds_name(name)}/{self.store.hash_rihs01(name)}"

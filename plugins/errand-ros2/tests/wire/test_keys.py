@@ -2,7 +2,7 @@
 
 import pytest
 
-from errand_ros2.wire.keys import SUBSCRIPTION, Attachment, NodeKey, Qos, dds_name, gid_of, topic_name
+from errand_ros2.wire.types import SUBSCRIPTION, Attachment, NodeKey, Qos, dds_name, gid_of, topic_name
 from skills.inputs.errors import InputError
 
 CHATTER = "std_msgs::msg::dds_::String_/RIHS01_df66"

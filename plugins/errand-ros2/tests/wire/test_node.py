@@ -16,9 +16,8 @@ import zenoh
 from ros_client import EMPTY, connected, free_port
 from zenoh_ros2_sdk import ROS2ServiceClient, ROS2Subscriber
 
-from errand_ros2.wire.keys import LATCHED
 from errand_ros2.wire.node import Client, Node, Place, open_session
-from errand_ros2.wire.types import ros_types
+from errand_ros2.wire.types import LATCHED, ros_types
 from skills.inputs.errors import InputError
 
 STRING, TRIGGER = "std_msgs/msg/String", "std_srvs/srv/Trigger"

@@ -135,8 +135,6 @@ class Bridge(RunVisitor):
                 control.resume()
         except ValueError as error:
             return {"success": False, "message": str(error)}
-        if what in ("pause", "cancel"):
-            self._robots[name].goals.halt()
         self._hurry.set()
         return {"success": True, "message": what}
 
@@ -180,11 +178,6 @@ class Bridge(RunVisitor):
                 if own.context is not None:
                     self._put_diagnostics(name, own.context, progress)
         self._keep_pace(now_s)
-        for own in self._robots.values():
-            if own.goals.halting:
-                own.goals.halting = False
-                if own.context is not None and own.is_active:
-                    own.context.robot.stop(lease=own.context.lease)
 
     def _announce(self, tree: CompiledTree, clock: Clock, prepared: Prepared) -> None:
         publish: Any = self.message

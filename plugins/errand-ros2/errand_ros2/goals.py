@@ -70,7 +70,6 @@ class Goals:
         """`pool` compiles goals; `hurry` lets the run go on at once."""
         self.prepared, self._control, self._grid, self._hurry = prepared, control, grid, hurry
         self.events = node.publisher("events", "std_msgs/msg/String")
-        self.halting = False  # whether the robot must stop before its clock's next step
         self._name = prepared.mission.robot_name
         self._numbers, self._lock = count(1), threading.RLock()
         self._pursued: dict[str, _Pursued] = {}
@@ -101,18 +100,13 @@ class Goals:
         return True
 
     def _cancel(self, goal: Goal) -> None:
-        """Ends a goal's mission; the robot stops at once."""
+        """Ends a goal's mission; the run stops the robot before its clock's next step."""
         with self._lock:
             found = next((each for each in self._pursued.values() if each.goal is goal), None)
             if found is not None:
                 with suppress(ValueError):  # it is being cancelled already
                     self._control.replace(found.stop, instead_of=found.mission)
-                self.halt()
-
-    def halt(self) -> None:
-        """Lets the robot stop at once."""
-        self.halting = True
-        self._hurry.set()
+                self._hurry.set()
 
     def _pursue(self, source: str, goal: Goal | None, poses: tuple[Pose2D, ...]) -> None:
         """Compiles a goal's mission, and lets it begin in place of the goal before. Raises InputError, ValueError."""

@@ -88,11 +88,8 @@ class RobotTopics:
         if self._robot.capabilities().gripper is not None:
             gripper = self._robot.gripper()
             self._holding.put({"data": gripper.holding})
-            force = {
-                "header": messages.header(gripper.stamp_s, self._body),
-                "wrench": {"force": {"z": gripper.force_n}},
-            }
-            self._force.put(force)
+            head = messages.header(gripper.stamp_s, self._body)
+            self._force.put({"header": head, "wrench": {"force": {"z": gripper.force_n}}})
         if (imu := self._robot.imu()) is not None:
             self._imu.put(messages.imu(imu, self._body))
         self._publish_scan()

@@ -49,7 +49,7 @@ from plant.models.catalogue import FACTS_FILE, read_imported
 from plant.scene_pictures import best_view, render_view, save_png
 from plant.simulation import Simulation
 from plant.worlds.seeding import place_objects
-from skills.api import Worker
+from skills.api import TOUCHES, Worker
 from skills.inputs.errors import InputError
 from skills.perception.class_forms import ANY_OBJECT
 from tests.benchmarks.harness import benchmark, for_each, quantile, share, tell
@@ -114,6 +114,8 @@ class Watch(RunVisitor):
             self.spot_W = checkpoint.get("spot_W", self.spot_W)
 
     def message(self, topic, message):
+        if topic == TOUCHES:
+            self.simulation.referee.expect_touch(ROBOT, message["until_s"])
         grasps = topic == "transitions" and "grasp" in message["node"].rsplit("/", 1)[-1]
         self.claimed = self.claimed or (grasps and message["to"] == "SUCCESS")
         return message

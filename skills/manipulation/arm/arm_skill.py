@@ -16,7 +16,7 @@ from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.manipulation.arm.motion import GripperTurn
 from skills.manipulation.arm.poses import carry_configuration, hangs_below
-from skills.manipulation.arm.solid_cells import Outline, OwnSpace, column_boxes, solid_boxes
+from skills.manipulation.arm.solid_cells import Outline, OwnSpace, column_boxes, hidden_boxes, solid_boxes
 from skills.robot import ArmCapabilities, ArmTrajectory, CommandId, FloatArray, GripperCapabilities, GripperKind
 from skills.routine import PlanningAttempt, Routine, RoutineSkill, SkillFailure
 
@@ -34,7 +34,7 @@ CONTACT_LAG_M = 0.0035
 """Lag of a slow hand that means contact; a free hand lags by at most 2 mm (measured in the plant)."""
 _FEEL_LAG_M, _DOWN = 0.0022, 0.8
 """The same for an empty hand that moves down at 0.05 rad/s at most, and the vertical component that counts as down."""
-CONTACT_N = 8.0
+_CONTACT_N = 8.0
 """Force on a slow hand that means contact; on a free hand it is at most 6 N (measured in the plant)."""
 WEIGHING_S = 0.3
 """Time over which weighing averages the noise of the readings."""
@@ -194,10 +194,11 @@ class ArmSkill(RoutineSkill[InputsT]):
 
         return prepared
 
-    def seen_boxes(self, beyond_m: float = 0.0) -> list[Box]:
+    def seen_boxes(self, beyond_m: float = 0.0, hidden_W: FloatArray | None = None) -> list[Box]:
         """Boxes (B) around the solid cells and columns within the arm's reach plus `beyond_m`, outside `known_W`.
 
-        Omits cells at the body, the arm and the held object: a small pose error must not block the arm.
+        Omits cells at the body, the arm and the held object: a small pose error must not block the arm. Space about a
+        point `hidden_W` (3,) that no picture shows counts as solid.
         """
         context, X_WB, q_rad = self.context, self.X_WB(), self.q_rad()
         held_H = context.payload.corners_H if context.robot.gripper().holding else None
@@ -207,7 +208,8 @@ class ArmSkill(RoutineSkill[InputsT]):
         reach_m = _BEYOND_M + self.arm.max_reach_m + beyond_m
         seen = solid_boxes(context.solid.cells, X_WB, reach_m, own.holds)
         own = replace(own, lines_W=(arm_W, stowed_W))
-        return [*seen, *column_boxes(context.solid_columns, X_WB, reach_m, own.holds)]
+        hidden = [] if hidden_W is None else hidden_boxes(hidden_W, context.solid.views, X_WB, own.holds)
+        return [*seen, *column_boxes(context.solid_columns, X_WB, reach_m, own.holds), *hidden]
 
     def _outline(self) -> Outline:
         """The body's outline, grown by a margin."""
@@ -344,9 +346,7 @@ class ArmSkill(RoutineSkill[InputsT]):
                 return True
         return False
 
-    def press(
-        self, offset_B: FloatArray, direction_B: FloatArray, speed_rad_s: float, message: str, most_n: float = math.inf
-    ) -> Routine[bool]:
+    def press(self, offset_B: FloatArray, direction_B: FloatArray, speed_rad_s: float, message: str) -> Routine[bool]:
         """Moves the hand slowly by an offset (3,) in B; returns whether contact along a direction stopped the hand.
 
         Ignores obstacles. Raises PlanningError when the arm cannot follow the line.
@@ -354,17 +354,15 @@ class ArmSkill(RoutineSkill[InputsT]):
         X_BH, planner = self.model.X_BH(self.q_rad()), self.context.stack.arm_planner
         path = planner.line(self.model, self.q_rad(), RigidTransform(X_BH.rotation(), X_BH.translation() + offset_B))
         trajectory = planner.trajectory(path, speed_rad_s=speed_rad_s)
-        return (yield from self.follow(trajectory, message, self.contact_guard(direction_B, most_n=most_n)))
+        return (yield from self.follow(trajectory, message, self.contact_guard(direction_B)))
 
-    def contact_guard(
-        self, direction_B: FloatArray, lag_m: float | None = None, most_n: float = math.inf
-    ) -> Callable[[FloatArray], bool]:
-        """A guard for `follow` that stops a slow hand at contact: a lag or a new force on it along a direction.
+    def contact_guard(self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M) -> Callable[[FloatArray], bool]:
+        """A guard for `follow` that stops a slow hand at contact: at a lag along a direction.
 
-        By default an empty hand that feels for a surface below it stops at a smaller lag than any other.
+        An empty hand that feels for a surface below it stops at a smaller lag, or at a force.
         """
         before_nm, feels = self.efforts_nm(), self.context.payload.kind is None and direction_B[2] < -_DOWN
-        most_m = lag_m or (_FEEL_LAG_M if feels else CONTACT_LAG_M)
+        most_m, most_n = (_FEEL_LAG_M, _CONTACT_N) if feels else (lag_m, math.inf)
 
         def guard(q_wanted_rad: FloatArray) -> bool:
             q_rad = self.q_rad()

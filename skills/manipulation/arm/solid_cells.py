@@ -235,6 +235,16 @@ def column_boxes(
     return boxes_around(cells, X_WB, lambda p_W: ~left_out(p_W))
 
 
+def hidden_boxes(
+    p_W: FloatArray, views: Iterable[View], X_WB: RigidTransform, left_out: Callable[[FloatArray], NDArray[np.bool_]]
+) -> list[Box]:
+    """Boxes in the body frame around the cells beside and above p_W (3,) that no view shows, except those left out."""
+    beside = np.arange(-_SHADOW_CELLS, _SHADOW_CELLS + 1)
+    grid = np.stack(np.meshgrid(beside, beside, np.arange(2 * _SHADOW_CELLS)), axis=-1).reshape(-1, 3)
+    cells = grid + np.floor(p_W / CELL_M).astype(np.int64)
+    return boxes_around(cells[never_seen(cell_centres(cells), views)], X_WB, lambda p_W: ~left_out(p_W))
+
+
 def cell_centres(cells: Cells) -> FloatArray:
     """Centres (N, 3) of cells (m)."""
     return np.asarray((cells + 0.5) * CELL_M, dtype=np.float64)

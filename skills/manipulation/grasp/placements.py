@@ -267,19 +267,23 @@ def _from_sides(target: Target, higher_B: FloatArray, ahead_rad: float) -> Itera
 def _along(target: Target, ahead_rad: float, middle_B: FloatArray | None = None) -> Iterator[Placement]:
     """Yields placements along a box's axes with the local width there; along both axes of a nearly square box.
 
+    A nearly square box that the gripper can enclose has them at its centre only; a wider one may have a narrow part.
     The cheapest is at the centre of mass `middle_B` (x, y), or where the outline suggests the centre of mass.
     """
-    square, centre = target.length_m < _SQUARE_RATIO * target.width_m, np.array(target.centre_B)
-    for yaw in (target.yaw_rad, target.yaw_rad + 0.5 * np.pi) if square else (target.yaw_rad,):
+    alike, centre = target.length_m < _SQUARE_RATIO * target.width_m, np.array(target.centre_B)
+    square = alike and target.width_m < _WIDE_M
+    outline_B = target.points_B[:, :2]
+    middle_B = np.mean(outline_B, axis=0) if alike and not square and middle_B is None else middle_B
+    for yaw in (target.yaw_rad, target.yaw_rad + 0.5 * np.pi) if alike else (target.yaw_rad,):
         axis = _turned(yaw)[0]
-        along = (target.points_B[:, :2] - centre) @ axis
-        middle = _balance(along, (target.points_B[:, :2] - centre) @ _turned(yaw)[1])
+        along = (outline_B - centre) @ axis
+        middle = _balance(along, (outline_B - centre) @ _turned(yaw)[1])
         middle = middle if middle_B is None else float(axis @ (middle_B - centre))
         for shift in (0.0,) if square else _SHIFTS_M:
             local = np.abs(along - middle - shift) < _LOCAL_HALF_M
             if np.count_nonzero(local) < _FEWEST_LOCAL_POINTS:
                 continue
-            near, at = target.points_B[local, :2], centre + (0.0 if square else middle + shift) * axis
+            near, at = outline_B[local], centre + (0.0 if square else middle + shift) * axis
             turned = yaw if square else _aligned(near, yaw)
             s, t = _turned(turned) @ (near - at).T
             low, high = np.percentile(t, _EDGES_PERCENT)
@@ -287,12 +291,13 @@ def _along(target: Target, ahead_rad: float, middle_B: FloatArray | None = None)
             if touching < _LEAST_TOUCHING:
                 continue
             xy = at + 0.5 * (low + high) * _turned(turned)[1]
+            lever_m = abs(shift) if middle_B is None else float(np.linalg.norm(xy - middle_B))
             for azimuth in (turned, turned + np.pi):
-                cost = _PER_LEVER_M * abs(shift) + _width_cost(high - low)
+                cost = _PER_LEVER_M * lever_m + _width_cost(high - low)
                 cost += _PER_OFF_AHEAD_RAD * abs(wrap(azimuth - ahead_rad))
                 cost += _LOOSE_COST * (1.0 - touching)
                 cost += 0.0 if square else _PER_BEYOND_END_M * _beyond_end_m(along, middle + shift)
-                yield Placement(xy, azimuth, float(high - low), _FLAT_HALF_DEPTH_M, cost, abs(shift))
+                yield Placement(xy, azimuth, float(high - low), _FLAT_HALF_DEPTH_M, cost, lever_m)
 
 
 def _beyond_end_m(along_m: FloatArray, at_m: float) -> float:

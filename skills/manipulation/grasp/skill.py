@@ -1,17 +1,17 @@
 """The grasp skill: views the object closely, plans a grasp, grasps and lifts the object, and checks that it is held."""
 
-import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from typing import ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, ObjectObservation, PlanningError, Succeeded
-from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, CONTACT_N, GRIPPER_FORCE_N, SHUT_RAD
+from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, GRIPPER_FORCE_N, SHUT_RAD
 from skills.manipulation.arm.collision import ArmScene, box_corners
 from skills.manipulation.arm.held_object import held_box, square_hand_pose
 from skills.manipulation.arm.poses import finger_sweep_m
@@ -272,10 +272,15 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         if not candidates:
             why = why_no_candidates(view.target, self.model.p_BS, self.gripper, name)
             raise SkillFailure(Cause.PLANNING, f"the {name} offers no other hold than the last two" if every else why)
-        *first, last = openings(candidates, self.gripper)
-        scene_now, q, stack, seen = self.scene_now(), self.q_rad(), self.context.stack, self.seen_boxes()
-        boxes, reach_m = (*view.boxes, *seen), self.arm.max_reach_m
-        around = Surroundings(boxes, view.target_box, up_B(view.X_WB), view.others, name, reach_m)
+        wide, scene_now, q, stack = (
+            openings(candidates, self.gripper),
+            self.scene_now(),
+            self.q_rad(),
+            self.context.stack,
+        )
+        p_WO = view.X_WB @ np.array([*view.target.centre_B, view.target.base_m])
+        seen, shown = ((*view.boxes, *self.seen_boxes(hidden_W=p_W)) for p_W in (None, p_WO))
+        around = Surroundings(seen, view.target_box, up_B(view.X_WB), view.others, name, self.arm.max_reach_m)
 
         def planned(scene: ArmScene, opening: float, space: Surroundings) -> tuple[GraspPlan, float]:
             scene.set_opening(opening)
@@ -283,12 +288,12 @@ class Grasp(CloseLookingSkill[GraspInputs]):
             return stack.grasp_planner.plan(scene, q, grasps, space, stack.arm_planner, self._rng), opening
 
         def plan() -> tuple[GraspPlan, float]:
-            """Plans with each opening until one has a plan; only with the last one looks for the blocking objects."""
+            """Plans through space that pictures show, then any, with each opening; finds at last what is in the way."""
             scene = scene_now()
-            for opening in first:
+            for boxes, opening in product((shown, seen), wide):
                 with suppress(PlanningError):
-                    return planned(scene, opening, replace(around, others=()))
-            return planned(scene, last, around)
+                    return planned(scene, opening, replace(around, boxes=boxes, others=()))
+            return planned(scene, wide[-1], around)
 
         found, opening = yield from self.compute(
             plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {name}"
@@ -306,8 +311,7 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         yield from self.follow(plan.to_grasp, f"reaching for the {name}")
         ahead = plan.candidate.X_BH.rotation().matrix()[:, 0]
         self.context.expect_touch(_TOUCH_S)
-        guard = self.contact_guard(ahead, most_n=CONTACT_N if ahead @ up_B(self.X_WB()) < -_DOWN else math.inf)
-        touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", guard)
+        touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", self.contact_guard(ahead))
         if touched:
             self._check_reached(plan.candidate.X_BH, name)
         thin, sweep_m = view.target.height_m <= THIN_M, finger_sweep_m(plan.candidate.X_BH, self.X_WB(), self.gripper)
@@ -366,7 +370,7 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         """Lowers downward fingers onto the surface, whose height is known only to a few millimetres."""
         if not touched and ahead_B @ up_B(self.X_WB()) < -_DOWN:
             try:
-                touched = yield from self.press(_FEEL_M * ahead_B, ahead_B, _FEEL_RAD_S, message, CONTACT_N)
+                touched = yield from self.press(_FEEL_M * ahead_B, ahead_B, _FEEL_RAD_S, message)
             except PlanningError:
                 touched = True  # the surface may be just below
         if touched:

@@ -14,6 +14,7 @@ from skills.manipulation.arm.solid_cells import (
     add_view,
     boxes_around,
     column_boxes,
+    hidden_boxes,
     map_columns,
     merge_cells,
     never_seen,
@@ -114,6 +115,15 @@ def test_points_outside_all_pictures_or_far_behind_their_depth_were_never_seen()
     points = np.array([on_the_table + [0.0, 0.0, 0.1], over_the_camera, under_the_table])
     assert never_seen(points, views).tolist() == [False, True, True]
     assert never_seen(points, ()).all()
+
+
+# the camera looks down on the table: 10 cm over it is shown, half a metre over it is above the picture
+def test_space_beside_and_above_a_point_that_no_picture_shows_is_hidden():
+    views, at_W = add_view((), picture(), RigidTransform()), np.array([1.05, 0.0, TABLE.height_m])
+    boxes = hidden_boxes(at_W, views, BODY, nothing_of)
+    assert not inside(boxes, at_W + [0.0, 0.0, 0.1])
+    assert inside(boxes, at_W + [0.0, 0.0, 0.5])
+    assert hidden_boxes(at_W, views, BODY, lambda points: np.ones(len(points), dtype=bool)) == []
 
 
 def test_only_the_last_views_are_stored():

@@ -98,6 +98,14 @@ def test_a_wide_tank_is_taken_from_above_by_its_handle(yaw):
     assert best.lever_m < 0.05
 
 
+def test_a_wide_flat_object_in_the_shape_of_an_l_is_taken_by_its_narrow_part_near_the_middle():
+    barrel, handle = _bar(0.18, 0.05, 0.0, 0.055), _bar(0.05, 0.14, 0.0, 0.055) + [0.06, -0.09, 0.0]
+    corner = Target(np.concatenate([barrel, handle]), (X_M, -0.07), 0.0, 0.185, 0.18, 0.055, BASE_M, False)
+    best = _best(corner)
+    assert best.width_m == pytest.approx(0.05, abs=0.006)
+    assert best.lever_m < 0.08
+
+
 def test_an_object_that_is_wide_over_all_its_height_has_no_placement_for_the_gripper():
     assert grasp_candidates(_target(_drum(0.08, 0.0, 0.3), width_m=0.16, height_m=0.3), P_BS, GRIPPER) == []
 

@@ -23,8 +23,8 @@ PREGRASPS_M = (0.12, 0.07, 0.045)
 """Distances from the grasp at which the straight approach begins, the best first."""
 LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0), (0.03, 0.0))
 """Lifts: distances up and back towards the shoulder, the best first."""
-_SLOW_POINTS = 3
-"""Number of points of the approach that the hand passes slowly."""
+_SLOW_POINTS, _SLOW_DOWN_POINTS = 3, 2
+"""Number of points, a centimetre apart, of the approach that the hand passes slowly, and more slowly down."""
 _OTHERS_TRIED = 3
 """Number of near objects that are checked for being in the way."""
 _MOST_CANDIDATES = 40
@@ -143,10 +143,10 @@ class GeometricGraspPlanner:
             except PlanningError as error:
                 reasons.append(str(error))
                 continue
-            to_grasp = arm_planner.trajectory(approach[:-_SLOW_POINTS], speed_rad_s=self.approach_rad_s)
             down = float(candidate.X_BH.rotation().matrix()[2, 0]) < -_DOWN
-            last_rad_s = self.touch_rad_s if down else self.last_rad_s
-            last_bit = arm_planner.trajectory(approach[-_SLOW_POINTS - 1 :], speed_rad_s=last_rad_s)
+            last_rad_s, slow = (self.touch_rad_s, _SLOW_DOWN_POINTS) if down else (self.last_rad_s, _SLOW_POINTS)
+            to_grasp = arm_planner.trajectory(approach[:-slow], speed_rad_s=self.approach_rad_s)
+            last_bit = arm_planner.trajectory(approach[-slow - 1 :], speed_rad_s=last_rad_s)
             return GraspPlan(candidate, arm_planner.trajectory(path, scene=scene), to_grasp, last_bit, lift_B)
         if reasons and set(reasons) == {_OUT_OF_REACH}:
             raise PlanningError(_out_of_reach(scene.model, around))

@@ -54,7 +54,8 @@ _SHORT_M = 0.025
 """Distance from the grasp beyond which a contact of the hand is not with the surface below the object."""
 _FEEL_M = 0.014
 """Additional depth of the fingers, to feel the surface."""
-_FEEL_RAD_S = 0.03
+_FEEL_RAD_S, _FEEL_LOW_M = 0.03, 0.04
+"""Joint speed of that, and height of the objects for which it is done."""
 _TOUCH_S = 15.0
 """Longest time from the last bit of the approach to the lift, in which fingertips may touch the surface."""
 _DOWN = 0.8
@@ -316,7 +317,8 @@ class Grasp(CloseLookingSkill[GraspInputs]):
             self._check_reached(plan.candidate.X_BH, name)
         thin, sweep_m = view.target.height_m <= THIN_M, finger_sweep_m(plan.candidate.X_BH, self.X_WB(), self.gripper)
         rounded, relax_m = thin and self.gripper.kind is GripperKind.HINGED, max(_RELAX_M, sweep_m + _CLEAR_M)
-        yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
+        if touched or view.target.height_m < _FEEL_LOW_M:
+            yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
         if rounded:
             nearby = self.gripper.opening_for(plan.candidate.width_m + _NEARBY_M)
             yield from self.move_gripper(nearby, GRIPPER_FORCE_N, f"closing on the {name}")

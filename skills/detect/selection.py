@@ -93,7 +93,8 @@ def matching_tracks(
 
     Where any object is wanted, the nearest and most accessible ones come first, and those to avoid last.
     """
-    tracks = [t for t in tracks if is_wanted(t, inputs) and _in_place(t, inputs, options, p_WB)]
+    every = ANY_OBJECT in inputs.classes
+    tracks = [t for t in tracks if (every or t.class_name in inputs.sought) and _in_place(t, inputs, options, p_WB)]
     fitting = [t for t in tracks if is_of_kind(t, inputs) or any(is_of_kind(t, one) for one in inputs.landmarks)]
     if inputs.expected_W is not None:
         off = {t.number: level_distance(t.position_W, inputs.expected_W) for t in fitting}
@@ -113,11 +114,6 @@ def sure_tracks(matching: Sequence[Track], inputs: DetectInputs, views: int) -> 
     if inputs.expected_W is not None or ANY_OBJECT in inputs.classes:
         return sure
     return sorted(sure, key=lambda track: -track.last_seen_s)
-
-
-def is_wanted(track: Track, inputs: DetectInputs) -> bool:
-    """Returns whether the class of a track is wanted, or that of a landmark."""
-    return ANY_OBJECT in inputs.classes or track.class_name in inputs.sought
 
 
 def is_of_kind(track: Track, kind: DetectInputs | Landmark) -> bool:
@@ -188,7 +184,8 @@ def unlabelled_clusters(clusters: Iterable[Cluster], tracks: Sequence[Track], cl
 
     A track of another class does not explain a cluster when it may be of a wanted class.
     """
-    named = [track.position_W for track in tracks if not _is_doubted(track, classes)]
+    sure = (t for t in tracks if t.class_name in classes or all(t.classes.get(c, 0.0) <= _DOUBTED for c in classes))
+    named = [track.position_W for track in sure]
     left: list[Cluster] = []
     for cluster in sorted(clusters, key=lambda one: -len(one.points)):
         shape = cluster.shape
@@ -198,11 +195,6 @@ def unlabelled_clusters(clusters: Iterable[Cluster], tracks: Sequence[Track], cl
         if not old and not known and _may_be(cluster, classes):
             left.append(cluster)
     return left
-
-
-def _is_doubted(track: Track, classes: Sequence[str]) -> bool:
-    """Returns whether a track has an unwanted class, but may be of a wanted one."""
-    return track.class_name not in classes and any(track.classes.get(name, 0.0) > _DOUBTED for name in classes)
 
 
 def _may_be(cluster: Cluster, classes: Sequence[str]) -> bool:

@@ -291,18 +291,14 @@ def _along(target: Target, ahead_rad: float, middle_B: FloatArray | None = None)
             if touching < _LEAST_TOUCHING:
                 continue
             xy = at + 0.5 * (low + high) * _turned(turned)[1]
+            end_m = min(middle + shift - float(np.min(along)), float(np.max(along)) - middle - shift)
             lever_m = abs(shift) if middle_B is None else float(np.linalg.norm(xy - middle_B))
             for azimuth in (turned, turned + np.pi):
                 cost = _PER_LEVER_M * lever_m + _width_cost(high - low)
                 cost += _PER_OFF_AHEAD_RAD * abs(wrap(azimuth - ahead_rad))
                 cost += _LOOSE_COST * (1.0 - touching)
-                cost += 0.0 if square else _PER_BEYOND_END_M * _beyond_end_m(along, middle + shift)
+                cost += 0.0 if square else _PER_BEYOND_END_M * max(0.0, _FINGER_HALF_M - end_m)
                 yield Placement(xy, azimuth, float(high - low), _FLAT_HALF_DEPTH_M, cost, lever_m)
-
-
-def _beyond_end_m(along_m: FloatArray, at_m: float) -> float:
-    """Length (m) by which fingers at a position extend beyond the end of an outline: they slide off a tapered end."""
-    return max(0.0, _FINGER_HALF_M - min(at_m - float(np.min(along_m)), float(np.max(along_m)) - at_m))
 
 
 def _aligned(xy: FloatArray, yaw_rad: float) -> float:

@@ -111,7 +111,8 @@ def _fused(
     groups: list[_Group] = []
     for one, number in sorted(_numbered(found), key=lambda pair: -pair[0].score):
         box = views[number].box_in_picture(one.box, shape[1])
-        same = [group for group in groups if group.is_of(one.class_name, box)]
+        alike = (group for group in groups if group.class_name == one.class_name)
+        same = [group for group in alike if box_overlap(group.box, box) > _SAME_OBJECT]
         if not same:
             groups.append(_Group(one.class_name, box, {number: (one.score, box)}))
         elif number not in same[0].seen:
@@ -131,10 +132,6 @@ class _Group:
     class_name: str
     box: Box
     seen: dict[int, tuple[float, Box]] = field(default_factory=dict)
-
-    def is_of(self, class_name: str, box: Box) -> bool:
-        """Returns whether a box shows the same object and class."""
-        return class_name == self.class_name and box_overlap(self.box, box) > _SAME_OBJECT
 
     def row(self, views: Sequence[View], shape: Sequence[int]) -> tuple[NDArray[np.float64], float, str]:
         """Mean box, weighted by the scores, mean score, and class, over the views that suit the object, or else all."""

@@ -20,6 +20,8 @@ from executive.app.runs.simulated import simulate
 from executive.run.worker import LockStepWorker
 from plant.worlds.seeding import place_objects
 from skills.api import TOUCHES, Running, SkillContext, Succeeded
+from skills.estimate.grid_map import load_grid_map
+from skills.manipulation.arm.solid_cells import map_columns
 from skills.manipulation.grasp.candidates import same_grasp
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
 from skills.manipulation.posture import Stow, StowInputs
@@ -58,6 +60,7 @@ class Bench:
             worker=LockStepWorker(self.clock),
             localiser=place,
             costmap=BlockCostmap(),
+            solid_columns=map_columns([load_grid_map(path) for path in world.scan_map_paths], [self.surface]),
             publish=self._publish,
             seed=seed,
             detector=PlainColours(MappingProxyType({})),

@@ -280,8 +280,9 @@ class Grasp(CloseLookingSkill[GraspInputs]):
             self.context.stack,
         )
         p_WO = view.X_WB @ np.array([*view.target.centre_B, view.target.base_m])
-        seen, shown = ((*view.boxes, *self.seen_boxes(hidden_W=p_W)) for p_W in (None, p_WO))
-        around = Surroundings(seen, view.target_box, up_B(view.X_WB), view.others, name, self.arm.max_reach_m)
+        hidden_W = (p_WO, None) if view.target.upright else (None,)  # a grasp from above needs the space above
+        spaces = [(*view.boxes, *self.seen_boxes(hidden_W=p_W)) for p_W in hidden_W]
+        around = Surroundings(spaces[-1], view.target_box, up_B(view.X_WB), view.others, name, self.arm.max_reach_m)
 
         def planned(scene: ArmScene, opening: float, space: Surroundings) -> tuple[GraspPlan, float]:
             scene.set_opening(opening)
@@ -291,7 +292,7 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         def plan() -> tuple[GraspPlan, float]:
             """Plans through space that pictures show, then any, with each opening; finds at last what is in the way."""
             scene = scene_now()
-            for boxes, opening in product((shown, seen), wide):
+            for boxes, opening in product(spaces, wide):
                 with suppress(PlanningError):
                     return planned(scene, opening, replace(around, boxes=boxes, others=()))
             return planned(scene, wide[-1], around)

@@ -34,8 +34,8 @@ CONTACT_LAG_M = 0.0035
 """Lag of a slow hand that means contact; a free hand lags by at most 2 mm (measured in the plant)."""
 _FEEL_LAG_M, _DOWN = 0.0022, 0.8
 """The same for an empty hand that moves down at 0.05 rad/s at most, and the vertical component that counts as down."""
-_CONTACT_N = 8.0
-"""Force on a slow hand that means contact; on a free hand it is at most 6 N (measured in the plant)."""
+_CONTACT_N, _PRESS_N = 8.0, 15.0
+"""Force on a slow hand that means contact; on a free hand it is at most 6 N (measured in the plant). With an object."""
 WEIGHING_S = 0.3
 """Time over which weighing averages the noise of the readings."""
 FEELING_S = (0.5, 4.0)
@@ -356,13 +356,17 @@ class ArmSkill(RoutineSkill[InputsT]):
         trajectory = planner.trajectory(path, speed_rad_s=speed_rad_s)
         return (yield from self.follow(trajectory, message, self.contact_guard(direction_B)))
 
-    def contact_guard(self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M) -> Callable[[FloatArray], bool]:
-        """A guard for `follow` that stops a slow hand at contact: at a lag along a direction.
+    def contact_guard(
+        self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M, most_n: float = _PRESS_N
+    ) -> Callable[[FloatArray], bool]:
+        """A guard for `follow` that stops a slow hand at contact: at a lag along a direction; down, also at a force.
 
-        An empty hand that feels for a surface below it stops at a smaller lag, or at a force.
+        An empty hand that feels for a surface below it stops at a smaller lag and force.
         """
-        before_nm, feels = self.efforts_nm(), self.context.payload.kind is None and direction_B[2] < -_DOWN
-        most_m, most_n = (_FEEL_LAG_M, _CONTACT_N) if feels else (lag_m, math.inf)
+        before_nm, down = self.efforts_nm(), direction_B[2] < -_DOWN
+        most_m, most_n = (lag_m, most_n if down else math.inf)
+        if down and self.context.payload.kind is None:
+            most_m, most_n = _FEEL_LAG_M, _CONTACT_N
 
         def guard(q_wanted_rad: FloatArray) -> bool:
             q_rad = self.q_rad()

@@ -58,6 +58,8 @@ _FEEL_RAD_S, _FEEL_LOW_M = 0.03, 0.04
 """Joint speed of that, and height of the objects for which it is done."""
 _TOUCH_S = 15.0
 """Longest time from the last bit of the approach to the lift, in which fingertips may touch the surface."""
+_MOST_SHOWN = 8
+"""Number of the best grasps that are tried with a way through space that pictures show."""
 _DOWN = 0.8
 """Vertical component of a direction that counts as down."""
 _FEEL_S = 0.4
@@ -280,22 +282,22 @@ class Grasp(CloseLookingSkill[GraspInputs]):
             self.context.stack,
         )
         p_WO = view.X_WB @ np.array([*view.target.centre_B, view.target.base_m])
-        hidden_W = (p_WO, None) if view.target.upright else (None,)  # a grasp from above needs the space above
-        spaces = [(*view.boxes, *self.seen_boxes(hidden_W=p_W)) for p_W in hidden_W]
-        around = Surroundings(spaces[-1], view.target_box, up_B(view.X_WB), view.others, name, self.arm.max_reach_m)
+        shown = (((*view.boxes, *self.seen_boxes(hidden_W=p_WO)), _MOST_SHOWN),) if view.target.upright else ()
+        spaces = [*shown, ((*view.boxes, *self.seen_boxes()), len(candidates))]  # from above it needs the space above
+        around = Surroundings(spaces[-1][0], view.target_box, up_B(view.X_WB), view.others, name, self.arm.max_reach_m)
 
-        def planned(scene: ArmScene, opening: float, space: Surroundings) -> tuple[GraspPlan, float]:
+        def planned(scene: ArmScene, opening: float, space: Surroundings, most: int) -> tuple[GraspPlan, float]:
             scene.set_opening(opening)
-            grasps = passing(candidates, opening, self.gripper)
+            grasps = passing(candidates, opening, self.gripper)[:most]
             return stack.grasp_planner.plan(scene, q, grasps, space, stack.arm_planner, self._rng), opening
 
         def plan() -> tuple[GraspPlan, float]:
             """Plans through space that pictures show, then any, with each opening; finds at last what is in the way."""
             scene = scene_now()
-            for boxes, opening in product(spaces, wide):
+            for (boxes, most), opening in product(spaces, wide):
                 with suppress(PlanningError):
-                    return planned(scene, opening, replace(around, boxes=boxes, others=()))
-            return planned(scene, wide[-1], around)
+                    return planned(scene, opening, replace(around, boxes=boxes, others=()), most)
+            return planned(scene, wide[-1], around, len(candidates))
 
         found, opening = yield from self.compute(
             plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {name}"

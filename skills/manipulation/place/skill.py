@@ -410,7 +410,7 @@ class Place(BinPlacement[PlaceInputs]):
         """
         message = f"putting the object down on the {surface.name}"
         p_BH = self.model.X_BH(above.q_rad).translation() - (above.height_m - _SURELY_FREE_M) * UP_B
-        early = self.contact_guard(-UP_B, _LAG_IN_CONTACT_M)
+        early = self.contact_guard(-UP_B, _LAG_IN_CONTACT_M, math.inf)
         stopped = yield from self.move_straight(p_BH, message, q_from_rad=above.q_rad, guard=early)
         X_BH, gripper = self.model.X_BH(self.q_rad()), self.gripper
         tip_B = X_BH.rotation() @ np.array([gripper.fixed_tip_x_m, 0.0, gripper.fixed_z_m])

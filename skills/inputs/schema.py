@@ -90,17 +90,13 @@ def _most_telling(errors: list[ErrorDetails], source: YamlSource) -> list[list[E
     misspelled = {paths[id(error)][:-1] for error in errors if error["type"] == "extra_forbidden"}
     above = {path[:n] for path in paths.values() for n in range(len(path))}
     own = [error for error in errors if not (error["type"] == "too_short" and paths[id(error)] in above)]
-    causes = (e for e in own if e["type"] == "extra_forbidden" or _parent(e, paths[id(e)]) not in misspelled)
+    parents = {id(e): paths[id(e)][:-1] if e["type"] == "missing" else paths[id(e)] for e in own}
+    causes = (e for e in own if e["type"] == "extra_forbidden" or parents[id(e)] not in misspelled)
     ordered = sorted(causes, key=lambda e: (e["type"] != "extra_forbidden", source.line(paths[id(e)])))
     places: dict[KeyPath, list[ErrorDetails]] = {}
     for error in ordered:
         places.setdefault(paths[id(error)], []).append(error)
     return [those if len(those[0]["loc"]) > len(place) else those[:1] for place, those in places.items()]
-
-
-def _parent(error: ErrorDetails, path: KeyPath) -> KeyPath:
-    """Path of the mapping that lacks a key, or of the value itself."""
-    return path[:-1] if error["type"] == "missing" else path
 
 
 def _path(error: ErrorDetails, source: YamlSource) -> KeyPath:

@@ -364,9 +364,8 @@ class ArmSkill(RoutineSkill[InputsT]):
         An empty hand that feels for a surface below it stops at a smaller lag and force.
         """
         before_nm, down = self.efforts_nm(), direction_B[2] < -_DOWN
-        most_m, most_n = (lag_m, most_n if down else math.inf)
-        if down and self.context.payload.kind is None:
-            most_m, most_n = _FEEL_LAG_M, _CONTACT_N
+        feels = down and self.context.payload.kind is None
+        most_m, most_n = (_FEEL_LAG_M, _CONTACT_N) if feels else (lag_m, most_n if down else math.inf)
 
         def guard(q_wanted_rad: FloatArray) -> bool:
             q_rad = self.q_rad()

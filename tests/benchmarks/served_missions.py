@@ -17,6 +17,7 @@ from executive.app.runs.real_robot import RealBackend
 from executive.app.runs.simulated import simulate
 from executive.mission.request import Request
 from executive.run.visitor import RunVisitor
+from skills.api import PICTURES, TOUCHES
 from skills.robot import ConnectedRobot
 from tests.benchmarks.errand_process import ROOT
 
@@ -38,6 +39,20 @@ class Judged(RealBackend):
         return verdict_of(tree, result, self.referee.judge, before=before, since_s=since_s)
 
 
+class Witness(RunVisitor):
+    """Visitor that tells the plant's referee of the pictures and the touches that the robot announces."""
+
+    def __init__(self, simulation):
+        self._simulation = simulation
+
+    def message(self, topic, message):
+        if topic == TOUCHES:
+            self._simulation.referee.expect_touch(message["robot"], message["until_s"])
+        if topic == PICTURES and "of" in message:
+            self._simulation.record_picture(message["robot"], message["camera"], message["stamp_s"])
+        return message
+
+
 def run_served(request, lock_step, options=lambda _: {}):
     """Runs a request through the adapter and server that `lock_step` starts around a robot and its clock.
 
@@ -51,8 +66,9 @@ def run_served(request, lock_step, options=lambda _: {}):
 
     step = lock_step(build)
     try:
-        began_s = time.monotonic()
-        return _ended(run_request(prepared, Judged(step, made[0], prepared), **options(step)).report, began_s)
+        began_s, given = time.monotonic(), options(step)
+        given["visitors"] = [Witness(made[0]), *given.get("visitors", ())]
+        return _ended(run_request(prepared, Judged(step, made[0], prepared), **given).report, began_s)
     finally:
         made.clear()
         step.close()

@@ -22,9 +22,9 @@ LINES = {
     "executive/conversation": 597,
     "executive/view": 1922,
     "executive/testing": 860,
-    "executive/app": 8278,
+    "executive/app": 8274,
     "executive/cli": 3938,
-    "skills": 28927,
+    "skills": 28930,
     "plant": 11542,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 426, 59, 7

@@ -11,12 +11,6 @@ from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.quantities import Angle, Turn
 from skills.routine import PlanningAttempt, Routine, SkillFailure
 
-_NEAR_X_M = 0.05
-"""Distance ahead of the carrying positions within which the hand is near the body."""
-_NEAR_Y_M = 0.3
-"""Distance to a side within which the hand is near the body."""
-_NEAR_Z_M = 0.06
-"""Height above the carrying positions within which the hand is near the body."""
 _RAISED_M = 0.05
 """Height above the usual one beyond which the body counts as raised."""
 _THERE_RAD = 0.05
@@ -65,11 +59,7 @@ class Stow(ArmSkill[StowInputs]):
         if not self.context.robot.gripper().holding:
             yield from self.stow()
             return
-        X_BH, arm = self.model.X_BH(self.q_rad()), self.arm
-        x_m, y_m, z_m = X_BH.translation()
-        far = x_m > max(arm.carry_x_m) + _NEAR_X_M or z_m > max(arm.carry_z_m) + _NEAR_Z_M
-        if far or abs(y_m) > _NEAR_Y_M:
-            yield from self.carry(X_BH.rotation(), "drawing in the arm")
+        yield from self.draw_near(self.model.X_BH(self.q_rad()).rotation())
 
 
 @dataclass(frozen=True)

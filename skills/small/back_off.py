@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, Part, Running, Succeeded
+from skills.api import Cause, Part, Running, SkillContext, Succeeded
 from skills.geometry import compose, relative_pose
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
@@ -56,10 +56,9 @@ class BackOff(MovingSkill[BackOffInputs]):
     Options: ClassVar[type] = BackOffOptions
     options: BackOffOptions
 
-    def begin(self, inputs: BackOffInputs) -> None:
-        """Starts a new attempt."""
-        super().begin(inputs)
-        self._scans = ScanHealth(self.context)
+    def __init__(self, context: SkillContext) -> None:
+        super().__init__(context)
+        self._scans = ScanHealth(context)
 
     def trouble(self) -> SkillFailure | None:
         """Returns a failure when the LiDAR does not work."""

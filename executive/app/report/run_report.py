@@ -205,14 +205,10 @@ class RunReport(Ending):
         """Yields the verdicts and the figures as lines with rich markup."""
         pace = "" if self.referee is None else f" ({self.real_time_factor:.1f} x real time)"
         figures = f"{self.duration_text}{pace}, {self.ticks} ticks"
-        if self.robots:
-            yield from (line for verdict in self.every_verdict() for line in verdict.lines())
-            yield from (escape(f"  {zone}") for zone in self.zones)
-            yield figures
-            return
-        yield from (line for verdict in self.verdicts() for line in verdict.lines())
-        yield figures if self.referee is None else f"{counts_text(self.referee)}; {figures}"
-        yield from (escape(f"  {event}") for event in (*self.zones, *self.notes, *self.seen.events))
+        yield from (line for verdict in self.every_verdict() for line in verdict.lines())
+        yield figures if self.robots or self.referee is None else f"{counts_text(self.referee)}; {figures}"
+        events = dict.fromkeys(event for one in self.robots.values() or (self,) for event in one.seen.events)
+        yield from (escape(f"  {event}") for event in (*self.zones, *self.notes, *events))
 
 
 DATE: Final = "%Y-%m-%d %H:%M"

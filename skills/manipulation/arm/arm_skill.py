@@ -36,6 +36,12 @@ _FEEL_LAG_M, _DOWN = 0.0022, 0.8
 """The same for an empty hand that moves down at 0.05 rad/s at most, and the vertical component that counts as down."""
 _CONTACT_N, _PRESS_N = 8.0, 15.0
 """Force on a slow hand that means contact; on a free hand it is at most 6 N (measured in the plant). With an object."""
+_NEAR_X_M = 0.05
+"""Distance ahead of the carrying positions within which the hand is near the body."""
+_NEAR_Y_M = 0.3
+"""Distance to a side within which the hand is near the body."""
+_NEAR_Z_M = 0.06
+"""Height above the carrying positions within which the hand is near the body."""
 WEIGHING_S = 0.3
 """Time over which weighing averages the noise of the readings."""
 FEELING_S = (0.5, 4.0)
@@ -301,6 +307,13 @@ class ArmSkill(RoutineSkill[InputsT]):
         """Draws the hand near the body, and keeps the object upright: R_BH only turns about the vertical."""
         arm, hangs = self.arm, hangs_below(self.context.payload.corners_H, self.gripper)
         yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q, hangs), message, speed_rad_s)
+
+    def draw_near(self, R_BH: RotationMatrix) -> Routine[None]:
+        """Draws in the hand, if it is ahead, above or to the side of where it carries objects (see `carry`)."""
+        (x_m, y_m, z_m), arm = self.model.X_BH(self.q_rad()).translation(), self.arm
+        far = x_m > max(arm.carry_x_m) + _NEAR_X_M or z_m > max(arm.carry_z_m) + _NEAR_Z_M
+        if far or abs(y_m) > _NEAR_Y_M:
+            yield from self.carry(R_BH, "drawing in the arm")
 
     def move_straight(
         self,

@@ -297,7 +297,8 @@ class Place(BinPlacement[PlaceInputs]):
 
         Raises SkillFailure with cause PLANNING when no spot has a free base placement.
         """
-        yield from self._draw_in(search.held)
+        if not (yield from self._draw_in(search.held)):
+            yield from self.draw_near(self._carried())
         context, pose, arm = self.context, self.context.pose(), self.arm
         footprint, best_m, space = ArmFootprint(context).now(), arm.standing_m[0], context.free_space()
         before = [

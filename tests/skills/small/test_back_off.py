@@ -5,7 +5,7 @@ import math
 import pytest
 from planar_robot import TWO_ROOMS, Bench, Box
 
-from skills.api import Cause, Failed, Succeeded
+from skills.api import Cause, Failed, Running, Succeeded
 from skills.robot import BaseKind, Pose2D
 from skills.small.back_off import BackOff, BackOffInputs
 
@@ -88,3 +88,14 @@ def test_it_stops_when_it_is_ended_while_it_drives():
     skill.end()
     skill.end()
     assert not bench.robot.driving
+
+
+def test_it_backs_off_when_a_restart_resumes_it():
+    bench = Bench(IN_THE_OPEN)
+    bench.tick(4)
+    skill = BackOff(bench.context())
+    skill.resume(BackOffInputs())
+    while isinstance(step := skill.step(), Running):
+        bench.tick()
+    assert isinstance(step, Succeeded)
+    assert gone(bench, IN_THE_OPEN) > 0.3

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.app.report.run_report import RunReport, Verdict, counts_text, title_of
+from executive.app.report.run_report import RobotReport, RunReport, Verdict, counts_text, title_of
 from executive.words.goal import RefereeReport
 
 
@@ -71,3 +71,13 @@ def test_the_duration_of_a_resumed_run_is_that_of_its_plots(log_time_s, text):
     referee = RefereeReport(True, "it is so", 0, 0)
     report = RunReport("success", None, "", referee, (), "flat", 1, 72.8, 30.0, 2.4, 10, "", log_time_s=log_time_s)
     assert report.duration_text == text
+
+
+# both robots have the same plant, and its referee tells both of what Bob dropped
+def test_the_report_of_several_robots_tells_each_event_once():
+    seen = RefereeReport(True, "it is so.", 0, 1, events=("Bob dropped the can at 12.30 s.",))
+    ending = {"outcome": "success", "cause": None, "message": "done", "referee": seen, "commands": ()}
+    robots = {name: RobotReport(**ending, kind="fetch") for name in ("Alice", "Bob")}
+    times = {"sim_time_s": 20.0, "wall_time_s": 5.0, "real_time_factor": 4.0, "ticks": 400}
+    report = RunReport(**ending, world="flat", seed=1, **times, log="", robots=robots)
+    assert [line for line in report.lines() if "12.30 s" in line] == ["  Bob dropped the can at 12.30 s."]

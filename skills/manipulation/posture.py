@@ -11,7 +11,7 @@ from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.quantities import Angle, Turn
 from skills.routine import PlanningAttempt, Routine, SkillFailure
 
-_RAISED_M = 0.05
+_RAISED_M = 0.01
 """Height above the usual one beyond which the body counts as raised."""
 _THERE_RAD = 0.05
 """Largest error of a joint angle at which the arm has reached its pose."""

@@ -32,7 +32,7 @@ class RefinementNetwork(CropNetwork):
         self.detector = DetectorNetwork(classes, _RESIDUALS)
         self.squeeze = ConvUnit(NECK[2], _SQUEEZED)
         self.trust_first = nn.Parameter(torch.full((classes,), 0.5))
-        self.trust_seen = nn.Parameter(torch.full((classes,), 0.5))
+        self.trust_seen = nn.Parameter(torch.full((classes,), 0.5 + 1e-6))  # the exporter merges equal weights
         self.nearer = nn.Parameter(torch.full((4,), 0.5))
 
     @property

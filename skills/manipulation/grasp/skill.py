@@ -54,8 +54,8 @@ _SHORT_M = 0.025
 """Distance from the grasp beyond which a contact of the hand is not with the surface below the object."""
 _FEEL_M = 0.014
 """Additional depth of the fingers, to feel the surface."""
-_FEEL_RAD_S, _FEEL_LOW_M = 0.03, 0.04
-"""Joint speed of that, and height of the objects for which it is done."""
+_FEEL_RAD_S, _FEEL_LOW_M, _LONG = 0.03, 0.04, 1.5
+"""Joint speed of that, and for which objects it is done: by height, or by the ratio of length to width."""
 _TOUCH_S = 15.0
 """Longest time from the last bit of the approach to the lift, in which fingertips may touch the surface."""
 _MOST_SHOWN = 8
@@ -320,7 +320,8 @@ class Grasp(CloseLookingSkill[GraspInputs]):
             self._check_reached(plan.candidate.X_BH, name)
         thin, sweep_m = view.target.height_m <= THIN_M, finger_sweep_m(plan.candidate.X_BH, self.X_WB(), self.gripper)
         rounded, relax_m = thin and self.gripper.kind is GripperKind.HINGED, max(_RELAX_M, sweep_m + _CLEAR_M)
-        if touched or view.target.height_m < _FEEL_LOW_M:
+        lies = view.target.height_m < _FEEL_LOW_M or view.target.length_m > _LONG * view.target.width_m
+        if touched or lies:
             yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
         if rounded:
             nearby = self.gripper.opening_for(plan.candidate.width_m + _NEARBY_M)

@@ -272,8 +272,8 @@ def _along(target: Target, ahead_rad: float, middle_B: FloatArray | None = None)
     """
     alike, centre = target.length_m < _SQUARE_RATIO * target.width_m, np.array(target.centre_B)
     square = alike and target.width_m < _WIDE_M
-    outline_B = target.points_B[:, :2]
-    middle_B = np.mean(outline_B, axis=0) if alike and not square and middle_B is None else middle_B
+    outline_B, wide = target.points_B[:, :2], alike and not square and middle_B is None
+    middle_B = np.mean(outline_B, axis=0) if wide else middle_B
     for yaw in (target.yaw_rad, target.yaw_rad + 0.5 * np.pi) if alike else (target.yaw_rad,):
         axis = _turned(yaw)[0]
         along = (outline_B - centre) @ axis
@@ -292,7 +292,7 @@ def _along(target: Target, ahead_rad: float, middle_B: FloatArray | None = None)
                 continue
             xy = at + 0.5 * (low + high) * _turned(turned)[1]
             end_m = min(middle + shift - float(np.min(along)), float(np.max(along)) - middle - shift)
-            lever_m = abs(shift) if middle_B is None else float(np.linalg.norm(xy - middle_B))
+            lever_m = float(np.linalg.norm(xy - middle_B)) if wide and middle_B is not None else abs(shift)
             for azimuth in (turned, turned + np.pi):
                 cost = _PER_LEVER_M * lever_m + _width_cost(high - low)
                 cost += _PER_OFF_AHEAD_RAD * abs(wrap(azimuth - ahead_rad))

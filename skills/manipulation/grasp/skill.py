@@ -275,15 +275,11 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         if not candidates:
             why = why_no_candidates(view.target, self.model.p_BS, self.gripper, name)
             raise SkillFailure(Cause.PLANNING, f"the {name} offers no other hold than the last two" if every else why)
-        wide, scene_now, q, stack = (
-            openings(candidates, self.gripper),
-            self.scene_now(),
-            self.q_rad(),
-            self.context.stack,
-        )
+        wide, scene_now = openings(candidates, self.gripper), self.scene_now()
+        q, stack = self.q_rad(), self.context.stack
         p_WO = view.X_WB @ np.array([*view.target.centre_B, view.target.base_m])
         shown = (((*view.boxes, *self.seen_boxes(hidden_W=p_WO)), _MOST_SHOWN),) if view.target.upright else ()
-        spaces = [*shown, ((*view.boxes, *self.seen_boxes()), len(candidates))]  # from above it needs the space above
+        spaces = [*shown, ((*view.boxes, *self.seen_boxes()), len(candidates))]  # the arm comes from above to flat ones
         around = Surroundings(spaces[-1][0], view.target_box, up_B(view.X_WB), view.others, name, self.arm.max_reach_m)
 
         def planned(scene: ArmScene, opening: float, space: Surroundings, most: int) -> tuple[GraspPlan, float]:

@@ -99,3 +99,15 @@ def test_it_backs_off_when_a_restart_resumes_it():
         bench.tick()
     assert isinstance(step, Succeeded)
     assert gone(bench, IN_THE_OPEN) > 0.3
+
+
+@pytest.mark.mission
+def test_spot_backs_off_in_the_plant_when_a_restart_resumes_it(small_plant):
+    bench = small_plant.bench
+    before, skill = bench.robot.odometry().pose, BackOff(bench.context())
+    skill.resume(BackOffInputs())
+    while isinstance(step := skill.step(), Running):
+        bench.clock.advance(0.05)
+    after = bench.robot.odometry().pose
+    assert isinstance(step, Succeeded), step
+    assert math.hypot(after.x_m - before.x_m, after.y_m - before.y_m) > 0.3

@@ -10,7 +10,7 @@ from types import ModuleType
 import grpc
 from call_faults import Switchboard
 
-from errand_spot.adapter.connection import Address, Connection
+from errand_spot.adapter.connection import SLOW_S, Address, Connection
 from errand_spot.adapter.robot import ApiRobot
 from errand_spot.server.computer import PERIOD_S, Pace
 from errand_spot.server.estop import Tablet
@@ -105,7 +105,7 @@ class LockStep:
         if self._failure is not None:
             raise self._failure
         self.connection = Connection(Address("127.0.0.1", self.server.port, credentials.certificate), USER, PASSWORD)
-        self.connection.synchronise()
+        self.connection.synchronise(timeout_s=SLOW_S)
         self.robot = ApiRobot("Alice", self.connection, self, spot_capabilities())
 
     def _serve(self):

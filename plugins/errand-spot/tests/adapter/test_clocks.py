@@ -9,7 +9,7 @@ import pytest
 from lock_step import PASSWORD, USER, scripted_spot
 
 from errand_spot.adapter import connection
-from errand_spot.adapter.connection import Address, Connection, WallClock
+from errand_spot.adapter.connection import SLOW_S, Address, Connection, WallClock
 from errand_spot.adapter.robot import ApiRobot
 from errand_spot.server import computer
 from plant.robots.spot.kind import spot_capabilities
@@ -49,7 +49,7 @@ def serve(credentials, monkeypatch):
             monkeypatch.setattr(computer, "POWER_ON_S", 0.1)
             server, scripted = ending.enter_context(scripted_spot(credentials))
             made = Connection(Address("127.0.0.1", server.port, credentials.certificate), USER, PASSWORD)
-            made.synchronise()
+            made.synchronise(timeout_s=SLOW_S)
             wall = WallClock(made)
             robot = ApiRobot("Alice", made, wall, spot_capabilities())
             wall.after.append(robot.poll)

@@ -18,7 +18,7 @@ from call_faults import Fault
 from lock_step import PASSWORD, USER, LockStep, scripted
 from proxy import Proxy
 
-from errand_spot.adapter.connection import Address, Connection, LostError
+from errand_spot.adapter.connection import SLOW_S, Address, Connection, LostError
 from errand_spot.adapter.robot import ApiRobot
 from errand_spot.adapter.statuses import trouble
 from plant.robots.spot.kind import spot_capabilities
@@ -199,7 +199,7 @@ def test_a_clock_that_is_not_synchronised_stays_as_it_was(step, number):
     before = step.connection._ahead_s
     fault = Fault(fields={"state.status": number})
     with step.server.faults.fault(f"{API}TimeSyncService/TimeSyncUpdate", fault), pytest.raises(LostError):
-        step.connection.synchronise()
+        step.connection.synchronise(timeout_s=SLOW_S)
     assert step.connection._ahead_s == before
 
 
@@ -229,7 +229,7 @@ def test_a_cut_connection_ends_what_runs_and_nothing_moves_on(step, credentials)
     step.robot.return_lease(step.lease)
     step.connection.give_back()
     connection = Connection(Address("127.0.0.1", proxy.port, credentials.certificate), USER, PASSWORD)
-    connection.synchronise()
+    connection.synchronise(timeout_s=SLOW_S)
     ours, step.robot = step.robot, ApiRobot("Alice", connection, step, spot_capabilities())
     try:
         step.lease = step.robot.take_lease("test")

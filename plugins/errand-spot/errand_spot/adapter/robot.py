@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import math
-import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
@@ -378,8 +377,8 @@ class ApiRobot:
     def _keep(self) -> None:
         """Sends the heartbeat; checks whether a lost lease is free again."""
         self.heartbeat.beat()
-        if self._taken_by and time.monotonic() - self._looked_s > _LOOK_S:
-            self._looked_s = time.monotonic()
+        if self._taken_by and self._clock.now() - self._looked_s > _LOOK_S:
+            self._looked_s = self._clock.now()
             self._taken_by = self._connection.holder()
 
     # -- inside ------------------------------------------------------------------------------------------------------
@@ -436,7 +435,7 @@ class ApiRobot:
         if self._connection.lease is not None:
             _LOG.warning("%s: %s has taken the lease; the mission waits", self._name, holder or "another client")
         self._current, self._connection.lease, self._taken_by = None, None, holder
-        self._looked_s = time.monotonic()
+        self._looked_s = self._clock.now()
 
     def _refused(self, reason: str, cause: CommandCause) -> CommandId:
         return self._sent.note(CommandState.REFUSED, reason, cause)

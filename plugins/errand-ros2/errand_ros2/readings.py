@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.common.eigen_geometry import Quaternion
@@ -16,14 +15,13 @@ from errand_ros2.messages import MAP_FRAME
 from skills.estimate.grid_map import GridMap
 from skills.geometry import compose
 from skills.inputs.errors import InputError
-from skills.robot import Capabilities, FloatArray, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
+from skills.robot import Capabilities, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
 FRAMES: Final = frozenset({MAP_FRAME, "world"})  # names of the map's frame
 TOPIC: Final = "cmd_vel"
 LIFE_S: Final = 0.2  # time after which a velocity no longer counts; then the robot stands
 STILL: Final = ((0.0, 0.0, 0.0), -math.inf)
 _SHORTEST_QUATERNION: Final = 0.1
-_NEAREST_M: Final = 0.3
 _MOST_PIXELS: Final = 1 << 24
 _POINT_TYPES: Final = {7: "f4", 8: "f8"}
 _COLOURS: Final = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4}
@@ -152,29 +150,6 @@ def cloud_points(message: Any) -> NDArray[np.float64]:
     return np.asarray(xyz[np.isfinite(xyz).all(axis=1)])
 
 
-def cloud_scan(
-    points_L: FloatArray,
-    elevations: FloatArray,
-    count: int,
-    stamp_s: float,
-    X_BL: RigidTransform,
-    X_OB: RigidTransform,
-) -> Scan:
-    """Returns points (N, 3) in the lidar's frame as a revolution; `count` columns, in each the nearest of a ring."""
-    far_m = np.linalg.norm(points_L, axis=1)
-    points_L, far_m = points_L[far_m > _NEAREST_M], far_m[far_m > _NEAREST_M]
-    found = np.arcsin(np.clip(points_L[:, 2] / far_m, -1.0, 1.0))
-    rings = np.rint((found - elevations[0]) / (elevations[1] - elevations[0])).astype(int)
-    turn = np.arctan2(points_L[:, 1], points_L[:, 0])
-    column = np.rint((turn + np.pi) / (2.0 * np.pi) * count).astype(int) % count
-    ranges: NDArray[np.float32] = np.full((len(elevations), count), np.inf, dtype=np.float32)
-    inside = (rings >= 0) & (rings < len(elevations))
-    np.minimum.at(ranges, (rings[inside], column[inside]), far_m[inside].astype(np.float32))
-    ranges[np.isinf(ranges)] = np.nan
-    azimuths = (-np.pi + np.arange(count) * (2.0 * np.pi / count)).astype(np.float64)
-    return Scan(stamp_s, ranges, elevations, azimuths, X_BL, X_OB)
-
-
 def flat_scan(message: Any, stamp_s: float, X_BL: RigidTransform, X_OB: RigidTransform) -> Scan:
     """Returns sensor_msgs/LaserScan as a revolution of one ring."""
     ranges = np.asarray(message.ranges, np.float32)
@@ -201,11 +176,6 @@ def pixels(message: Any) -> NDArray[Any]:
     if channels == 1:
         return np.asarray(made[:, :, 0])
     return np.ascontiguousarray(made[:, :, :3] if message.encoding.startswith("rgb") else made[:, :, 2::-1])
-
-
-def grey_of(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Returns a picture without its colours."""
-    return picture if picture.ndim == 2 else np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), np.uint8)
 
 
 def depth_m(message: Any) -> NDArray[np.float32]:

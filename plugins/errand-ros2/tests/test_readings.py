@@ -93,15 +93,6 @@ def test_a_cloud_with_other_fields_gives_its_finite_points(datatype):
     assert found == pytest.approx(np.array(points)[[0, 2]], abs=1e-6)
 
 
-def test_a_cloud_becomes_rings_of_a_revolution():
-    far = readings.cloud_scan(
-        np.array([[2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]), np.radians(np.linspace(-15.0, 15.0, 31)), 900, 1.0, HERE, HERE
-    )
-    assert far.ranges_m.shape == (31, 900)
-    assert far.ranges_m[15, 450] == pytest.approx(2.0)
-    assert np.isfinite(far.ranges_m).sum() == 1
-
-
 @pytest.mark.parametrize(
     "changes", [{"fields": []}, {"point_step": 3}, {"width": 1000}, {"row_step": 5}, {"height": 9}]
 )

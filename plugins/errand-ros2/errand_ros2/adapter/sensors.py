@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
+import cv2
 import numpy as np
 from pydrake.math import RigidTransform
 
@@ -186,7 +187,7 @@ class SensedRobot:
         points_L = (X_BL.inverse() @ X_BF @ points_F.T).T if len(points_F) else points_F
         file = self._description.file.lidar
         elevations = np.radians(np.linspace(file.lowest, file.highest, file.rings))
-        self._scan = readings.cloud_scan(points_L, elevations, file.columns, stamp_s, X_BL, X_OB)
+        self._scan = Scan.of_points(points_L, elevations, file.columns, stamp_s, X_BL, X_OB)
 
     def _hear_scan(self, message: Any) -> None:
         stamp_s = self._stamp(message)
@@ -306,5 +307,5 @@ class SensedRobot:
         if frames is None or picture is None or far is None or None in lenses:
             raise NoImageError(f"{source}: the picture cannot be used")
         colour = picture if picture.ndim == 3 else None
-        grey = readings.grey_of(picture)
+        grey = picture if colour is None else np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), np.uint8)
         return Image(stamp_s, source, f"{source}_camera", lenses[0], lenses[-1], colour, grey, far, frames)

@@ -32,12 +32,12 @@ from skills.robot import (
 
 TIP_RADIUS_M: Final = float(spot_facts()["gripper"]["tip_radius"])
 """Distance of the fingertip from the hinge of the finger."""
-_RINGS_DEG: Final = np.arange(-15.0, 16.0, 2.0)
-_COLUMNS: Final = 900
+RINGS_RAD: Final = np.deg2rad(np.arange(-15.0, 16.0, 2.0))
+COLUMNS: Final = 900
 _NO_DEPTH: Final = (0, 65535)
 _MILD: Final = (SystemFault.SEVERITY_INFO, SystemFault.SEVERITY_WARN)
 DEPTH_RANGE_M: Final = 4.0
-_DEPTH_RINGS_DEG: Final = np.arange(-75.0, 16.0, 1.5)
+_DEPTH_RINGS_RAD: Final = np.deg2rad(np.arange(-75.0, 16.0, 1.5))
 _DEPTH_STRIDE: Final = 3
 
 
@@ -125,33 +125,11 @@ def off_path_rad(path_rad: FloatArray, q_rad: FloatArray) -> float:
     return float(np.abs(starts + shares[:, None] * steps - q_rad).max(axis=1).min())
 
 
-def scan(
-    points_L: FloatArray,
-    stamp_s: float,
-    X_BL: RigidTransform,
-    X_OB: RigidTransform,
-    rings_deg: NDArray[np.float64] = _RINGS_DEG,
-) -> Scan:
-    """Returns points (N, 3) in the lidar's frame as a revolution; the nearest of a ring and azimuth counts."""
-    far_m = np.linalg.norm(points_L, axis=1)
-    points_L, far_m = points_L[far_m > 0.3], far_m[far_m > 0.3]
-    elevations = np.arcsin(np.clip(points_L[:, 2] / far_m, -1.0, 1.0))
-    rings = np.rint((np.rad2deg(elevations) - rings_deg[0]) / (rings_deg[1] - rings_deg[0])).astype(int)
-    turn = np.arctan2(points_L[:, 1], points_L[:, 0])
-    columns = np.rint((turn + np.pi) / (2.0 * np.pi) * _COLUMNS).astype(int) % _COLUMNS
-    ranges: NDArray[np.float32] = np.full((len(rings_deg), _COLUMNS), np.inf, dtype=np.float32)
-    inside = (rings >= 0) & (rings < len(rings_deg))
-    np.minimum.at(ranges, (rings[inside], columns[inside]), far_m[inside].astype(np.float32))
-    ranges[np.isinf(ranges)] = np.nan
-    azimuths = np.arange(_COLUMNS) / _COLUMNS * 2.0 * np.pi - np.pi
-    return Scan(stamp_s, ranges, np.deg2rad(rings_deg), azimuths, X_BL, X_OB)
-
-
 def depth_scan(answers: Sequence[Any], stamp_s: float, X_BL: RigidTransform, X_OB: RigidTransform) -> Scan:
     """Returns the depth cameras' points within 4 m as a revolution of a LiDAR at X_BL. Raises NoImageError."""
     seen = [_points_B(answer) for answer in answers]
     points_L = X_BL.inverse() @ np.concatenate([np.zeros((0, 3)), *seen]).T
-    return scan(np.asarray(points_L.T), stamp_s, X_BL, X_OB, _DEPTH_RINGS_DEG)
+    return Scan.of_points(np.asarray(points_L.T), _DEPTH_RINGS_RAD, COLUMNS, stamp_s, X_BL, X_OB)
 
 
 def _points_B(answer: Any) -> FloatArray:

@@ -13,12 +13,13 @@ from pydrake.math import RigidTransform
 
 from errand_spot.adapter.connection import Connection, LostError, RobotClock
 from errand_spot.adapter.readings import (
+    COLUMNS,
     DEPTH_RANGE_M,
+    RINGS_RAD,
     Readings,
     depth_scan,
     picture,
     readings,
-    scan,
     sensor_pose,
     unfit,
 )
@@ -191,7 +192,8 @@ class Sensors:
         points = np.frombuffer(cloud.data, np.float32).reshape(-1, 3).astype(np.float64)
         X_BF = pose_between(frames, "body", source.frame_name_sensor)
         points_L = (self._X_BL().inverse() @ X_BF @ points.T).T
-        return scan(points_L, self._stamp(source.acquisition_time), self._X_BL(), pose_between(frames, "odom", "body"))
+        stamp_s, X_OB = self._stamp(source.acquisition_time), pose_between(frames, "odom", "body")
+        return Scan.of_points(points_L, RINGS_RAD, COLUMNS, stamp_s, self._X_BL(), X_OB)
 
     def _X_BL(self) -> RigidTransform:
         """Pose of the LiDAR on the rear rails, as in the description."""

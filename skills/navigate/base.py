@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from skills.api import Cause, InputsT, Running, SkillContext
 from skills.geometry import compose
-from skills.navigate.footprint import Footprint, pose_array
+from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.robot import CommandCause, CommandId, CommandState, Pose2D
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 
 _LOOK_AHEAD_S = 0.4
+_BRAKING_M_S2 = 2.0
 
 
 class Base:
@@ -39,6 +40,25 @@ class Base:
         until_s = self._context.clock.now() + self._context.robot.capabilities().drive_expiry_s
         self._command = self._context.robot.drive(*velocity, until_s=until_s, lease=self._context.lease)
         self.last_velocity = np.array(velocity)
+
+    def drive_clear(self, wanted: NDArray[np.float64], most_change: NDArray[np.float64]) -> bool:
+        """Drives towards a velocity (3,), changed by so much at most, slower near obstacles; returns whether it does.
+
+        The ground that the body covers until it stands must be free, or its clearance grow; else the base stops.
+        """
+        towards = self.last_velocity + np.clip(wanted - self.last_velocity, -most_change, most_change)
+        for velocity in (towards, 0.5 * towards, 0.25 * towards):
+            if self._is_clear(vx := float(velocity[0]), vy := float(velocity[1]), wz := float(velocity[2])):
+                self.drive((vx, vy, wz))
+                return True
+        self.stop()
+        return False
+
+    def _is_clear(self, vx: float, vy: float, wz: float) -> bool:
+        here, until_s = self._context.pose(), _LOOK_AHEAD_S + math.hypot(vx, vy) / (2.0 * _BRAKING_M_S2)
+        ahead = [compose(here, _moved(vx, vy, wz, time_s)) for time_s in np.linspace(0.0, until_s, 6)]
+        clearance = footprint_clearance_m(self._context.costmap, self._footprint, pose_array(ahead))
+        return bool(np.min(clearance[1:]) >= min(SAFE_MARGIN_M, float(clearance[0]) + 0.002))
 
     def _within_limits(self, velocity: tuple[float, float, float]) -> tuple[float, float, float]:
         """The velocity, reduced to the speed limits of the zones about the robot."""
@@ -78,6 +98,12 @@ class Base:
         if self._context.robot.command_status(self._command).state is CommandState.RUNNING:
             self._context.robot.stop(lease=self._context.lease, only=self._command)
         self._command = None
+
+
+def _moved(vx: float, vy: float, wz: float, time_s: float) -> Pose2D:
+    """Where a velocity leads in a time, along an arc (approximately)."""
+    c, s = math.cos(0.5 * wz * time_s), math.sin(0.5 * wz * time_s)
+    return Pose2D(time_s * (c * vx - s * vy), time_s * (s * vx + c * vy), wz * time_s)
 
 
 class MovingSkill(RoutineSkill[InputsT]):

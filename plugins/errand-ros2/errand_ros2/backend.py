@@ -48,8 +48,10 @@ class Ros2:
             node = Node(session, _NAME, f"/{space}")
             if isinstance(clock, SimulatedClock):
                 node.subscribe("/clock", "rosgraph_msgs/msg/Clock", clock.hear_clock)
-            robot, ready = Ros2Robot(name, node, clock, description), Event()
-            if missing := _missing(robot, clock):
+            robot, ready, until_s = Ros2Robot(name, node, clock, description), Event(), time.monotonic() + _PATIENCE_S
+            while (missing := robot.missing() if clock.is_heard else "/clock") and time.monotonic() < until_s:
+                Event().wait(_TICK_S)
+            if missing:
                 hint = "is the robot on, with RMW_IMPLEMENTATION=rmw_zenoh_cpp, in this domain and at this router?"
                 raise InputError(f"ros2://{space}: nothing is heard on {missing}", hint=hint)
 
@@ -63,11 +65,3 @@ class Ros2:
                 yield ConnectedRobot(robot, clock, ready.set, robot.notes(f"ros2://{space}", session.place.endpoint))
             finally:
                 robot.return_lease(robot.take_lease(_NAME))
-
-
-def _missing(robot: Ros2Robot, clock: RobotClock) -> str:
-    """Waits for the first readings; returns the topic on which nothing was heard, empty when all are there."""
-    until_s = time.monotonic() + _PATIENCE_S
-    while (missing := robot.missing() if clock.is_heard else "/clock") and time.monotonic() < until_s:
-        Event().wait(_TICK_S)
-    return missing

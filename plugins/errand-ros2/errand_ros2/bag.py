@@ -22,11 +22,10 @@ from errand_ros2.messages import Fields
 from errand_ros2.wire.types import ros_types
 from executive.record.history import Event
 from executive.record.other_tools import body_frame, ros_name
+from executive.record.schemas import DERIVED, GRID
 from skills.inputs.outside import writing
 
-GRID: Final = "map/grid"
-VIEWER_COPIES: Final = frozenset({"detections/boxes", "map/zones", "transform"})
-"""Topics of the log whose messages repeat others in a form that Foxglove draws."""
+VIEWER_COPIES: Final = DERIVED - {GRID}
 TF: Final = "/tf"
 TF_STATIC: Final = "/tf_static"
 _ROOT: Final = "map"  # frame that other tools take for the fixed one; it equals the world frame

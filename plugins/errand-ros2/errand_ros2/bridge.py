@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -20,6 +20,7 @@ from errand_ros2.goals import Goals
 from errand_ros2.messages import Fields
 from errand_ros2.readings import FRAMES, TOPIC, planar_pose
 from errand_ros2.robot_topics import Frames, RobotTopics
+from errand_ros2.tree_topic import TreeTopic
 from errand_ros2.wire.node import Node, Place, Publisher, open_session
 from errand_ros2.wire.types import LATCHED
 from executive.app.prepare.prepared import Prepared
@@ -34,7 +35,6 @@ from executive.tree.compiler import CompiledTree
 from skills.api import LocalisationEstimate, ParticleView, SearchingLocaliser, SkillContext
 from skills.estimate.grid_map import load_grid_map
 from skills.inputs.errors import InputError
-from skills.robot import Clock
 
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
@@ -46,10 +46,12 @@ _TOPICS: Final = {
     "task_channel": "errand_msgs/msg/TaskMessage",
     "object_to_detect": "errand_msgs/msg/ObjectToDetect",
     "object_destination": "errand_msgs/msg/ObjectDestination",
-    "local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
+    **dict.fromkeys(("local_costmap/costmap", "global_costmap/costmap"), "nav_msgs/msg/OccupancyGrid"),
+    **dict.fromkeys(("objects", "people"), "visualization_msgs/msg/MarkerArray"),
     "particle_cloud": "nav2_msgs/msg/ParticleCloud",
 }
-_DIAGNOSTICS_PERIOD_S, _POSE_PERIOD_S, _MOST_PARTICLES = 1.0, 0.5, 200
+_PERIOD_S, _MOST_PARTICLES = 0.5, 200
+_CHEST_M, _HALF_M = 1.2, 3.0  # height of people's markers; half the side of the local costmap
 _LATE_S: Final = 0.5  # delay that a run does not catch up with
 
 
@@ -67,11 +69,12 @@ class _RobotBridge:
     driving: Driving
     goals: Goals
     out: Mapping[str, Publisher]
+    tree_topic: TreeTopic
     context: SkillContext | None = None
     tree: CompiledTree | None = None
     topics: RobotTopics | None = None
     is_active: bool = False
-    pose_due_s: float = 0.0
+    due_s: float = 0.0
     initial: list[Any] = field(default_factory=list)
 
 
@@ -86,19 +89,13 @@ class Bridge(RunVisitor):
         self._pool = self._open.enter_context(ThreadPoolExecutor(1, thread_name_prefix="errand-ros2"))
         self._node = Node(self.session, "errand")
         self._clock = self._node.publisher("/clock", "rosgraph_msgs/msg/Clock")
-        self._map = self._node.publisher("/map", "nav_msgs/msg/OccupancyGrid", LATCHED)
         self._diagnostics = self._node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
         self._frames = Frames(self._node)
         self._grid = load_grid_map(prepared.world.scan_map_path)
-        self._map.put(messages.occupancy_grid(self._grid))
+        self._node.publisher("/map", "nav_msgs/msg/OccupancyGrid", LATCHED).put(messages.occupancy_grid(self._grid))
         self._conversations = Conversations(prepared, control)
         self._robots = {each.mission.robot_name: self._robot(each) for each in prepared.all}
-        first = next(iter(self._robots.values()))  # RViz's buttons and teleoperation send without a namespace
-        hear_pose = self._node.later(self._pool, first.goals.hear_pose)
-        self._node.subscribe("/goal_pose", "geometry_msgs/msg/PoseStamped", hear_pose)
-        self._node.subscribe("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", first.initial.append)
-        self._node.subscribe(f"/{TOPIC}", "geometry_msgs/msg/Twist", first.driving.hear)
-        self._diagnostics_due_s = 0.0
+        self._hear(self._node, next(iter(self._robots.values())))  # RViz and teleoperation send without a namespace
         self._begun: tuple[float, float] | None = None
 
     def _robot(self, prepared: Prepared) -> _RobotBridge:
@@ -111,27 +108,31 @@ class Bridge(RunVisitor):
 
         driving = Driving(name, self._control)
         goals = Goals(node, prepared, self._control, self._grid, self._pool, self._hurry)
-        own = _RobotBridge(node, driving, goals, out)
-        node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", node.later(self._pool, goals.hear_pose))
-        node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
-        node.subscribe(TOPIC, "geometry_msgs/msg/Twist", driving.hear)
+        own = _RobotBridge(node, driving, goals, out, TreeTopic(node))
+        self._hear(node, own)
         node.subscribe("say", "std_msgs/msg/String", node.later(self._pool, hear))
         for what in ("pause", "resume", "cancel", "step"):
             node.answer(what, "std_srvs/srv/Trigger", partial(self._obey, name, what))
         return own
 
+    def _hear(self, node: Node, own: _RobotBridge) -> None:
+        """Takes goals, poses and velocities for a robot."""
+        node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", node.later(self._pool, own.goals.hear_pose))
+        node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
+        node.subscribe(TOPIC, "geometry_msgs/msg/Twist", own.driving.hear)
+
     def _obey(self, name: str, what: str, _: Any) -> Fields:
         """Answers a service by its command to a robot, or by the reason why it is refused."""
         control = self._control
+        verbs: Mapping[str, Callable[[], None]] = {
+            "pause": partial(control.pause, "paused by ROS 2", robot=name),
+            "cancel": partial(control.cancel, "cancelled by ROS 2", robot=name),
+            "resume": partial(control.resume, robot=name),
+            "step": control.step,
+        }
         try:
-            if what == "pause":
-                control.pause("paused by ROS 2", robot=name)
-            elif what == "cancel":
-                control.cancel("cancelled by ROS 2", robot=name)
-            elif what == "step":
-                control.step()
-            else:
-                control.resume(robot=name)
+            verbs[what]()
+            if what == "resume":
                 control.resume()
         except ValueError as error:
             return {"success": False, "message": str(error)}
@@ -156,6 +157,12 @@ class Bridge(RunVisitor):
         elif topic == "detections":
             head = messages.header(message["stamp_s"], f"{own.node.namespace.strip('/')}/{message['source']}_camera")
             own.out["detections"].put(messages.detections(head, message["detections"]))
+        elif topic == "tracks":
+            seen = [(each["class_name"], each["position_W"]) for each in message["tracks"] if each["confirmed"]]
+            own.out["objects"].put(messages.markers(message["stamp"], seen))
+        elif topic == "people":
+            seen = [("person", (*each["position_W"], _CHEST_M)) for each in message["people"]]
+            own.out["people"].put(messages.markers(message["stamp"], seen))
         elif topic in _EVENTS:
             own.goals.events.put(messages.event(topic, message))
         name = {"taskChannel": "task_channel"}.get(topic, topic)
@@ -172,48 +179,48 @@ class Bridge(RunVisitor):
         for own in self._robots.values():
             if own.context is not None and own.topics is not None:
                 self._tick_robot(own, own.context, own.topics, progress)
-        if now_s >= self._diagnostics_due_s:
-            self._diagnostics_due_s = now_s + _DIAGNOSTICS_PERIOD_S
-            for name, own in self._robots.items():
-                if own.context is not None:
-                    self._put_diagnostics(name, own.context, progress)
         self._keep_pace(now_s)
 
-    def _announce(self, tree: CompiledTree, clock: Clock, prepared: Prepared) -> None:
-        publish: Any = self.message
-        announce(publish, clock, tree.robot_name, tree.commands, prepared.knowledge, world=prepared.world.name, seed=0)
-
     def _tick_robot(self, own: _RobotBridge, context: SkillContext, topics: RobotTopics, progress: Progress) -> None:
-        clock, now_s, tree = context.clock, context.clock.now(), progress.trees.get(context.robot.name)
+        now_s, tree = context.clock.now(), progress.trees.get(context.robot.name)
         if tree is not None and tree is not own.tree:
             own.tree = tree
-            self._node.guarded(partial(self._announce, tree, clock, own.goals.prepared), "a command")
+            publish: Any = self.message
+            world, knowledge = own.goals.prepared.world.name, own.goals.prepared.knowledge
+            told = partial(announce, publish, context.clock, tree.robot_name, tree.commands, knowledge)
+            self._node.guarded(partial(told, world=world, seed=0), "a command")
         while own.initial:
             _set_pose(context, own.initial.pop(0))
         estimate = context.localiser.estimate()
         topics.publish(now_s, estimate.X_WO if estimate.localised else None)
-        if estimate.localised and now_s >= own.pose_due_s:
-            own.pose_due_s = now_s + _POSE_PERIOD_S
-            own.out["amcl_pose"].put(messages.pose_with_covariance(now_s, context.X_WB(), estimate.covariance))
-            if own.out["local_costmap/costmap"].is_heard:
-                here = context.pose()
-                own.out["local_costmap/costmap"].put(messages.costmap(now_s, context.costmap, (here.x_m, here.y_m)))
-            if isinstance(context.localiser, ParticleView) and own.out["particle_cloud"].is_heard:
-                own.out["particle_cloud"].put(messages.particles(now_s, context.localiser.particles_W(_MOST_PARTICLES)))
+        if now_s >= own.due_s:
+            own.due_s = now_s + _PERIOD_S
+            self._put_slowly(own, context, estimate, progress)
+            if tree is not None:
+                own.tree_topic.put(now_s, tree, progress.states[context.robot.name])
         if own.is_active:
             own.driving.tick(context)
             own.goals.tick(context, progress)
 
-    def _put_diagnostics(self, name: str, context: SkillContext, progress: Progress) -> None:
-        estimate, robot = context.localiser.estimate(), context.robot
-        values = {
-            "battery": f"{robot.battery().charge:.3f}",
-            "localised": str(estimate.localised),
-            "localisation health": f"{estimate.health:.3f}",
-            "overruns": str(progress.overruns),
-            "tick (ms)": f"{progress.tick_wall_s * 1e3:.1f}",
-        }
-        self._diagnostics.put(messages.diagnostics(progress.now_s, name, robot.faults(), values))
+    def _put_slowly(
+        self, own: _RobotBridge, context: SkillContext, estimate: LocalisationEstimate, progress: Progress
+    ) -> None:
+        """Publishes the robot's health, and while it is localised pose, costmaps and particles."""
+        robot, now_s = context.robot, context.clock.now()
+        values = {"overruns": str(progress.overruns), "tick (ms)": f"{progress.tick_wall_s * 1e3:.1f}"}
+        values |= {"localised": str(estimate.localised), "localisation health": f"{estimate.health:.3f}"}
+        values |= {"battery": f"{robot.battery().charge:.3f}"}
+        self._diagnostics.put(messages.diagnostics(progress.now_s, robot.name, robot.faults(), values))
+        if not estimate.localised:
+            return
+        own.out["amcl_pose"].put(messages.pose_with_covariance(now_s, context.X_WB(), estimate.covariance))
+        low_m = context.pose().x_m - _HALF_M, context.pose().y_m - _HALF_M
+        areas = {"local": (low_m, (2.0 * _HALF_M,) * 2), "global": (self._grid.origin_m, self._grid.size_m)}
+        for name, area in areas.items():
+            if (out := own.out[f"{name}_costmap/costmap"]).is_heard:
+                out.put(messages.costmap(now_s, context.costmap, *area))
+        if isinstance(context.localiser, ParticleView) and own.out["particle_cloud"].is_heard:
+            own.out["particle_cloud"].put(messages.particles(now_s, context.localiser.particles_W(_MOST_PARTICLES)))
 
     def mission_ended(self, end: MissionEnd) -> None:
         """Ends the goals of a robot whose mission has ended."""

@@ -8,17 +8,16 @@ from typing import Final
 
 import numpy as np
 
-from errand_ros2.readings import LIFE_S, TOPIC, HeardVelocity
+from errand_ros2.readings import LIFE_S, TOPIC, HeardVelocity, within_limits
 from executive.run.control import Control
 from skills.api import SkillContext
 from skills.navigate.base import Base
 from skills.navigate.follower import FollowerOptions
-from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m
-from skills.robot import FloatArray
 
 RESUME_S: Final = 1.0  # time (wall clock) without velocities after which the mission goes on
-_REACTION_S, _BRAKING_M_S2, _SAMPLES = 0.4, 2.0, 6
-_TICK_S: Final = 0.05
+_TICK_S, _LIMITS = 0.05, FollowerOptions()
+_MOST: Final = np.array([_LIMITS.max_speed_m_s, _LIMITS.lateral_m_s, _LIMITS.turn_rad_s])
+_MOST_CHANGE: Final = _TICK_S * np.array([*[_LIMITS.acceleration_m_s2] * 2, _LIMITS.turn_acceleration_rad_s2])
 
 
 class Driving(HeardVelocity):
@@ -45,36 +44,13 @@ class Driving(HeardVelocity):
         base = self._base[1]
         if alive and any(asked):
             self._moved_s = now_s
-            self._drive(base, context, np.array(asked))
+            most = np.array([_LIMITS.max_speed_m_s, _LIMITS.lateral_m_s, _LIMITS.turn_rad_s])
+            wanted = np.clip(within_limits(asked, context.robot.capabilities()), -most, most)
+            base.drive_clear(
+                wanted, _TICK_S * np.array([*[_LIMITS.acceleration_m_s2] * 2, _LIMITS.turn_acceleration_rad_s2])
+            )
         else:
             base.stop()
         if now_s - max(at_s, self._moved_s) > RESUME_S:
             self._driving = False
             self._control.resume(robot=self._name)
-
-    def _drive(self, base: Base, context: SkillContext, wanted: FloatArray) -> None:
-        """Drives towards a velocity within the base's limits, slower or not at all near obstacles."""
-        limits, abilities = FollowerOptions(), context.robot.capabilities()
-        most = np.array([limits.max_speed_m_s, limits.lateral_m_s, limits.turn_rad_s])
-        wanted = np.clip(wanted, -most, most)
-        wanted *= min(1.0, abilities.max_speed_m_s / max(float(np.hypot(*wanted[:2])), 1e-9))
-        change = _TICK_S * np.array([limits.acceleration_m_s2] * 2 + [limits.turn_acceleration_rad_s2])
-        towards = base.last_velocity + np.clip(wanted - base.last_velocity, -change, change)
-        for share in (1.0, 0.5, 0.25):
-            if is_clear(context, share * towards):
-                base.drive(tuple((share * towards).tolist()))
-                return
-        base.stop()
-
-
-def is_clear(context: SkillContext, moving: FloatArray) -> bool:
-    """Returns whether the ground that the body covers until it stands is free, or its clearance grows."""
-    here, footprint = context.pose(), Footprint.of(context.robot.capabilities())
-    until_s = _REACTION_S + float(np.hypot(*moving[:2])) / (2.0 * _BRAKING_M_S2)
-    times = np.linspace(0.0, until_s, _SAMPLES)
-    halfway = here.yaw_rad + 0.5 * moving[2] * times
-    x = here.x_m + times * (np.cos(halfway) * moving[0] - np.sin(halfway) * moving[1])
-    y = here.y_m + times * (np.sin(halfway) * moving[0] + np.cos(halfway) * moving[1])
-    poses = np.stack([x, y, here.yaw_rad + moving[2] * times], axis=1)
-    clearance = footprint_clearance_m(context.costmap, footprint, poses)
-    return bool(np.min(clearance[1:]) >= min(SAFE_MARGIN_M, float(clearance[0]) + 0.002))

@@ -15,6 +15,7 @@ from errand_ros2.wire.types import ros_types
 from executive.record.event_log import plain_values
 from skills.api import FreeSpace
 from skills.estimate.grid_map import GridMap
+from skills.navigate.footprint import clearance_on_grid
 from skills.robot import Battery, FloatArray, Image, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
 MAP_FRAME: Final = "map"
@@ -22,7 +23,9 @@ LEAST_RANGE_M, MOST_RANGE_M = 0.05, 100.0
 MOST_COLUMNS: Final = 320  # raw pictures of a run are reduced to at most so many columns
 _UNKNOWN: Final = np.array([-1.0, *[0.0] * 8])  # covariance of what is not measured
 _FLOAT32: Final = 7
-_CELL_M, _HALF_M, _DECAY_M = 0.1, 3.0, 0.3  # cells and half the side of a costmap; where costs fall to 1/e
+_CELL_M, _DECAY_M = 0.1, 0.3  # cells of a costmap; where costs fall to 1/e
+_SPHERE, _TEXT, _DELETE_ALL = 2, 9, 3  # types and an action of visualization_msgs/Marker
+_MARKER_M, _GREEN = 0.12, {"r": 0.1, "g": 0.7, "b": 0.2, "a": 0.8}
 Fields = dict[str, Any]  # values of a message by field
 
 
@@ -88,16 +91,10 @@ def joint_state(reading: Joints) -> Fields:
 
 def laser_scan(head: Fields, ranges: Any, first_rad: float, last_rad: float, period_s: float = 0.0) -> Fields:
     """Returns beams from the first to the last azimuth; a range of NaN becomes infinite."""
-    return {
-        "header": head,
-        "angle_min": first_rad,
-        "angle_max": last_rad,
-        "angle_increment": (last_rad - first_rad) / max(len(ranges) - 1, 1),
-        "scan_time": period_s,
-        "range_min": LEAST_RANGE_M,
-        "range_max": MOST_RANGE_M,
-        "ranges": np.nan_to_num(np.asarray(ranges, np.float32), nan=np.inf),
-    }
+    step_rad = (last_rad - first_rad) / max(len(ranges) - 1, 1)
+    angles = {"angle_min": first_rad, "angle_max": last_rad, "angle_increment": step_rad, "scan_time": period_s}
+    reach = {"range_min": LEAST_RANGE_M, "range_max": MOST_RANGE_M}
+    return {"header": head, **angles, **reach, "ranges": np.nan_to_num(np.asarray(ranges, np.float32), nan=np.inf)}
 
 
 def level_scan(reading: Scan, frame: str, period_s: float) -> Fields:
@@ -158,21 +155,31 @@ def _image(head: Fields, pixels: Any, encoding: str) -> Fields:
     return {"header": head, "encoding": encoding, **size, "data": rows.ravel()}
 
 
-def compressed(picture: Fields) -> Fields:
+def compressed(reading: Image, frame: str, most_columns: int = MOST_COLUMNS) -> Fields:
     """Returns what `picture` returns as JPEG."""
-    pixels = picture["data"].reshape(picture["height"], picture["width"], -1)
-    _, data = cv2.imencode(".jpg", pixels[:, :, ::-1])
-    return {"header": picture["header"], "format": f"{picture['encoding']}; jpeg compressed", "data": data.ravel()}
+    raw = picture(reading, frame, most_columns)
+    _, data = cv2.imencode(".jpg", raw["data"].reshape(raw["height"], raw["width"], -1)[:, :, ::-1])
+    return {"header": raw["header"], "format": f"{raw['encoding']}; jpeg compressed", "data": data.ravel()}
 
 
-def camera_info(stamp_s: float, frame: str, lens: Intrinsics, most_columns: int = MOST_COLUMNS) -> Fields:
-    """Returns the intrinsics of a picture that `picture` or `depth` returns; `lens` are those before."""
+def compressed_depth(reading: Image, frame: str, most_columns: int = MOST_COLUMNS) -> Fields:
+    """Returns depth in millimetres as PNG, behind the empty header of image_transport's `compressedDepth`."""
+    step = _step(reading.depth_intrinsics, most_columns)
+    _, data = cv2.imencode(".png", np.rint(1e3 * reading.depth_m[::step, ::step]).astype(np.uint16))
+    content = np.append(np.zeros(12, np.uint8), data)
+    return {"header": header(reading.stamp_s, frame), "format": "16UC1; compressedDepth png", "data": content}
+
+
+def camera_info(reading: Image, frame: str, most_columns: int = MOST_COLUMNS, *, of_depth: bool = False) -> Fields:
+    """Returns the intrinsics of what `picture`, or `depth`, returns."""
+    lens = reading.depth_intrinsics if of_depth else reading.intrinsics
     step = _step(lens, most_columns)
     K = np.diag([lens.fx / step, lens.fy / step, 1.0])
     K[:2, 2] = lens.cx / step, lens.cy / step
     size = {"height": math.ceil(lens.height / step), "width": math.ceil(lens.width / step)}
     flat = {"distortion_model": "plumb_bob", "d": np.zeros(5), "r": np.eye(3).ravel()}
-    return {"header": header(stamp_s, frame), **size, **flat, "k": K.ravel(), "p": (K @ np.eye(3, 4)).ravel()}
+    values = {**size, **flat, "k": K.ravel(), "p": (K @ np.eye(3, 4)).ravel()}
+    return {"header": header(reading.stamp_s, frame), **values}
 
 
 def _step(lens: Intrinsics, most_columns: int) -> int:
@@ -194,13 +201,24 @@ def grid_of(stamp_s: float, cells: Any, resolution_m: float, origin_m: Sequence[
     return {"header": header(stamp_s, MAP_FRAME), "info": info, "data": cells.ravel()}
 
 
-def costmap(stamp_s: float, free: FreeSpace, centre_m: Sequence[float]) -> Fields:
-    """Returns costs about a point by clearance: 100 in obstacles, less the farther away."""
-    steps_m = np.arange(0.5 * _CELL_M - _HALF_M, _HALF_M, _CELL_M)
-    points = np.stack(np.meshgrid(centre_m[0] + steps_m, centre_m[1] + steps_m), axis=-1)
-    clearance_m = free.clearance_m(points.reshape(-1, 2)).reshape(points.shape[:2])
+def costmap(stamp_s: float, free: FreeSpace, low_m: Sequence[float], size_m: Sequence[float]) -> Fields:
+    """Returns costs by clearance in a rectangle from its lowest corner on: 100 in obstacles, less the farther away."""
+    spans = zip(low_m, size_m, strict=True)
+    x_m, y_m = (low + _CELL_M * (np.arange(float(round(size / _CELL_M))) + 0.5) for low, size in spans)
+    clearance_m = clearance_on_grid(free, x_m, y_m)
     costs = np.where(clearance_m <= 0.0, 100.0, 98.0 * np.exp(-clearance_m / _DECAY_M))
-    return grid_of(stamp_s, costs.astype(np.int8), _CELL_M, [value - _HALF_M for value in centre_m])
+    return grid_of(stamp_s, costs.astype(np.int8), _CELL_M, low_m)
+
+
+def markers(stamp_s: float, seen: Iterable[tuple[str, Sequence[float]]]) -> Fields:
+    """Returns a sphere and a name at each place on the map, instead of all before (visualization_msgs/MarkerArray)."""
+    every: list[Fields] = [{"action": _DELETE_ALL}]
+    for number, (name, at) in enumerate(seen):
+        place = {"position": vector(at), "orientation": {"w": 1.0}}
+        shown = {"header": header(stamp_s, MAP_FRAME), "pose": place, "scale": vector([_MARKER_M] * 3), "color": _GREEN}
+        every += [shown | {"ns": "places", "id": number, "type": _SPHERE}]
+        every += [shown | {"ns": "names", "id": number, "type": _TEXT, "text": name}]
+    return {"markers": every}
 
 
 def particles(stamp_s: float, poses: FloatArray) -> Fields:

@@ -17,7 +17,7 @@ from skills.api import FreeSpace, PlanningError
 from skills.geometry import compose, inverse
 from skills.inputs.errors import InputError
 from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
-from skills.navigate.path import Path, progress_m
+from skills.navigate.path import Path, densify
 from skills.quantities import Angle, Coordinate, Duration, Length
 from skills.robot import Pose2D
 
@@ -52,7 +52,18 @@ class Nav2:
         X_WM = Pose2D(*self.map_pose)
         poses_M = [compose(inverse(X_WM), pose).transform() for pose in (start, goal)]
         here, there = (pose_stamped(0.0, MAP_FRAME, X_MB) for X_MB in poses_M)
-        result = self._ask({"start": here, "goal": there, "use_start": True, "planner_id": self.planner_id})
+        asked = {"start": here, "goal": there, "use_start": True, "planner_id": self.planner_id}
+        with open_session(Place.parse(self.network)) as session:
+            client = ActionClient(Node(session, "errand_planner"), self.action, _ACTION)
+            try:
+                sent = client.send(asked, limit_s=self.limit_s)
+            except NoAnswerError as error:
+                raise PlanningError(f"no Nav2 answers on {self.action}") from error
+            if sent is None or not sent.ended.wait(self.limit_s):
+                raise PlanningError(f"Nav2 on {self.action} does not plan within {self.limit_s:g} s")
+        result = sent.result
+        if sent.status is not GoalStatus.SUCCEEDED:
+            raise PlanningError(f"Nav2 finds no path: {result.error_msg[:200] or result.error_code}")
         try:
             found = [compose(X_WM, planar_pose(each.pose)) for each in result.path.poses]
         except InputError as error:
@@ -62,20 +73,5 @@ class Nav2:
             raise PlanningError(f"Nav2's path ends {off_m:.2f} m from the goal")
         rows = pose_array([start, *found, goal])
         rows[:, 2] = np.unwrap(rows[:, 2])
-        way_m = progress_m(rows)
-        at_m = np.append(np.arange(0.0, way_m[-1], _STEP_M), way_m[-1])
-        poses = np.stack([np.interp(at_m, way_m, column) for column in rows.T], axis=1)
+        poses = densify(rows, _STEP_M)
         return Path(poses, footprint_clearance_m(costmap, footprint, poses))
-
-    def _ask(self, goal: dict[str, Any]) -> Any:
-        with open_session(Place.parse(self.network)) as session:
-            client = ActionClient(Node(session, "errand_planner"), self.action, _ACTION)
-            try:
-                sent = client.send(goal, limit_s=self.limit_s)
-            except NoAnswerError as error:
-                raise PlanningError(f"no Nav2 answers on {self.action}") from error
-            if sent is None or not sent.ended.wait(self.limit_s):
-                raise PlanningError(f"Nav2 on {self.action} does not plan within {self.limit_s:g} s")
-        if sent.status is not GoalStatus.SUCCEEDED:
-            raise PlanningError(f"Nav2 finds no path: {sent.result.error_msg[:200] or sent.result.error_code}")
-        return sent.result

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import partial
 from typing import Final
 
 from pydrake.math import RigidTransform
@@ -13,16 +15,22 @@ from errand_ros2.wire.node import Node
 from errand_ros2.wire.types import LATCHED, SENSOR, Qos
 from skills.robot import CameraCapabilities, Image, Mount, NoImageError, Robot
 
-IMAGE_PERIOD_S: Final = 0.2
-BATTERY_PERIOD_S: Final = 1.0
-_EPSILON_S: Final = 1e-6
+IMAGE_PERIOD_S, BATTERY_PERIOD_S, _EPSILON_S = 0.2, 1.0, 1e-6
 _TF: Final = "tf2_msgs/msg/TFMessage"
-_IMAGE, _INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
-_PICTURES: Final = {
-    False: {"image": _IMAGE, "camera_info": _INFO, "image/compressed": "sensor_msgs/msg/CompressedImage"},
-    True: {"depth": _IMAGE, "depth/camera_info": _INFO},
+_IMAGE, _INFO, _COMPRESSED = (f"sensor_msgs/msg/{each}" for each in ("Image", "CameraInfo", "CompressedImage"))
+_PICTURES: Final[Mapping[bool, Mapping[str, tuple[str, Callable[[Image, str, int], Fields]]]]] = {
+    False: {
+        "image": (_IMAGE, messages.picture),
+        "camera_info": (_INFO, messages.camera_info),
+        "image/compressed": (_COMPRESSED, messages.compressed),
+    },
+    True: {
+        "depth": (_IMAGE, messages.depth),
+        "depth/camera_info": (_INFO, partial(messages.camera_info, of_depth=True)),
+        "depth/compressedDepth": (_COMPRESSED, messages.compressed_depth),
+    },
 }
-"""Topics of a camera, without and with depth."""
+"""Topics of a camera, without and with depth: their types, and how their messages are made."""
 
 
 class Frames:
@@ -46,8 +54,8 @@ class _Stream:
     def __init__(self, node: Node, camera: CameraCapabilities, depth: bool) -> None:
         self.camera, self.depth, self.due_s = camera, depth, 0.0
         self.frame = f"{node.namespace.strip('/')}/{camera.source}_camera"
-        topics = {name: (f"{camera.source}/{name}", kind) for name, kind in _PICTURES[depth].items()}
-        self.out = {name: node.publisher(*topic, SENSOR) for name, topic in topics.items()}
+        topics = _PICTURES[depth].items()
+        self.out = [(node.publisher(f"{camera.source}/{name}", kind, SENSOR), make) for name, (kind, make) in topics]
 
 
 class RobotTopics:
@@ -102,11 +110,11 @@ class RobotTopics:
     def publish_pictures(self, now_s: float) -> None:
         """Publishes the pictures for which subscriptions wait."""
         for stream in self._streams:
-            if now_s >= stream.due_s - _EPSILON_S and any(each.is_heard for each in stream.out.values()):
+            if now_s >= stream.due_s - _EPSILON_S and any(each.is_heard for each, _ in stream.out):
                 stream.due_s = now_s + self.image_period_s
                 with suppress(NoImageError):
-                    reading = self._robot.image(stream.camera.source, visual=not stream.depth, depth=stream.depth)
-                    self._publish_picture(stream, reading)
+                    source, depth = stream.camera.source, stream.depth
+                    self._publish_picture(stream, self._robot.image(source, visual=not depth, depth=depth))
 
     def _publish_scan(self) -> None:
         scan = self._robot.scan()
@@ -121,17 +129,10 @@ class RobotTopics:
 
     def _publish_picture(self, at: _Stream, reading: Image) -> None:
         """Publishes a picture or depth, and the transform of a camera that moves on the body."""
-        most, stamp_s, out = self._most_columns, reading.stamp_s, at.out
         if at.camera.mount is not Mount.BODY:
             X_OC = reading.frames.pose(reading.camera_frame)
-            moved = messages.transform(stamp_s, self._odom_frame, at.frame, X_OC)
+            moved = messages.transform(reading.stamp_s, self._odom_frame, at.frame, X_OC)
             self._frames.moving.put({"transforms": [moved]})
-        if at.depth:
-            out["depth/camera_info"].put(messages.camera_info(stamp_s, at.frame, reading.depth_intrinsics, most))
-            out["depth"].put(messages.depth(reading, at.frame, most))
-            return
-        picture = messages.picture(reading, at.frame, most)
-        out["camera_info"].put(messages.camera_info(stamp_s, at.frame, reading.intrinsics, most))
-        out["image"].put(picture)
-        if out["image/compressed"].is_heard:
-            out["image/compressed"].put(messages.compressed(picture))
+        for out, make in at.out:
+            if out.is_heard:
+                out.put(make(reading, at.frame, self._most_columns))

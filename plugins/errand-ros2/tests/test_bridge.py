@@ -47,6 +47,7 @@ HEARD = {
     "/alice/reply": STRING,
     "/alice/odom": "nav_msgs/msg/Odometry",
     "/alice/local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
+    "/alice/global_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
     "/alice/particle_cloud": "nav2_msgs/msg/ParticleCloud",
 }
 
@@ -185,6 +186,9 @@ def test_a_run_publishes_clock_pose_plan_map_events_and_diagnostics(talk):
         assert ros.heard["/alice/plan"][-1].poses[-1].pose.position.y == pytest.approx(-1.2, abs=0.1)
         assert ros.heard["/alice/amcl_pose"][-1].pose.pose.position.y == pytest.approx(-1.2, abs=0.1)
         assert max(ros.heard["/alice/local_costmap/costmap"][-1].data) == 100
+        whole, known = ros.heard["/alice/global_costmap/costmap"][-1].info, late["/map"][0].info
+        assert whole.origin.position == known.origin.position
+        assert whole.width * whole.resolution == pytest.approx(known.width * known.resolution, abs=0.1)
         assert [each.pose.position.x for each in ros.heard["/alice/particle_cloud"][-1].particles] == [0.5, 0.7]
         assert late["/map"][0].info.resolution == pytest.approx(0.025)
         assert "<robot" in late["/alice/robot_description"][0].data
@@ -263,6 +267,42 @@ def test_detections_are_boxes_in_pixels(talk):
         assert (each.results[0].hypothesis.class_id, each.results[0].hypothesis.score) == ("coke", 0.9)
         assert (each.bbox.center.position.x, each.bbox.center.position.y) == (20.0, 40.0)
         assert (each.bbox.size_x, each.bbox.size_y) == (20.0, 40.0)
+
+    talk(says)
+
+
+def test_a_viewer_asks_for_the_tree_and_sees_its_changes(talk):
+    def says(ros):
+        kind, heard = "py_trees_ros_interfaces/srv/OpenSnapshotStream", []
+        opened = Client(ros.node, "/alice/tree/snapshot_streams/open", ros_types().service(kind)).call({}, limit_s=5.0)
+        ros.node.subscribe(opened.topic_name, "py_trees_ros_interfaces/msg/BehaviourTree", heard.append, LATCHED)
+        ros.soon(lambda: heard)
+        assert [each.name for each in heard[0].behaviours if each.is_active][-1].startswith("wait")
+        ros.publisher("/goal_pose", POSE).put(stamped(0.6, -1.2))
+        ros.soon(lambda: any("navigate" in each.name for each in heard[-1].behaviours if each.is_active))
+        before = len(heard)
+        ros.soon(lambda: ros.events("outcome"))
+        assert 0 < len(heard) - before < 60
+
+    talk(says)
+
+
+def test_things_and_people_that_are_seen_are_markers(talk):
+    def says(ros):
+        heard, kind = defaultdict(list), "visualization_msgs/msg/MarkerArray"
+        for topic in ("objects", "people"):
+            ros.node.subscribe(f"/alice/{topic}", kind, heard[topic].append)
+            ros.soon(lambda topic=topic: ros.bridge._robots["Alice"].out[topic].is_heard)
+        tracks = [
+            {"class_name": name, "position_W": [1.0, 2.0, 0.8], "confirmed": sure}
+            for name, sure in (("coke", True), ("beer", False))
+        ]
+        ros.bridge.message("tracks", {"stamp": 2.5, "robot_name": "Alice", "tracks": tracks})
+        ros.bridge.message("people", {"stamp": 2.5, "robot": "Alice", "people": [{"position_W": [3.0, 1.0]}]})
+        ros.soon(lambda: heard["objects"] and heard["people"])
+        assert [each.text for each in heard["objects"][0].markers if each.text] == ["coke"]
+        (person,) = (each for each in heard["people"][0].markers if each.text)
+        assert (person.text, person.pose.position.x) == ("person", 3.0)
 
     talk(says)
 

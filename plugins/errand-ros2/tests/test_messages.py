@@ -66,7 +66,7 @@ def test_points_are_all_returns_of_all_rings():
 def test_a_picture_is_reduced_with_its_intrinsics(colour, encoding, row):
     picture, info = (
         decoded("sensor_msgs/msg/Image", messages.picture(image_of(colour), "c")),
-        decoded("sensor_msgs/msg/CameraInfo", messages.camera_info(1.0, "c", image_of(colour).intrinsics)),
+        decoded("sensor_msgs/msg/CameraInfo", messages.camera_info(image_of(colour), "c")),
     )
     assert (picture.width, picture.height, picture.encoding, picture.step) == (320, 240, encoding, row)
     assert len(picture.data) == row * 240
@@ -78,7 +78,7 @@ def test_a_compressed_picture_shows_the_same(colour, shape):
     reading = image_of(colour)
     if colour:
         reading.colour[:] = (200, 100, 50)
-    told = decoded("sensor_msgs/msg/CompressedImage", messages.compressed(messages.picture(reading, "c")))
+    told = decoded("sensor_msgs/msg/CompressedImage", messages.compressed(reading, "c"))
     assert told.format == f"{'rgb8' if colour else 'mono8'}; jpeg compressed"
     pixels = cv2.imdecode(told.data, cv2.IMREAD_UNCHANGED)
     assert pixels.shape == shape
@@ -91,6 +91,24 @@ def test_unknown_depth_is_nan():
     assert values[1] == 2.0
 
 
+def test_compressed_depth_is_in_millimetres_behind_a_header_of_12_bytes():
+    told = decoded("sensor_msgs/msg/CompressedImage", messages.compressed_depth(image_of(True), "c"))
+    assert told.format == "16UC1; compressedDepth png"
+    values = cv2.imdecode(told.data[12:], cv2.IMREAD_UNCHANGED)
+    assert (values.dtype, values.shape, values[0, 0], values[0, 1]) == (np.uint16, (240, 320), 0, 2000)
+
+
+def test_markers_take_the_place_of_those_before():
+    seen = [("coke", (1.0, 2.0, 0.8)), ("beer", (1.5, 2.0, 0.8))]
+    told = decoded("visualization_msgs/msg/MarkerArray", messages.markers(2.0, seen)).markers
+    # all before are deleted; then a sphere and a name for each
+    assert [(each.action, each.type, each.text) for each in told] == [
+        *[(3, 0, ""), (0, 2, ""), (0, 9, "coke"), (0, 2, ""), (0, 9, "beer")],
+    ]
+    assert (told[3].header.frame_id, told[3].pose.position.x, told[3].pose.position.z) == ("map", 1.5, 0.8)
+    assert len({(each.ns, each.id) for each in told}) == 5
+
+
 def test_a_map_has_free_occupied_and_unknown_cells():
     occupied, unknown = np.zeros((2, 3), bool), np.zeros((2, 3), bool)
     occupied[0, 1] = unknown[1, 2] = True
@@ -101,7 +119,7 @@ def test_a_map_has_free_occupied_and_unknown_cells():
 
 def test_a_costmap_costs_most_in_obstacles_and_less_away_from_them():
     free = BlockCostmap([Block(2.0, 0.95, 2.4, 1.45)])
-    grid = decoded("nav_msgs/msg/OccupancyGrid", messages.costmap(1.0, free, (1.0, 1.0)))
+    grid = decoded("nav_msgs/msg/OccupancyGrid", messages.costmap(1.0, free, (-2.0, -2.0), (6.0, 6.0)))
     costs = grid.data.reshape(grid.info.height, grid.info.width)
     assert (costs.shape, grid.info.origin.position.x, grid.info.origin.position.y) == ((60, 60), -2.0, -2.0)
     assert costs[31, 41] == 100  # (2.15, 1.15)

@@ -45,6 +45,10 @@ TOPICS = {
         f"/alice/{each.source}/image/compressed": "sensor_msgs/msg/CompressedImage"
         for each in spot_capabilities().cameras
     },
+    **{
+        f"/alice/{each.source}/depth/compressedDepth": "sensor_msgs/msg/CompressedImage"
+        for each in spot_capabilities().cameras
+    },
     **{f"/alice/{each.source}/camera_info": INFO for each in spot_capabilities().cameras},
     **{f"/alice/{each.source}/depth/camera_info": INFO for each in spot_capabilities().cameras},
 }

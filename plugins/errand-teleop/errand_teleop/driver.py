@@ -17,8 +17,7 @@ from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.kinematics import arm_model
 from skills.navigate.base import Base
 from skills.navigate.follower import FollowerOptions
-from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m
-from skills.quantities import Acceleration, Delay, Duration, Force, Margin, Speed, Turn, TurnAcceleration, TurnRate
+from skills.quantities import Delay, Duration, Force, Speed, Turn, TurnAcceleration, TurnRate
 from skills.robot import ArmTrajectory, Capabilities, CommandId, CommandState, FloatArray
 
 _TAIL_POINTS = 5
@@ -186,17 +185,11 @@ _ARM: frozenset[str] = frozenset((*HAND, *JOINTS))
 
 @dataclass(frozen=True)
 class TeleopOptions:
-    """Limits of teleoperation; speeds and accelerations of the base are those of the path follower.
-
-    `margin_m`: clearance on the ground that the base covers in `reaction_s` and while it brakes at `stop_m_s2`.
-    """
+    """Limits of teleoperation; speeds and accelerations of the base are those of the path follower."""
 
     life_s: Delay = 0.3
     period_s: Duration = 0.1
     base: FollowerOptions = field(default_factory=FollowerOptions)
-    margin_m: Margin = SAFE_MARGIN_M
-    reaction_s: Delay = 0.4
-    stop_m_s2: Acceleration = 2.0
     arm: ArmOptions = field(default_factory=ArmOptions)
     gripper_rad_s: TurnRate = 1.0
     gripper_n: Force = 20.0
@@ -211,7 +204,7 @@ class Teleop:
         """Moves the robot under the context's lease. Raises ValueError when the arm's kinematics are not supported."""
         self._context, self._options = context, options or TeleopOptions()
         capabilities = context.robot.capabilities()
-        self._base, self._footprint = Base(context), Footprint.of(capabilities)
+        self._base = Base(context)
         self._model = None if capabilities.arm is None else arm_model(capabilities)
         self._hand = None if self._model is None else HandControl(capabilities, self._options.arm)
         self._scene: ArmScene | None = None
@@ -259,26 +252,8 @@ class Teleop:
         wanted = direction * (ahead, base.lateral_m_s, base.turn_rad_s)
         wanted *= min(1.0, capabilities.max_speed_m_s / max(float(np.hypot(*wanted[:2])), 1e-9))
         most = self._options.period_s * np.array([base.acceleration_m_s2] * 2 + [base.turn_acceleration_rad_s2])
-        velocity = self._base.last_velocity + np.clip(wanted - self._base.last_velocity, -most, most)
-        for share in (1.0, 0.5, 0.25):
-            if self._clear(share * velocity):
-                vx, vy, wz = (share * velocity).tolist()
-                self._base.drive((vx, vy, wz))
-                return
-        self.note = "an obstacle blocks the body"
-        self._base.stop()
-
-    def _clear(self, velocity: FloatArray) -> bool:
-        """Returns whether the ground that the body covers until it stands is free, or its clearance grows."""
-        options, here = self._options, self._context.pose()
-        until_s = options.reaction_s + float(np.hypot(*velocity[:2])) / (2.0 * options.stop_m_s2)
-        times = np.linspace(0.0, until_s, 6)
-        yaws = here.yaw_rad + velocity[2] * times
-        c, s = np.cos(here.yaw_rad + 0.5 * velocity[2] * times), np.sin(here.yaw_rad + 0.5 * velocity[2] * times)
-        x = here.x_m + times * (c * velocity[0] - s * velocity[1])
-        y = here.y_m + times * (s * velocity[0] + c * velocity[1])
-        clearance = footprint_clearance_m(self._context.costmap, self._footprint, np.stack([x, y, yaws], axis=1))
-        return bool(np.min(clearance[1:]) >= min(options.margin_m, float(clearance[0]) + 0.002))
+        if not self._base.drive_clear(wanted, most):
+            self.note = "an obstacle blocks the body"
 
     def _move_arm(self, asked: Mapping[str, float], now_s: float) -> None:
         if self._hand is None or self._model is None or (self._scene is None and not _ARM & asked.keys()):

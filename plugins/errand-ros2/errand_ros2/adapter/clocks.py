@@ -10,8 +10,7 @@ from collections.abc import Callable
 from threading import Event
 from typing import Any, Final
 
-_JUMP_S: Final = 0.7
-_DELAYS_S: Final = 5.0
+_JUMP_S, _DELAYS_S = 0.7, 5.0
 _GRACE_S: Final = 1.0  # silence of `/clock` (wall clock) after which time goes on without it
 _LOOK_S: Final = 0.02
 

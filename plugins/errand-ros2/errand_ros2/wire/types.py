@@ -21,7 +21,6 @@ _ADMIN: Final = "@ros2_lv"
 _GID_BYTES: Final = 16
 _ATTACHMENT: Final = struct.Struct("<qqB16s")
 _NAME: Final = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
-_TYPE: Final = re.compile(r"(?P<package>\w+)/(?P<kind>msg|srv|action)/(?P<name>\w+)")
 NODE, PUBLISHER, SUBSCRIPTION, SERVICE, CLIENT = "NN", "MP", "MS", "SS", "SC"  # kinds of entities in the graph of ROS 2
 INTERFACES: Final = Path(__file__).parents[1] / "interfaces"
 """Folder of the interface files that rosbags lacks, as PACKAGE/KIND/NAME.KIND."""
@@ -67,11 +66,11 @@ class NodeKey:
         """Returns the liveliness token of the node, or of one of its entities."""
         number = self.number if number is None else number
         head = (_ADMIN, str(self.domain), self.session, str(self.number), str(number), kind)
-        return "/".join((*head, "%", _mangled(self.namespace) or "%", self.name, *of_type))
+        return "/".join((*head, "%", self.namespace.replace("/", "%"), self.name, *of_type))
 
     def entity_token(self, kind: str, number: int, name: str, type_key: str, qos: Qos) -> str:
         """Returns the liveliness token of one of the node's publishers, subscriptions, services or clients."""
-        return self.token(number, kind, _mangled(name), type_key, qos.text())
+        return self.token(number, kind, name.replace("/", "%"), type_key, qos.text())
 
     def data_key(self, name: str, type_key: str) -> str:
         """Returns the key expression of a topic or service; `type_key` is DDS_NAME/HASH of its type."""
@@ -102,15 +101,10 @@ def gid_of(token: str) -> bytes:
     return hashlib.blake2b(token.encode(), digest_size=_GID_BYTES).digest()
 
 
-def _mangled(name: str) -> str:
-    return name.replace("/", "%")
-
-
 def dds_name(ros_name: str) -> str:
-    """Returns the name in DDS of a type such as `std_msgs/msg/String`. Raises ValueError when it is no type."""
-    if (found := _TYPE.fullmatch(ros_name)) is None:
-        raise ValueError(f"'{ros_name}' is no type of ROS 2")
-    return f"{found['package']}::{found['kind']}::dds_::{found['name']}_"
+    """Returns the name in DDS of a type such as `std_msgs/msg/String`."""
+    package, kind, name = ros_name.split("/")
+    return f"{package}::{kind}::dds_::{name}_"
 
 
 def topic_name(name: str) -> str:

@@ -17,7 +17,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, NewType, Protocol
+from typing import TYPE_CHECKING, NewType, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,6 @@ FloatArray = NDArray[np.float64]
 """Array of floats; each use says its shape."""
 Picture = NDArray[np.uint8]
 """Picture, (H, W) grey or (H, W, 3) RGB."""
-_BODY_M: Final = 0.3  # LiDAR returns nearer than this are the robot's own
 CommandId = NewType("CommandId", int)
 """Number of a motion command, to query its status."""
 
@@ -128,33 +127,6 @@ class Scan:
     azimuths_rad: FloatArray
     X_BL: RigidTransform
     X_OB: RigidTransform
-
-    @classmethod
-    def of_points(
-        cls,
-        points_L: FloatArray,
-        rings: FloatArray,
-        columns: int,
-        stamp_s: float,
-        X_BL: RigidTransform,
-        X_OB: RigidTransform,
-    ) -> Scan:
-        """Returns points (N, 3) in the lidar frame as a revolution; the nearest of a ray counts.
-
-        `rings` are the elevations (rad), evenly spaced. Points nearer than 0.3 m are the robot's own.
-        """
-        far_m = np.linalg.norm(points_L, axis=1)
-        points_L, far_m = points_L[far_m > _BODY_M], far_m[far_m > _BODY_M]
-        above_rad = np.arcsin(np.clip(points_L[:, 2] / far_m, -1.0, 1.0)) - rings[0]
-        ring = np.rint(above_rad / (rings[1] - rings[0])).astype(int)
-        turns = np.arctan2(points_L[:, 1], points_L[:, 0]) / (2.0 * np.pi) + 0.5
-        inside = (ring >= 0) & (ring < len(rings))
-        ranges: NDArray[np.float32] = np.full((len(rings), columns), np.inf, dtype=np.float32)
-        ray = ring[inside], np.rint(turns[inside] * columns).astype(int) % columns
-        np.minimum.at(ranges, ray, far_m[inside].astype(np.float32))
-        ranges[np.isinf(ranges)] = np.nan
-        azimuths_rad = np.arange(columns) / columns * 2.0 * np.pi - np.pi
-        return cls(stamp_s, ranges, rings, azimuths_rad, X_BL, X_OB)
 
     @cached_property
     def pose(self) -> Pose2D:

@@ -24,7 +24,7 @@ LINES = {
     "executive/testing": 860,
     "executive/app": 8274,
     "executive/cli": 3938,
-    "skills": 28981,
+    "skills": 28984,
     "plant": 11542,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 426, 59, 7

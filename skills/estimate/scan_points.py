@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,38 @@ from skills.estimate.compiled import Triple, compiled
 from skills.geometry import relative_pose
 from skills.robot import Capabilities, FloatArray, Joints, Pose2D, Robot, Scan
 
+if TYPE_CHECKING:
+    from pydrake.math import RigidTransform
+
 _MOVED_M = 0.02
 _MOVED_RAD = 0.02
+_BODY_M = 0.3  # LiDAR returns nearer than this are the robot's own
+
+
+def scan_of_points(
+    points_L: FloatArray,
+    rings: FloatArray,
+    columns: int,
+    stamp_s: float,
+    X_BL: RigidTransform,
+    X_OB: RigidTransform,
+) -> Scan:
+    """Returns points (N, 3) in the lidar frame as a revolution; the nearest of a ray counts.
+
+    `rings` are the elevations (rad), evenly spaced. Points nearer than 0.3 m are left out.
+    """
+    far_m = np.linalg.norm(points_L, axis=1)
+    points_L, far_m = points_L[far_m > _BODY_M], far_m[far_m > _BODY_M]
+    above_rad = np.arcsin(np.clip(points_L[:, 2] / far_m, -1.0, 1.0)) - rings[0]
+    ring = np.rint(above_rad / (rings[1] - rings[0])).astype(int)
+    turns = np.arctan2(points_L[:, 1], points_L[:, 0]) / (2.0 * np.pi) + 0.5
+    inside = (ring >= 0) & (ring < len(rings))
+    ranges: NDArray[np.float32] = np.full((len(rings), columns), np.inf, dtype=np.float32)
+    ray = ring[inside], np.rint(turns[inside] * columns).astype(int) % columns
+    np.minimum.at(ranges, ray, far_m[inside].astype(np.float32))
+    ranges[np.isinf(ranges)] = np.nan
+    azimuths_rad = np.arange(columns) / columns * 2.0 * np.pi - np.pi
+    return Scan(stamp_s, ranges, rings, azimuths_rad, X_BL, X_OB)
 
 
 class ArmShape:

@@ -21,6 +21,7 @@ from errand_ros2.adapter.description import CameraFile, Description
 from errand_ros2.readings import planar_pose, transform_of
 from errand_ros2.wire.node import Node
 from errand_ros2.wire.types import LATCHED, SENSOR
+from skills.estimate.scan_points import scan_of_points
 from skills.geometry import compose, inverse
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import (
@@ -187,7 +188,7 @@ class SensedRobot:
         points_L = (X_BL.inverse() @ X_BF @ points_F.T).T if len(points_F) else points_F
         file = self._description.file.lidar
         elevations = np.radians(np.linspace(file.lowest, file.highest, file.rings))
-        self._scan = Scan.of_points(points_L, elevations, file.columns, stamp_s, X_BL, X_OB)
+        self._scan = scan_of_points(points_L, elevations, file.columns, stamp_s, X_BL, X_OB)
 
     def _hear_scan(self, message: Any) -> None:
         stamp_s = self._stamp(message)

@@ -16,6 +16,7 @@ from pydrake.math import RigidTransform
 from errand_spot.adapter.statuses import response_trouble
 from errand_spot.messages import Frames, frames_of, our_joint, pose_between
 from plant.robots.spot.description import spot_facts
+from skills.estimate.scan_points import scan_of_points
 from skills.robot import (
     Battery,
     Capabilities,
@@ -129,7 +130,7 @@ def depth_scan(answers: Sequence[Any], stamp_s: float, X_BL: RigidTransform, X_O
     """Returns the depth cameras' points within 4 m as a revolution of a LiDAR at X_BL. Raises NoImageError."""
     seen = [_points_B(answer) for answer in answers]
     points_L = X_BL.inverse() @ np.concatenate([np.zeros((0, 3)), *seen]).T
-    return Scan.of_points(np.asarray(points_L.T), _DEPTH_RINGS_RAD, COLUMNS, stamp_s, X_BL, X_OB)
+    return scan_of_points(np.asarray(points_L.T), _DEPTH_RINGS_RAD, COLUMNS, stamp_s, X_BL, X_OB)
 
 
 def _points_B(answer: Any) -> FloatArray:

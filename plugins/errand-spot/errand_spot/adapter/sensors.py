@@ -25,6 +25,7 @@ from errand_spot.adapter.readings import (
 )
 from errand_spot.adapter.statuses import response_trouble
 from errand_spot.messages import frames_of, pose_between, seconds, transform
+from skills.estimate.scan_points import scan_of_points
 from skills.robot import (
     Capabilities,
     CommandCause,
@@ -193,7 +194,7 @@ class Sensors:
         X_BF = pose_between(frames, "body", source.frame_name_sensor)
         points_L = (self._X_BL().inverse() @ X_BF @ points.T).T
         stamp_s, X_OB = self._stamp(source.acquisition_time), pose_between(frames, "odom", "body")
-        return Scan.of_points(points_L, RINGS_RAD, COLUMNS, stamp_s, self._X_BL(), X_OB)
+        return scan_of_points(points_L, RINGS_RAD, COLUMNS, stamp_s, self._X_BL(), X_OB)
 
     def _X_BL(self) -> RigidTransform:
         """Pose of the LiDAR on the rear rails, as in the description."""

@@ -131,8 +131,11 @@ class Watch:
             time.sleep(0.005)
 
     def still_after(self, wall_s, stamp_s):
-        """Times (wall, robot's clock) from an instant until the last reading in which the base moved."""
-        moving = [each for each in self.seen if each[0] > wall_s and (each[2] > 0.05 or each[3] > 0.1)]
+        """Times (wall, robot's clock) from an instant until the last reading in which the base moved.
+
+        Odometry tells the speed of a base that stands with a deviation of 0.02 m/s: 0.1 m/s is beyond its noise.
+        """
+        moving = [each for each in self.seen if each[0] > wall_s and (each[2] > 0.1 or each[3] > 0.1)]
         return (moving[-1][0] - wall_s, moving[-1][1] - stamp_s) if moving else (0.0, 0.0)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from errand_ros2.wire.types import INTERFACES, ActionType, MalformedError, Types, ros_types
+from errand_ros2.wire.types import INTERFACES, ActionType, MalformedError, Types, older_types, ros_types
 from tests.tables import yaml_beside
 
 HASHES = yaml_beside(__file__, "test_types.yaml")
@@ -36,6 +36,11 @@ def test_a_message_has_the_public_hash(types, name):
 @pytest.mark.parametrize("name", HASHES["service"])
 def test_a_service_has_the_public_hash(types, name):
     assert types.service(name).key.rpartition("/")[2] == f"RIHS01_{HASHES['service'][name]}"
+
+
+@pytest.mark.parametrize("name", HASHES["older service"])
+def test_a_service_of_an_older_distribution_has_the_public_hash(name):
+    assert older_types().service(name).key.rpartition("/")[2] == f"RIHS01_{HASHES['older service'][name]}"
 
 
 @pytest.mark.parametrize("name", HASHES["feedback"])

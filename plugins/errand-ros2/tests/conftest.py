@@ -55,3 +55,11 @@ def message_files(tmp_path_factory):
 
     write_messages(folder := tmp_path_factory.mktemp("messages"))
     return folder
+
+
+@pytest.fixture
+def talk(tmp_path):
+    """A run to which a function talks as a client of ROS 2."""
+    from ros_run import ScriptedRun
+
+    return ScriptedRun(tmp_path)

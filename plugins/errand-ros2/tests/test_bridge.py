@@ -1,11 +1,6 @@
-"""A run of a scripted robot as a system of ROS 2: goals, cancelling, velocities, sentences, services, odd input.
+"""A run of a scripted robot as a system of ROS 2: goals, cancelling, velocities, sentences, services, odd input."""
 
-The run is in the test's own thread, and what a client does in another, which ends the run.
-"""
-
-import json
 import math
-import threading
 import time
 import uuid
 from collections import defaultdict
@@ -15,161 +10,13 @@ import pytest
 
 pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
 
-from ros_client import free_port
+from ros_run import HEARD, NAVIGATE, POSE, RUN, STRING, THROUGH, TWIST, ActionClient, stamped, text, twist
 
-from errand_ros2.bridge import Bridge, observe
+from errand_ros2.bridge import observe
 from errand_ros2.wire.actions import GoalStatus
-from errand_ros2.wire.node import Client, Node, Place, open_session
-from errand_ros2.wire.types import LATCHED, ActionType, Attachment, older_types, ros_types
-from executive.app.prepare.from_request import prepare
-from executive.app.runs.one_run import run_request
-from executive.mission.request import Request
-from executive.run.control import Control
-from executive.run.visitor import RunEntry
-from executive.testing.bench import write_small_room
+from errand_ros2.wire.node import Client
+from errand_ros2.wire.types import LATCHED, older_types
 from skills.inputs.errors import InputError
-from skills.testing.blocks import ROOM
-from skills.testing.estimators import BlockCostmap, KnownPlace
-from tests.executive.app.runs.scripted_backend import ScriptedBackend
-
-TWIST, POSE, STRING, TRIGGER = (
-    *("geometry_msgs/msg/Twist", "geometry_msgs/msg/PoseStamped"),
-    *("std_msgs/msg/String", "std_srvs/srv/Trigger"),
-)
-NAVIGATE, RUN = "nav2_msgs/action/NavigateToPose", "errand_msgs/action/RunMission"
-THROUGH = "nav2_msgs/action/NavigateThroughPoses"
-HEARD = {
-    "/clock": "rosgraph_msgs/msg/Clock",
-    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
-    "/alice/amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
-    "/alice/plan": "nav_msgs/msg/Path",
-    "/alice/events": STRING,
-    "/alice/reply": STRING,
-    "/alice/odom": "nav_msgs/msg/Odometry",
-    "/alice/local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
-    "/alice/global_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
-    "/alice/particle_cloud": "nav2_msgs/msg/ParticleCloud",
-}
-
-
-class CloudPlace(KnownPlace):
-    """A localiser with particles."""
-
-    def particles_W(self, most):
-        return np.array([[0.5, 0.0, 0.0], [0.7, 0.0, 0.0]])
-
-
-class RoomBackend(ScriptedBackend):
-    """A scripted robot that knows the small room's walls."""
-
-    def entry(self, tree, durable):
-        return RunEntry(tree, self.robot, CloudPlace(), BlockCostmap(ROOM))
-
-
-class RosClient:
-    """Another program: what it hears by topic, and goals that it sends."""
-
-    def __init__(self, session, robot, bridge):
-        self.node, self.robot, self.bridge, self.heard = Node(session, "client"), robot, bridge, defaultdict(list)
-        for topic, kind in HEARD.items():
-            self.node.subscribe(topic, kind, self.heard[topic].append)
-
-    def soon(self, condition, limit_s=20.0):
-        until_s = time.monotonic() + limit_s
-        while not condition() and time.monotonic() < until_s:
-            time.sleep(0.01)
-        assert condition(), "it did not come about"
-
-    def events(self, topic):
-        said = [json.loads(each.data) for each in self.heard["/alice/events"]]
-        return [each for each in said if each["topic"] == topic]
-
-    def call(self, name):
-        return Client(self.node, f"/alice/{name}", ros_types().service(TRIGGER)).call({}, limit_s=5.0)
-
-    def publisher(self, topic, kind):
-        made = self.node.publisher(topic, kind)
-        self.soon(lambda: made.is_heard)
-        return made
-
-    def still(self):
-        return float(np.max(np.abs(self.robot.velocity))) < 0.02
-
-
-class ActionClient:
-    """Client of an action, which sends one goal."""
-
-    def __init__(self, client, name, kind):
-        self.kind, node = ActionType(ros_types(), kind), client.node
-        base = f"/alice/{name}/_action"
-        self._send = Client(node, f"{base}/send_goal", self.kind.send_goal)
-        self._result = Client(node, f"{base}/get_result", self.kind.get_result)
-        self._cancel = Client(node, f"{base}/cancel_goal", self.kind.cancel_goal)
-        self.feedback = []
-        node.subscribe(f"{base}/feedback", self.kind.feedback_message.name, self.feedback.append)
-        self.identity = {"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)}
-        self.goal = ros_types().make(f"{kind}_Goal")
-
-    def send(self):
-        return self._send.call({"goal_id": self.identity, "goal": self.goal}, limit_s=20.0).accepted
-
-    def result(self):
-        return self._result.call({"goal_id": self.identity}, limit_s=60.0)
-
-    def cancel(self):
-        return self._cancel.call({"goal_info": {"goal_id": self.identity}}, limit_s=5.0).return_code
-
-
-def stamped(x, y, frame="map", w=1.0):
-    message = ros_types().make(POSE)
-    message.header.frame_id, message.pose.position.x, message.pose.position.y = frame, x, y
-    message.pose.orientation.w = w
-    return message
-
-
-def twist(x, wz=0.0):
-    message = ros_types().make(TWIST)
-    message.linear.x, message.angular.z = x, wz
-    return message
-
-
-def text(value):
-    return {"data": value}
-
-
-@pytest.fixture
-def talk(tmp_path):
-    """Runs a mission that waits, while a function talks to it as a client; then cancels it, and returns the report."""
-    room, mission = write_small_room(tmp_path / "room"), tmp_path / "wait.yaml"
-    mission.write_text("name: wait\nsteps:\n  - wait: {seconds: 600}\n")
-    prepared = prepare(Request(file=mission, world=str(room), out=tmp_path / "out", seed=1))
-
-    def run(says):
-        place, control, backend, errors = Place(port=free_port()), Control(pace=None), RoomBackend(), []
-        bridge = Bridge(prepared, control, place)
-
-        def client():
-            try:
-                with open_session(place) as session:
-                    ros = RosClient(session, backend.robot, bridge)
-                    ros.soon(lambda: ros.heard["/alice/odom"])
-                    says(ros)
-            except BaseException as error:
-                errors.append(error)
-            finally:
-                control.cancel("the test is over")
-
-        thread = threading.Thread(target=client)
-        thread.start()
-        try:
-            report = run_request(prepared, backend, visitors=[bridge], control=control).report
-        finally:
-            thread.join()
-        if errors:
-            raise errors[0]
-        return report
-
-    return run
 
 
 def test_a_run_publishes_clock_pose_plan_map_events_and_diagnostics(talk):
@@ -469,31 +316,6 @@ def test_services_pause_resume_and_cancel(talk):
         assert [told[0], told[-1]] == ["pause", "cancel"]
 
     assert talk(says).message == "cancelled by ROS 2"
-
-
-def test_random_bytes_on_every_input_move_nothing(talk, capfd):
-    def says(ros):
-        types, chance = ros_types(), np.random.default_rng(1)
-        kinds = {"/goal_pose": POSE, "/cmd_vel": TWIST, "/alice/say": STRING}
-        kinds["/initialpose"] = "geometry_msgs/msg/PoseWithCovarianceStamped"
-        keys = [ros.node.key.data_key(topic, types.message(kind).key) for topic, kind in kinds.items()]
-        for _ in range(500):
-            for key in keys:
-                ros.node.session.inner.put(key, chance.bytes(int(chance.integers(0, 47))))
-        action, base = ActionType(types, NAVIGATE), "/alice/navigate_to_pose/_action"
-        names = {"send_goal": action.send_goal, "cancel_goal": action.cancel_goal, "get_result": action.get_result}
-        attachment = Attachment(1, 2, bytes(16)).encoded()
-        for name, kind in names.items():
-            key = ros.node.key.data_key(f"{base}/{name}", kind.key)
-            for _ in range(60):
-                payload = b"\0\1\0\0" + chance.bytes(int(chance.integers(0, 120)))
-                ros.node.session.inner.get(key, timeout=0.2, payload=payload, attachment=attachment)
-        time.sleep(0.5)
-        assert ros.still()
-        assert ros.call("pause").success
-
-    talk(says)
-    assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("value", ["x", "300", "0@:99999"])

@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
+from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
@@ -18,7 +19,7 @@ from errand_ros2 import messages
 from errand_ros2.driving import Driving
 from errand_ros2.goals import Goals
 from errand_ros2.messages import Fields
-from errand_ros2.readings import FRAMES, TOPIC, planar_pose
+from errand_ros2.readings import TOPIC, pose_on_map
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.tree_topic import TreeTopic
 from errand_ros2.wire.node import Node, Place, Publisher, open_session
@@ -33,7 +34,7 @@ from executive.run.outcome import RunResult
 from executive.run.visitor import MissionEnd, Progress, RunVisitor
 from executive.tree.compiler import CompiledTree
 from skills.api import LocalisationEstimate, ParticleView, SearchingLocaliser, SkillContext
-from skills.estimate.grid_map import load_grid_map
+from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.inputs.errors import InputError
 
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
@@ -50,7 +51,7 @@ _TOPICS: Final = {
     **dict.fromkeys(("objects", "people"), "visualization_msgs/msg/MarkerArray"),
     "particle_cloud": "nav2_msgs/msg/ParticleCloud",
 }
-_PERIOD_S, _MOST_PARTICLES = 0.5, 200
+_PERIOD_S, _MOST_PARTICLES, _MOST_VARIANCE = 0.5, 200, 1e6  # variances in m² and rad²
 _CHEST_M, _HALF_M = 1.2, 3.0  # height of people's markers; half the side of the local costmap
 _LATE_S: Final = 0.5  # delay that a run does not catch up with
 
@@ -190,7 +191,7 @@ class Bridge(RunVisitor):
             told = partial(announce, publish, context.clock, tree.robot_name, tree.commands, knowledge)
             self._node.guarded(partial(told, world=world, seed=0), "a command")
         while own.initial:
-            _set_pose(context, own.initial.pop(0))
+            self._node.guarded(partial(_set_pose, context, self._grid, own.initial.pop(0)), "initialpose")
         estimate = context.localiser.estimate()
         topics.publish(now_s, estimate.X_WO if estimate.localised else None)
         if now_s >= own.due_s:
@@ -246,17 +247,18 @@ class Bridge(RunVisitor):
         self._open.close()
 
 
-def _set_pose(context: SkillContext, stamped: Any) -> None:
+def _set_pose(context: SkillContext, grid: GridMap, stamped: Any) -> None:
     """Gives the localiser the pose of `initialpose`, if it can take one; ignores what is no pose on the map."""
     localiser, X_OB = context.localiser, context.robot.odometry().X_OB
     try:
-        pose = planar_pose(stamped.pose.pose)
+        pose = pose_on_map(SimpleNamespace(header=stamped.header, pose=stamped.pose.pose), grid, {})
     except InputError:
         return
-    if stamped.header.frame_id.strip("/") not in FRAMES or not isinstance(localiser, SearchingLocaliser):
+    if not isinstance(localiser, SearchingLocaliser):
         return
     X_WO = pose.transform(float(X_OB.translation()[2])) @ X_OB.inverse()
     covariance = np.asarray(stamped.pose.covariance).reshape(6, 6)[np.ix_([0, 1, 5], [0, 1, 5])]
-    usable = np.all(np.isfinite(covariance)) and np.all(np.diag(covariance) > 0.0)
+    covariance = 0.5 * (covariance + covariance.T)
+    usable = np.all(np.abs(covariance) < _MOST_VARIANCE) and np.all(np.linalg.eigvalsh(covariance) > 0.0)
     shape = covariance if usable else np.diag([0.25, 0.25, 0.07])
     localiser.accept(LocalisationEstimate(context.clock.now(), X_WO, shape, localised=True))

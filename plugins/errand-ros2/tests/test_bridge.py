@@ -15,7 +15,7 @@ from ros_run import HEARD, NAVIGATE, POSE, RUN, STRING, THROUGH, TWIST, ActionCl
 from errand_ros2.bridge import observe
 from errand_ros2.wire.actions import GoalStatus
 from errand_ros2.wire.node import Client
-from errand_ros2.wire.types import LATCHED, older_types
+from errand_ros2.wire.types import LATCHED, older_types, ros_types
 from skills.inputs.errors import InputError
 
 

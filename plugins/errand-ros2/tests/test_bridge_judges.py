@@ -1,0 +1,175 @@
+"""Runs that share a router, senders that share a topic, and random bytes on every input of a run."""
+
+import math
+import time
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
+
+import numpy as np
+import pytest
+
+pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
+
+from ros_run import NAVIGATE, POSE, RUN, STRING, THROUGH, TRIGGER, TWIST, ActionClient, ScriptedRun, stamped, twist
+
+from errand_ros2.wire.actions import GoalStatus
+from errand_ros2.wire.node import Node, Place, open_session
+from errand_ros2.wire.types import ActionType, Attachment, older_services, ros_types
+from skills.navigate.follower import FollowerOptions
+
+INPUTS = {"goal_pose": POSE, "cmd_vel": TWIST, "initialpose": "geometry_msgs/msg/PoseWithCovarianceStamped"}
+BYTES = 200_000
+PERIOD_S, SLACK = 0.02, 0.05
+
+
+def topics_of(ros):
+    """Topics of all domains, by domain, as the tokens of nodes tell them."""
+    tokens = [str(each.ok.key_expr).split("/") for each in ros.node.session.liveliness.get("@ros2_lv/**", timeout=1.0)]
+    found = {int(each[1]): set() for each in tokens}
+    for each in tokens:
+        if each[5] == "MP":
+            found[int(each[1])].add(each[9].replace("%", "/"))
+    return found
+
+
+def test_runs_in_two_domains_of_one_router_hear_their_own_goals_only(talk, tmp_path):
+    other = ScriptedRun(tmp_path / "other")
+
+    def says(ros):
+        def says_in_7(ros_7):
+            listed = topics_of(ros_7)
+            assert listed[0] == listed[7]  # both runs are of Alice, and publish the same topics
+            assert {"/alice/odom", "/clock"} < listed[7]
+            for here, there in ((ros, ros_7), (ros_7, ros)):
+                began, told = there.robot.pose, len(there.events("refused") + there.events("outcome"))
+                action = ActionClient(here, "navigate_to_pose", NAVIGATE)
+                action.goal.pose = stamped(-0.4, 0.0)
+                assert action.send()
+                here.publisher("/goal_pose", POSE).put(stamped(-0.4, 0.3))
+                assert action.result().status == GoalStatus.ABORTED  # the second goal takes its place
+                here.soon(lambda here=here: here.robot.pose.y_m > 0.15)
+                assert here.call("pause").success
+                assert there.robot.pose == began
+                assert len(there.events("refused") + there.events("outcome")) == told
+
+        with ThreadPoolExecutor(1) as pool:
+            pool.submit(other, says_in_7, Place(domain=7, port=ros.place.port)).result()
+
+    talk(says)
+
+
+@pytest.mark.parametrize("speeds", [(0.3, 0.6), (-0.4, 0.4), (0.5, 100.0)])
+def test_two_senders_of_velocities_keep_the_robot_between_them_until_both_are_silent(talk, speeds):
+    most, stopping = FollowerOptions().turn_rad_s, Event()
+
+    def send(place, wz):
+        with open_session(place) as session:
+            command = Node(session, "sender").publisher("/cmd_vel", TWIST)
+            while not stopping.wait(PERIOD_S):
+                command.put(twist(0.0, wz))
+
+    def says(ros):
+        with ThreadPoolExecutor(2) as pool:
+            sending = [pool.submit(send, ros.place, wz) for wz in speeds]
+            time.sleep(0.8)
+            rates, until_s = [], time.monotonic() + 1.0
+            while time.monotonic() < until_s:
+                rates.append(float(ros.robot.velocity[2]))
+                time.sleep(0.01)
+            stopping.set()
+            silent_s = time.monotonic()
+            for each in sending:
+                each.result()
+        ros.soon(ros.still, 2.0)
+        assert time.monotonic() - silent_s < 0.6
+        assert min(speeds) - SLACK <= min(rates) and max(rates) <= min(max(speeds), most) + SLACK
+        assert np.hypot(*ros.robot.velocity[:2]) < 0.01
+
+    talk(says)
+
+
+def initial_pose(x, frame="map", covariance=None):
+    """A message of RViz's button 2D Pose Estimate; the covariance is that of x, y and yaw."""
+    message = ros_types().make(INPUTS["initialpose"])
+    message.header.frame_id, message.pose.pose.position.x, message.pose.pose.orientation.w = frame, x, 1.0
+    whole = np.zeros((6, 6))
+    whole[np.ix_([0, 1, 5], [0, 1, 5])] = np.eye(3) if covariance is None else covariance
+    message.pose.covariance = whole.ravel()
+    return message
+
+
+def test_an_initial_pose_that_is_no_pose_on_the_map_is_ignored(talk):
+    def says(ros):
+        localiser = ros.bridge._robots["Alice"].context.localiser
+        send = ros.publisher("/initialpose", INPUTS["initialpose"]).put
+        for x, frame in ((1e300, "map"), (9.0, "map"), (math.nan, "map"), (-math.inf, "map"), (0.1, "mars")):
+            send(initial_pose(x, frame))
+        send(initial_pose(0.5))
+        ros.soon(lambda: localiser.accepted)
+        assert [each.X_WO.translation()[0] for each in localiser.accepted] == [0.5]
+
+    talk(says)
+
+
+def test_the_covariance_of_an_initial_pose_is_that_of_its_message_if_it_is_one(talk):
+    usual, good = np.diag([0.25, 0.25, 0.07]), np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.1], [0.0, 0.1, 0.3]])
+    leaning = np.array([[1.0, 5.0, 0.0], [5.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # no covariance: one variance is negative
+    cases = [(good, good), (leaning, usual), (np.zeros((3, 3)), usual), (math.nan * np.eye(3), usual)]
+    cases += [(1e300 * np.eye(3), usual), (-np.eye(3), usual)]
+
+    def says(ros):
+        localiser = ros.bridge._robots["Alice"].context.localiser
+        send = ros.publisher("/initialpose", INPUTS["initialpose"]).put
+        for told, _ in cases:
+            send(initial_pose(0.5, covariance=told))
+        ros.soon(lambda: len(localiser.accepted) == len(cases))
+        for (_, wanted), each in zip(cases, localiser.accepted, strict=True):
+            assert each.covariance == pytest.approx(wanted)
+
+    talk(says)
+
+
+def services_of():
+    """Services of a run of Alice, with their types, in all forms."""
+    found = [(f"/alice/{name}", ros_types().service(TRIGGER)) for name in ("pause", "resume", "step", "cancel")]
+    for name, kind in {"navigate_to_pose": NAVIGATE, "navigate_through_poses": THROUGH, "run_mission": RUN}.items():
+        action, base = ActionType(ros_types(), kind), f"/alice/{name}/_action"
+        found.append((f"{base}/cancel_goal", action.cancel_goal))
+        for part, service in (("send_goal", action.send_goal), ("get_result", action.get_result)):
+            found += [(f"{base}/{part}", each) for each in (service, *older_services(service))]
+    return found
+
+
+def chunks(chance, most, header):
+    """Random bytes, 200 000 in all, in messages of up to so many; some have the header of a message."""
+    left = BYTES
+    while left > 0:
+        data = header[: int(chance.integers(0, 5))] + chance.bytes(int(chance.integers(0, most)))
+        left -= len(data)
+        yield data
+
+
+def test_random_bytes_on_every_input_of_a_run_move_nothing(talk, capfd):
+    def says(ros):
+        types, chance, session = ros_types(), np.random.default_rng(1), ros.node.session.inner
+        topics = {f"{space}/{name}": kind for name, kind in INPUTS.items() for space in ("", "/alice")}
+        topics["/alice/say"] = STRING
+        for topic, kind in topics.items():
+            key = ros.node.key.data_key(topic, types.message(kind).key)
+            for data in chunks(chance, 9000, b"\0\1\0\0"):
+                if not 52 <= len(data) < 60:  # random bytes of a velocity's length are a velocity
+                    session.put(key, data)
+        head = Attachment(1, 2, bytes(16)).encoded()
+        for name, kind in services_of():
+            key = ros.node.key.data_key(name, kind.key)
+            for data in chunks(chance, 9000, b"\0\1\0\0"):
+                if len(data) >= 32:  # random bytes of a request's length may be a request
+                    session.get(key, timeout=0.2, payload=data, attachment=head)
+        time.sleep(0.5)
+        assert ros.still() and (ros.robot.pose.x_m, ros.robot.pose.yaw_rad) == (0.0, 0.0)
+        assert ros.events("control") == [] and ros.events("outcome") == []
+        assert ros.call("pause").success
+        ros.soon(lambda: ros.events("control"))
+
+    assert talk(says).message == "the test is over"
+    assert "Traceback" not in capfd.readouterr().err

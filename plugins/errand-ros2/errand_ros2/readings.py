@@ -121,12 +121,18 @@ def joints(message: Any, stamp_s: float, names: dict[str, str]) -> Joints:
     return Joints(stamp_s, *(dict(zip(told, values, strict=True)) for values in finite))
 
 
+def newer(before: Any, after: Any) -> Any:
+    """Returns the newer of two readings, of which one may be None: a link may reorder them."""
+    return before if after is None or (before is not None and after.stamp_s < before.stamp_s) else after
+
+
 def merged(before: Joints | None, new: Joints) -> Joints:
     """Returns new joints over earlier ones: drivers of base, arm and gripper may publish apart."""
+    latest: Joints = newer(before, new)
     if before is None or before.position_rad.keys() <= new.position_rad.keys():
-        return new
+        return latest
     columns = ("position_rad", "velocity_rad_s", "effort_nm")
-    return Joints(new.stamp_s, *({**getattr(before, each), **getattr(new, each)} for each in columns))
+    return Joints(latest.stamp_s, *({**getattr(before, each), **getattr(new, each)} for each in columns))
 
 
 def imu(message: Any, stamp_s: float) -> Imu:

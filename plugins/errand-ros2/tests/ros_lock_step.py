@@ -10,9 +10,20 @@ from errand_ros2.adapter.description import described, served_file
 from errand_ros2.adapter.robot import Ros2Robot
 from errand_ros2.server import PERIOD_S, RobotServer
 from errand_ros2.wire.node import Client, Node, Publisher, open_session
+from plant.robots.spot.kind import spot_capabilities
+from skills.testing.blocks import Block
+from skills.testing.clock import VirtualClock
+from skills.testing.robot import ScriptedRobot
 
 IDLE_S, CONNECTING_S, PATIENCE_S = 0.005, 0.2, 20.0
 """Pauses of the server; longest wait for a message until both sides have found each other, and afterwards."""
+
+
+def scripted(**options):
+    """Builds a scripted Spot two metres before a wall."""
+    clock = VirtualClock()
+    given = {"capabilities": spot_capabilities(), "blocks": [Block(3.0, -1.5, 3.2, 1.5)], **options}
+    return ScriptedRobot(clock, **given), clock
 
 
 class LockStep(RobotClock):
@@ -92,6 +103,7 @@ class LockStep(RobotClock):
             yield
         finally:
             self._is_cut = False
+            self.server.topics.stamps_s.pop("scan", None)  # the last scan was lost, and is published again
             for (kind, name), method in kept.items():
                 setattr(kind, name, method)
 

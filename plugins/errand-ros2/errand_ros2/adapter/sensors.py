@@ -18,7 +18,7 @@ from pydrake.math import RigidTransform
 from errand_ros2 import readings
 from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import CameraFile, Description
-from errand_ros2.readings import planar_pose, transform_of
+from errand_ros2.readings import newer, planar_pose, transform_of
 from errand_ros2.wire.node import Node
 from errand_ros2.wire.types import LATCHED, SENSOR
 from skills.estimate.scan_points import scan_of_points
@@ -188,16 +188,17 @@ class SensedRobot:
         points_L = (X_BL.inverse() @ X_BF @ points_F.T).T if len(points_F) else points_F
         file = self._description.file.lidar
         elevations = np.radians(np.linspace(file.lowest, file.highest, file.rings))
-        self._scan = scan_of_points(points_L, elevations, file.columns, stamp_s, X_BL, X_OB)
+        read = scan_of_points(points_L, elevations, file.columns, stamp_s, X_BL, X_OB)
+        self._scan = newer(self._scan, read)
 
     def _hear_scan(self, message: Any) -> None:
         stamp_s = self._stamp(message)
         X_BL, X_OB = self._X_BF(message.header.frame_id.strip("/")), self._X_OB(stamp_s)
         if X_BL is not None and X_OB is not None:
-            self._scan = readings.usable(readings.flat_scan, message, stamp_s, X_BL, X_OB) or self._scan
+            self._scan = newer(self._scan, readings.usable(readings.flat_scan, message, stamp_s, X_BL, X_OB))
 
     def _hear_imu(self, message: Any) -> None:
-        self._imu = readings.imu(message, self._stamp(message))
+        self._imu = newer(self._imu, readings.imu(message, self._stamp(message)))
 
     def _hear_force(self, message: Any) -> None:
         force = message.wrench.force

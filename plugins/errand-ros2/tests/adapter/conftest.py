@@ -7,20 +7,9 @@ import pytest
 pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
 
 from ros_client import free_port
-from ros_lock_step import LockStep
+from ros_lock_step import LockStep, scripted
 
 from errand_ros2.wire.node import Place
-from plant.robots.spot.kind import spot_capabilities
-from skills.testing.blocks import Block
-from skills.testing.clock import VirtualClock
-from skills.testing.robot import ScriptedRobot
-
-
-def scripted(**options):
-    """Builds a scripted Spot two metres before a wall."""
-    clock = VirtualClock()
-    given = {"capabilities": spot_capabilities(), "blocks": [Block(3.0, -1.5, 3.2, 1.5)], **options}
-    return ScriptedRobot(clock, **given), clock
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ FRAMES: Final = frozenset({MAP_FRAME, "world"})  # names of the map's frame
 TOPIC: Final = "cmd_vel"
 LIFE_S: Final = 0.2  # time after which a velocity no longer counts; then the robot stands
 STILL: Final = ((0.0, 0.0, 0.0), -math.inf)
-_SHORTEST_QUATERNION: Final = 0.1
+_SHORTEST_QUATERNION, _LONGEST_QUATERNION = 0.1, 1e6
 _MOST_PIXELS: Final = 1 << 24
 _POINT_TYPES: Final = {7: "f4", 8: "f8"}
 _COLOURS: Final = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4}
@@ -34,8 +34,8 @@ def transform_of(at: Any, turn: Any) -> RigidTransform:
     values = np.array([at.x, at.y, at.z, turn.w, turn.x, turn.y, turn.z], float)
     if not np.isfinite(values).all():
         raise InputError("the pose has a number that is not finite", hint="send finite numbers")
-    if (length := float(np.linalg.norm(values[3:]))) < _SHORTEST_QUATERNION:
-        raise InputError("the pose's quaternion is zero", hint="send w = 1 for no rotation")
+    if not _SHORTEST_QUATERNION <= (length := math.hypot(*values[3:])) < _LONGEST_QUATERNION:
+        raise InputError("the pose's quaternion is zero or too long", hint="send w = 1 for no rotation")
     return RigidTransform(Quaternion(values[3:] / length), values[:3])
 
 

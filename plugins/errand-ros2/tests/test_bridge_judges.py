@@ -173,3 +173,37 @@ def test_random_bytes_on_every_input_of_a_run_move_nothing(talk, capfd):
 
     assert talk(says).message == "the test is over"
     assert "Traceback" not in capfd.readouterr().err
+
+
+def test_goals_and_poses_with_wrong_bytes_leave_a_run_that_answers(talk, caplog):
+    types, chance = ros_types(), np.random.default_rng(1)
+    kinds = {"/goal_pose": POSE, "/initialpose": INPUTS["initialpose"], "/alice/say": STRING}
+    messages = {"/goal_pose": stamped(0.2, 0.1), "/initialpose": initial_pose(0.0), "/alice/say": {"data": "go"}}
+    through = {"goals": [stamped(0.2, 0.1), stamped(0.0, 0.1)]}
+    goals = {"navigate_to_pose": (NAVIGATE, {"pose": stamped(0.2, 0.1)}), "run_mission": (RUN, {"sentence": "go"})}
+    goals["navigate_through_poses"] = (THROUGH, {"poses": through})
+
+    def changed(data):
+        """Bytes of a message with some others behind its header."""
+        wrong = bytearray(data)
+        for at in chance.integers(4, len(data), int(chance.integers(1, 6))):
+            wrong[at] = int(chance.integers(0, 256))
+        return bytes(wrong)
+
+    def says(ros):
+        session, head = ros.node.session.inner, Attachment(1, 2, bytes(16)).encoded()
+        for _ in range(80):
+            for topic, kind in kinds.items():
+                message = types.message(kind)
+                session.put(ros.node.key.data_key(topic, message.key), changed(message.encode(messages[topic])))
+            for name, (kind, goal) in goals.items():
+                send = ActionType(types, kind).send_goal
+                asked = {"goal_id": {"uuid": np.frombuffer(chance.bytes(16), np.uint8)}, "goal": goal}
+                key = ros.node.key.data_key(f"/alice/{name}/_action/send_goal", send.key)
+                session.get(key, timeout=0.2, payload=changed(send.request.encode(asked)), attachment=head)
+            time.sleep(0.02)
+        assert ros.call("pause").success
+        ros.soon(lambda: ros.events("refused") and ros.events("outcome"))
+
+    assert talk(says).message == "the test is over"
+    assert "could not be handled" not in caplog.text

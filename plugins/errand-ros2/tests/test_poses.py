@@ -52,9 +52,10 @@ def test_a_pose_that_is_no_goal_is_refused(frame, x, y, why):
         pose_on_map(stamped(frame, x, y), GRID, FRAMES)
 
 
-def test_a_quaternion_of_zeros_is_refused():
+@pytest.mark.parametrize("w", [0.0, 1e200, -1e300])
+def test_a_quaternion_that_cannot_be_normalised_is_refused(w):
     message = stamped("map", 0.0, 0.0)
-    message.pose.orientation.w = 0.0
+    message.pose.orientation.w = w
     with pytest.raises(InputError, match="quaternion"):
         planar_pose(message.pose)
 

@@ -35,7 +35,6 @@ from executive.run.visitor import MissionEnd, Progress, RunVisitor
 from executive.tree.compiler import CompiledTree
 from skills.api import LocalisationEstimate, ParticleView, SearchingLocaliser, SkillContext
 from skills.estimate.grid_map import GridMap, load_grid_map
-from skills.inputs.errors import InputError
 
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
@@ -248,12 +247,9 @@ class Bridge(RunVisitor):
 
 
 def _set_pose(context: SkillContext, grid: GridMap, stamped: Any) -> None:
-    """Gives the localiser the pose of `initialpose`, if it can take one; ignores what is no pose on the map."""
+    """Gives the localiser the pose of `initialpose`, if it can take one. Raises InputError for one off the map."""
     localiser, X_OB = context.localiser, context.robot.odometry().X_OB
-    try:
-        pose = pose_on_map(SimpleNamespace(header=stamped.header, pose=stamped.pose.pose), grid, {})
-    except InputError:
-        return
+    pose = pose_on_map(SimpleNamespace(header=stamped.header, pose=stamped.pose.pose), grid, {})
     if not isinstance(localiser, SearchingLocaliser):
         return
     X_WO = pose.transform(float(X_OB.translation()[2])) @ X_OB.inverse()

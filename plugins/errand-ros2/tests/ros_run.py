@@ -189,7 +189,7 @@ def documented(heading, space="/alice"):
         kinds = [each.replace("/", "/msg/") for each in re.findall(r"`([^`]+)`", kinds)]
         names = re.findall(r"`([^`]+)`", names)
         kinds = kinds * len(names) if len(kinds) == 1 else kinds
-        if len(kinds) < len(names):
+        if len(kinds) < len(names):  # pictures, then their intrinsics
             kinds = [kinds["info" in name] for name in names]
         found |= dict(zip(names, kinds, strict=True))
     cameras = [each.source for each in spot_capabilities().cameras]
@@ -221,4 +221,7 @@ def provoke(ros):
     place = {f"goal_{axis}": value for axis, value in zip("xyz", (1.0, 2.0, 0.5), strict=True)}
     found = {"stamp": 2.5, "sequence": 2500, "class_name": "coke", **place}
     ros.bridge.message("object_destination", found)
+    track = {"class_name": "coke", "position_W": [1.0, 2.0, 0.8], "confirmed": True}
+    ros.bridge.message("tracks", {"stamp": 2.5, "robot_name": "Alice", "tracks": [track]})
+    ros.bridge.message("people", {"stamp": 2.5, "robot": "Alice", "people": [{"position_W": [3.0, 1.0]}]})
     ros.publisher("/alice/say", STRING).put(text("what do you do?"))

@@ -150,9 +150,12 @@ def test_the_independent_client_drives_and_calls_the_services(talk, message_file
         port, answers = ros.place.port, {"response_definition": "bool success\nstring message"}
         with connected(port, message_files) as session:
             goal = ROS2Publisher("/goal_pose", POSE, router_port=port)
-            time.sleep(0.2)  # until the router knows the publisher
             to = stamped_by(session.store.types, 0.3, 0.0)
-            goal.publish(header=to.header, pose=to.pose)
+            for _ in range(20):  # the router may not know the publisher at once
+                goal.publish(header=to.header, pose=to.pose)
+                time.sleep(0.5)
+                if not ros.still():
+                    break
             ros.soon(lambda: ros.robot.pose.x_m > 0.15)
             for name in ("pause", "step", "resume", "cancel"):
                 client = ROS2ServiceClient(

@@ -28,8 +28,6 @@ OLDER: Final = INTERFACES.with_name("interfaces_before_kilted")
 _PARTS: Final = re.compile(r"^---$", re.MULTILINE)
 _EVENT: Final = "service_msgs/msg/ServiceEventInfo info\n{0}_Request[<=1] request\n{0}_Response[<=1] response"
 _SERVICE: Final = "{0}_Request request_message\n{0}_Response response_message\n{0}_Event event_message"
-_CHECKED_BYTES, _PADDING_BYTES = 4096, 8
-"""Messages up to so many bytes, as all commands are, must have no bytes behind them but padding."""
 _UUID: Final = "unique_identifier_msgs/UUID goal_id"
 
 
@@ -134,13 +132,9 @@ class MessageType:
     def decode(self, data: bytes) -> Any:
         """Reads a message. Raises MalformedError when the bytes are no message of this type."""
         try:
-            message = self.types.store.deserialize_cdr(data, self.name)
-            fits = len(data) > _CHECKED_BYTES or len(data) - len(self.encode(message)) < _PADDING_BYTES
+            return self.types.store.deserialize_cdr(data, self.name)
         except Exception as error:  # generated code: struct.error, IndexError, UnicodeDecodeError and others
             raise MalformedError(f"{len(data)} bytes are no {self.name} ({type(error).__name__})") from error
-        if not fits:
-            raise MalformedError(f"{len(data)} bytes are more than one {self.name}")
-        return message
 
 
 @dataclass(frozen=True)

@@ -163,6 +163,7 @@ def test_the_independent_client_drives_and_calls_the_services(talk, message_file
                 )
                 told = client.call()
                 assert (told.success, told.message) == (True, name)
+            ros.soon(lambda: ros.events("outcome"))
 
     assert talk(says).message == "cancelled by ROS 2"
 

@@ -161,11 +161,8 @@ class ArmSkill(RoutineSkill[InputsT]):
             raise SkillFailure(Cause.EXECUTION, "the robot does not know its arm's angles")
         return np.asarray(np.clip(q, self.model.lower_rad, self.model.upper_rad))
 
-    def arm_points_B(self) -> FloatArray:
+    def arm_points_B(self, q_rad: FloatArray) -> FloatArray:
         """Points (J + 1, 3) of the arm in the body frame: the joints from the shoulder on, and the gripper's tip."""
-        return self._arm_points_B(self.q_rad())
-
-    def _arm_points_B(self, q_rad: FloatArray) -> FloatArray:
         gripper = self.context.robot.capabilities().gripper
         tip_B = self.model.X_BH(q_rad) @ np.array([0.0 if gripper is None else gripper.length_m, 0.0, 0.0])
         return np.vstack([self.model.points_B(q_rad), tip_B])
@@ -209,7 +206,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         context, X_WB, q_rad = self.context, self.X_WB(), self.q_rad()
         held_H = context.payload.corners_H if context.robot.gripper().holding else None
         held_W = None if held_H is None else (X_WB @ self.model.X_BH(q_rad), held_H)
-        arm_W, stowed_W = (X_WB @ self._arm_points_B(q_rad).T for q_rad in (q_rad, self.model.stowed_rad))
+        arm_W, stowed_W = (X_WB @ self.arm_points_B(q_rad).T for q_rad in (q_rad, self.model.stowed_rad))
         own = OwnSpace(self._outline(), (arm_W,), tuple(self.known_W), held_W)
         reach_m = _BEYOND_M + self.arm.max_reach_m + beyond_m
         seen = solid_boxes(context.solid.cells, X_WB, reach_m, own.holds)
@@ -232,11 +229,8 @@ class ArmSkill(RoutineSkill[InputsT]):
         *first_m, last_m = heights_m
         for height_m in first_m:
             yield from self.stand_at(height_m, message)
-            try:
+            with PlanningAttempt():
                 return (yield from attempt())
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
         yield from self.stand_at(last_m, message)
         return (yield from attempt())
 

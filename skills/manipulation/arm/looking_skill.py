@@ -135,7 +135,8 @@ class LookingSkill(ArmSkill[InputsT]):
             yield from self.pause(_ASK_AGAIN_S, f"the {camera.mount.value} camera shows nothing; {message}")
             self._doubted_s += self.context.clock.now() - begun_s
         if not camera.on_hand and robot.capabilities().arm is not None:
-            image = mask_arm(image, self.arm_points_B(), _HELD_RADIUS_M if robot.gripper().holding else None)
+            held_radius_m = _HELD_RADIUS_M if robot.gripper().holding else None
+            image = mask_arm(image, self.arm_points_B(self.q_rad()), held_radius_m)
         solid, X_WO = self.context.solid, self.context.localiser.estimate().X_WO
         solid.cells = add_picture(solid.cells, image, X_WO, self._outline())
         solid.views = add_view(solid.views, image, X_WO)

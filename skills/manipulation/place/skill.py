@@ -214,16 +214,13 @@ class Place(BinPlacement[PlaceInputs]):
                 yield from self.carry(carried, f"holding the object before the {surface.name}")
             view = yield from self._view(search, spot_W)
             search.add(view, spot_W)
-            try:
+            with PlanningAttempt() as attempt:
                 above, X_WB = partial(self._go_above, search, view), self.X_WB()
                 corners_W = X_WB.multiply(box_corners(search.held.box(self.model.X_BH(self.q_rad()))).T).T
                 clear_m = clear_heights(heights_m, float(X_WB.translation()[2]), corners_W, surface)
                 return (yield from self.attempt_at_heights(clear_m, standing, above))
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
-                if moves >= self.options.moves:
-                    raise SkillFailure(Cause.PLANNING, search.why_none()) from failure
+            if moves >= self.options.moves:
+                raise SkillFailure(Cause.PLANNING, search.why_none()) from attempt.failure
             moves += 1
             if not (yield from self._draw_in(search.held)):
                 yield from self.carry(carried, "carrying the object on along the surface")
@@ -233,12 +230,9 @@ class Place(BinPlacement[PlaceInputs]):
     def _go_on(self, search: SpotSearch) -> Routine[FloatArray]:
         """Drives to the next spot that has a base placement. Raises SkillFailure when none is left."""
         while others := search.others(self.X_WB().translation()[:2])[:_OTHER_SPOTS]:
-            try:
+            with PlanningAttempt():
                 return (yield from self._go_before(others, search))
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
-                search.pass_over(others)
+            search.pass_over(others)
         raise SkillFailure(Cause.PLANNING, search.why_none())
 
     def _view(self, search: SpotSearch, spot_W: FloatArray) -> Routine[SurfaceView]:
@@ -268,7 +262,8 @@ class Place(BinPlacement[PlaceInputs]):
         if scan is not None:
             (x0, y0), (x1, y1) = np.min(capabilities.footprint_m, axis=0), np.max(capabilities.footprint_m, axis=0)
             points_B = scan.points_B()
-            foreign_B = points_B[SelfFilter((x0, x1, y0, y1)).foreign(points_B, self.arm_points_B(), holding=True)]
+            own, arm_B = SelfFilter((x0, x1, y0, y1)), self.arm_points_B(self.q_rad())
+            foreign_B = points_B[own.foreign(points_B, arm_B, holding=True)]
             X_WB = self.context.localiser.estimate().X_WO @ scan.X_OB
             seen.append(foreign_B @ X_WB.rotation().matrix().T + X_WB.translation())
         points_W = np.vstack(seen)

@@ -16,7 +16,7 @@ from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect
 from skills.perception.point_cloud import Mask
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
 from skills.robot import FloatArray, Image
-from skills.routine import Routine, SkillFailure
+from skills.routine import PlanningAttempt, Routine, SkillFailure
 
 _AT_HAND_M = 0.4
 """Depth below which a pixel shows the held object, or something too near to measure."""
@@ -95,11 +95,9 @@ class PlaceVerification(ReleasingSkill[InputsT]):
             return np.asarray(near & (distances_m(before_W, points_W) > _NEW_M))
 
         for near in (False, True):
-            try:
+            with PlanningAttempt() as attempt:
                 image, view = yield from self.seen_on(surface, spot_W, put_down, near=near)
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
+            if attempt.failure is not None:
                 continue
             if np.count_nonzero(new(objects_W(view))) >= _LEAST_NEW or (
                 yield from self._is_detected(image, surface, new)

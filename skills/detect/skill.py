@@ -377,16 +377,11 @@ class Detect(LookingSkill[DetectInputs]):
         relations = " and ".join(map(str, inputs.relations))
         several = f"{count_sentence(found, inputs.surfaces)} {relations}"
         question = Question(f"which of {self.context.robot.name}", f"{several}: which one?", (*names,), "", _ANSWER_S)
-        asked = self.context.ask(question)
-        try:
-            while not asked.done():
-                yield Running(f"asking which one is meant: {several}")
-        finally:
-            asked.withdraw()
-        if asked.result() not in names:
+        answer = yield from self._awaited(self.context.ask(question), f"asking which one is meant: {several}")
+        if answer not in names:
             yield from self.try_stow()
             raise SkillFailure(Cause.PRECONDITION, f"{several}, and it is not said which one", final=True)
-        return names[asked.result()]
+        return names[answer]
 
     def _too_few(self, inputs: DetectInputs, found: Sequence[ObjectObservation]) -> SkillFailure:
         """Failure that says how much of each surface was seen."""

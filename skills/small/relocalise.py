@@ -235,10 +235,8 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
             latency_s=low.latency_s,
             name=f"look for low obstacles by {source}",
         )
-        while not job.done():
-            yield Running("looking ahead")
         try:
-            return job.result()
+            return (yield from self._awaited(job, "looking ahead"))
         except NoImageError as error:
             raise SkillFailure(Cause.EXECUTION, str(error)) from error
 

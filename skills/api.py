@@ -232,6 +232,8 @@ PICTURES: Final = "pictures"
 """Topic of the messages that `SkillContext.show_picture` publishes."""
 TOUCHES: Final = "touches"
 """Topic of the messages that `SkillContext.expect_touch` publishes."""
+SPEECH: Final = "speech"
+"""Topic of the messages that `say` publishes."""
 
 
 @dataclass
@@ -344,6 +346,15 @@ class SkillContext:
         if last is None or last[0] is not X_WO or last[1] is not X_OB:
             last = self._last_pose.known = X_WO, X_OB, Pose2D.from_transform(X_WO @ X_OB)
         return last[2]
+
+
+def say(context: SkillContext, text: str) -> str | None:
+    """Says a text without waiting for its end; in a silent zone only shows it, and returns the zone's name."""
+    message = {"robot": context.robot.name, "text": text, "t": round(context.clock.now(), 6)}
+    if silent := context.silent_zone():
+        message["silent"] = silent
+    context.publish(SPEECH, message)
+    return silent
 
 
 @dataclass(frozen=True)

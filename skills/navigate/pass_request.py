@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 
-from skills.api import SkillContext
+from skills.api import SkillContext, say
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
 
@@ -40,17 +40,10 @@ class PassRequest:
         goes_on, self._tick_s = now_s - self._tick_s < ASKS_S, now_s
         if not goes_on or math.dist((here.x_m, here.y_m), (self._here.x_m, self._here.y_m)) > _STANDS_M:
             if goes_on and self._asked and all(math.dist(one.place_W, self._person_W) > _LEFT_M for one in people()):
-                _say(self._context, "Thank you.")
+                say(self._context, "Thank you.")
             self._here, self._since_s, self._asked = here, now_s, 0
         elif now_s - self._since_s >= ASKS_S and self._asked < TIMES:
             self._since_s = now_s
             if (blocker := find()) is not None:
-                _say(self._context, "May I pass, please?")
+                say(self._context, "May I pass, please?")
                 self._asked, self._person_W = self._asked + 1, blocker.place_W
-
-
-def _say(context: SkillContext, text: str) -> None:
-    """Says a text as the skill `speak` does, which stands in a room above."""
-    message = {"robot": context.robot.name, "text": text, "t": round(context.clock.now(), 6)}
-    silent = context.silent_zone()
-    context.publish("speech", message | ({"silent": silent} if silent else {}))

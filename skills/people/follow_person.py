@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from skills.api import Cause, ClearableCostmap, Failed, Part, Running, SkillContext, Succeeded
+from skills.api import Cause, ClearableCostmap, Failed, Part, Running, SkillContext, Succeeded, say
 from skills.geometry import bearing_rad, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
@@ -30,7 +30,7 @@ from skills.perception.people_tracking import PeopleWatch
 from skills.quantities import Coordinate, Duration, Speed
 from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure
-from skills.small.speak import ListeningSkill, say
+from skills.small.speak import ListeningSkill
 
 _SURELY_M = 0.1
 """Distance inside the edge of a place beyond which a person is certainly in it."""

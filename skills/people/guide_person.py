@@ -1,13 +1,13 @@
 """The guide_person skill: leads a person at their pace, waits for them, and goes back for them."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
 import numpy as np
 
-from skills.api import Cause, Part, Running, Step, Succeeded
+from skills.api import Cause, Part, Running, Step, Succeeded, say
 from skills.geometry import grid_inside, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
@@ -15,12 +15,11 @@ from skills.navigate.skill import Navigate
 from skills.navigate.surroundings import Company, NavigateInputs
 from skills.people.followed_person import Target, TargetOptions, people_about
 from skills.people.meet_person import MeetPerson, MeetPersonInputs, MeetPersonOptions, person_text
-from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.quantities import Coordinate, Delay, Length, Speed, Tries, Turn
 from skills.robot import Pose2D
 from skills.routine import ENDED_EARLY, Patience, Routine, SkillFailure
-from skills.small.speak import ListeningSkill, say
+from skills.small.speak import ListeningSkill
 
 _TRACKING: Final = PeopleOptions(period_s=1.0, track_m=6.0, hidden_s=8.0)
 _NEAR: Final = MeetPersonOptions(apart_m=(1.3, 1.6, 2.2, 2.7))
@@ -129,17 +128,14 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
         watch, now_s = self._company.watch, self.context.clock.now()
         watch.step(np.zeros(3))
         if self._target is None:
-            if (first := next(iter(self._candidates(watch.tracks())), None)) is not None:
-                self._target = Target(first, self.context.pose(), TargetOptions())
+            here = self.context.pose()
+            reach_m = self.options.ahead_m if self._place_W is None else self.options.same_m
+            if near := people_about(watch.tracks(), here, self._place_W, reach_m, self.options.ahead_rad):
+                self._target = Target(near[0], here, TargetOptions())
         else:
             self._target.update(watch.tracks(), (), now_s)
         self._company.track = 0 if self._target is None else self._target.seen.track
         return super().step()
-
-    def _candidates(self, tracks: Sequence[SeenPerson]) -> list[SeenPerson]:
-        """People who may be the one to guide, the likeliest first."""
-        reach_m = self.options.ahead_m if self._place_W is None else self.options.same_m
-        return people_about(tracks, self.context.pose(), self._place_W, reach_m, self.options.ahead_rad)
 
     def _gap_m(self) -> float:
         """Distance between the robot and the person, in metres; infinite while the person is hidden."""

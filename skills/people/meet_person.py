@@ -104,8 +104,10 @@ class MeetPerson(RoutineSkill[MeetPersonInputs]):
                     why = nobody if place_W is None else f"{who} is not seen at {place_text(place_W)}"
                     raise SkillFailure(Cause.POSTCONDITION, why)
                 place_W = person.place_W
-                if self._is_beside(person, near_m):
-                    return self._met(inputs, person)
+                off_rad = abs(bearing_rad(self.context.pose(), place_W))
+                if person.distance_m <= near_m and off_rad <= self.options.facing_rad:
+                    seen = person_observation(person, inputs.person, inputs.place or None)
+                    return Succeeded(f"beside {who} at {place_text(place_W)}", {"person": seen})
             near_m = max(near_m, inputs.within_m or 0.0)
             yield from self._go_beside(place_W, who, inputs.within_m)
         raise SkillFailure(Cause.POSTCONDITION, f"{who} does not stay where the robot goes")
@@ -144,10 +146,6 @@ class MeetPerson(RoutineSkill[MeetPersonInputs]):
         towards = Pose2D(here.x_m, here.y_m, here.yaw_rad + bearing_rad(here, place_W))
         return math.dist(place_W, (here.x_m, here.y_m)) <= self.options.near_m and self._sees(towards, place_W)
 
-    def _is_beside(self, person: SeenPerson, near_m: float) -> bool:
-        off_rad = abs(bearing_rad(self.context.pose(), person.place_W))
-        return person.distance_m <= near_m and off_rad <= self.options.facing_rad
-
     def _go_beside(self, place_W: tuple[float, float], name: str, within_m: float | None) -> Routine[None]:
         """Drives to the nearest free pose that faces a place. Raises SkillFailure when there is none."""
         footprint, costmap, here = ArmFootprint(self.context).now(), self.context.free_space(), self.context.pose()
@@ -163,7 +161,3 @@ class MeetPerson(RoutineSkill[MeetPersonInputs]):
         """Returns whether no wall or table is between a pose and a person."""
         at_W = np.array([(pose.x_m, pose.y_m)])
         return bool(line_of_sight(self.context.costmap, np.array(place_W), at_W, beyond_m=_ARM_M)[0])
-
-    def _met(self, inputs: MeetPersonInputs, person: SeenPerson) -> Succeeded:
-        beside = f"beside {person_text(inputs.person)} at {place_text(person.place_W)}"
-        return Succeeded(beside, {"person": person_observation(person, inputs.person, inputs.place or None)})

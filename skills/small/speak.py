@@ -1,14 +1,13 @@
-"""The speak skill says a sentence to the people around; skills that move speak and listen through this module."""
+"""The speak skill says a sentence to the people around; skills that move listen through this module."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
-from skills.api import Cause, Failed, InputsT, Job, Part, Question, Running, Skill, SkillContext, Step, Succeeded
+from skills.api import Cause, Failed, InputsT, Job, Part, Question, Running, Skill, Step, Succeeded, say
 from skills.quantities import Delay
 from skills.routine import Routine, RoutineSkill
 
-SPEECH_TOPIC: Final = "speech"
 LONGEST_TEXT: Final = 500
 """Largest number of characters."""
 
@@ -71,15 +70,6 @@ class Speak(Skill[SpeakInputs]):
         """Says the text again only after a restart, when it is unknown how much of it was heard."""
         if self._begun_s is None:
             self.begin(inputs)
-
-
-def say(context: SkillContext, text: str) -> str | None:
-    """Says a text without waiting for its end; in a silent zone only shows it, and returns the zone's name."""
-    message = {"robot": context.robot.name, "text": text, "t": round(context.clock.now(), 6)}
-    if silent := context.silent_zone():
-        message["silent"] = silent
-    context.publish(SPEECH_TOPIC, message)
-    return silent
 
 
 def _refusal(text: str) -> Failed | None:

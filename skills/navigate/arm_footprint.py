@@ -46,7 +46,10 @@ class ArmFootprint:
 
     def now(self) -> Footprint:
         """The footprint at the arm's present joint angles."""
-        arm, held = self._outside(self._arm_discs()), self._outside(self._held_discs())
+        if self._model is None or (q_rad := self._q_rad(self._model)) is None:
+            return self._body
+        arm = self._outside(_link_discs(self._model, q_rad, self._tip_m))
+        held = self._outside(self._held_discs(self._model, q_rad))
         discs = self._clipped(np.vstack([arm, held]))
         if len(discs) == 0:
             return self._body
@@ -61,29 +64,20 @@ class ArmFootprint:
         apart = np.linalg.norm(new[:, None, :2] - old[None, :, :2], axis=2) + new[:, None, 2] - old[None, :, 2]
         return bool(np.any(np.min(apart, axis=1) > _CHANGED_M))
 
-    def _arm_discs(self) -> FloatArray:
-        """Discs under the arm's links, rows of x, y, radius; none while the joint angles are unknown."""
-        q_rad = self._q_rad()
-        if self._model is None or q_rad is None:
-            return np.empty((0, 3))
-        return _link_discs(self._model, q_rad, self._tip_m)
-
-    def _held_discs(self) -> FloatArray:
+    def _held_discs(self, model: ArmModel, q_rad: FloatArray) -> FloatArray:
         """Discs under the held object; an object of unknown size counts as the largest that the gripper can hold."""
-        q_rad = self._q_rad()
-        if self._model is None or self._gripper is None or q_rad is None or not self._context.robot.gripper().holding:
+        if self._gripper is None or not self._context.robot.gripper().holding:
             return np.empty((0, 3))
-        X_BH, corners_H = self._model.X_BH(q_rad), self._context.payload.corners_H
+        X_BH, corners_H = model.X_BH(q_rad), self._context.payload.corners_H
         if corners_H is not None:
             return _box_discs(X_BH, corners_H)
         middle = X_BH @ np.array([self._gripper.grip_x_m, 0.0, 0.0])
         return np.array([[middle[0], middle[1], self._gripper.length_m - self._gripper.grip_x_m]])
 
-    def _q_rad(self) -> FloatArray | None:
-        if self._model is None:
-            return None
+    def _q_rad(self, model: ArmModel) -> FloatArray | None:
+        """The arm's joint angles; None while they are unknown."""
         positions = self._context.robot.joints().position_rad
-        q_rad = np.array([positions[name] for name in self._model.names])
+        q_rad = np.array([positions[name] for name in model.names])
         return q_rad if np.all(np.isfinite(q_rad)) else None
 
     def _outside(self, discs: FloatArray) -> FloatArray:

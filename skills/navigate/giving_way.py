@@ -98,7 +98,7 @@ class GivingWay:
 
     def reserve_pose(self, pose: Pose2D, footprint: Footprint) -> None:
         """Reserves only the pose where the robot stands."""
-        self._traffic.announce(np.array([[pose.x_m, pose.y_m, pose.yaw_rad]]), footprint.discs)
+        self._traffic.announce(pose_array([pose]), footprint.discs)
 
     def reserve_goal(self, pose: Pose2D, goal: Pose2D, footprint: Footprint) -> None:
         """Reserves the goal while no path leads to it, so that a robot with lower priority steps aside."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
+from skills.geometry import wrap
 from skills.navigate.footprint import ClearanceField, clearance_at
 from skills.robot import FloatArray
 
@@ -172,7 +173,4 @@ def drive_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> tuple
     return best, heading
 
 
-@compiled
-def _half_turn(angle: float) -> float:
-    """The same angle in [-pi, pi)."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+_half_turn = compiled(wrap)

@@ -112,10 +112,7 @@ def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m:
     Both ends stay. A pose moves only where its clearance stays above margin_m or does not decrease.
     """
     poses = poses.copy()
-    count = poses.shape[0]
-    clearance = np.empty(count)
-    for n in range(count):
-        clearance[n] = clearance_at(space.field, poses[n, 0], poses[n, 1], poses[n, 2])
+    count, clearance = poses.shape[0], clearances(space, poses)
     for _ in range(rounds):
         for n in range(1, count - 1):
             x = 0.5 * poses[n, 0] + 0.25 * (poses[n - 1, 0] + poses[n + 1, 0])

@@ -189,7 +189,7 @@ def _solve(problem: Problem) -> Path:
         rough = _search(problem, space, yaw0_rad)
         if rough is not None:
             return _smooth(problem, space, rough)
-    places = f"from {_place(problem.start)} to {_place(problem.goal)}"
+    places = f"from {xy_text(problem.start)} to {xy_text(problem.goal)}"
     raise NoPathError(f"There is no path {places} that the robot fits through{_because(problem.footprint)}.")
 
 
@@ -199,7 +199,8 @@ def _because(footprint: Footprint) -> str:
     return f": {footprint.beyond} makes it {length:.2f} m long and {width:.2f} m wide" if footprint.beyond else ""
 
 
-def _place(pose: Pose2D) -> str:
+def xy_text(pose: Pose2D) -> str:
+    """Position (x, y) of a pose, for a message: "(1.20, 5.50)"."""
     return f"({pose.x_m:.2f}, {pose.y_m:.2f})"
 
 
@@ -207,7 +208,7 @@ def _needs(problem: Problem) -> Needs:
     """Required clearance; near a blocked start, the clearance of that start."""
     options, clearance = problem.options, clearance_at(problem.field, *_row(problem.start))
     if clearance < -options.deepest_start_m:
-        raise PlanningError(f"The robot stands in an obstacle at {_place(problem.start)}, so no path can begin there.")
+        raise PlanningError(f"The robot stands in an obstacle at {xy_text(problem.start)}, so no path can begin there.")
     escape = min(options.margin_m, clearance - _NOISE_M)
     return Needs(options.margin_m, escape, options.escape_m, problem.start.x_m, problem.start.y_m)
 
@@ -218,7 +219,7 @@ def _check_goal(problem: Problem) -> None:
         return
     needed = f"would have {clearance:.2f} m to the nearest obstacle there and needs {problem.options.margin_m:.2f} m"
     why = "would stand in an obstacle there, or off the map" if clearance < 0.0 else needed
-    raise PlanningError(f"The goal {_place(problem.goal)} is blocked: the robot {why}{_because(problem.footprint)}.")
+    raise PlanningError(f"The goal {xy_text(problem.goal)} is blocked: the robot {why}{_because(problem.footprint)}.")
 
 
 def _lattice(problem: Problem, yaw0_rad: float) -> tuple[Lattice, int, int]:

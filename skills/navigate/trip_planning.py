@@ -13,7 +13,7 @@ from skills.navigate.door_openers import DoorCalls
 from skills.navigate.giving_way import Avoided
 from skills.navigate.pass_request import PassRequest
 from skills.navigate.path import Path
-from skills.navigate.planner import LatticePlanner
+from skills.navigate.planner import LatticePlanner, xy_text
 from skills.navigate.surroundings import NavigateInputs, NavigateOptions, Surroundings
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
@@ -127,7 +127,7 @@ class TripPlanning:
         zones = self._around.forbidding_zones(self._inputs.goal)
         if zones:
             sentence = (
-                f"{zones_sentence(zones, 'keep-out zone')} The robot does not stand at {_place(self._inputs.goal)}."
+                f"{zones_sentence(zones, 'keep-out zone')} The robot does not stand at {xy_text(self._inputs.goal)}."
             )
             raise SkillFailure(Cause.PLANNING, sentence, final=all(map(self._around.forbidding_zones, self._goals)))
 
@@ -235,7 +235,7 @@ class TripPlanning:
         if self.obstacle_W is None or self._replans >= self._options.replans:
             zones = () if may_go else self._around.zones_between(self._goals)
             if zones:
-                sentence = f"{zones_sentence(zones, 'keep-out zone')} No path leads to {_place(self._inputs.goal)}."
+                sentence = f"{zones_sentence(zones, 'keep-out zone')} No path leads to {xy_text(self._inputs.goal)}."
                 raise SkillFailure(Cause.PLANNING, sentence, final=True)
             who = self._around.robots.name_at(self.obstacle_W) or "an obstacle"
             seen = f" The path is blocked by {who} at {place_text(self.obstacle_W)}." if self.obstacle_W else ""
@@ -323,10 +323,6 @@ class TripPlanning:
         self._around.robots.reserve_goal(self._context.pose(), self.goal, self._around.footprint)
         self._around.clear_obstacles()
         return True
-
-
-def _place(pose: Pose2D) -> str:
-    return place_text((pose.x_m, pose.y_m))
 
 
 def place_text(place_W: tuple[float, float] | None) -> str:

@@ -28,7 +28,7 @@ def detections_message(image: Image, found: Iterable[Detection], placed: Sequenc
 
 def _detection(detection: Detection, placed: Detection3D | None) -> Message:
     message = {
-        "class_id": class_id(detection.class_name),
+        "class_id": class_form(detection.class_name).id,
         "class_name": detection.class_name,
         "score": round(detection.score, 3),
         "box": [round(value) for value in detection.box],
@@ -45,17 +45,12 @@ def _detection(detection: Detection, placed: Detection3D | None) -> Message:
     return {**message, **place}
 
 
-def class_id(class_name: str) -> int:
-    """Number of a class in messages; 0 for a class without a form."""
-    return class_form(class_name).id
-
-
 def object_to_detect_message(context: SkillContext, classes: Sequence[str]) -> Message:
     """Message with the wanted classes."""
     return {
         "stamp": context.clock.now(),
         "robot_name": context.robot.name,
-        "class_id": [class_id(name) for name in classes],
+        "class_id": [class_form(name).id for name in classes],
         "class_name": list(classes),
     }
 
@@ -70,7 +65,7 @@ def object_destination_message(
         "stamp": context.clock.now(),
         "sequence": sequence,
         "message_id": f"{context.robot.name}-{sequence}",
-        "class_id": class_id(seen.kind.name),
+        "class_id": class_form(seen.kind.name).id,
         "class_name": seen.kind.name,
         "goal_x": seen.position_W[0],
         "goal_y": seen.position_W[1],

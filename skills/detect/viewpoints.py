@@ -73,15 +73,10 @@ def surface_boxes(surfaces: Iterable[Surface], X_WB: RigidTransform) -> list[Box
     return [_standing_box(np.asarray(s.polygon_W, dtype=float), 0.05, s.height_m, X_WB) for s in standing]
 
 
-def cluster_box(cluster: Cluster, X_WB: RigidTransform, grow_m: float = 0.01) -> Box:
-    """Bounding box of a cluster, grown by grow_m, in the body frame."""
-    return _part_box(cluster, cluster.points.p_W[:, :2], X_WB, grow_m)
-
-
 def cluster_boxes(clusters: Iterable[Cluster], X_WB: RigidTransform, grow_m: float = 0.01) -> list[Box]:
     """Bounding boxes of clusters, in the body frame; several for a cluster that fills one box poorly."""
     parts = ((cluster, xy) for cluster in clusters for xy in standing_parts(cluster.points.p_W[:, :2]))
-    return [_part_box(cluster, xy, X_WB, grow_m) for cluster, xy in parts]
+    return [part_box(cluster, xy, X_WB, grow_m) for cluster, xy in parts]
 
 
 def standing_parts(xy: FloatArray, depth: int = _SPLITS) -> list[FloatArray]:
@@ -100,7 +95,8 @@ def standing_parts(xy: FloatArray, depth: int = _SPLITS) -> list[FloatArray]:
     return [part for half in halves for part in standing_parts(half, depth - 1)]
 
 
-def _part_box(cluster: Cluster, xy: FloatArray, X_WB: RigidTransform, grow_m: float) -> Box:
+def part_box(cluster: Cluster, xy: FloatArray, X_WB: RigidTransform, grow_m: float = 0.01) -> Box:
+    """Bounding box of the points (N, 2) of a cluster, grown by grow_m, in the body frame."""
     top_m = cluster.base_m + cluster.shape.height_m + grow_m
     return _standing_box(xy, cluster.base_m, top_m, X_WB, grow_m)
 

@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, InputsT, LocalisationEstimate, ObjectKind, ObjectObservation, Surface
-from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
+from skills.detect.viewpoints import cluster_boxes, part_box, surface_boxes
 from skills.manipulation.arm.collision import Box
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import TALL_M, close_viewpoints, overview_viewpoints, sees_closely
@@ -120,7 +120,8 @@ def examine(
     surfaces = surface_boxes([_seen_surface(view, surface, cluster.shape.centre)], X_WB)
     boxes = (*surfaces, *(box for other in others for box in other.boxes))
     objects = tuple(other for other in others if max(other.seen.size_m) < LONGEST_M)
-    return CloseView(_target(cluster, X_WB), boxes, cluster_box(cluster, X_WB), X_WB, objects)
+    own_box = part_box(cluster, cluster.points.p_W[:, :2], X_WB)
+    return CloseView(_target(cluster, X_WB), boxes, own_box, X_WB, objects)
 
 
 def _split_others(view: SurfaceView, own: Sequence[Detection3D], p_WC: FloatArray) -> SurfaceView:

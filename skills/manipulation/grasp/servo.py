@@ -20,6 +20,7 @@ from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.kinematics import ArmModel
 from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.planning import GraspPlan
+from skills.perception.point_cloud import lens_rays, project
 from skills.robot import ArmTrajectory, FloatArray, Image, Intrinsics
 
 SEARCHED_M: Final = 0.06
@@ -176,9 +177,8 @@ class _Picture:
     def _outline(self, offset_B: FloatArray) -> Mask:
         """Mask of the pixels that the shifted object covers."""
         p_C = self.X_CB @ (self.points_B + offset_B).T
-        ahead = p_C[:, p_C[2] > 0.02]
-        u = np.rint((ahead[0] / ahead[2] * self.lens.fx + self.lens.cx) / self.stride).astype(np.int64)
-        v = np.rint((ahead[1] / ahead[2] * self.lens.fy + self.lens.cy) / self.stride).astype(np.int64)
+        pixels = project(p_C[:, p_C[2] > 0.02].T, self.lens)
+        u, v = (np.rint(each / self.stride).astype(np.int64) for each in pixels)
         inside = (u >= 0) & (v >= 0) & (u < self.solid.shape[1]) & (v < self.solid.shape[0])
         mask = np.zeros(self.solid.shape, np.uint8)
         mask[v[inside], u[inside]] = 1
@@ -187,8 +187,7 @@ class _Picture:
 
 def _rays(lens: Intrinsics, stride: int) -> FloatArray:
     """Directions (H, W, 3) in the camera frame with z = 1, one for each pixel of the reduced picture."""
-    x = (np.arange(0, lens.width, stride) - lens.cx) / lens.fx
-    y = (np.arange(0, lens.height, stride) - lens.cy) / lens.fy
+    x, y = (slopes[::stride] for slopes in lens_rays(lens))
     return np.stack([*np.meshgrid(x, y), np.ones((len(y), len(x)))], axis=-1)
 
 

@@ -48,7 +48,6 @@ _VNNI: Final = frozenset({"avx512_vnni", "avx_vnni"})
 _NUMPY: Final = {"uint8": np.uint8, "float": np.float32}
 
 Inputs = Mapping[str, tuple[str, tuple[int, ...]]]
-Outputs = Mapping[str, tuple[str, int]]
 
 
 class ModelFileError(InputError):
@@ -57,20 +56,14 @@ class ModelFileError(InputError):
 
 @dataclass(frozen=True)
 class NetworkKind:
-    """Expected format, inputs and outputs of a model file; `hint` says how to make a new one.
+    """Expected format and inputs of a model file; `hint` says how to make a new one.
 
-    As functions of the number of classes, `inputs` maps a name to ("uint8" or "float", shape of a row), and `outputs`
-    to ("float", length of the last axis).
+    As a function of the number of classes, `inputs` maps a name to ("uint8" or "float", shape of a row).
     """
 
     format: str
     hint: str
     inputs: Callable[[int], Inputs]
-    outputs: Callable[[int], Outputs]
-
-
-def _box_outputs(classes: int) -> Outputs:
-    return {"boxes": ("float", 4), "scores": ("float", classes)}
 
 
 def _crop_inputs(classes: int) -> Inputs:
@@ -81,21 +74,18 @@ PROPOSAL: Final = NetworkKind(
     "errand-detector-1",
     "make a new one: errand dataset train --data DIR --out DIR",
     lambda _classes: {"images": ("uint8", (HEIGHT_PX, WIDTH_PX, 3))},
-    _box_outputs,
 )
 """Proposes regions in a whole picture."""
 REFINEMENT: Final = NetworkKind(
     "errand-regions-1",
     "remove it, or make a new one: errand dataset refine --data DIR --out DIR",
     _crop_inputs,
-    _box_outputs,
 )
 """Refines boxes and scores of regions."""
 CLASSIFIER: Final = NetworkKind(
     "errand-third-1",
     "remove it, or make a new one: errand dataset refine --classifier --data DIR --out DIR",
     _crop_inputs,
-    _box_outputs,
 )
 """Classifies the refined regions."""
 _EXPORTED: Final = replace(
@@ -251,7 +241,7 @@ class _Reader:
         inputs = {port.name: (port.type, tuple(port.shape[1:])) for port in session.get_inputs()}
         outputs = {port.name: (port.type, port.shape[-1] if port.shape else None) for port in session.get_outputs()}
         wanted_inputs = {name: (f"tensor({of})", shape) for name, (of, shape) in self.kind.inputs(classes).items()}
-        wanted_outputs = {name: (f"tensor({of})", length) for name, (of, length) in self.kind.outputs(classes).items()}
+        wanted_outputs = {"boxes": ("tensor(float)", 4), "scores": ("tensor(float)", classes)}
         if (inputs, outputs) != (wanted_inputs, wanted_outputs):
             raise self.error(f"the model has other inputs or outputs: {_ports_text(inputs)} -> {_ports_text(outputs)}")
 
@@ -260,7 +250,7 @@ class _Reader:
         ports = self.kind.inputs(classes)
         zeros = {name: np.zeros((1, *shape), dtype=_NUMPY[of]) for name, (of, shape) in ports.items()}
         try:
-            session.run(list(self.kind.outputs(classes)), zeros)
+            session.run(["boxes", "scores"], zeros)
         except Exception as error:  # the library's errors have no common class
             raise self.error("the model of the detector is damaged (it does not run)") from error
 

@@ -142,7 +142,7 @@ class Scene:
     def places(self, landmark: Landmark, one: Standing) -> Sequence[Standing]:
         """Objects other than `one` that a landmark may be, or the point of known furniture nearest to it."""
         if landmark.outline_W:
-            return [Standing(_nearest_point(landmark.outline_W, one.p_W))]
+            return [Standing(nearest_point(landmark.outline_W, one.p_W))]
         if landmark.name == ROBOT and not landmark.classes:
             return [Standing((self.viewer.x_m, self.viewer.y_m))]
         return [each for each in self.objects.get(landmark, ()) if each != one]
@@ -195,9 +195,9 @@ def margin_m(relation: Relation, one: Standing, scene: Scene) -> float:
     if kind is _K.SEEN_FROM or (kind in PARTS and not len(scene.polygon_W)):
         return math.inf if kind is _K.SEEN_FROM else -math.inf
     if kind is _K.EDGE:
-        return EDGE_M - math.dist(_nearest_point(scene.polygon_W, one.p_W), one.p_W)
+        return EDGE_M - math.dist(nearest_point(scene.polygon_W, one.p_W), one.p_W)
     if kind is _K.MIDDLE:
-        half_m = 0.5 * math.dist(_nearest_point(scene.polygon_W, middle_W), middle_W)
+        half_m = 0.5 * math.dist(nearest_point(scene.polygon_W, middle_W), middle_W)
         return max(MIDDLE_M, half_m) - math.dist(one.p_W, middle_W)
     if kind in PARTS:
         return (_TURNS[kind] * scene.offset_m(middle_W, one.p_W)).real
@@ -235,7 +235,7 @@ def _key_m(relation: Relation, one: Standing, scene: Scene) -> float:
     return -left_m if relation.kind is _K.LEFT else left_m
 
 
-def _nearest_point(outline_W: Sequence[tuple[float, float]], p_W: tuple[float, float]) -> tuple[float, float]:
+def nearest_point(outline_W: Sequence[tuple[float, float]], p_W: tuple[float, float]) -> tuple[float, float]:
     """Point of an outline nearest to a point."""
     corners, p = np.array(outline_W, dtype=float), np.array(p_W)
     along = np.roll(corners, -1, axis=0) - corners

@@ -29,6 +29,7 @@ from plant.people.walk import Leg, Walk
 from plant.saved_state import Stateful
 from plant.worlds.seeding import PointRoute
 from plant.worlds.world import Point, WorldError
+from skills.relations import nearest_point
 from skills.robot import FloatArray
 
 BODY_KG = 75.0
@@ -342,8 +343,8 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
 
     def _close_ahead(self, walk: Walk, outline_W: FloatArray) -> bool:
         """Returns whether an outline is close to the person and ahead of the person."""
-        nearest_W = _nearest_on(outline_W, np.array(walk.place_W))
-        if float(np.hypot(*(nearest_W - walk.place_W))) > (PASS_M if walk.on_detour else YIELD_M):
+        nearest_W = nearest_point(outline_W.tolist(), walk.place_W)
+        if float(np.hypot(*np.subtract(nearest_W, walk.place_W))) > (PASS_M if walk.on_detour else YIELD_M):
             return False
         return _is_ahead(walk, nearest_W)
 
@@ -393,11 +394,3 @@ def _swept_W(a_W: Point, b_W: Point) -> FloatArray:
     box = _HALF_BODY_M * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     corners = np.concatenate([box + a_W, box + b_W]).astype(np.float32)
     return np.asarray(cv2.convexHull(corners).reshape(-1, 2), dtype=np.float64)
-
-
-def _nearest_on(polygon: FloatArray, point: FloatArray) -> FloatArray:
-    """Nearest point (2,) to a point on the edges of a polygon (K, 2)."""
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    shares = np.clip(np.sum((point - polygon) * edges, axis=1) / np.sum(edges**2, axis=1), 0.0, 1.0)
-    places = polygon + shares[:, None] * edges
-    return np.asarray(places[int(np.argmin(np.linalg.norm(places - point, axis=1)))])

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from executive.app.evaluate.results import Case, Evaluation, Evidence, Results, ResultsFile, RunSpec, Standing
 from executive.app.evaluate.workers import Pool, installed_code
 from executive.app.prepare.from_request import prepare_checked
+from executive.app.report.artifacts import to_jpeg
 from executive.app.report.run_report import RunReport
 from executive.app.runs.one_run import return_memory, run_request
 from executive.mission.request import Request
@@ -248,8 +249,4 @@ def _pictures(events: Sequence[Event]) -> Iterator[tuple[str, bytes]]:
 
 def _jpeg(picture: NDArray[np.uint8]) -> bytes:
     """Encodes a picture (height, width, 3; blue, green, red) as a small JPEG."""
-    height, width = picture.shape[:2]
-    scale = min(1.0, _WIDEST_PX / width)
-    size = (round(width * scale), max(1, round(height * scale)))
-    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA) if scale < 1.0 else picture
-    return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes()
+    return to_jpeg(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8), _WIDEST_PX, _JPEG_QUALITY)

@@ -236,14 +236,14 @@ def save_pictures(events: Iterable[Event], folder: Path) -> Sequence[Path]:
     return files
 
 
-def to_jpeg(picture: Picture) -> bytes:
-    """Encodes a picture as JPEG, at most 720 pixels wide."""
+def to_jpeg(picture: Picture, widest_px: int = _WIDEST_PX, quality: int = _JPEG_QUALITY) -> bytes:
+    """Encodes a picture as JPEG, by default at most 720 pixels wide."""
     height, width = picture.shape[:2]
-    scale = min(1.0, _WIDEST_PX / width)
+    scale = min(1.0, widest_px / width)
     size = (round(width * scale), max(1, round(height * scale)))
     small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA) if scale < 1.0 else picture
     bgr = cv2.cvtColor(small, cv2.COLOR_RGB2BGR) if small.ndim == 3 else small
-    return cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes()
+    return cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
 
 
 def _sheet(pictures: Sequence[Picture]) -> Picture:

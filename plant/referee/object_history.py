@@ -265,7 +265,7 @@ class ObjectHistory(Stateful):
         if self._left_z_m - sample.p_WO[2] > FALL_M or (sample.on_floor and not set_down):
             self._dropped = True
             self.dropped_s.append(sample.time_s)
-            self.events.append(f"{self._grip_robot} dropped {definite(self.name)} at {sample.time_s:.2f} s.")
+            self.events.append(f"{self._grip_robot} let {definite(self.name)} fall at {sample.time_s:.2f} s.")
 
     def _note_rest(self, sample: ObjectSample) -> None:
         """Ends a carry and records the place, once the object has rested for a while."""

@@ -377,10 +377,10 @@ def released_above_shelf():
     ("act", "drops", "event"),
     [
         pytest.param(
-            lambda: Stage().lift().let_go().fall("coke", OVER_TABLE, ON_TABLE), 1, "dropped the coke", id="slips"
+            lambda: Stage().lift().let_go().fall("coke", OVER_TABLE, ON_TABLE), 1, "let the coke fall", id="slips"
         ),
         pytest.param(lambda: released_above_floor(0.0), 0, "", id="set down on the floor"),
-        pytest.param(lambda: released_above_floor(0.03), 1, "dropped the coke", id="let go of above the floor"),
+        pytest.param(lambda: released_above_floor(0.03), 1, "let the coke fall", id="let go of above the floor"),
         pytest.param(released_above_shelf, 0, "", id="let go of low above a surface"),
         pytest.param(
             lambda: Stage().fall("coke", (1.5, 1.0, TABLE_Z), (1.5, 1.0, HALF - TOUCH)), 0, "knocked down", id="knocked"

@@ -1,12 +1,13 @@
-"""The command table of a robot in software: ids, statuses and expiry of commands."""
+"""Commands and lease of a robot in software: ids, statuses and expiry of commands."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
+from uuid import uuid4
 
-from skills.robot import CommandCause, CommandId, CommandState, CommandStatus
+from skills.robot import CommandCause, CommandId, CommandState, CommandStatus, Lease, LeaseError
 
 PartT = TypeVar("PartT", bound=Hashable)
 
@@ -86,6 +87,48 @@ class CommandTable(CommandStatuses, Generic[PartT]):
     def running(self, part: PartT) -> Active | None:
         """Running command of a part; None when there is none."""
         return self._running.get(part)
+
+
+class LeaseManager:
+    """Manages one robot's lease; only the lease with the highest number is valid."""
+
+    def __init__(self, robot_name: str) -> None:
+        self._robot_name, self._epoch = robot_name, uuid4().hex
+        self._number = 0
+        self._current: Lease | None = None
+
+    @property
+    def current(self) -> Lease | None:
+        """Valid lease; None while nobody holds one."""
+        return self._current
+
+    def acquire(self, holder: str) -> Lease:
+        """Gives a free lease to `holder`. Raises LeaseError while another holder has it."""
+        if self._current is not None:
+            raise LeaseError(
+                f"{self._robot_name}: the lease is held by {self._current.holder!r}; ask for its return, or take it"
+            )
+        return self.take(holder)
+
+    def take(self, holder: str) -> Lease:
+        """Gives the lease to `holder`, also while another holder has it."""
+        self._number += 1
+        self._current = Lease(self._robot_name, holder, self._number, self._epoch)
+        return self._current
+
+    def give_back(self, lease: Lease) -> bool:
+        """Frees the lease; returns False when `lease` was not valid."""
+        if lease != self._current:
+            return False
+        self._current = None
+        return True
+
+    def refusal(self, lease: Lease) -> str | None:
+        """Reason why `lease` does not allow motion; None when it does."""
+        if lease == self._current:
+            return None
+        holder = self._current.holder if self._current else "nobody"
+        return f"lease {lease.number} of {lease.holder!r} no longer counts; the lease is held by {holder!r}"
 
 
 class ScriptedCommands(CommandTable[str]):

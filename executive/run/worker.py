@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import gc
 import threading
+import time
 from collections.abc import Callable
-from concurrent.futures import Future, wait
+from concurrent.futures import Executor, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any, Final, Generic, TypeVar
@@ -92,6 +94,33 @@ def _run_jobs(given: SimpleQueue[_Work | None]) -> None:
             if future.set_running_or_notify_cancel():
                 fulfil(future, work)
             del work, future
+
+
+class WorkQueue(Executor):
+    """Executor whose work is done by the thread that calls `work_for`, such as the owner of a robot."""
+
+    def __init__(self) -> None:
+        self._given: SimpleQueue[_Work] = SimpleQueue()
+
+    @property
+    def is_empty(self) -> bool:
+        """Returns whether no work waits."""
+        return self._given.empty()
+
+    def submit(self, work: Callable[..., ResultT], /, *args: Any, **options: Any) -> Future[ResultT]:
+        """Hands work over; the future has its result."""
+        future: Future[ResultT] = Future()
+        self._given.put((partial(work, *args, **options), future))
+        return future
+
+    def work_for(self, limit_s: float, most: int = 1000) -> None:
+        """Does the work that waits, and what comes within a time (s, wall clock), up to a number."""
+        until_s = time.monotonic() + limit_s
+        with suppress(Empty):
+            for _ in range(most):
+                work, future = self._given.get(timeout=max(0.0, until_s - time.monotonic()))
+                if future.set_running_or_notify_cancel():
+                    fulfil(future, work)
 
 
 def fulfil(future: Future[ResultT], work: Callable[[], ResultT]) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from typing import TypeVar
-from uuid import uuid4
 
 import numpy as np
 from pydrake.systems.framework import Context
@@ -23,7 +22,7 @@ from plant.robots.servos import (
     Velocity,
 )
 from plant.saved_state import State, Stateful
-from skills.command_table import CommandTable
+from skills.command_table import CommandTable, LeaseManager
 from skills.robot import (
     ArmTrajectory,
     Battery,
@@ -40,54 +39,11 @@ from skills.robot import (
     Imu,
     Joints,
     Lease,
-    LeaseError,
     Odometry,
     Scan,
 )
 
 GoalT = TypeVar("GoalT")
-
-
-class LeaseManager:
-    """Manages one robot's lease; only the lease with the highest number is valid."""
-
-    def __init__(self, robot_name: str) -> None:
-        self._robot_name, self._epoch = robot_name, uuid4().hex
-        self._number = 0
-        self._current: Lease | None = None
-
-    @property
-    def current(self) -> Lease | None:
-        """Valid lease; None while nobody holds one."""
-        return self._current
-
-    def acquire(self, holder: str) -> Lease:
-        """Gives a free lease to `holder`. Raises LeaseError while another holder has it."""
-        if self._current is not None:
-            raise LeaseError(
-                f"{self._robot_name}: the lease is held by {self._current.holder!r}; ask for its return, or take it"
-            )
-        return self.take(holder)
-
-    def take(self, holder: str) -> Lease:
-        """Gives the lease to `holder`, also while another holder has it."""
-        self._number += 1
-        self._current = Lease(self._robot_name, holder, self._number, self._epoch)
-        return self._current
-
-    def give_back(self, lease: Lease) -> bool:
-        """Frees the lease; returns False when `lease` was not valid."""
-        if lease != self._current:
-            return False
-        self._current = None
-        return True
-
-    def refusal(self, lease: Lease) -> str | None:
-        """Reason why `lease` does not allow motion; None when it does."""
-        if lease == self._current:
-            return None
-        holder = self._current.holder if self._current else "nobody"
-        return f"lease {lease.number} of {lease.holder!r} no longer counts; the lease is held by {holder!r}"
 
 
 class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):

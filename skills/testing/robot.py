@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.command_table import Active, ScriptedCommands
+from skills.command_table import Active, LeaseManager, ScriptedCommands
 from skills.faults.fault_kinds import joints_under_pull
 from skills.geometry import compose
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
@@ -30,7 +30,6 @@ from skills.robot import (
     Imu,
     Joints,
     Lease,
-    LeaseError,
     Odometry,
     Pose2D,
     Scan,
@@ -117,7 +116,7 @@ class ScriptedRobot:
         self.in_gripper_rad = self.opening if start.holding else start.in_gripper_rad
         self.clamp_force_n = 20.0 if start.holding else 0.0
         self.held: Block | None = can_at(0.0, 0.0, 0.0) if start.holding else None
-        self.carries, self._lease_number = False, 0
+        self.carries, self._leases = False, LeaseManager(name)
         self._hangs_down_m = 0.057  # of the held object, below the fingers' middle
         self.charge, self.docked, self._pulled_at_s = start.charge, start.docked, start.pulled_at_s
         self.present_faults: tuple[str, ...] = ()
@@ -125,7 +124,6 @@ class ScriptedRobot:
         self.refusal_cause = CommandCause.REFUSED
         self.calls: list[str] = []
         self._commands = ScriptedCommands()
-        self._lease: Lease | None = None
         self._scan: Scan | None = None
         self._rng = np.random.default_rng(seed)
         clock.attach(self._pass_time)
@@ -276,13 +274,13 @@ class ScriptedRobot:
     def carry(self, holding: bool, *, lease: Lease) -> None:
         """Notes whether the gripper must keep its object."""
         self.calls.append("carry")
-        if lease == self._lease:
+        if lease == self._leases.current:
             self.carries = holding
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stops all motion, or only the given command; the gripper keeps its force."""
         self.calls.append("stop")
-        if lease != self._lease:
+        if lease != self._leases.current:
             return self._commands.refuse("the lease was taken away", CommandCause.NO_LEASE)
         self._commands.stop(only)
         return self._commands.note(CommandState.DONE)
@@ -294,27 +292,22 @@ class ScriptedRobot:
 
     def acquire_lease(self, holder: str) -> Lease:
         """Takes a free lease. Raises LeaseError when another holds it."""
-        if self._lease is not None:
-            raise LeaseError(f"{self._name}: the lease is held by '{self._lease.holder}'")
-        return self.take_lease(holder)
+        return self._leases.acquire(holder)
 
     def take_lease(self, holder: str) -> Lease:
         """Takes the lease away from its holder; the robot stops."""
         self._commands.stop(None, CommandCause.NO_LEASE)
-        self._lease_number += 1
-        self._lease = Lease(self._name, holder, self._lease_number, "scripted")
-        return self._lease
+        return self._leases.take(holder)
 
     def return_lease(self, lease: Lease) -> None:
         """Returns the lease; the robot stops."""
         self.calls.append("return_lease")
-        if lease == self._lease:
+        if self._leases.give_back(lease):
             self._commands.stop(None, CommandCause.NO_LEASE)
-            self._lease = None
 
     def lease_holder(self) -> Lease | None:
         """Valid lease; None while nobody holds one."""
-        return self._lease
+        return self._leases.current
 
     @property
     def moving_parts(self) -> tuple[str, ...]:
@@ -327,7 +320,7 @@ class ScriptedRobot:
     ) -> CommandId:
         self.calls.append(verb := verb or part)
         causes = (
-            (CommandCause.NO_LEASE, "the lease was taken away" if lease != self._lease else ""),
+            (CommandCause.NO_LEASE, "the lease was taken away" if lease != self._leases.current else ""),
             (CommandCause.UNSUPPORTED, lacks),
             (CommandCause.INVALID, fault),
             (self.refusal_cause, self.refuse_because.get(verb, "")),

@@ -111,12 +111,12 @@ class StandingRobot(ScriptedRobot):
 
     @property
     def lease(self):
-        return self._lease
+        return self._leases.current
 
     @lease.setter
     def lease(self, lease):
         self._commands.stop(None)
-        self._lease = lease
+        self._leases._current = lease
 
     @property
     def holder(self):

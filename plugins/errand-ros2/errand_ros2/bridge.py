@@ -19,6 +19,7 @@ from errand_ros2 import messages
 from errand_ros2.driving import Driving
 from errand_ros2.goals import Goals
 from errand_ros2.messages import Fields
+from errand_ros2.part_actions import PartActions
 from errand_ros2.readings import TOPIC, pose_on_map
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.tree_topic import TreeTopic
@@ -73,6 +74,7 @@ class _RobotBridge:
     context: SkillContext | None = None
     tree: CompiledTree | None = None
     topics: RobotTopics | None = None
+    parts: PartActions | None = None
     is_active: bool = False
     due_s: float = 0.0
     initial: list[Any] = field(default_factory=list)
@@ -145,6 +147,7 @@ class Bridge(RunVisitor):
         own.context, own.is_active = context, True
         if own.topics is None:
             own.topics = RobotTopics(own.node, context.robot, self._frames)
+            own.parts = PartActions(own.node, context.robot, context.clock, lambda: (own.context or context).lease)
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """Publishes paths and events; ends the goal whose mission has ended."""
@@ -198,8 +201,8 @@ class Bridge(RunVisitor):
             self._put_slowly(own, context, estimate, progress)
             if tree is not None:
                 own.tree_topic.put(now_s, tree, progress.states[context.robot.name])
-        if own.is_active:
-            own.driving.tick(context)
+        if own.is_active and own.parts is not None:
+            own.driving.tick(context, own.parts)
             own.goals.tick(context, progress)
 
     def _put_slowly(
@@ -227,6 +230,8 @@ class Bridge(RunVisitor):
         own = self._robots[end.result.robot_name]
         own.is_active = False
         own.goals.end()
+        if own.parts is not None:
+            own.parts.end()
 
     def _keep_pace(self, now_s: float) -> None:
         """Waits for the wall clock, unless a request is in a hurry; forgets a delay that is too long."""

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from errand_ros2.readings import LIFE_S, TOPIC, HeardVelocity, within_limits
+from errand_ros2.part_actions import PartActions
+from errand_ros2.readings import LIFE_S, HeardVelocity, within_limits
 from executive.run.control import Control
 from skills.api import SkillContext
 from skills.navigate.base import Base
@@ -29,12 +30,12 @@ class Driving(HeardVelocity):
         self._base: tuple[SkillContext, Base] | None = None
         self._driving, self._moved_s = False, -math.inf
 
-    def tick(self, context: SkillContext) -> None:
-        """Sends the command for the next tick, while velocities arrive."""
+    def tick(self, context: SkillContext, parts: PartActions) -> None:
+        """Sends the command for the next tick, while velocities arrive, and does what the actions of the parts ask."""
         (asked, at_s), now_s = self.last, time.monotonic()
-        alive = now_s - at_s <= LIFE_S
-        if alive and any(asked) and not self._driving:
-            self._control.pause(f"driven by {TOPIC}", robot=self._name)
+        drives = now_s - at_s <= LIFE_S and any(asked)
+        if (drives or parts.is_busy) and not self._driving:
+            self._control.pause("moved by ROS 2", robot=self._name)
             self._driving = True  # the run stands still from its next tick on
             return
         if not self._driving:
@@ -42,8 +43,10 @@ class Driving(HeardVelocity):
         if self._base is None or self._base[0] is not context:
             self._base = (context, Base(context))
         base = self._base[1]
-        if alive and any(asked):
-            self._moved_s = now_s
+        parts.work.work_for(0.0)
+        parts.follow()
+        self._moved_s = now_s if drives or parts.is_busy else self._moved_s
+        if drives:
             most = np.array([_LIMITS.max_speed_m_s, _LIMITS.lateral_m_s, _LIMITS.turn_rad_s])
             wanted = np.clip(within_limits(asked, context.robot.capabilities()), -most, most)
             base.drive_clear(

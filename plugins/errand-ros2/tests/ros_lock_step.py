@@ -84,7 +84,7 @@ class LockStep(RobotClock):
         heard = [(at_s["odom"], seen.odometry()), (at_s["odom"], seen.joints())]
         heard += [(at_s["scan"], seen.scan())] if "scan" in at_s else []
         all_heard = all(each is not None and each.stamp_s >= at_s - 1e-6 for at_s, each in heard)
-        return all_heard and self.server.ended <= sum(each.ended for each in self.robot.actions.values())
+        return all_heard and self.server.parts.ended <= sum(each.ended for each in self.robot.actions.values())
 
     def _soon(self, true):
         until_s = time.monotonic() + self._patience_s

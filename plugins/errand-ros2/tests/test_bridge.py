@@ -1,6 +1,7 @@
 """A run of a scripted robot as a system of ROS 2: goals, cancelling, velocities, sentences, services, odd input."""
 
 import math
+import threading
 import time
 import uuid
 from collections import defaultdict
@@ -17,6 +18,9 @@ from errand_ros2.wire.actions import GoalStatus
 from errand_ros2.wire.node import Client
 from errand_ros2.wire.types import LATCHED, older_types, ros_types
 from skills.inputs.errors import InputError
+
+TRAJECTORY = "control_msgs/action/FollowJointTrajectory"
+ARM_RAD = [0.0, -0.9, 1.8, 0.0, -0.9, 0.0]
 
 
 def test_a_run_publishes_clock_pose_plan_map_events_and_diagnostics(talk):
@@ -285,6 +289,76 @@ def test_velocities_pause_the_mission_and_their_end_resumes_it(talk):
         ros.soon(lambda: [each["what"] for each in ros.events("control")] == ["pause", "resume"], 5.0)
 
     talk(says)
+
+
+def arm_goal(ros, seconds):
+    """An action of the arm whose goal takes some seconds."""
+    action = ActionClient(ros, "arm_controller/follow_joint_trajectory", TRAJECTORY)
+    points = [{"positions": ARM_RAD, "time_from_start": {"sec": seconds, "nanosec": 0}}]
+    names = [*ros.robot.capabilities().arm.joint_names]
+    action.goal.trajectory = ros_types().make("trajectory_msgs/msg/JointTrajectory", joint_names=names, points=points)
+    return action
+
+
+def test_a_trajectory_moves_the_arm_while_the_mission_is_paused(talk):
+    def says(ros):
+        action = arm_goal(ros, 1)
+        assert action.send()
+        result = action.result()
+        assert (result.status, result.result.error_code) == (GoalStatus.SUCCEEDED, 0)
+        assert ros.robot.q_rad == pytest.approx(ARM_RAD, abs=0.02)
+        ros.soon(lambda: [each["what"] for each in ros.events("control")] == ["pause", "resume"], 5.0)
+
+    talk(says)
+
+
+def test_a_trajectory_of_other_joints_is_rejected(talk):
+    def says(ros):
+        action = ActionClient(ros, "arm_controller/follow_joint_trajectory", TRAJECTORY)
+        action.goal.trajectory.joint_names = ["elbow"]
+        assert not action.send()
+
+    talk(says)
+
+
+def test_a_cancelled_trajectory_stops_the_arm(talk):
+    def says(ros):
+        action = arm_goal(ros, 20)
+        assert action.send()
+        ros.soon(lambda: "move_arm" in ros.robot.moving_parts)
+        action.cancel()
+        assert action.result().status == GoalStatus.CANCELED
+        assert "move_arm" not in ros.robot.moving_parts
+
+    talk(says)
+
+
+def test_the_gripper_is_opened_and_tells_its_opening(talk):
+    def says(ros):
+        action = ActionClient(ros, "gripper_controller/gripper_cmd", "control_msgs/action/GripperCommand")
+        action.goal.command.position = 0.8
+        assert action.send()
+        result = action.result()
+        assert result.status == GoalStatus.SUCCEEDED
+        assert (result.result.position, result.result.reached_goal) == (pytest.approx(0.8, abs=0.02), True)
+
+    talk(says)
+
+
+def test_a_goal_of_the_arm_ends_with_the_mission(talk):
+    def says(ros):
+        action = arm_goal(ros, 60)
+        assert action.send()
+        ros.soon(lambda: "move_arm" in ros.robot.moving_parts)
+        results = []
+        asking = threading.Thread(target=lambda: results.append(action.result()))
+        asking.start()
+        time.sleep(0.3)  # until it waits
+        assert ros.call("cancel").success
+        asking.join()
+        assert results[0].status == GoalStatus.ABORTED
+
+    assert talk(says).message == "cancelled by ROS 2"
 
 
 def test_velocities_do_not_drive_the_robot_into_a_wall(talk):

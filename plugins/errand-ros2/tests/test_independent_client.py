@@ -29,6 +29,10 @@ from tests.tables import yaml_beside
 TAKEN = {"goal_pose": POSE, "cmd_vel": "geometry_msgs/msg/Twist"}
 TAKEN["initialpose"] = "geometry_msgs/msg/PoseWithCovarianceStamped"
 HASHES = yaml_beside(Path(__file__).with_name("wire") / "test_types.py", "test_types.yaml")["service"]
+PART_ACTIONS = {
+    "arm_controller/follow_joint_trajectory": "control_msgs/action/FollowJointTrajectory",
+    "gripper_controller/gripper_cmd": "control_msgs/action/GripperCommand",
+}
 PARTS = {"send_goal": f"{NAVIGATE}_SendGoal", "get_result": f"{NAVIGATE}_GetResult"}
 
 
@@ -105,6 +109,9 @@ def test_the_independent_client_lists_every_topic_and_service_of_a_run(talk, mes
     published = documented("Published") | action_topics()
     taken = {f"{space}/{name}": kind for name, kind in TAKEN.items() for space in ("", "/alice")}
     taken["/alice/say"] = "std_msgs/msg/String"
+    for name, kind in PART_ACTIONS.items():  # they tell no feedback
+        base = f"/alice/{name}/_action"
+        taken |= {f"{base}/feedback": f"{kind}_FeedbackMessage", f"{base}/status": "action_msgs/msg/GoalStatusArray"}
 
     def says(ros):
         with connected(ros.place.port, message_files):

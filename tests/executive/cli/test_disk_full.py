@@ -55,7 +55,7 @@ def test_the_robot_stops_and_the_resume_command_is_named(prepared, filling, tmp_
     told = str(left.value)
     assert ("disk is full" in told, f"errand resume --store {tmp_path}" in told) == (True, True)
     assert "stop" in backend.robot.calls[-2:]
-    assert backend.robot._lease is None
+    assert backend.robot.lease_holder() is None
 
 
 def test_the_mission_may_be_resumed_and_what_was_logged_is_there(prepared, filling, tmp_path):

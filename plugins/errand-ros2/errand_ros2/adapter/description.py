@@ -9,7 +9,8 @@ from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from errand_ros2.server import ARM_ACTION, CARRY, GRIPPER_ACTION, HEAD_ACTION, POSTURE
+from errand_ros2.part_actions import ARM_ACTION, GRIPPER_ACTION, HEAD_ACTION
+from errand_ros2.server import CARRY, POSTURE
 from plant.robots.robot_kind import robot_kind, robot_kinds
 from skills.inputs.errors import InputError
 from skills.inputs.schema import first_error

@@ -12,11 +12,11 @@ from errand_ros2 import messages
 from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import DRIVE_EXPIRY_S, Description
 from errand_ros2.adapter.sensors import OLD_STATE_S, SensedRobot
+from errand_ros2.part_actions import GRIPPER, INVALID_GOAL, TRAJECTORY
 from errand_ros2.readings import within_limits
-from errand_ros2.server import GRIPPER, INVALID_GOAL, TRAJECTORY
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError
 from errand_ros2.wire.node import Node
-from skills.command_table import CommandTable
+from skills.command_table import CommandTable, LeaseManager
 from skills.robot import (
     ArmTrajectory,
     BaseKind,
@@ -25,7 +25,6 @@ from skills.robot import (
     CommandState,
     CommandStatus,
     Lease,
-    LeaseError,
 )
 
 GONE_S: Final = 15.0
@@ -51,8 +50,7 @@ class Ros2Robot(SensedRobot):
             part: ActionClient(node, each.action, action) for part, (each, action) in given.items() if each is not None
         }
         self._commands, self._unsure = CommandTable[str](), dict[str, Any]()
-        self._lease_number = 0
-        self._current: Lease | None = None
+        self._leases = LeaseManager(name)
 
     def notes(self, address: str, endpoint: str) -> tuple[str, ...]:
         """Returns sentences for the report on what the robot does not tell."""
@@ -124,12 +122,12 @@ class Ros2Robot(SensedRobot):
 
     def carry(self, holding: bool, *, lease: Lease) -> None:
         """Tells the robot whether the gripper holds an object, if a topic is described for it."""
-        if lease == self._current and self._carry is not None:
+        if lease == self._leases.current and self._carry is not None:
             self._carry.put({"data": holding})
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stops base, arm and head, or only the part of a command; the gripper keeps its force."""
-        if (gone := self._without(lease)) is not None:
+        if (gone := self._leases.refusal(lease)) is not None:
             return self._commands.refuse(f"stop: {gone}", CommandCause.NO_LEASE)
         for part in (BASE, POSTURE, ARM, HEAD):
             active = self._commands.running(part)
@@ -143,27 +141,23 @@ class Ros2Robot(SensedRobot):
 
     def lease_holder(self) -> Lease | None:
         """Valid lease within this program; ROS 2 has none."""
-        return self._current
+        return self._leases.current
 
     def acquire_lease(self, holder: str) -> Lease:
         """Takes the lease within this program. Raises LeaseError when another has it."""
-        if self._current is not None:
-            raise LeaseError(f"{self.name}: the lease is held by {self._current.holder!r}")
-        return self.take_lease(holder)
+        return self._leases.acquire(holder)
 
     def take_lease(self, holder: str) -> Lease:
         """Takes the lease from its holder; the robot stops."""
-        if self._current is not None:
-            self.stop(lease=self._current)
-        self._lease_number += 1
-        self._current = Lease(self.name, holder, self._lease_number)
-        return self._current
+        if (before := self._leases.current) is not None:
+            self.stop(lease=before)
+        return self._leases.take(holder)
 
     def return_lease(self, lease: Lease) -> None:
         """Returns the lease; the robot stops."""
-        if lease == self._current:
+        if lease == self._leases.current:
             self.stop(lease=lease)
-            self._current = None
+            self._leases.give_back(lease)
 
     def poll(self) -> None:
         """Renews the velocity, follows the actions, and ends what is late; call it once a tick."""
@@ -265,14 +259,10 @@ class Ros2Robot(SensedRobot):
             return self._commands.refuse(f"{part}: the controller rejects the goal", CommandCause.REFUSED)
         return self._commands.begin(part, sent, self._clock.now(), until_s)
 
-    def _without(self, lease: Lease) -> str | None:
-        """Returns why a lease does not count; None when it does."""
-        return None if lease == self._current else f"lease {lease.number} of {lease.holder!r} no longer counts"
-
     def _objection(self, part: str, lease: Lease, until_s: float, values: Iterable[float]) -> CommandId | None:
         """Refuses a forbidden command; returns None for an allowed one."""
         now_s, silent_s = self._clock.now(), self.silent_s()
-        if (gone := self._without(lease)) is not None:
+        if (gone := self._leases.refusal(lease)) is not None:
             return self._commands.refuse(f"{part}: {gone}", CommandCause.NO_LEASE)
         if not np.isfinite([*values, min(until_s, 1e9)]).all():
             return self._commands.refuse(f"{part}: a value is not finite")

@@ -80,7 +80,7 @@ class LossyStep(LockStep):
         sent, came = self.server.topics.stamps_s, self.link.arrived_s
         pairs = {"odom": "odom", "joint_states": "odom", "imu": "odom", "points": "scan"}
         ended = sum(each.ended for each in self.robot.actions.values())
-        return self.server.ended <= ended and all(
+        return self.server.parts.ended <= ended and all(
             came.get(topic, -1.0) >= sent[by] - 1e-6 for topic, by in pairs.items() if by in sent
         )
 

@@ -8,7 +8,7 @@ import pytest
 
 from errand_ros2.adapter.description import served_file
 from errand_ros2.adapter.sensors import SILENT_S
-from errand_ros2.server import GRIPPER, TRAJECTORY
+from errand_ros2.part_actions import GRIPPER, TRAJECTORY
 from errand_ros2.wire.types import ActionType, Attachment, ros_types
 from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError
 

@@ -6,11 +6,9 @@ One thread owns robot and clock. Calls of clients read the last snapshot, and ha
 from __future__ import annotations
 
 import math
-import queue
 import time
 from collections.abc import Callable, Container, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from itertools import count
@@ -27,6 +25,7 @@ from errand_spot.server.gripper import Grip
 from errand_spot.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
 from errand_spot.server.obstacles import Region, ScanPoints
 from errand_spot.server.refusals import known_frame
+from executive.run.worker import WorkQueue
 from skills.robot import (
     Battery,
     Capabilities,
@@ -158,7 +157,7 @@ class Computer:
         self.regions: Sequence[Region] = ()
         """No-go regions of clients."""
         self._motions: dict[str, Motion] = {}
-        self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._work = WorkQueue()
         self._started_s = time.time() if pace is Pace.REAL else _CLIENT_START_S
         self._started_monotonic_s = time.monotonic()
         self.watchers: list[Callable[[], None]] = []
@@ -193,17 +192,7 @@ class Computer:
 
     def do(self, work: Callable[[], T]) -> Future[T]:
         """Hands over work to be done between steps."""
-        done: Future[T] = Future()
-
-        def run() -> None:
-            if done.set_running_or_notify_cancel():
-                try:
-                    done.set_result(work())
-                except Exception as error:  # the caller gets it
-                    done.set_exception(error)
-
-        self._work.put(run)
-        return done
+        return self._work.submit(work)
 
     def lost(self, parts: Sequence[str]) -> None:
         """Stops the parts whose lease has changed hands."""
@@ -216,34 +205,23 @@ class Computer:
         due_s = time.monotonic()
         while not stopping.is_set():
             due_s = max(due_s + PERIOD_S, time.monotonic() - _LATE_S)
-            self._work_until(due_s)
+            self._work.work_for(due_s - time.monotonic())
             self.step()
 
     def serve(self, stopping: Event) -> None:
         """Does the work of clients until `stopping` is set; one client steps the clock, by `do(step)`."""
         while not stopping.is_set():
-            with suppress(queue.Empty):
-                self._work.get(timeout=_LATE_S)()
+            self._work.work_for(_LATE_S, most=1)
 
     def step(self) -> None:
         """Does the waiting work, steps the clock and goes on with all motions."""
-        self._work_until(0.0)
+        self._work.work_for(0.0)
         self._watch()
         self.clock.advance(PERIOD_S)
         self.snapshot = self._sensed()
         self.scan_points.take(self.snapshot.scan)
         for motion in dict.fromkeys(self._motions.values()):
             motion.tick(self)
-
-    def _work_until(self, due_s: float) -> None:
-        """Does work that waits, or comes until a time (s, monotonic)."""
-        while True:
-            left_s = due_s - time.monotonic()
-            try:
-                work = self._work.get(timeout=left_s) if left_s > 0.0 else self._work.get_nowait()
-            except queue.Empty:
-                return
-            work()
 
     # -- motors ------------------------------------------------------------------------------------------------------
 

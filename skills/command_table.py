@@ -105,9 +105,8 @@ class LeaseManager:
     def acquire(self, holder: str) -> Lease:
         """Gives a free lease to `holder`. Raises LeaseError while another holder has it."""
         if self._current is not None:
-            raise LeaseError(
-                f"{self._robot_name}: the lease is held by {self._current.holder!r}; ask for its return, or take it"
-            )
+            held = f"{self._robot_name}: the lease is held by {self._current.holder!r}"
+            raise LeaseError(f"{held}; ask for its return, or take it")
         return self.take(holder)
 
     def take(self, holder: str) -> Lease:

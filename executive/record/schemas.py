@@ -47,6 +47,7 @@ SCAN: Final = "scan"
 JOINTS: Final = "joints"
 TRANSFORM: Final = "transform"
 GRID: Final = "map/grid"
+"""Topic of the map as a grid."""
 ZONES: Final = "map/zones"
 DERIVED: Final = frozenset({BOXES, TRANSFORM, GRID, ZONES})
 """Topics whose messages repeat others in a form that viewers draw."""

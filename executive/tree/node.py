@@ -112,4 +112,5 @@ class Change(NamedTuple):
 
 
 Snapshot = Mapping[str, NodeState]
+"""States of nodes by path id."""
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")

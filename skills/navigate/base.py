@@ -12,8 +12,7 @@ from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_cleara
 from skills.robot import CommandCause, CommandId, CommandState, Pose2D
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 
-_LOOK_AHEAD_S = 0.4
-_BRAKING_M_S2 = 2.0
+_LOOK_AHEAD_S, _BRAKING_M_S2 = 0.4, 2.0
 
 
 class Base:

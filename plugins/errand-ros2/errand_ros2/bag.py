@@ -26,8 +26,7 @@ from executive.record.schemas import DERIVED, GRID
 from skills.inputs.outside import writing
 
 VIEWER_COPIES: Final = DERIVED - {GRID}
-TF: Final = "/tf"
-TF_STATIC: Final = "/tf_static"
+TF, TF_STATIC = "/tf", "/tf_static"
 _ROOT: Final = "map"  # frame that other tools take for the fixed one; it equals the world frame
 _LATCHED: Final = frozenset({"/map", TF_STATIC})  # topics whose last message stays for late listeners
 _VERSION: Final = 8  # version of the metadata that ROS 2 Humble and all later releases read

@@ -16,8 +16,7 @@ from skills.robot import ArmTrajectory, Clock, CommandCause, CommandId, CommandS
 
 TRAJECTORY: Final = "control_msgs/action/FollowJointTrajectory"
 GRIPPER: Final = "control_msgs/action/GripperCommand"
-ARM_ACTION: Final = "arm_controller/follow_joint_trajectory"
-HEAD_ACTION: Final = "head_controller/follow_joint_trajectory"
+ARM_ACTION, HEAD_ACTION = (f"{part}_controller/follow_joint_trajectory" for part in ("arm", "head"))
 GRIPPER_ACTION: Final = "gripper_controller/gripper_cmd"
 INVALID_GOAL, PATH_VIOLATED = -1, -4
 _EXTRA_S, MOST_S = 5.0, 120.0  # time that a trajectory may take longer, and the most that a gripper or posture takes
@@ -86,6 +85,10 @@ class PartActions:
     def _follow(self, names: tuple[str, ...], move: Callable[..., CommandId], goal: Any) -> CommandId:
         """Begins a trajectory of these joints by a verb of the robot."""
         trajectory = trajectory_of(goal.trajectory, names)
+        if trajectory.times_s[0] > 0.0:  # it leads on from where the joints are
+            here_rad = [self._robot.joints().position_rad[name] for name in names]
+            way_rad = np.vstack([here_rad, trajectory.positions_rad])
+            trajectory = ArmTrajectory(np.append(0.0, trajectory.times_s), way_rad)
         until_s = self._clock.now() + float(trajectory.times_s[-1]) + _EXTRA_S
         return move(trajectory, until_s=until_s, lease=self._lease())
 

@@ -25,8 +25,7 @@ from skills.robot import Clock, CommandId, Robot
 
 PERIOD_S: Final = 0.05
 POSTURE, CARRY = "body_pose", "gripper/carry"
-_EXPIRY_S: Final = 0.1
-_LATE_S: Final = 0.5
+_EXPIRY_S, _LATE_S = 0.1, 0.5
 _WHOLE: Final = 1 << 16  # columns of pictures that are not reduced
 
 

@@ -119,8 +119,8 @@ class ActionClient:
     def send(self):
         return self._send.call({"goal_id": self.identity, "goal": self.goal}, limit_s=20.0).accepted
 
-    def result(self):
-        return self._result.call({"goal_id": self.identity}, limit_s=60.0)
+    def result(self, limit_s=60.0):
+        return self._result.call({"goal_id": self.identity}, limit_s=limit_s)
 
     def cancel(self):
         return self._cancel.call({"goal_info": {"goal_id": self.identity}}, limit_s=5.0).return_code

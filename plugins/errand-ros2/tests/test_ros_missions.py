@@ -4,12 +4,22 @@ import pytest
 
 pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
 
+from ros2_benchmarks import in_flat
 from ros2_missions import through_ros
+from ros_run import RUN, ActionClient, RosClient
 
+from errand_ros2.part_actions import TRAJECTORY
+from errand_ros2.wire.actions import GoalStatus
+from errand_ros2.wire.node import Client, open_session
+from errand_ros2.wire.types import ros_types
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from tests.benchmarks.served_missions import MISSIONS, Cut
+
+TREE = "py_trees_ros_interfaces/msg/BehaviourTree"
+OPEN = "py_trees_ros_interfaces/srv/OpenSnapshotStream"
+RAISED_RAD = {"arm_sh0": 0.0, "arm_sh1": -1.8, "arm_el0": 2.0, "arm_el1": 0.0, "arm_wr0": 0.2, "arm_wr1": 0.0}
 
 
 @pytest.mark.mission
@@ -39,3 +49,62 @@ def test_a_run_whose_robot_is_silent_for_a_while_goes_on_by_itself(tmp_path):
     ended = through_ros(Request(sentence="go to the kitchen", seed=3, record=False, out=tmp_path / "out"), with_cut)
     assert cuts[0].seen == [(Mode.RUNNING, ""), (Mode.PAUSED, "Alice has not answered for 3 s"), (Mode.RUNNING, "")]
     assert (ended.outcome, ended.verdict) == ("success", True), ended
+
+
+def talked_to(says, **kinds):
+    """Lets a client talk to a run in the flat, which waits; returns what it heard by topic."""
+    heard, errors = {topic: [] for topic in kinds}, []
+
+    def client(place, bridge):
+        try:
+            with open_session(place) as session:
+                ros = RosClient(session, None, bridge)
+                for topic, kind in kinds.items():
+                    ros.node.subscribe(f"/alice/{topic}", kind, heard[topic].append)
+                ros.soon(lambda: ros.heard["/alice/odom"], 120.0)
+                says(ros, heard)
+        except BaseException as error:
+            errors.append(error)
+
+    in_flat(client)
+    if errors:
+        raise errors[0]
+    return heard
+
+
+@pytest.mark.mission
+def test_a_client_moves_the_arm_in_the_plant():
+    def says(ros, heard):
+        arm = ActionClient(ros, "arm_controller/follow_joint_trajectory", TRAJECTORY)
+        points = [{"positions": list(RAISED_RAD.values()), "time_from_start": {"sec": 3, "nanosec": 0}}]
+        arm.goal.trajectory = ros_types().make(
+            "trajectory_msgs/msg/JointTrajectory", joint_names=list(RAISED_RAD), points=points
+        )
+        assert arm.send()
+        moved = arm.result()
+        assert moved.status == GoalStatus.SUCCEEDED, moved.result.error_string
+        last = heard["joint_states"][-1]
+        angles = dict(zip(last.name, last.position, strict=True))
+        assert {name: angles[name] for name in RAISED_RAD} == pytest.approx(RAISED_RAD, abs=0.05)
+
+    talked_to(says, joint_states="sensor_msgs/msg/JointState")
+
+
+@pytest.mark.mission
+@pytest.mark.nightly
+def test_a_client_watches_the_tree_and_the_objects_of_a_search():
+    trees = []
+
+    def says(ros, heard):
+        opener = Client(ros.node, "/alice/tree/snapshot_streams/open", ros_types().service(OPEN))
+        ros.node.subscribe(opener.call({}, limit_s=5.0).topic_name, TREE, trees.append)
+        search = ActionClient(ros, "run_mission", RUN)
+        search.goal.sentence = "find a coke in the kitchen"
+        assert search.send()
+        found = search.result(limit_s=200.0).result
+        assert found.outcome == "success", found.claim
+
+    heard = talked_to(says, objects="visualization_msgs/msg/MarkerArray")
+    active = {each.name for tree in trees for each in tree.behaviours if each.is_active}
+    assert any("detect" in name for name in active), active
+    assert "coke" in {each.text for found in heard["objects"] for each in found.markers}

@@ -114,7 +114,7 @@ def test_an_arm_that_is_late_is_cancelled(step):
 
 
 def test_a_trajectory_that_the_controller_rejects_is_refused(step):
-    far = ArmTrajectory(np.array([0.01]), (step.served.q_rad + 2.0)[None, :])
+    far = ArmTrajectory(np.array([0.0]), (step.served.q_rad + 2.0)[None, :])  # it is not there
     status = step.robot.command_status(step.robot.move_arm(far, **within(step, 5.0)))
     assert (status.state, status.cause) == (CommandState.REFUSED, CommandCause.REFUSED)
 

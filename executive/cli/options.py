@@ -136,8 +136,8 @@ def join_values(arguments: Sequence[str]) -> list[str]:
         elif word == _VIEW:
             given = rest and _NUMERIC.fullmatch(rest[0])
             word = f"{_VIEW}={rest.pop(0) if given else _UNTIL_CTRL_C_S}"
-        elif word == "--ros2":
-            word = f"--observe=ros2={rest.pop(0) if rest and rest[0][:1] in '0123456789@' else ''}"
+        elif word.partition("=")[0] == "--ros2":
+            word = f"--observe=ros2={word[7:] or (rest.pop(0) if rest and rest[0][:1] in '0123456789@' else '')}"
         words.append(word)
     return words
 

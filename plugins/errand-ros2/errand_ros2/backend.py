@@ -20,8 +20,7 @@ from skills.robot import ConnectedRobot, RobotStoppedError
 
 _NAME: Final = "errand_driver"
 _NAMESPACE: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
-_PATIENCE_S: Final = 10.0
-_TICK_S: Final = 0.05
+_PATIENCE_S, _TICK_S = 10.0, 0.05
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,6 @@ from skills.inputs.outside import writing
 
 VIEWER_COPIES: Final = DERIVED - {GRID}
 TF, TF_STATIC = "/tf", "/tf_static"
-_ROOT: Final = "map"  # frame that other tools take for the fixed one; it equals the world frame
-_LATCHED: Final = frozenset({"/map", TF_STATIC})  # topics whose last message stays for late listeners
 _VERSION: Final = 8  # version of the metadata that ROS 2 Humble and all later releases read
 _FOREVER: Final = QosTime(9223372036, 854775807)
 _QOS: Final = Qos(
@@ -70,7 +68,8 @@ def _write(events: Iterable[Event], bag: Path) -> int:
             time_ns = round((converter.start_s + event.stamp_s) * 1e9)
             for topic, kind, fields in converter.messages(event):
                 if topic not in connections:
-                    qos = _QOS._replace(durability=QosDurability.TRANSIENT_LOCAL) if topic in _LATCHED else _QOS
+                    late = topic in ("/map", TF_STATIC)  # late listeners get the last message
+                    qos = _QOS._replace(durability=QosDurability.TRANSIENT_LOCAL) if late else _QOS
                     added = writer.add_connection(topic, kind, typestore=types.store, offered_qos_profiles=[qos])
                     connections[topic] = added, types.message(kind)
                 connection, message_type = connections[topic]
@@ -95,7 +94,7 @@ class _Converter:
         if topic in VIEWER_COPIES or (topic == "map" and "data" in data):  # the grid has the same map
             return
         if not self.statics:
-            yield self._static(messages.moved(messages.header(stamp_s, _ROOT), "world", _HERE))
+            yield self._static(messages.moved(messages.header(stamp_s, messages.MAP_FRAME), "world", _HERE))
         if topic == "pose":
             yield f"{space}/pose", "geometry_msgs/msg/PoseStamped", {"header": header, "pose": data["pose"]}
             moved = messages.moved(header, body_frame(robot), data["pose"])

@@ -24,7 +24,7 @@ from errand_ros2.readings import TOPIC, pose_on_map
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.tree_topic import TreeTopic
 from errand_ros2.wire.node import Node, Place, Publisher, open_session
-from errand_ros2.wire.types import LATCHED
+from errand_ros2.wire.types import LATCHED, Qos
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.backend import Observe
 from executive.app.runs.conversations import Conversations
@@ -90,12 +90,14 @@ class Bridge(RunVisitor):
         self.session = self._open.enter_context(open_session(place))
         self._pool = self._open.enter_context(ThreadPoolExecutor(1, thread_name_prefix="errand-ros2"))
         self._node = Node(self.session, "errand")
+        self._node.claim("/clock")
         self._clock = self._node.publisher("/clock", "rosgraph_msgs/msg/Clock")
         self._diagnostics = self._node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
         self._frames = Frames(self._node)
         self._grid = load_grid_map(prepared.world.scan_map_path)
         self._node.publisher("/map", "nav_msgs/msg/OccupancyGrid", LATCHED).put(messages.occupancy_grid(self._grid))
         self._conversations = Conversations(prepared, control)
+        self._conversations.set_missions()
         self._robots = {each.mission.robot_name: self._robot(each) for each in prepared.all}
         self._hear(self._node, next(iter(self._robots.values())))  # RViz and teleoperation send without a namespace
         self._begun: tuple[float, float] | None = None
@@ -103,14 +105,15 @@ class Bridge(RunVisitor):
     def _robot(self, prepared: Prepared) -> _RobotBridge:
         name = prepared.mission.robot_name
         node = Node(self.session, "errand", f"/{ros_name(name)}")
-        out = {topic: node.publisher(topic, kind) for topic, kind in _TOPICS.items()}
+        node.claim("odom")
+        latched = {kind: Qos(transient_local=kind.startswith("errand_msgs/")) for kind in _TOPICS.values()}
+        out = {topic: node.publisher(topic, kind, latched[kind]) for topic, kind in _TOPICS.items()}
 
         def hear(said: Any) -> None:
             out["reply"].put({"data": self._conversations.hear(said.data, name).text})
 
-        driving = Driving(name, self._control)
         goals = Goals(node, prepared, self._control, self._grid, self._pool, self._hurry)
-        own = _RobotBridge(node, driving, goals, out, TreeTopic(node))
+        own = _RobotBridge(node, Driving(name, self._control), goals, out, TreeTopic(node))
         self._hear(node, own)
         node.subscribe("say", "std_msgs/msg/String", node.later(self._pool, hear))
         for what in ("pause", "resume", "cancel", "step"):
@@ -119,7 +122,8 @@ class Bridge(RunVisitor):
 
     def _hear(self, node: Node, own: _RobotBridge) -> None:
         """Takes goals, poses and velocities for a robot."""
-        node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", node.later(self._pool, own.goals.hear_pose))
+        drive = node.later(self._pool, lambda stamped: own.goals.accept("goal_pose", None, [stamped]))
+        node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", drive)
         node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
         node.subscribe(TOPIC, "geometry_msgs/msg/Twist", own.driving.hear)
 
@@ -178,6 +182,7 @@ class Bridge(RunVisitor):
     def tick(self, progress: Progress) -> None:
         """Publishes what is due, sends commands of `/cmd_vel`, and waits for the wall clock."""
         now_s = progress.now_s
+        self._conversations.tick(progress)
         self._clock.put({"clock": messages.time_of(now_s)})
         for own in self._robots.values():
             if own.context is not None and own.topics is not None:

@@ -36,15 +36,14 @@ from skills.estimate.grid_map import GridMap
 from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 
-FEEDBACK_PERIOD_S: Final = 0.5
+FEEDBACK_PERIOD_S, _PASSED_M = 0.5, 0.3  # a pose counts as passed within this distance
+_STOP: Final = {"wait": {"seconds": 0.05}}
 _MISSION: Final = "run_mission"
 _ACTIONS: Final = {
     "navigate_to_pose": "nav2_msgs/action/NavigateToPose",
     "navigate_through_poses": "nav2_msgs/action/NavigateThroughPoses",
     _MISSION: "errand_msgs/action/RunMission",
 }
-_PASSED_M: Final = 0.3  # distance from a pose at which it counts as passed
-_STOP: Final = {"wait": {"seconds": 0.05}}
 _FAILED: Final = 9000  # error code of navigate_to_pose for any failure; its message has the cause
 
 
@@ -81,16 +80,12 @@ class Goals:
             name: make(name, kind, accept=partial(self._accept_goal, name)) for name, kind in _ACTIONS.items()
         }
 
-    def hear_pose(self, stamped: Any) -> None:
-        """Drives to a pose of `goal_pose`; tells why it cannot."""
-        self._accept("goal_pose", None, [stamped])
-
     def _accept_goal(self, action: str, goal: Goal) -> bool:
         message = goal.message
         poses = [message.pose] if hasattr(message, "pose") else getattr(message, "poses", [])
-        return self._accept(action, goal, getattr(poses, "goals", poses))
+        return self.accept(action, goal, getattr(poses, "goals", poses))
 
-    def _accept(self, source: str, goal: Goal | None, stamped: Sequence[Any]) -> bool:
+    def accept(self, source: str, goal: Goal | None, stamped: Sequence[Any]) -> bool:
         """Pursues a goal of a topic or action; tells why it cannot."""
         try:
             self._pursue(source, goal, tuple(pose_on_map(each, self._grid, self._frames) for each in stamped))
@@ -115,7 +110,10 @@ class Goals:
         name = f"ros2 goal {next(self._numbers)}"
         asked = None if goal is None else goal.message
         mission = self._asked(name, asked) if source == _MISSION else self._mission_of(name, *map(_drive_to, poses))
-        tree, stop = self._compiled(mission), self._compiled(self._mission_of(f"{name} cancelled", _STOP))
+        tree, stop = (
+            self._compiled(mission),
+            self._compiled(self._mission_of(f"{name} cancelled", _STOP)),
+        )
         with self._lock:
             before = next(reversed(self._pursued), None)
             self._pursued[name] = _Pursued(source, goal, poses, name, stop)

@@ -18,7 +18,7 @@ from skills.estimate.grid_map import GridMap
 from skills.navigate.footprint import clearance_on_grid
 from skills.robot import Battery, FloatArray, Image, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
-MAP_FRAME: Final = "map"
+MAP_FRAME: Final = "map"  # it equals the frame "world" of logs
 LEAST_RANGE_M, MOST_RANGE_M = 0.05, 100.0
 MOST_COLUMNS: Final = 320  # raw pictures of a run are reduced to at most so many columns
 _UNKNOWN: Final = np.array([-1.0, *[0.0] * 8])  # covariance of what is not measured

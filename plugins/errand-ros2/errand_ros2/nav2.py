@@ -58,7 +58,7 @@ class Nav2:
             try:
                 sent = client.send(asked, limit_s=self.limit_s)
             except NoAnswerError as error:
-                raise PlanningError(f"no Nav2 answers on {self.action}") from error
+                raise PlanningError(f"no Nav2 answers on {self.action}, which the stack file names") from error
             if sent is None or not sent.ended.wait(self.limit_s):
                 raise PlanningError(f"Nav2 on {self.action} does not plan within {self.limit_s:g} s")
         result = sent.result

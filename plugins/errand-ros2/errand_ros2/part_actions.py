@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable
 from functools import partial
@@ -14,8 +15,8 @@ from errand_ros2.wire.node import Node
 from executive.run.worker import WorkQueue
 from skills.robot import ArmTrajectory, Clock, CommandCause, CommandId, CommandState, CommandStatus, Lease, Robot
 
-TRAJECTORY: Final = "control_msgs/action/FollowJointTrajectory"
-GRIPPER: Final = "control_msgs/action/GripperCommand"
+_LOG: Final = logging.getLogger(__name__)
+TRAJECTORY, GRIPPER = (f"control_msgs/action/{each}" for each in ("FollowJointTrajectory", "GripperCommand"))
 ARM_ACTION, HEAD_ACTION = (f"{part}_controller/follow_joint_trajectory" for part in ("arm", "head"))
 GRIPPER_ACTION: Final = "gripper_controller/gripper_cmd"
 INVALID_GOAL, PATH_VIOLATED = -1, -4
@@ -67,9 +68,10 @@ class PartActions:
         def accept(goal: Goal) -> bool:
             try:
                 command = begin(goal.message)
-            except ValueError:
-                return False
-            if self._robot.command_status(command).state is CommandState.REFUSED:
+                if (status := self._robot.command_status(command)).state is CommandState.REFUSED:
+                    raise ValueError(status.reason)
+            except ValueError as error:
+                _LOG.warning("errand: a goal of %s is refused: %s", name, error)
                 return False
             self._goals.append((server, goal, command))
             return True

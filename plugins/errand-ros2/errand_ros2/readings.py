@@ -26,7 +26,6 @@ _MOST_PIXELS: Final = 1 << 24
 _POINT_TYPES: Final = {7: "f4", 8: "f8"}
 _COLOURS: Final = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4}
 _CHANNEL: Final = {"mono8": "u1", "16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
-_MILLIMETRE_M: Final = 0.001
 
 
 def transform_of(at: Any, turn: Any) -> RigidTransform:
@@ -189,7 +188,7 @@ def depth_m(message: Any) -> NDArray[np.float32]:
     values = pixels(message)
     if values.ndim != 2:
         raise ValueError("the depth has colours")
-    metres = values.astype(np.float32) * np.float32(_MILLIMETRE_M if values.dtype.kind == "u" else 1.0)
+    metres = values.astype(np.float32) * np.float32(0.001 if values.dtype.kind == "u" else 1.0)
     return np.where(np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0))
 
 

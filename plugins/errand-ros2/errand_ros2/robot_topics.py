@@ -16,7 +16,6 @@ from errand_ros2.wire.types import LATCHED, SENSOR, Qos
 from skills.robot import CameraCapabilities, Image, Mount, NoImageError, Robot
 
 IMAGE_PERIOD_S, BATTERY_PERIOD_S, _EPSILON_S = 0.2, 1.0, 1e-6
-_TF: Final = "tf2_msgs/msg/TFMessage"
 _IMAGE, _INFO, _COMPRESSED = (f"sensor_msgs/msg/{each}" for each in ("Image", "CameraInfo", "CompressedImage"))
 _PICTURES: Final[Mapping[bool, Mapping[str, tuple[str, Callable[[Image, str, int], Fields]]]]] = {
     False: {
@@ -37,8 +36,8 @@ class Frames:
     """Publisher of `/tf`, and of `/tf_static`, whose one message has the static transforms of all robots."""
 
     def __init__(self, node: Node) -> None:
-        self.moving = node.publisher("/tf", _TF, Qos(depth=100))
-        self._static = node.publisher("/tf_static", _TF, LATCHED)
+        self.moving = node.publisher("/tf", "tf2_msgs/msg/TFMessage", Qos(depth=100))
+        self._static = node.publisher("/tf_static", "tf2_msgs/msg/TFMessage", LATCHED)
         self._fixed: dict[str, Fields] = {}
 
     def fix(self, *every: Fields) -> None:

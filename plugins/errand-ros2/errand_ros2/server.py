@@ -23,9 +23,8 @@ from skills.estimate.grid_map import GridMap
 from skills.inputs.errors import InputError
 from skills.robot import Clock, CommandId, Robot
 
-PERIOD_S: Final = 0.05
 POSTURE, CARRY = "body_pose", "gripper/carry"
-_EXPIRY_S, _LATE_S = 0.1, 0.5
+PERIOD_S, _EXPIRY_S, _LATE_S = 0.05, 0.1, 0.5
 _WHOLE: Final = 1 << 16  # columns of pictures that are not reduced
 
 
@@ -47,6 +46,7 @@ class RobotServer:
         self._lease = robot.acquire_lease("the server of ROS 2")
         space = f"/{ros_name(robot.name)}"
         top, self.node = Node(session, "robot"), Node(session, "robot", space)
+        top.claim("/clock", f"{space}/odom")
         self._time = top.publisher("/clock", "rosgraph_msgs/msg/Clock")
         if grid is not None:
             top.publisher("/map", "nav_msgs/msg/OccupancyGrid", LATCHED).put(messages.occupancy_grid(grid))

@@ -17,6 +17,7 @@ from errand_ros2.bridge import observe
 from errand_ros2.wire.actions import GoalStatus
 from errand_ros2.wire.node import Client
 from errand_ros2.wire.types import LATCHED, older_types, ros_types
+from executive.run.control import Control
 from skills.inputs.errors import InputError
 
 TRAJECTORY = "control_msgs/action/FollowJointTrajectory"
@@ -169,7 +170,9 @@ def test_commands_and_wanted_objects_are_typed_messages(talk):
         action.goal.sentence = "go to the table"
         assert action.send()
         ros.soon(lambda: heard["task_channel"])
-        task = heard["task_channel"][0]
+        task, late = heard["task_channel"][0], []
+        ros.node.subscribe("/alice/task_channel", "errand_msgs/msg/TaskMessage", late.append, LATCHED)
+        ros.soon(lambda: late)  # a late subscription gets it, too
         assert (task.robot_name, task.mission_count, task.task_count, task.cmd_type) == ("Alice", 1, 1, 0)
         assert (task.item_type.tolist(), task.obj_type.tolist()) == ([0], [0])
         assert math.isfinite(task.goal_x)
@@ -377,6 +380,24 @@ def test_a_sentence_is_answered(talk):
         ros.publisher("/alice/say", STRING).put(text("what do you do?"))
         ros.soon(lambda: ros.heard["/alice/reply"])
         assert ros.heard["/alice/reply"][0].data
+
+    talk(says)
+
+
+def test_a_question_is_answered_from_the_run(talk):
+    def says(ros):
+        ros.publisher("/alice/say", STRING).put(text("what are you doing?"))
+        ros.soon(lambda: ros.heard["/alice/reply"])
+        assert "not begun" not in ros.heard["/alice/reply"][0].data
+        assert "wait" in ros.heard["/alice/reply"][0].data
+
+    talk(says)
+
+
+def test_a_run_beside_another_in_one_domain_is_refused(talk):
+    def says(ros):
+        with pytest.raises(InputError, match="/clock is published in domain 0 already"):
+            observe(f"0@{ros.place.host}:{ros.place.port}")(talk.prepared, Control(pace=None))
 
     talk(says)
 

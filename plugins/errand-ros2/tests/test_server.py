@@ -18,7 +18,9 @@ from slow_link import SlowLink
 from zenoh import ext
 from zenoh_ros2_sdk import ROS2Subscriber
 
+from errand_ros2.part_actions import TRAJECTORY
 from errand_ros2.server import PERIOD_S, RobotServer
+from errand_ros2.wire import actions
 from errand_ros2.wire.node import Node, Place, open_session
 from errand_ros2.wire.types import LATCHED, ros_types
 from plant.robots.spot.kind import spot_capabilities
@@ -220,6 +222,12 @@ def test_the_robot_drives_over_a_link_with_delays_and_short_stalls_until_its_sen
     remote.speed, silent_s = None, time.monotonic()
     assert soon(remote.still)
     assert time.monotonic() - silent_s < 0.6 + 0.15  # the link's delay
+
+
+def test_a_goal_of_the_arm_that_is_refused_is_told_with_its_reason(served, caplog):
+    client = actions.ActionClient(served.node, "/alice/arm_controller/follow_joint_trajectory", TRAJECTORY)
+    assert client.send({"trajectory": {"joint_names": ["elbow"]}}, limit_s=5.0) is None
+    assert "is refused: the trajectory moves elbow, not arm_sh0" in caplog.text
 
 
 def test_pictures_are_taken_only_while_somebody_looks(served):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -27,8 +27,7 @@ from skills.robot import (
     Lease,
 )
 
-GONE_S: Final = 15.0
-_CALL_S: Final = 0.5
+GONE_S, _CALL_S = 15.0, 0.5
 _LEAST_POINT_S, _HEAD_RAD_S = 0.2, 1.0
 _REACHED_M, _REACHED_RAD = 0.02, 0.03
 PARTS = BASE, POSTURE, ARM, HEAD, GRIP = "base", "posture", "arm", "head", "gripper"

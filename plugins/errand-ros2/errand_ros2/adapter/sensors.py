@@ -40,13 +40,9 @@ from skills.robot import (
     Scan,
 )
 
-OLD_STATE_S, SILENT_S = 0.5, 3.0
+OLD_STATE_S, SILENT_S, _PICTURE_S, _SAME_S, _EPSILON_S = 0.5, 3.0, 2.0, 0.051, 1e-6
 NEVER: Final = Odometry(-math.inf, RigidTransform(), (0.0, 0.0, 0.0))
-_KEPT: Final = 400
-_PICTURE_S: Final = 2.0
-_SAME_S: Final = 0.051
-_EPSILON_S: Final = 1e-6
-_MOST_FRAMES: Final = 32
+_KEPT, _MOST_FRAMES = 400, 32
 
 
 class SensedRobot:

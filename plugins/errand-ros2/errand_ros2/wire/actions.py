@@ -9,15 +9,14 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from errand_ros2.wire.node import Client, Node, Request
 from errand_ros2.wire.types import LATCHED, ActionType, older_services, ros_types
 
-MOST_GOALS: Final = 64  # goals whose results are kept; older ones are forgotten
-_RESULT_S: Final = 3600.0  # time for which a client waits for a result
+MOST_GOALS, _RESULT_S = 64, 3600.0  # goals whose results are kept; time for which a client waits for a result
 _REJECTED, _UNKNOWN_GOAL, _TERMINATED = 1, 2, 3  # answers to a request to cancel goals (action_msgs/srv/CancelGoal)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import re
 import socket
 import time
@@ -18,6 +19,7 @@ import zenoh
 from zenoh import ext
 
 from errand_ros2.wire.types import (
+    ADMIN,
     CLIENT,
     PUBLISHER,
     SERVICE,
@@ -37,10 +39,9 @@ from skills.inputs.errors import InputError
 
 _LOG: Final = logging.getLogger(__name__)
 _CDR: Final = "application/cdr"
-MOST_BYTES: Final = 1 << 26  # longer messages are dropped
-PORT: Final = 7447  # port of rmw_zenoh's router
+MOST_BYTES, _CLAIM_S = 1 << 26, 2.0  # longer messages are dropped
 _PLACE: Final = re.compile(r"(?P<domain>\d{1,9})?(@(?P<host>[\w.-]+|\[[\w:.%]+\])?(:(?P<port>\d{1,5}))?)?")
-_MOST_DOMAIN, _MOST_PORT = 232, 65535
+PORT, _MOST_DOMAIN, _MOST_PORT = 7447, 232, 65535  # port of rmw_zenoh's router; limits
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,8 @@ class Place:
 
     @classmethod
     def parse(cls, text: str) -> Place:
-        """Reads `[DOMAIN][@HOST[:PORT]]`; what is left out has its usual value. Raises InputError."""
+        """Reads `[DOMAIN][@HOST[:PORT]]`; the usual domain is ROS_DOMAIN_ID, or 0. Raises InputError."""
+        text = text if text[:1].isdecimal() else f"{os.environ.get('ROS_DOMAIN_ID', '')}{text}"
         if (found := _PLACE.fullmatch(text)) is not None:
             place = cls(int(found["domain"] or 0), found["host"] or cls.host, int(found["port"] or cls.port))
             if place.domain <= _MOST_DOMAIN and 0 < place.port <= _MOST_PORT:
@@ -72,8 +74,7 @@ class Session:
 
     def __init__(self, inner: zenoh.Session, place: Place, is_router: bool) -> None:
         self.inner, self.place, self.is_router = inner, place, is_router
-        self.numbers = count()
-        self.liveliness = inner.liveliness()
+        self.numbers, self.liveliness = count(), inner.liveliness()
 
 
 @contextmanager
@@ -82,7 +83,10 @@ def open_session(place: Place) -> Iterator[Session]:
 
     A session that is a client waits for its router again when the router restarts.
     """
-    client, endpoints = _answers(place), {"endpoints": [place.endpoint]}
+    client, endpoints = False, {"endpoints": [place.endpoint]}
+    with suppress(OSError, UnicodeError):
+        socket.create_connection((place.host.strip("[]"), place.port), timeout=0.5).close()
+        client = True
     how = {"mode": "client", "connect": endpoints} if client else {"mode": "router", "listen": endpoints}
     how |= {"scouting": {"multicast": {"enabled": False}}}
     how |= {"timestamping": {"enabled": True, "drop_future_timestamp": False}}  # which caches need
@@ -94,14 +98,6 @@ def open_session(place: Place) -> Iterator[Session]:
         raise InputError(what, hint="start it, name another port, or leave @HOST out") from error
     with opened as inner:
         yield Session(inner, place, is_router=not client)
-
-
-def _answers(place: Place) -> bool:
-    try:
-        socket.create_connection((place.host.strip("[]"), place.port), timeout=0.5).close()
-    except (OSError, UnicodeError):
-        return False
-    return True
 
 
 class Publisher:
@@ -201,6 +197,15 @@ class Node:
         """Returns the absolute name of a topic or service. Raises InputError."""
         return topic_name(name if name.startswith("/") else f"{self.namespace.rstrip('/')}/{name}")
 
+    def claim(self, *topics: str) -> None:
+        """Raises InputError when another node publishes one of the topics, which only one may publish."""
+        domain, liveliness = self.key.domain, self.session.liveliness
+        for name in map(self.absolute, topics):
+            key = f"{ADMIN}/{domain}/*/*/*/{PUBLISHER}/*/*/*/{name.replace('/', '%')}/**"
+            if any(reply.ok is not None for reply in liveliness.get(key, timeout=_CLAIM_S)):
+                what = f"{name} is published in domain {domain} already, by another robot, simulator or run"
+                raise InputError(what, hint=f"end it, or name another domain, as in {domain + 1}")
+
     def declare(self, kind: str, name: str, type_key: str, qos: Qos) -> bytes:
         """Declares an entity of the node; returns its identity."""
         token = self.key.entity_token(kind, next(self.session.numbers), name, type_key, qos)
@@ -271,7 +276,7 @@ class Node:
             self.dropped += 1
             return None
 
-    def later(self, pool: Executor, handle: Callable[[Any], None]) -> Callable[[Any], None]:
+    def later(self, pool: Executor, handle: Callable[[Any], Any]) -> Callable[[Any], None]:
         """Returns a handler that lets a pool handle what comes, because it may take long, until the pool is closed."""
 
         def hear(message: Any) -> None:

@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from skills.inputs.errors import InputError
 
-_ADMIN: Final = "@ros2_lv"
+ADMIN: Final = "@ros2_lv"  # where tokens of the graph stand
 _GID_BYTES: Final = 16
 _ATTACHMENT: Final = struct.Struct("<qqB16s")
 _NAME: Final = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
@@ -63,7 +63,7 @@ class NodeKey:
     def token(self, number: int | None = None, kind: str = NODE, *of_type: str) -> str:
         """Returns the liveliness token of the node, or of one of its entities."""
         number = self.number if number is None else number
-        head = (_ADMIN, str(self.domain), self.session, str(self.number), str(number), kind)
+        head = (ADMIN, str(self.domain), self.session, str(self.number), str(number), kind)
         return "/".join((*head, "%", self.namespace.replace("/", "%"), self.name, *of_type))
 
     def entity_token(self, kind: str, number: int, name: str, type_key: str, qos: Qos) -> str:

@@ -190,3 +190,19 @@ def test_a_place_has_its_usual_values():
 def test_a_router_elsewhere_that_does_not_answer_is_refused():
     with pytest.raises(InputError, match="no Zenoh router"), open_session(Place(host="192.0.2.1")):
         pass
+
+
+def test_a_topic_that_another_node_publishes_cannot_be_claimed(router, other):
+    router.node.claim("odom", "/clock")
+    router.node.publisher("/clock", "rosgraph_msgs/msg/Clock")
+    other.claim("odom")
+    with pytest.raises(InputError, match="is published in domain 0 already, by another robot, simulator or run"):
+        other.claim("odom", "/clock")
+
+
+def test_the_usual_domain_is_that_of_the_environment(monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", "42")
+    assert [Place.parse(text).domain for text in ("", "@somewhere", "7")] == [42, 42, 7]
+    monkeypatch.setenv("ROS_DOMAIN_ID", "many")
+    with pytest.raises(InputError, match="'many' is no ROS domain"):
+        Place.parse("")

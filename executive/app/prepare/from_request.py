@@ -72,7 +72,7 @@ def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
         return _for_only_robot(_at_start(request, world, knowledge, ask), loaded)
     if request.start is not None or request.stack is not None:
         what = "--start and --stack are for a run with one robot"
-        raise InputError(what, hint="write alice=spot@X,Y,YAW, or `robots` with `at` and `stack` in a mission file")
+        raise InputError(what, hint="write alice=KIND@X,Y,YAW, or `robots` with `at` and `stack` in a mission file")
     robots = placed_robots(world, knowledge, configs)
     setting = Setting(replace(request, robots=configs), world, knowledge, robots, ask)
     if loaded is None:

@@ -84,7 +84,7 @@ def real_runner(prepared: Prepared, address: str) -> Iterator[Callable[..., Fini
         raise InputError(what, hint="leave --fault, --scenario and the like out")
     found = _ADDRESS.fullmatch(address)
     if found is None:
-        raise InputError(f"--robot {address[:60]}: is no address", hint="write spot://192.168.80.3, for example")
+        raise InputError(f"--robot {address[:60]}: is no address", hint="write spot://192.168.80.3 or ros2://alice")
     try:
         driver = robot_backend(found["scheme"].lower(), _options(found["options"]))
     except StackError as error:

@@ -80,15 +80,15 @@ def test_a_client_of_an_older_distribution_gets_the_result_in_its_form(talk):
 def test_a_goal_of_navigate_through_poses_passes_them_in_order(talk):
     def says(ros):
         action = ActionClient(ros, "navigate_through_poses", THROUGH)
-        action.goal.poses.goals = [stamped(0.6, -1.2), stamped(-0.6, -1.2), stamped(-0.6, 1.2)]
+        action.goal.poses.goals = [stamped(0.3, -0.5), stamped(-0.4, -0.5), stamped(-0.4, 0.3)]
         assert action.send()
         result = action.result()
         assert (result.status, result.result.error_code) == (GoalStatus.SUCCEEDED, 0)
-        assert math.hypot(ros.robot.pose.x_m + 0.6, ros.robot.pose.y_m - 1.2) < 0.15
+        assert math.hypot(ros.robot.pose.x_m + 0.4, ros.robot.pose.y_m - 0.3) < 0.15
         left = [each.feedback.number_of_poses_remaining for each in action.feedback]
         assert left == sorted(left, reverse=True) and {1, 2, 3} == {*left}
         far_m = [each.feedback.distance_remaining for each in action.feedback]
-        assert far_m[0] > 3.5 and far_m[-1] < 1.5
+        assert far_m[0] > 1.5 and far_m[-1] < 0.8
 
     talk(says)
 

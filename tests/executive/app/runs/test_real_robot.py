@@ -50,8 +50,8 @@ def test_a_plug_in_of_two_files_drives_a_robot(run, tmp_path):
 @pytest.mark.parametrize(
     ("address", "refused"),
     [
-        ("", "--robot : is no address; write spot://192.168.80.3, for example"),
-        ("pond", "--robot pond: is no address; write spot://192.168.80.3, for example"),
+        ("", "--robot : is no address; write spot://192.168.80.3 or ros2://alice"),
+        ("pond", "--robot pond: is no address; write spot://192.168.80.3 or ros2://alice"),
         ("tortoise://pond", "no plug-in drives robots of 'tortoise://'"),
         ("turtle://pond?sped=3", "sped: unknown key 'sped'; did you mean 'speed'?"),
         ("turtle://pond?speed=fast", "speed: should be a number"),

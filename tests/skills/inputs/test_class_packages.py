@@ -99,13 +99,20 @@ def test_a_network_that_knows_it_needs_its_form_alone(site):
 )
 def test_a_broken_class_is_reported_with_its_file(site, file, text, says):
     (site / "mugs" / file).write_text(text)
+    ended = errand(site, "check", "--say", "bring me the mug", "--world", "pantry")
+    assert ended.returncode == 2
+    assert says in ended.stderr
+    assert f"{site / 'mugs' / file}: " in ended.stderr
+
+
+def test_a_broken_class_is_listed_among_the_plug_ins(site):
+    (site / "mugs" / "class_forms.yaml").write_text(FORM.replace("round", "oval"))
     ended = errand(site, "plugins", "--json")
     (plugin,) = (
         each for each in json.loads(ended.stdout.splitlines()[-1])["plugins"] if each["distribution"] == "mugs"
     )
     assert ended.returncode == 1
-    assert says in plugin["broken"]
-    assert file in plugin["broken"]
+    assert "class_forms.yaml: mug.form" in plugin["broken"]
 
 
 def test_an_entry_point_without_its_package_is_reported(site):

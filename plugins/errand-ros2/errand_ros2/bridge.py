@@ -20,7 +20,7 @@ from errand_ros2.driving import Driving
 from errand_ros2.goals import Goals
 from errand_ros2.messages import Fields
 from errand_ros2.part_actions import PartActions
-from errand_ros2.readings import TOPIC, pose_on_map
+from errand_ros2.readings import LIFE_S, TOPIC, pose_on_map
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.tree_topic import TreeTopic
 from errand_ros2.wire.node import Node, Place, Publisher, open_session
@@ -52,8 +52,7 @@ _TOPICS: Final = {
     "particle_cloud": "nav2_msgs/msg/ParticleCloud",
 }
 _PERIOD_S, _MOST_PARTICLES, _MOST_VARIANCE = 0.5, 200, 1e6  # variances in m² and rad²
-_CHEST_M, _HALF_M = 1.2, 3.0  # height of people's markers; half the side of the local costmap
-_LATE_S: Final = 0.5  # delay that a run does not catch up with
+_LATE_S, _CHEST_M, _HALF_M = 0.5, 1.2, 3.0  # delay not caught up; height of people's markers; half the local costmap
 
 
 def observe(value: str) -> Observe:
@@ -125,7 +124,7 @@ class Bridge(RunVisitor):
         drive = node.later(self._pool, lambda stamped: own.goals.accept("goal_pose", None, [stamped]))
         node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", drive)
         node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
-        node.subscribe(TOPIC, "geometry_msgs/msg/Twist", own.driving.hear)
+        node.subscribe(TOPIC, "geometry_msgs/msg/Twist", own.driving.hear, late_s=LIFE_S)
 
     def _obey(self, name: str, what: str, _: Any) -> Fields:
         """Answers a service by its command to a robot, or by the reason why it is refused."""

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import re
+from contextlib import closing, suppress
 from pathlib import Path
 from threading import Event
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, start_pose
-from executive.cli.output import console_for, new_folder
+from executive.cli.output import new_folder
 from executive.record.history import read_history
-from skills.inputs.errors import InputError
 from skills.quantities import Delay, Seed
-
-_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 
 ros2 = typer.Typer(name="ros2", help="Logs as ROS 2 bags.", no_args_is_help=True, rich_markup_mode=None)
 
@@ -71,13 +68,10 @@ def serve_ros2(
     from skills.estimate.grid_map import load_grid_map
 
     at, opened = Place.parse(place), open_world(world)
-    if not _NAME.fullmatch(robot):
-        raise InputError(f"'{robot[:60]}' is not a name for a robot", hint="use letters and digits, as in Alice")
     capabilities_of(kind)
     placed = only_robot(robot, opened, seed=seed, start=start_pose(start), kind=kind)
     if start is not None:
         refuse_blocked(opened, placed.start)
-    console = console_for(False)
     with open_session(at) as session:
         compile_first()
         simulation = simulate(opened, {robot: placed}, seed=seed, record=False)
@@ -89,10 +83,6 @@ def serve_ros2(
             truth=(lambda: simulation.engine.poses_W()[robot]) if truth else None,
         )
         router = "the router is here" if session.is_router else "by its router"
-        console.print(f"ROS 2: /{ros_name(robot)}, domain {at.domain}, {at.endpoint} ({router}; Ctrl-C ends it)")
-        try:
+        typer.echo(f"ROS 2: /{ros_name(robot)}, domain {at.domain}, {at.endpoint} ({router}; Ctrl-C ends it)")
+        with closing(server), suppress(KeyboardInterrupt):
             server.run(Event(), limit)
-        except KeyboardInterrupt:
-            pass
-        finally:
-            server.close()

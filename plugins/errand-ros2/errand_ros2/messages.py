@@ -19,10 +19,9 @@ from skills.navigate.footprint import clearance_on_grid
 from skills.robot import Battery, FloatArray, Image, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
 MAP_FRAME: Final = "map"  # it equals the frame "world" of logs
-LEAST_RANGE_M, MOST_RANGE_M = 0.05, 100.0
+LEAST_RANGE_M, MOST_RANGE_M, _FLOAT32 = 0.05, 100.0, 7  # the last is a type of sensor_msgs/PointField
 MOST_COLUMNS: Final = 320  # raw pictures of a run are reduced to at most so many columns
 _UNKNOWN: Final = np.array([-1.0, *[0.0] * 8])  # covariance of what is not measured
-_FLOAT32: Final = 7
 _CELL_M, _DECAY_M = 0.1, 0.3  # cells of a costmap; where costs fall to 1/e
 _SPHERE, _TEXT, _DELETE_ALL = 2, 9, 3  # types and an action of visualization_msgs/Marker
 _MARKER_M, _GREEN = 0.12, {"r": 0.1, "g": 0.7, "b": 0.2, "a": 0.8}

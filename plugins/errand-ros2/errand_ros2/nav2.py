@@ -22,7 +22,6 @@ from skills.quantities import Angle, Coordinate, Duration, Length
 from skills.robot import Pose2D
 
 _ACTION: Final = "nav2_msgs/action/ComputePathToPose"
-_STEP_M: Final = 0.05
 
 
 @dataclass(frozen=True)
@@ -73,5 +72,5 @@ class Nav2:
             raise PlanningError(f"Nav2's path ends {off_m:.2f} m from the goal")
         rows = pose_array([start, *found, goal])
         rows[:, 2] = np.unwrap(rows[:, 2])
-        poses = densify(rows, _STEP_M)
+        poses = densify(rows, step_m=0.05)
         return Path(poses, footprint_clearance_m(costmap, footprint, poses))

@@ -82,10 +82,8 @@ class HeardVelocity:
 
     def hear(self, twist: Any) -> None:
         """Takes a velocity; one that is not finite stops the robot."""
-        try:
-            self.last = velocity(twist), self._now()
-        except InputError:
-            self.last = STILL
+        read = usable(velocity, twist)
+        self.last = STILL if read is None else (read, self._now())
 
 
 def stamp_of(header: Any) -> float:

@@ -64,7 +64,7 @@ def test_a_bag_needs_a_name(log_file):
         ("300", "'300' is no ROS domain: domains go to 232"),
         ("0@:0", "ports from 1 to 65535"),
         ("here", "'here' is no ROS domain"),
-        ("--robot 1a", "'1a' is not a name for a robot"),
+        ("--robot 1a", "'/1a' is no name of ROS 2"),
         ("--kind crane", "no kind of robot 'crane'"),
         ("--world nowhere", "unknown world 'nowhere'"),
         ("0@192.0.2.1", "no Zenoh router answers at 192.0.2.1:7447"),

@@ -224,6 +224,17 @@ def test_the_robot_drives_over_a_link_with_delays_and_short_stalls_until_its_sen
     assert time.monotonic() - silent_s < 0.6 + 0.15  # the link's delay
 
 
+def test_velocities_that_a_stalled_link_held_do_not_drive_after_their_sender_has_died(remote):
+    with remote.link.stall():
+        assert soon(remote.still)
+        time.sleep(0.5)
+        remote.speed = None
+        time.sleep(0.5)
+        stood_at_m = remote.robot.pose.x_m
+    time.sleep(0.8)
+    assert remote.robot.pose.x_m == stood_at_m
+
+
 def test_a_goal_of_the_arm_that_is_refused_is_told_with_its_reason(served, caplog):
     client = actions.ActionClient(served.node, "/alice/arm_controller/follow_joint_trajectory", TRAJECTORY)
     assert client.send({"trajectory": {"joint_names": ["elbow"]}}, limit_s=5.0) is None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import os
 import re
 import socket
@@ -39,7 +40,7 @@ from skills.inputs.errors import InputError
 
 _LOG: Final = logging.getLogger(__name__)
 _CDR: Final = "application/cdr"
-MOST_BYTES, _CLAIM_S = 1 << 26, 2.0  # longer messages are dropped
+MOST_BYTES, _CLAIM_S, _DRIFT_S = 1 << 26, 2.0, 0.001  # longer messages are dropped
 _PLACE: Final = re.compile(r"(?P<domain>\d{1,9})?(@(?P<host>[\w.-]+|\[[\w:.%]+\])?(:(?P<port>\d{1,5}))?)?")
 PORT, _MOST_DOMAIN, _MOST_PORT = 7447, 232, 65535  # port of rmw_zenoh's router; limits
 
@@ -219,14 +220,18 @@ class Node:
         return made
 
     def subscribe(
-        self, topic: str, type_name: str, handle: Callable[[Any], Any], qos: Qos = USUAL
+        self, topic: str, type_name: str, handle: Callable[[Any], Any], qos: Qos = USUAL, late_s: float = math.inf
     ) -> Callable[[], None]:
-        """Calls `handle` with each message of a topic; returns a function that ends the subscription."""
+        """Calls `handle` with each message that is not `late_s` late; returns a function that ends the subscription."""
         name, kind = self.absolute(topic), ros_types().message(type_name)
         self.declare(SUBSCRIPTION, name, kind.key, qos)
         token = self._declared[-1]
 
+        quickest_s = dict[bytes, float]()
+
         def received(sample: zenoh.Sample) -> None:
+            if late_s < math.inf and _delay_s(sample, quickest_s) > late_s:
+                return
             if (message := self._decoded(kind, sample.payload)) is not None:
                 self.guarded(lambda: handle(message), name)
                 self.handled += 1
@@ -291,3 +296,13 @@ class Node:
             handle()
         except Exception as error:
             _LOG.warning("errand: %s could not be handled (%s: %s)", name, type(error).__name__, error)
+
+
+def _delay_s(sample: zenoh.Sample, quickest_s: dict[bytes, float]) -> float:
+    """How much longer a message took than its sender's quickest, which grows by a millisecond with each message."""
+    with suppress(ValueError):
+        head = Attachment.decoded(sample.attachment.to_bytes() if sample.attachment else b"")
+        took_s = 1e-9 * (time.time_ns() - head.stamp_ns)
+        quickest_s[head.gid] = min(took_s, quickest_s.get(head.gid, took_s) + _DRIFT_S)
+        return took_s - quickest_s[head.gid]
+    return 0.0

@@ -227,7 +227,7 @@ def _counted_text(of: ObjectKind | None, count: int) -> str:
         return _NOTHING
     number = {0: f"{_PLURAL} ", 1: ""}.get(count, f"{count} ")
     plain = f"{number}{of.plain}"
-    parses = not _has_relation(plain) and _parse_counted(plain) == (of.plain, count)
+    parses = not _has_relation(plain) and plain[-1] != "," and _parse_counted(plain) == (of.plain, count)
     return related(plain if parses else f'{number}{" ".join((*of.attributes, ""))}"{of.name}"', of.relations)
 
 
@@ -253,7 +253,7 @@ def _goal_text(command: Command) -> str:
 
 
 def _quoted_place(name: str) -> str:
-    is_plain = name != _NOTHING and " at " not in f" {name} " and not _has_relation(f"at {name}")
+    is_plain = name != _NOTHING and name[-1] != "," and " at " not in f" {name} " and not _has_relation(f"at {name}")
     return name if is_plain else f'"{name}"'
 
 

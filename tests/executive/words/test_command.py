@@ -90,6 +90,12 @@ def commands(draw):
     )
 
 
+def test_a_name_that_ends_in_a_comma_is_no_beginning_of_a_relation():
+    beside = (Relation(RelationKind.NEXT_TO, (Landmark("cup"),)),)
+    command = Command(object=ObjectKind(",", (), beside), goal="here,", goal_relations=(Relation(RelationKind.EDGE),))
+    assert parse_command(str(command)) == command
+
+
 @given(commands())
 def test_every_command_parses_back_from_its_text(command):
     assert parse_command(str(command)) == command

@@ -72,5 +72,5 @@ class Nav2:
             raise PlanningError(f"Nav2's path ends {off_m:.2f} m from the goal")
         rows = pose_array([start, *found, goal])
         rows[:, 2] = np.unwrap(rows[:, 2])
-        poses = densify(rows, step_m=0.05)
+        poses = densify(rows, 0.05)
         return Path(poses, footprint_clearance_m(costmap, footprint, poses))

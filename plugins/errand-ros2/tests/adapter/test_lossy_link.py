@@ -34,9 +34,9 @@ class LossyLink:
         """Stamps of what came in last, by topic; numbers of messages lost, passed on, and passed on twice."""
         self.is_open, self.after = True, lambda: None
 
-    def subscribe(self, node, topic, kind, handle, qos=USUAL):
+    def subscribe(self, node, topic, kind, handle, qos=USUAL, **late):
         if qos.transient_local:
-            return self._subscribe(node, topic, kind, handle, qos)
+            return self._subscribe(node, topic, kind, handle, qos, **late)
 
         def hear(message):
             with self._lock:
@@ -49,7 +49,7 @@ class LossyLink:
                 if hasattr(message, "header"):
                     self.arrived_s[topic] = stamp_of(message.header)
 
-        return self._subscribe(node, topic, kind, hear, qos)
+        return self._subscribe(node, topic, kind, hear, qos, **late)
 
     def deliver(self):
         """Hands over what is due, if the link is open."""

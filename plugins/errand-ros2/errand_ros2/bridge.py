@@ -105,8 +105,7 @@ class Bridge(RunVisitor):
         name = prepared.mission.robot_name
         node = Node(self.session, "errand", f"/{ros_name(name)}")
         node.claim("odom")
-        latched = {kind: Qos(transient_local=kind.startswith("errand_msgs/")) for kind in _TOPICS.values()}
-        out = {topic: node.publisher(topic, kind, latched[kind]) for topic, kind in _TOPICS.items()}
+        out = {topic: node.publisher(topic, kind, Qos(10, "errand_msgs" in kind)) for topic, kind in _TOPICS.items()}
 
         def hear(said: Any) -> None:
             out["reply"].put({"data": self._conversations.hear(said.data, name).text})

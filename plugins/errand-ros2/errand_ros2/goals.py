@@ -110,10 +110,7 @@ class Goals:
         name = f"ros2 goal {next(self._numbers)}"
         asked = None if goal is None else goal.message
         mission = self._asked(name, asked) if source == _MISSION else self._mission_of(name, *map(_drive_to, poses))
-        tree, stop = (
-            self._compiled(mission),
-            self._compiled(self._mission_of(f"{name} cancelled", _STOP)),
-        )
+        tree, stop = self._compiled(mission), self._compiled(self._mission_of(f"{name} cancelled", _STOP))
         with self._lock:
             before = next(reversed(self._pursued), None)
             self._pursued[name] = _Pursued(source, goal, poses, name, stop)

@@ -1,14 +1,16 @@
 """Missions through ROS 2: adapter and server in lock-step, judged by the plant's referee."""
 
+import cv2
+import numpy as np
 import pytest
 
 pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
 
 from ros2_benchmarks import in_flat
 from ros2_missions import through_ros
-from ros_run import RUN, ActionClient, RosClient
+from ros_run import RUN, STRING, ActionClient, RosClient
 
-from errand_ros2.part_actions import TRAJECTORY
+from errand_ros2.part_actions import GRIPPER, TRAJECTORY
 from errand_ros2.wire.actions import GoalStatus
 from errand_ros2.wire.node import Client, open_session
 from errand_ros2.wire.types import ros_types
@@ -88,6 +90,27 @@ def test_a_client_moves_the_arm_in_the_plant():
         assert {name: angles[name] for name in RAISED_RAD} == pytest.approx(RAISED_RAD, abs=0.05)
 
     talked_to(says, joint_states="sensor_msgs/msg/JointState")
+
+
+@pytest.mark.mission
+def test_a_client_opens_the_gripper_in_the_plant_and_asks_about_the_run():
+    def says(ros, heard):
+        gripper = ActionClient(ros, "gripper_controller/gripper_cmd", GRIPPER)
+        gripper.goal.command.position = 0.8
+        assert gripper.send()
+        assert gripper.result().result.position == pytest.approx(0.8, abs=0.05)
+        ros.publisher("/alice/say", STRING).put({"data": "what are you doing?"})
+        ros.soon(lambda: ros.heard["/alice/reply"])
+        assert "'wait'" in ros.heard["/alice/reply"][0].data
+        ros.soon(lambda: all(heard.values()))
+
+    depth, costs = "hand/depth/compressedDepth", "global_costmap/costmap"
+    kinds = {depth: "sensor_msgs/msg/CompressedImage", costs: "nav_msgs/msg/OccupancyGrid"}
+    heard = talked_to(says, **kinds)
+    depth_mm = cv2.imdecode(heard[depth][0].data[12:], cv2.IMREAD_UNCHANGED)
+    assert depth_mm.shape == (240, 320) and 300 < np.median(depth_mm[depth_mm > 0]) < 5000
+    cells = np.asarray(heard[costs][0].data)
+    assert 0.05 < np.mean(cells == 100) < 0.9 and 0.05 < np.mean(cells < 50) < 0.9  # walls, and open floor
 
 
 @pytest.mark.mission

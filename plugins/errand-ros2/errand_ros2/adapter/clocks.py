@@ -10,8 +10,8 @@ from collections.abc import Callable
 from threading import Event
 from typing import Any
 
-_JUMP_S, _DELAYS_S = 0.7, 5.0
-_GRACE_S, _LOOK_S = 1.0, 0.02  # silence of `/clock` (wall clock) after which time goes on without it
+_JUMP_S, _DELAYS_S, _LOOK_S = 0.7, 5.0, 0.02
+_GRACE_S = 1.0  # silence of `/clock` (wall clock) after which time goes on without it
 
 
 class RobotClock:

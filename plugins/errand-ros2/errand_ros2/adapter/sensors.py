@@ -40,7 +40,8 @@ from skills.robot import (
     Scan,
 )
 
-OLD_STATE_S, SILENT_S, _PICTURE_S, _SAME_S, _EPSILON_S = 0.5, 3.0, 2.0, 0.051, 1e-6
+OLD_STATE_S, SILENT_S, _PICTURE_S = 0.5, 3.0, 2.0  # ages of the last reading; longest wait for a picture
+_SAME_S, _EPSILON_S = 0.051, 1e-6  # readings so far apart count as of one time; rounding of stamps
 NEVER: Final = Odometry(-math.inf, RigidTransform(), (0.0, 0.0, 0.0))
 _KEPT, _MOST_FRAMES = 400, 32
 

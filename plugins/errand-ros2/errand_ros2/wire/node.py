@@ -40,7 +40,8 @@ from skills.inputs.errors import InputError
 
 _LOG: Final = logging.getLogger(__name__)
 _CDR: Final = "application/cdr"
-MOST_BYTES, _CLAIM_S, _DRIFT_S = 1 << 26, 2.0, 0.001  # longer messages are dropped
+MOST_BYTES: Final = 1 << 26  # longer messages are dropped
+_CLAIM_S, _DRIFT_S, _MOST_SENDERS = 2.0, 0.001, 1000  # wait for publishers; growth of the quickest; senders noted
 _PLACE: Final = re.compile(r"(?P<domain>\d{1,9})?(@(?P<host>[\w.-]+|\[[\w:.%]+\])?(:(?P<port>\d{1,5}))?)?")
 PORT, _MOST_DOMAIN, _MOST_PORT = 7447, 232, 65535  # port of rmw_zenoh's router; limits
 
@@ -205,7 +206,7 @@ class Node:
             key = f"{ADMIN}/{domain}/*/*/*/{PUBLISHER}/*/*/*/{name.replace('/', '%')}/**"
             if any(reply.ok is not None for reply in liveliness.get(key, timeout=_CLAIM_S)):
                 what = f"{name} is published in domain {domain} already, by another robot, simulator or run"
-                raise InputError(what, hint=f"end it, or name another domain, as in {domain + 1}")
+                raise InputError(what, hint="end it, or name another domain")
 
     def declare(self, kind: str, name: str, type_key: str, qos: Qos) -> bytes:
         """Declares an entity of the node; returns its identity."""
@@ -303,6 +304,8 @@ def _delay_s(sample: zenoh.Sample, quickest_s: dict[bytes, float]) -> float:
     with suppress(ValueError):
         head = Attachment.decoded(sample.attachment.to_bytes() if sample.attachment else b"")
         took_s = 1e-9 * (time.time_ns() - head.stamp_ns)
+        if len(quickest_s) > _MOST_SENDERS:
+            quickest_s.clear()
         quickest_s[head.gid] = min(took_s, quickest_s.get(head.gid, took_s) + _DRIFT_S)
         return took_s - quickest_s[head.gid]
     return 0.0

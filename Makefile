@@ -16,11 +16,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 PLUGINS := $(wildcard plugins/*)
 # Plug-ins as `make env` installs them, with the extras of theirs that it adds.
-EDITABLE := $(PLUGINS:%/errand-make=%/errand-make[mapping])
+EDITABLE := $(PLUGINS:%/errand-make=%/errand-make[mapping,xacro])
 # What the wheels need beyond Python: libraries of Drake, and software rendering through EGL for the cameras.
 DEBIAN := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libsm6 libx11-6
-# Voices that speak to the tests of speech; without them those are skipped.
+# What some tests need; without it those are skipped, and fail where CI is set.
 VOICES := flite espeak-ng
+BROWSER := chromium
 # One more than there are processors, since tests of pages and of processes wait.
 JOBS ?= $(shell expr $$(nproc) + 1)
 SINCE ?= HEAD
@@ -34,8 +35,14 @@ define install
 	echo "installing Debian packages:$(1)"; \
 	$$run apt-get update -qq && $$run apt-get install -y -qq --no-install-recommends $(1) >/dev/null; }
 endef
+# Debian packages, and the tests that are left out without them.
+define install_for
+@missing="$$($(call missing,$(1)))"; \
+	if [ -z "$$missing" ]; then exit 0; fi; \
+	$(call install,$$missing) || { echo "$(2) will be left out; as root: apt-get install$$missing"; [ -z "$$CI" ]; }
+endef
 
-.PHONY: env train demo test affected fast nightly check bench docs wheels pythons format debian voices clean
+.PHONY: env train demo test affected fast nightly check bench docs wheels pythons format debian voices browser clean
 
 env: $(VENV)/.ready
 
@@ -64,14 +71,15 @@ debian:
 	$(call install,$$missing) || { echo "Errand needs these Debian packages; as root: apt-get install$$missing"; exit 1; }
 
 voices:
-	@missing="$$($(call missing,$(VOICES)))"; \
-	if [ -z "$$missing" ]; then exit 0; fi; \
-	$(call install,$$missing) || echo "tests with synthetic voices will be skipped; as root: apt-get install$$missing"
+	$(call install_for,$(VOICES),tests with synthetic voices)
+
+browser: | voices
+	$(call install_for,$(BROWSER),tests of pages in a browser)
 
 demo: $(VENV)/.run
 	$(BIN)/errand run --say "Hey Alice, can you fetch me a drink from the kitchen" --world flat --seed 1
 
-test: env voices
+test: env voices browser
 	$(PYTEST) --durations-file=out/tests/durations.json
 
 affected: env
@@ -80,7 +88,7 @@ affected: env
 fast: env
 	$(PYTEST) --fast -m "not mission and not nightly"
 
-nightly: env voices
+nightly: env voices browser
 	$(PYTEST) -m nightly --durations-file=out/tests/nightly.json
 
 check: env

@@ -1,10 +1,11 @@
 """Options of a test run, what is left to the night, and the collection of garbage."""
 
 import gc
+import os
 
 import pytest
 
-from tests import affected, durations
+from tests import affected, durations, missing
 
 
 def pytest_addoption(parser):
@@ -16,6 +17,8 @@ def pytest_configure(config):
     file, revision = config.getoption("durations_file"), config.getoption("affected")
     if file and not hasattr(config, "workerinput"):
         config.pluginmanager.register(durations.Durations(file))
+    if os.environ.get("CI"):
+        config.pluginmanager.register(missing.NothingMissing())
     if config.getoption("fast"):
         config.pluginmanager.register(durations.Fast())
     if revision:

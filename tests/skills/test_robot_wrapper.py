@@ -1,6 +1,7 @@
 """Every wrapper of a robot passes every verb of the protocol on, with its arguments and its answer."""
 
 import inspect
+from itertools import product
 from types import SimpleNamespace
 
 import pytest
@@ -16,7 +17,7 @@ from skills.testing.clock import VirtualClock
 LEASE = Lease("Alice", "test", 1)
 VALUES = {"lease": LEASE, "until_s": 1.0, "only": CommandId(3), "visual": False, "depth": True, "command": CommandId(3)}
 OWN_COMMAND = CommandId(77)
-SETTLED = ("command_status", "move_arm", "stop")  # the pipeline keeps ids of its own, and shortens trajectories
+SETTLED = ("command_status", "move_arm", "stop")  # by a pipeline itself: see tests/plant/test_engine.py
 PACKAGES = ("executive.", "skills.", "plant.")
 
 
@@ -95,15 +96,14 @@ def test_a_wrapper_has_every_verb_with_the_signature_of_the_protocol(wrapper):
         assert kinds[0] == kinds[1], verb
 
 
-@pytest.mark.parametrize("verb", VERBS)
-@pytest.mark.parametrize("maker", MAKERS)
+@pytest.mark.parametrize(
+    ("maker", "verb"), [pair for pair in product(MAKERS, VERBS) if "pipeline" not in pair[0] or pair[1] not in SETTLED]
+)
 def test_a_verb_arrives_with_its_arguments_and_its_answer_comes_back(maker, verb, monkeypatch):
     monkeypatch.setattr("executive.run.guarded_robot.CHECKS", {})
     robot = RecordingRobot()
     wrapped = MAKERS[maker](robot)
     by_position, by_name = arguments_of(verb)
-    if "pipeline" in maker and verb in SETTLED:
-        pytest.skip("the pipeline answers by itself: see tests/plant/test_engine.py")
     answer = getattr(wrapped, verb)(*by_position, **by_name)
     begin(wrapped)
     assert robot.calls == [(verb, by_position, by_name)]

@@ -43,10 +43,11 @@ def test_a_sentence_becomes_its_commands(parser, sentence, commands):
     assert (answer.reason, [str(command) for command in answer.commands]) == (None, commands)
 
 
-@pytest.mark.parametrize(("sentence", "commands"), every_third(sentences("understood")))
+@pytest.mark.parametrize(
+    ("sentence", "commands"),
+    [row for row in every_third(sentences("understood")) if row.values[0] not in NEED_COMMAS],
+)
 def test_it_needs_neither_capitals_nor_punctuation(parser, sentence, commands):
-    if sentence in NEED_COMMAS:
-        pytest.skip("what is said is clear only by its commas")
     bare = " ".join(re.sub(r"[^a-z0-9' ]", " ", sentence.lower()).split())
     found = [str(command).lower() for command in answer_to(bare, parser).commands]
     assert found == [command.lower() for command in commands]

@@ -119,12 +119,9 @@ def test_anything_but_a_json_object_is_refused(content):
         json_object(content, what="the values", hint="give one")
 
 
-@pytest.mark.parametrize("value", DATA)
+@pytest.mark.parametrize("value", [each for each in DATA if not isinstance(each, bytes)])
 def test_any_json_is_an_object_or_refused(value):
-    try:
-        content = json.dumps({"a": value}).encode()
-    except (TypeError, ValueError):
-        pytest.skip("no JSON")
+    content = json.dumps({"a": value}).encode()
     try:
         assert set(json_object(content, what="the values", hint="")) == {"a"}
     except InputError as error:

@@ -1,6 +1,5 @@
 """What the kinds of robots are able to, as far as is known before a mission."""
 
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -121,9 +120,8 @@ def test_each_route_is_planned_once_in_all_processes(tmp_path, broken):
     assert planner.asked == 3
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_routes_are_planned_without_a_writable_cache(tmp_path):
-    tmp_path.chmod(0o500)
+    (tmp_path / "routes").write_text("a file where the folder would be")
     assert RouteCache(tmp_path / "routes" / "a.json", Planner()).route(HERE, THERE) == Route(5.0, 5.25)
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 HEIGHTS_M: Final = (0.15, 1.0)
 _PADDING_M, _NEAR_M, _CARRIED_M = 0.05, 2.0, 0.35
 _REMEMBERED_S, _CELL_M, _SEEN_M, _THIN_M, _AROUND_M = 15.0, 0.05, 0.01, 0.12, 0.2
-_LARGEST_M, _FAR_M = 100.0, 5.0
+_LARGEST_M, _FAR_M, _ROW = 100.0, 5.0, 1e7
 _BRAKING_S, _WAITS_S = 0.5, 0.04
 """Time to a collision from which on the robot slows down, and at which it waits."""
 _SLIP_M, _ALONG, _LEVEL = 0.005, 0.3, 0.5
@@ -55,11 +55,11 @@ class ScanPoints:
         unseen = (far_m < _NEAR_M) & (low | ((missed_m > _SEEN_M) & (self._points[:, 4] > 0.0)))
         kept = self._points[unseen & (self._points[:, 3] > scan.stamp_s - _REMEMBERED_S)]
         highest = points_O[np.argsort(-points_O[:, 2], kind="stable")]
-        first = np.unique(np.round(highest[:, :2] / _CELL_M), axis=0, return_index=True)[1]
-        around = np.round(highest[:, :2] / _AROUND_M)
-        _, top, inverse = np.unique(around, axis=0, return_index=True, return_inverse=True)
-        bottom = len(around) - 1 - np.unique(around[::-1], axis=0, return_index=True)[1]
-        thin = (highest[top, 2] - highest[bottom, 2] < _THIN_M)[inverse.ravel()][first]
+        cells, around = (np.round(highest[:, :2] / size_m) @ [_ROW, 1.0] for size_m in (_CELL_M, _AROUND_M))
+        first = np.unique(cells, return_index=True)[1]
+        _, top, inverse = np.unique(around, return_index=True, return_inverse=True)
+        bottom = len(around) - 1 - np.unique(around[::-1], return_index=True)[1]
+        thin = (highest[top, 2] - highest[bottom, 2] < _THIN_M)[inverse][first]
         new = np.column_stack([highest[first], np.full(len(first), scan.stamp_s), thin])
         self._scan, self._points = scan, np.concatenate([kept, new])
         self.points_O = self._points[:, :2]

@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import distributions, requires, version
 from typing import Annotated, Final
 
 import typer
@@ -82,17 +82,9 @@ def _python() -> Iterator[Finding]:
 def _packages() -> Iterator[Finding]:
     needed = [line for line in requires(OURS) or () if "extra ==" not in line]
     names = [re.split(r"[<>=!~\[; ]", line, maxsplit=1)[0] for line in needed]
-    missing = [name for name in names if not _is_installed(name)]
+    missing = [name for name in names if not any(distributions(name=name))]
     mend = f"pip install {' '.join(missing)}" if missing else ""
     yield Finding("packages", not missing, f"{OURS} {version(OURS)}, {len(names) - len(missing)} of {len(names)}", mend)
-
-
-def _is_installed(name: str) -> bool:
-    try:
-        version(name)
-    except PackageNotFoundError:
-        return False
-    return True
 
 
 def _rendering() -> Iterator[Finding]:

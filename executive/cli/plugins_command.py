@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
-import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, replace
-from importlib.metadata import EntryPoint, entry_points, version
+from dataclasses import asdict, dataclass
+from importlib.metadata import EntryPoint, version
+from multiprocessing import get_context
+from tempfile import NamedTemporaryFile
 from typing import Annotated, Final
 
 import typer
@@ -25,8 +26,8 @@ from executive.tree import registry
 from executive.tree.port_values import describe_type, field_types
 from plant.models.catalogue import load_catalogue
 from plant.robots import robot_kind as kinds
+from skills.inputs import plugins as loading
 from skills.inputs.errors import InputError
-from skills.inputs.plugins import CLASSES, KERNELS, LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
 from skills.inputs.yaml_source import yaml_of
 from skills.perception.class_forms import class_forms
 from skills.quantities import Duration
@@ -37,6 +38,8 @@ _WORD: Final = re.compile(r"[a-z][a-z0-9_-]*")
 _SCHEME: Final = re.compile(r"[a-z][a-z0-9+.-]*")
 _MORE_S: Final = 30.0
 """Time of a process that loads a plug-in, beside the plug-in's own limit."""
+_FORKS: Final = get_context("forkserver")
+"""Starts each process as a fork of one that has imported this module, which takes longer than most plug-ins."""
 
 
 @dataclass(frozen=True)
@@ -53,14 +56,11 @@ class Plugin:
 
 def plugins(
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
-    limit: Annotated[float, quantity_option(Duration, "--limit", help="Time limit to load a plug-in.")] = LIMIT_S,
-    load: Annotated[str | None, typer.Option(hidden=True)] = None,
+    limit: Annotated[float, quantity_option(Duration, "--limit", help="Time limit per plug-in.")] = loading.LIMIT_S,
 ) -> None:
     """Lists distributions, what each registers, and errors of loading it, each in a process of its own."""
-    if load is not None:
-        _load(load, limit)
-        return
     entries = _of_others()
+    _FORKS.set_forkserver_preload([__name__])
     console, found = console_for(as_json), list[Plugin]()
     with ThreadPoolExecutor(_WORKERS) as pool, progress_bar(console, "plug-ins", len(entries)) as advance:
         for each in pool.map(lambda entry: _checked(entry, limit), entries):
@@ -86,54 +86,53 @@ def skills(as_json: AS_JSON = False) -> None:
 
 def _rows(found: Sequence[Plugin]) -> Iterator[tuple[str, ...]]:
     """Yields the rows for the core, for the plug-ins, and for this project's plug-ins that are not installed."""
-    yield (OURS, version(OURS), "", "", "", "the core")
+    yield (loading.OURS, version(loading.OURS), "", "", "", "the core")
     last = ""
     for each in sorted(found, key=lambda each: each.distribution):
         named = (each.distribution, each.version) if each.distribution != last else ("", "")
         yield (*named, each.group, each.name, each.value, each.broken or "can be used")
         last = each.distribution
-    for name in sorted(
-        {each.distribution for each in PLUGIN_COMMANDS.values()} - {each.distribution for each in found}
-    ):
+    missing = {each.distribution for each in PLUGIN_COMMANDS.values()} - {each.distribution for each in found}
+    for name in sorted(missing):
         yield (name, "", "", "", "", f"not installed: pip install {name}")
 
 
 def groups() -> Sequence[str]:
     """Returns the entry-point groups that Errand reads."""
-    own = (kinds.GROUP, BACKENDS, trigger_source.GROUP, CLASSES, COMMANDS_GROUP, KERNELS, OBSERVERS)
+    own = (kinds.GROUP, BACKENDS, trigger_source.GROUP, loading.CLASSES, COMMANDS_GROUP, loading.KERNELS, OBSERVERS)
     return (registry.GROUP, *SLOTS.values(), DOORS, *own)
 
 
 def _of_others() -> Sequence[EntryPoint]:
-    every = entry_points()  # reads the files of all distributions
-    found = (entry for group in groups() for entry in every.select(group=group))
-    return sorted((each for each in found if distribution_of(each) != OURS), key=_key)
+    found = (entry for group in groups() for entry in loading.installed_plugins(group))
+    return sorted((each for each in found if loading.distribution_of(each) != loading.OURS), key=_key)
 
 
 def _key(entry: EntryPoint) -> str:
-    return f"{entry.group}:{entry.name}:{distribution_of(entry)}"
+    return f"{entry.group}:{entry.name}:{loading.distribution_of(entry)}"
 
 
 def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
-    """Loads a plug-in in a separate process; returns the result."""
-    plugin = Plugin(
-        entry.group, entry.name, distribution_of(entry), entry.dist.version if entry.dist else "", entry.value
-    )
-    namesakes = entry_points(group=entry.group, name=entry.name)
-    clash = next((each for each in namesakes if _key(each) != _key(entry)), None)
-    if clash is not None:
-        return replace(plugin, broken=f"{distribution_of(clash)} registers the same name")
+    made = entry.dist.version if entry.dist else ""
+    return Plugin(entry.group, entry.name, loading.distribution_of(entry), made, entry.value, _defect(entry, limit_s))
+
+
+def _defect(entry: EntryPoint, limit_s: float) -> str | None:
+    """Loads a plug-in in a separate process; returns why it cannot be used (None: it can be used)."""
+    for each in loading.installed_plugins(entry.group).select(name=entry.name):
+        if _key(each) != _key(entry):
+            return f"{loading.distribution_of(each)} registers the same name"
     if entry.group == COMMANDS_GROUP and (why := _unusable(entry.name)):
-        return replace(plugin, broken=why)
-    command = [sys.executable, "-m", "executive.cli", "plugins", "--load", _key(entry), "--limit", str(limit_s)]
-    try:
-        ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=limit_s + _MORE_S)
-    except subprocess.TimeoutExpired:
-        return replace(plugin, broken=f"it is not loaded within {limit_s:g} s")
-    if ended.returncode == 0:
-        return plugin
-    last = ended.stderr.strip().rpartition("\n")[2].removeprefix("errand: ")
-    return replace(plugin, broken=last or f"its process ended with status {ended.returncode}")
+        return why
+    with NamedTemporaryFile("r", errors="replace") as errors:
+        process = _FORKS.Process(target=_load_alone, args=(entry, limit_s, errors.name), daemon=True)
+        process.start()
+        process.join(limit_s + _MORE_S)
+        if process.exitcode is None:
+            process.kill()
+            return f"it is not loaded within {limit_s:g} s"
+        last = errors.read().strip().rpartition("\n")[2].removeprefix("errand: ")
+    return (last or f"its process ended with status {process.exitcode}") if process.exitcode else None
 
 
 def _unusable(name: str) -> str | None:
@@ -149,29 +148,34 @@ def _unusable(name: str) -> str | None:
     return "a command of Errand has this name" if short in below else None
 
 
-def _load(key: str, limit_s: float) -> None:
+def _load_alone(entry: EntryPoint, limit_s: float, errors: str) -> None:
+    """Loads one plug-in in a process of its own, which writes its errors to a file."""
+    for stream, file in ((1, os.devnull), (2, errors)):
+        os.dup2(os.open(file, os.O_WRONLY), stream)
+    try:
+        _load(entry, limit_s)
+    except InputError as error:
+        raise SystemExit(str(error)) from error
+
+
+def _load(entry: EntryPoint, limit_s: float) -> None:
     """Loads one plug-in in this process. Raises InputError if it cannot be used."""
-    entry = {_key(each): each for each in _of_others()}.get(key)
-    if entry is None:
-        raise InputError(f"there is no plug-in {key}")
     if entry.group == registry.GROUP:
         registry.skills_of([entry], limit_s=limit_s)
-    if entry.group == CLASSES:  # its tables, and none of its code
+    if entry.group == loading.CLASSES:  # its tables, and none of its code
         class_forms()
         load_catalogue()
         return
-    is_command = entry.group == COMMANDS_GROUP
+    load = entry.load if entry.group != COMMANDS_GROUP else lambda: as_command(entry.name, entry.load())
     try:
-        used = run_plugin(
-            entry, lambda: as_command(entry.name, entry.load()) if is_command else entry.load(), limit_s=limit_s
-        )
-    except PluginDefect as defect:
+        used = loading.run_plugin(entry, load, limit_s=limit_s)
+    except loading.PluginDefect as defect:
         raise InputError(f"cannot load {entry.value} ({defect})") from defect
     if entry.group == BACKENDS and not (is_frozen_dataclass(used) and callable(getattr(used, "connect", None))):
         raise InputError(f"{entry.value} is no frozen dataclass with a method connect")
     if entry.group == BACKENDS and _SCHEME.fullmatch(entry.name) is None:
         raise InputError(f"'{entry.name}' is no scheme in lower case")
-    if entry.group == KERNELS and not callable(used):
+    if entry.group == loading.KERNELS and not callable(used):
         raise InputError(f"{entry.value} is no function")
 
 

@@ -26,7 +26,7 @@ from tests.tables import yaml_beside
 
 __all__ = ["Place", "WorkBegins", "arguments", "called", "commands", "defect", "hostile_texts", "places", "prepare"]
 
-LIMIT_S: Final = 20
+LIMIT_S: Final = 120
 CALLS: Final = yaml_beside(__file__, "hostile_calls.yaml")
 GOOD: Final[Mapping[str, Mapping[str, str]]] = CALLS["good"]
 _UNTOLD: Final = re.compile(r"Traceback|<class|NoneType| object at 0x|\b[A-Z][A-Za-z]+Error\b|re\.compile|\(\?:|\\d")
@@ -99,7 +99,7 @@ def places():
         Place(command, *typed_name(each))
         for command, found in commands().items()
         for each in found.params
-        if not getattr(each, "is_flag", False) and each.name not in ("help", "load")
+        if not getattr(each, "is_flag", False) and each.name != "help"
     ]
 
 

@@ -20,7 +20,7 @@ from errand_ros2.driving import Driving
 from errand_ros2.goals import Goals
 from errand_ros2.messages import Fields
 from errand_ros2.part_actions import PartActions
-from errand_ros2.readings import LIFE_S, TOPIC, pose_on_map
+from errand_ros2.readings import TOPIC, pose_on_map
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.tree_topic import TreeTopic
 from errand_ros2.wire.node import Node, Place, Publisher, open_session
@@ -82,9 +82,11 @@ class _RobotBridge:
 class Bridge(RunVisitor):
     """Visitor of one run that is a system of ROS 2."""
 
-    def __init__(self, prepared: Prepared, control: Control, place: Place) -> None:
-        """Opens the session. Raises InputError."""
-        self._open, self._control = ExitStack(), control
+    def __init__(
+        self, prepared: Prepared, control: Control, place: Place, life: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Opens the session; velocities die by the clock `life` (s). Raises InputError."""
+        self._open, self._control, self._life = ExitStack(), control, life
         self._hurry = threading.Event()
         self.session = self._open.enter_context(open_session(place))
         self._pool = self._open.enter_context(ThreadPoolExecutor(1, thread_name_prefix="errand-ros2"))
@@ -111,7 +113,7 @@ class Bridge(RunVisitor):
             out["reply"].put({"data": self._conversations.hear(said.data, name).text})
 
         goals = Goals(node, prepared, self._control, self._grid, self._pool, self._hurry)
-        own = _RobotBridge(node, Driving(name, self._control), goals, out, TreeTopic(node))
+        own = _RobotBridge(node, Driving(name, self._control, self._life), goals, out, TreeTopic(node))
         self._hear(node, own)
         node.subscribe("say", "std_msgs/msg/String", node.later(self._pool, hear))
         for what in ("pause", "resume", "cancel", "step"):
@@ -123,7 +125,7 @@ class Bridge(RunVisitor):
         drive = node.later(self._pool, lambda stamped: own.goals.accept("goal_pose", None, [stamped]))
         node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", drive)
         node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
-        node.subscribe(TOPIC, "geometry_msgs/msg/Twist", own.driving.hear, late_s=LIFE_S)
+        node.subscribe(TOPIC, "geometry_msgs/msg/Twist", own.driving.hear, late_s=own.driving.late_s)
 
     def _obey(self, name: str, what: str, _: Any) -> Fields:
         """Answers a service by its command to a robot, or by the reason why it is refused."""
@@ -185,7 +187,7 @@ class Bridge(RunVisitor):
         for own in self._robots.values():
             if own.context is not None and own.topics is not None:
                 self._tick_robot(own, own.context, own.topics, progress)
-        self._keep_pace(now_s)
+        self.keep_pace(now_s)
 
     def _tick_robot(self, own: _RobotBridge, context: SkillContext, topics: RobotTopics, progress: Progress) -> None:
         now_s, tree = context.clock.now(), progress.trees.get(context.robot.name)
@@ -236,7 +238,7 @@ class Bridge(RunVisitor):
         if own.parts is not None:
             own.parts.end()
 
-    def _keep_pace(self, now_s: float) -> None:
+    def keep_pace(self, now_s: float) -> None:
         """Waits for the wall clock, unless a request is in a hurry; forgets a delay that is too long."""
         wall_s = time.monotonic()
         begun_s, begun_wall_s = self._begun = self._begun or (now_s, wall_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -74,10 +75,14 @@ def within_limits(velocity: tuple[float, float, float], can: Capabilities) -> tu
 
 
 class HeardVelocity:
-    """Last velocity of a topic, and when it came on the clock `now` (s). Any thread may call `hear`."""
+    """Last velocity of a topic, and when it came on the clock `now` (s). Any thread may call `hear`.
+
+    `late_s` is the delay (wall clock) from which on a velocity does not count; infinite on a clock that stands between
+    steps.
+    """
 
     def __init__(self, now: Callable[[], float]) -> None:
-        self._now = now
+        self._now, self.late_s = now, LIFE_S if now is time.monotonic else math.inf
         self.last = STILL
 
     def hear(self, twist: Any) -> None:

@@ -56,8 +56,7 @@ class RobotServer:
         self.parts = PartActions(self.node, robot, clock, lambda: self._lease)
         self.work = self.parts.work
         self._velocity = HeardVelocity(life)
-        late_s = LIFE_S if life is time.monotonic else math.inf
-        self.node.subscribe(TOPIC, "geometry_msgs/msg/Twist", self._velocity.hear, late_s=late_s)
+        self.node.subscribe(TOPIC, "geometry_msgs/msg/Twist", self._velocity.hear, late_s=self._velocity.late_s)
         self._driving: CommandId | None = None
         if (can := robot.capabilities()).gripper is not None:
             carry = partial(robot.carry, lease=self._lease)

@@ -57,9 +57,16 @@ def message_files(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def talk(tmp_path):
-    """A run to which a function talks as a client of ROS 2."""
-    from ros_run import ScriptedRun
+@pytest.fixture(scope="module")
+def run_of_module(tmp_path_factory):
+    from ros_run import run_of_alice
 
-    return ScriptedRun(tmp_path)
+    with run_of_alice(tmp_path_factory.mktemp("run")) as ros:
+        yield ros
+
+
+@pytest.fixture
+def ros(run_of_module):
+    """A client of ROS 2 that steps a run of the scripted Alice, who stands where she began."""
+    run_of_module.begin_anew()
+    return run_of_module

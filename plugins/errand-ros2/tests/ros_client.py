@@ -1,6 +1,7 @@
 """An independent client of ROS 2 over Zenoh (zenoh-ros2-sdk), which takes message files from a folder."""
 
 import socket
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -22,6 +23,14 @@ def free_port():
     """A port that nobody uses."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         return server.getsockname()[1]
+
+
+def soon(condition, limit_s=20.0):
+    """Waits for what needs no robot's time, such as a message on its way; returns whether the condition holds."""
+    until_s = time.monotonic() + limit_s
+    while not condition() and time.monotonic() < until_s:
+        time.sleep(0.0005)
+    return condition()
 
 
 def write_messages(folder):

@@ -4,6 +4,7 @@ import gc
 import threading
 import time
 from contextlib import ExitStack, contextmanager
+from copy import deepcopy
 
 from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import described, served_file
@@ -17,6 +18,22 @@ from skills.testing.robot import ScriptedRobot
 
 IDLE_S, CONNECTING_S, PATIENCE_S = 0.005, 0.2, 20.0
 """Pauses of the server; longest wait for a message until both sides have found each other, and afterwards."""
+
+
+STATE = (
+    *("pose", "odometry_pose", "velocity", "height_m", "pitch_rad", "q_rad", "opening", "in_gripper_rad"),
+    *("clamp_force_n", "held", "carries", "charge"),
+)
+
+
+def state_of(robot):
+    """Returns the state of a scripted robot, to `restore` it for another test."""
+    return {name: deepcopy(getattr(robot, name)) for name in STATE}
+
+
+def restore(robot, state):
+    for name, value in deepcopy(state).items():
+        setattr(robot, name, value)
 
 
 def scripted(**options):

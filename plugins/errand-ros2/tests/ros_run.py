@@ -1,18 +1,21 @@
-"""A run of a scripted robot as a system of ROS 2, and a client that talks to it.
-
-The run is in the caller's thread, and what a client does in another, which ends the run.
-"""
+"""A run of a scripted robot as a system of ROS 2, and a client in the same process that talks to it and steps it."""
 
 import json
+import queue
 import re
 import threading
 import time
 import uuid
 from collections import defaultdict
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from ros_client import free_port
+import pytest
+from ros_client import free_port, soon
+from ros_lock_step import restore, state_of
 
 from errand_ros2.bridge import Bridge
 from errand_ros2.wire.node import Client, Node, Place, open_session
@@ -21,6 +24,7 @@ from executive.app.prepare.from_request import prepare
 from executive.app.runs.one_run import run_request
 from executive.mission.request import Request
 from executive.run.control import Control
+from executive.run.control_state import Mode
 from executive.run.visitor import RunEntry
 from executive.testing.bench import write_small_room
 from plant.robots.spot.kind import spot_capabilities
@@ -35,13 +39,12 @@ TWIST, POSE, STRING, TRIGGER = (
 _MANUAL = Path(__file__).parents[3] / "docs" / "how-to" / "ros2.md"
 NAVIGATE, RUN = "nav2_msgs/action/NavigateToPose", "errand_msgs/action/RunMission"
 THROUGH = "nav2_msgs/action/NavigateThroughPoses"
+ACTIONS = {"navigate_to_pose": NAVIGATE, "navigate_through_poses": THROUGH, "run_mission": RUN}
+PATIENCE_S = 20.0
 HEARD = {
-    "/clock": "rosgraph_msgs/msg/Clock",
     "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
     "/alice/amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
     "/alice/plan": "nav_msgs/msg/Path",
-    "/alice/events": STRING,
-    "/alice/reply": STRING,
     "/alice/odom": "nav_msgs/msg/Odometry",
     "/alice/local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
     "/alice/global_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
@@ -67,63 +70,196 @@ class CloudPlace(KnownPlace):
 class RoomBackend(ScriptedBackend):
     """A scripted robot that knows the small room's walls."""
 
+    def __init__(self):
+        super().__init__()
+        self.localiser = CloudPlace()
+        self.robot.scan(), self.robot.image("hand")  # compiles them, which may take longer than a run waits
+
     def entry(self, tree, durable):
-        return RunEntry(tree, self.robot, CloudPlace(), BlockCostmap(ROOM))
+        return RunEntry(tree, self.robot, self.localiser, BlockCostmap(ROOM))
+
+
+class SteppedBridge(Bridge):
+    """Bridge of a run that another thread steps: between the steps the run stands, and velocities do not age."""
+
+    def __init__(self, prepared, control, place):
+        self._go, self._stands = threading.Semaphore(0), threading.Semaphore(0)
+        self.now_s, self.has_ended = 0.0, False
+        super().__init__(prepared, control, place, life=self.now)
+
+    def now(self):
+        return self.now_s
+
+    def tick(self, progress):
+        self.now_s = progress.now_s
+        super().tick(progress)
+
+    def keep_pace(self, now_s):
+        self._stands.release()
+        self._go.acquire()
+
+    def stands(self):
+        """Waits until the run stands between two ticks, or has ended."""
+        self._stands.acquire()
+
+    def step(self):
+        self._go.release()
+        self.stands()
+
+    def run(self, work):
+        """Calls the function that is the run; tells its end."""
+        try:
+            return work()
+        finally:
+            self.has_ended = True
+            self._stands.release()
+
+
+class RealBridge(SteppedBridge):
+    """Bridge of a run in real time; a step of its client waits for the run's next tick."""
+
+    now, step = staticmethod(time.monotonic), SteppedBridge.stands
+
+    def keep_pace(self, now_s):
+        Bridge.keep_pace(self, now_s)
+        self._stands.release()
 
 
 class RosClient:
-    """Another program: what it hears by topic, and goals that it sends."""
+    """Another program, which steps the run: what it hears by topic, and what it sends."""
 
-    def __init__(self, session, robot, bridge):
-        self.node, self.robot, self.bridge, self.heard = Node(session, "client"), robot, bridge, defaultdict(list)
-        self.place = session.place
-        for topic, kind in HEARD.items():
-            self.node.subscribe(topic, kind, self.heard[topic].append)
+    def __init__(self, session, bridge, backend=None):
+        self.node, self.place, self.bridge, self.heard = (
+            Node(session, "client"),
+            session.place,
+            bridge,
+            defaultdict(list),
+        )
+        self.backend, self.robot = backend, getattr(backend, "robot", None)
+        self._begun = None if backend is None else state_of(self.robot)
+        self._pool, self._clock = ThreadPoolExecutor(1), queue.SimpleQueue()
+        self.node.subscribe("/clock", "rosgraph_msgs/msg/Clock", self._clock.put)
+        for topic in ("/alice/events", "/alice/reply"):
+            self.hear(topic, STRING)
+        assert soon(lambda: bridge._clock.is_heard and bridge._robots["Alice"].goals.events.is_heard)
 
-    def soon(self, condition, limit_s=20.0):
-        until_s = time.monotonic() + limit_s
-        while not condition() and time.monotonic() < until_s:
-            time.sleep(0.01)
-        assert condition(), "it did not come about"
+    def hear(self, topic, kind, *options):
+        """Subscribes to a topic; returns the list of what comes."""
+        self.node.subscribe(topic, kind, self.heard[topic].append, *options)
+        return self.heard[topic]
+
+    def step(self, count=1):
+        """Steps the run, and waits until its clock is heard; a run in real time needs no step."""
+        for _ in range(0 if self.bridge.has_ended else count):
+            self.bridge.step()
+            if not self.bridge.has_ended:
+                self._clock.get(timeout=PATIENCE_S)
+
+    def soon(self, condition, limit_s=60.0):
+        """Steps the run until a condition holds, at most for some time of the robot; returns that time."""
+        begun_s = self.bridge.now()
+        while not condition() and self.bridge.now() < begun_s + limit_s and not self.bridge.has_ended:
+            self.step()
+        assert condition() or (self.bridge.has_ended and soon(condition)), "it did not come about"
+        return self.bridge.now() - begun_s
+
+    def meanwhile(self, call):
+        """Steps the run until a call has returned; returns what it returned."""
+        made = self._pool.submit(call)
+        self.soon(made.done)
+        return made.result()
 
     def events(self, topic):
         said = [json.loads(each.data) for each in self.heard["/alice/events"]]
         return [each for each in said if each["topic"] == topic]
 
+    def controls(self):
+        return [each["what"] for each in self.events("control")]
+
     def call(self, name):
-        return Client(self.node, f"/alice/{name}", ros_types().service(TRIGGER)).call({}, limit_s=5.0)
+        return Client(self.node, f"/alice/{name}", ros_types().service(TRIGGER)).call({}, limit_s=PATIENCE_S)
 
     def publisher(self, topic, kind):
         made = self.node.publisher(topic, kind)
-        self.soon(lambda: made.is_heard)
+        assert soon(lambda: made.is_heard)
         return made
+
+    def put(self, publisher, *messages):
+        """Publishes messages, and waits until the run has handled them."""
+        nodes = [self.bridge._node, *(each.node for each in self.bridge._robots.values())]
+        wanted = sum(each.handled for each in nodes) + len(messages)
+        for each in messages:
+            publisher.put(each)
+        assert soon(lambda: sum(each.handled for each in nodes) >= wanted)
+        self.bridge._pool.submit(int).result()
+
+    def tell(self, topic, kind, message):
+        self.put(self.publisher(topic, kind), message)
 
     def still(self):
         return float(np.max(np.abs(self.robot.velocity))) < 0.02
+
+    def begin_anew(self):
+        """Ends all goals, lets the mission go on, and puts the robot where it began."""
+        for name, kind in ACTIONS.items():
+            ActionClient(self, name, kind).cancel(every=True)
+        control = self.bridge._control
+        if control.state.robots["Alice"].mode is not Mode.RUNNING:
+            self.call("resume")
+        self.soon(lambda: len(control.state.missions["Alice"]) == 1 and self.still())
+        self.step(3)
+        restore(self.robot, self._begun)
+        self.backend.localiser.__init__()
+        self.step(2)
+        for each in self.heard.values():
+            each.clear()
+
+    def close(self):
+        """Cancels the run, and steps it to its end."""
+        self.bridge._control.cancel("the test is over")
+        while not self.bridge.has_ended:
+            self.bridge.step()
+        self._pool.shutdown()
 
 
 class ActionClient:
     """Client of an action, which sends one goal."""
 
-    def __init__(self, client, name, kind):
-        self.kind, node = ActionType(ros_types(), kind), client.node
+    def __init__(self, ros, name, kind=None):
+        self.ros, self.kind = ros, ActionType(ros_types(), kind or ACTIONS[name])
         base = f"/alice/{name}/_action"
-        self._send = Client(node, f"{base}/send_goal", self.kind.send_goal)
-        self._result = Client(node, f"{base}/get_result", self.kind.get_result)
-        self._cancel = Client(node, f"{base}/cancel_goal", self.kind.cancel_goal)
-        self.feedback = []
-        node.subscribe(f"{base}/feedback", self.kind.feedback_message.name, self.feedback.append)
+        self._send = Client(ros.node, f"{base}/send_goal", self.kind.send_goal)
+        self._result = Client(ros.node, f"{base}/get_result", self.kind.get_result)
+        self._cancel = Client(ros.node, f"{base}/cancel_goal", self.kind.cancel_goal)
+        self._feedback, self.feedback = f"{base}/feedback", []
         self.identity = {"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)}
-        self.goal = ros_types().make(f"{kind}_Goal")
+        self.goal = ros_types().make(f"{self.kind.name}_Goal")
+
+    def follow(self):
+        """Collects the feedback."""
+        self.ros.node.subscribe(self._feedback, self.kind.feedback_message.name, self.feedback.append)
+        return self
 
     def send(self):
-        return self._send.call({"goal_id": self.identity, "goal": self.goal}, limit_s=20.0).accepted
+        return self._send.call({"goal_id": self.identity, "goal": self.goal}, limit_s=PATIENCE_S).accepted
 
     def result(self, limit_s=60.0):
+        return self.ros.meanwhile(partial(self.asked, limit_s))
+
+    def asked(self, limit_s=60.0):
+        """Asks for the result while somebody else steps the run."""
         return self._result.call({"goal_id": self.identity}, limit_s=limit_s)
 
-    def cancel(self):
-        return self._cancel.call({"goal_info": {"goal_id": self.identity}}, limit_s=5.0).return_code
+    def cancel(self, *, every=False):
+        info = {} if every else {"goal_id": self.identity}
+        return self._cancel.call({"goal_info": info}, limit_s=PATIENCE_S).return_code
+
+
+class PartClient(ActionClient):
+    """Client of an action whose goals the run takes in its ticks."""
+
+    def send(self):
+        return self.ros.meanwhile(super().send)
 
 
 def stamped(x, y, frame="map", w=1.0):
@@ -143,42 +279,43 @@ def text(value):
     return {"data": value}
 
 
-class ScriptedRun:
-    """Runs a mission that waits, while a function talks to it as a client; then cancels it, and returns the report."""
+def small_room(folder):
+    """Prepares a mission of Alice that waits in the small room."""
+    folder.mkdir(exist_ok=True)
+    room, mission = write_small_room(folder / "room"), folder / "wait.yaml"
+    mission.write_text("name: wait\nsteps:\n  - wait: {seconds: 3000}\n")
+    return prepare(Request(file=mission, world=str(room), out=folder / "out", seed=1, time_limit_s=3500.0))
 
-    def __init__(self, folder):
-        folder.mkdir(exist_ok=True)
-        room, mission = write_small_room(folder / "room"), folder / "wait.yaml"
-        mission.write_text("name: wait\nsteps:\n  - wait: {seconds: 600}\n")
-        self.prepared = prepare(Request(file=mission, world=str(room), out=folder / "out", seed=1))
 
-    def __call__(self, says, place=None, *, before=lambda place: None):
-        """`before` is called when the bridge is open, and the run has not begun."""
-        place, control, backend, errors = place or Place(port=free_port()), Control(pace=None), RoomBackend(), []
-        backend.robot.scan(), backend.robot.image("hand")  # compiles them, which may take longer than a run waits
-        bridge = Bridge(self.prepared, control, place)
+@contextmanager
+def run_of_alice(folder, place=None, *, pace=SteppedBridge, before=lambda place: None):
+    """Runs a mission that waits, in a thread; yields a client, which has the run's `report` after the block.
 
-        def client():
-            try:
-                with open_session(place) as session:
-                    ros = RosClient(session, backend.robot, bridge)
-                    ros.soon(lambda: ros.heard["/alice/odom"])
-                    says(ros)
-            except BaseException as error:
-                errors.append(error)
-            finally:
-                control.cancel("the test is over")
+    `before` is called when the bridge is open, and the run has not begun.
+    """
+    prepared, control, backend = small_room(folder), Control(pace=None), RoomBackend()
+    place = place or Place(port=free_port())
+    bridge = pace(prepared, control, place)
+    before(place)
 
-        before(place)
-        thread = threading.Thread(target=client)
-        thread.start()
+    def work():
+        return run_request(prepared, backend, visitors=[bridge], control=control).report
+
+    with ThreadPoolExecutor(1) as pool, pytest.MonkeyPatch.context() as patch:
+        patch.setattr("executive.run.guarded_robot.call_aside", lambda call, *_: call())  # a thread for each verb
+        run = pool.submit(bridge.run, work)
+        bridge.stands()
         try:
-            report = run_request(self.prepared, backend, visitors=[bridge], control=control).report
+            with open_session(place) as session:
+                ros = RosClient(session, bridge, backend)
+                ros.prepared = prepared
+                try:
+                    yield ros
+                finally:
+                    ros.close()
         finally:
-            thread.join()
-        if errors:
-            raise errors[0]
-        return report
+            report = run.result()
+        ros.report = report
 
 
 def documented(heading, space="/alice"):
@@ -200,16 +337,14 @@ def documented(heading, space="/alice"):
 
 def action_topics(space="/alice"):
     """Topics of a run's actions, with their types."""
-    kinds = {"navigate_to_pose": NAVIGATE, "navigate_through_poses": THROUGH, "run_mission": RUN}
-    feedback = {f"{space}/{name}/_action/feedback": f"{kind}_FeedbackMessage" for name, kind in kinds.items()}
-    return feedback | {f"{space}/{name}/_action/status": "action_msgs/msg/GoalStatusArray" for name in kinds}
+    feedback = {f"{space}/{name}/_action/feedback": f"{kind}_FeedbackMessage" for name, kind in ACTIONS.items()}
+    return feedback | {f"{space}/{name}/_action/status": "action_msgs/msg/GoalStatusArray" for name in ACTIONS}
 
 
 def provoke(ros):
     """Lets a run say something on each topic: a drive, two missions, and what a search would find."""
-    through = ActionClient(ros, "navigate_through_poses", THROUGH)
+    drive, through, mission = (ActionClient(ros, name).follow() for name in ACTIONS)
     through.goal.poses.goals = [stamped(-0.4, 0.0), stamped(-0.4, 0.4)]
-    drive, mission = ActionClient(ros, "navigate_to_pose", NAVIGATE), ActionClient(ros, "run_mission", RUN)
     drive.goal.pose, mission.goal.sentence = stamped(0.3, -0.6), "go to the table"
     for action in (through, drive, mission):
         assert action.send()

@@ -2,7 +2,6 @@
 
 import math
 import re
-import time
 import uuid
 from contextlib import ExitStack
 from functools import partial
@@ -14,8 +13,8 @@ import pytest
 pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
 
 from mcap_ros2._dynamic import generate_dynamic
-from ros_client import EMPTY, connected
-from ros_run import NAVIGATE, POSE, TRIGGER, action_topics, documented, provoke
+from ros_client import EMPTY, connected, soon
+from ros_run import NAVIGATE, POSE, TRIGGER, action_topics, documented, provoke, run_of_alice
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from zenoh import ext
 from zenoh_ros2_sdk import ROS2Publisher, ROS2ServiceClient, ROS2Subscriber
@@ -81,31 +80,53 @@ def stamped_by(types, x, y):
     return types[POSE](header, types["geometry_msgs/msg/Pose"](point, turn))
 
 
-def test_the_independent_client_hears_every_topic_of_a_run(talk, message_files):
-    heard, topics = {}, documented("Published") | action_topics()
+@pytest.fixture(scope="module")
+def run_and_topics(message_files, tmp_path_factory):
+    """A run to which the client listens from before its beginning, and what it, and a plain subscription, then heard.
 
-    def says(ros):
-        provoke(ros)
-        ros.soon(lambda: heard.keys() == topics.keys())
-        assert heard["/map"].info.resolution == pytest.approx(0.025)
-        assert heard["/alice/detections"].detections[0].results[0].hypothesis.class_id == "coke"
-        assert heard["/alice/object_destination"].goal_y == 2.0
-        assert len(heard["/alice/particle_cloud"].particles) == 2
-        assert heard["/alice/navigate_through_poses/_action/feedback"].feedback.number_of_poses_remaining == 2
-        assert {each.child_frame_id for each in heard["/tf"].transforms} == {"alice/body", "alice/odom"}
+    The client's one session is open meanwhile.
+    """
+    heard, raw, topics = {}, {}, documented("Published") | action_topics()
+
+    def keep(sample):
+        raw.setdefault("/" + "/".join(str(sample.key_expr).split("/")[1:-2]), sample.payload.to_bytes())
 
     with ExitStack() as ends:
 
         def listen(place):
-            ends.enter_context(connected(place.port, message_files))
+            session, history = ends.enter_context(open_session(place)).inner, ext.HistoryConfig(max_samples=1)
+            ends.callback(session.declare_subscriber("0/**", keep).undeclare)
+            ends.callback(ext.declare_advanced_subscriber(session, "0/map/**", keep, history=history).undeclare)
+            ends.sdk = ends.enter_context(connected(place.port, message_files))
             for topic, kind in topics.items():
                 hear, qos = partial(heard.setdefault, topic), LATCHED.text() if topic == "/map" else None
                 ROS2Subscriber(topic, kind, hear, router_port=place.port, qos=qos)
 
-        talk(says, before=listen)
+        with run_of_alice(tmp_path_factory.mktemp("run"), before=listen) as ros:
+            provoke(ros)
+            ros.soon(lambda: heard.keys() == topics.keys() and raw.keys() >= topics.keys())
+            ros.sdk = ends.sdk
+            yield ros, topics, heard, raw
 
 
-def test_the_independent_client_lists_every_topic_and_service_of_a_run(talk, message_files):
+@pytest.fixture
+def ros(run_and_topics):
+    run_and_topics[0].begin_anew()
+    return run_and_topics[0]
+
+
+def test_the_independent_client_hears_every_topic_of_a_run(run_and_topics):
+    _, topics, heard, _ = run_and_topics
+    assert heard.keys() == topics.keys()
+    assert heard["/map"].info.resolution == pytest.approx(0.025)
+    assert heard["/alice/detections"].detections[0].results[0].hypothesis.class_id == "coke"
+    assert heard["/alice/object_destination"].goal_y == 2.0
+    assert len(heard["/alice/particle_cloud"].particles) == 2
+    assert heard["/alice/navigate_through_poses/_action/feedback"].feedback.number_of_poses_remaining == 2
+    assert {each.child_frame_id for each in heard["/tf"].transforms} == {"alice/body", "alice/odom"}
+
+
+def test_the_independent_client_lists_every_topic_and_service_of_a_run(ros):
     published = documented("Published") | action_topics()
     taken = {f"{space}/{name}": kind for name, kind in TAKEN.items() for space in ("", "/alice")}
     taken["/alice/say"] = "std_msgs/msg/String"
@@ -113,66 +134,51 @@ def test_the_independent_client_lists_every_topic_and_service_of_a_run(talk, mes
         base = f"/alice/{name}/_action"
         taken |= {f"{base}/feedback": f"{kind}_FeedbackMessage", f"{base}/status": "action_msgs/msg/GoalStatusArray"}
 
-    def says(ros):
-        with connected(ros.place.port, message_files):
-            listed = dict(get_topic_names_and_types(router_port=ros.place.port))
-            assert listed == {topic: [kind] for topic, kind in (published | taken).items()}
-            for topic, kind in published.items():
-                told = get_topic_info(topic, router_port=ros.place.port, verbose=True)
-                (publisher,) = told.publishers
-                space = "/alice" if topic.startswith("/alice/") else "/"
-                assert (publisher.topic_type, publisher.node_name, publisher.node_namespace) == (kind, "errand", space)
-            services = dict(get_service_names_and_types(router_port=ros.place.port))
-            assert services.keys() >= {f"/alice/{name}" for name in ("pause", "resume", "cancel", "step")}
-            base = "/alice/navigate_to_pose/_action"
-            assert services[f"{base}/cancel_goal"] == ["action_msgs/srv/CancelGoal"]
-            assert {part: services[f"{base}/{part}"] for part in PARTS} == {part: [PARTS[part]] for part in PARTS}
-
-    talk(says)
+    listed = dict(get_topic_names_and_types(router_port=ros.place.port))
+    assert listed == {topic: [kind] for topic, kind in (published | taken).items()}
+    for topic, kind in published.items():
+        told = get_topic_info(topic, router_port=ros.place.port, verbose=True)
+        (publisher,) = told.publishers
+        space = "/alice" if topic.startswith("/alice/") else "/"
+        assert (publisher.topic_type, publisher.node_name, publisher.node_namespace) == (kind, "errand", space)
+    services = dict(get_service_names_and_types(router_port=ros.place.port))
+    assert services.keys() >= {f"/alice/{name}" for name in ("pause", "resume", "cancel", "step")}
+    base = "/alice/navigate_to_pose/_action"
+    assert services[f"{base}/cancel_goal"] == ["action_msgs/srv/CancelGoal"]
+    assert {part: services[f"{base}/{part}"] for part in PARTS} == {part: [PARTS[part]] for part in PARTS}
 
 
-def test_the_independent_client_reaches_a_goal_and_cancels_another(talk, message_files):
-    def says(ros):
-        with connected(ros.place.port, message_files) as session:
-            first = Navigation(session, ros.place.port)
-            assert first.send(0.3, -0.3).accepted
-            ended = first.result()
-            assert (ended.status, ended.result.error_code, ended.result.error_msg) == (GoalStatus.SUCCEEDED, 0, "")
-            assert math.hypot(ros.robot.pose.x_m - 0.3, ros.robot.pose.y_m + 0.3) < 0.15
-            assert first.feedback[0].feedback.distance_remaining == pytest.approx(0.42, abs=0.15)
-            second = Navigation(session, ros.place.port)
-            assert second.send(-0.6, 1.2).accepted
-            ros.soon(lambda: not ros.still())
-            answer = second.cancel()
-            assert answer.return_code == 0
-            assert [each.goal_id.uuid.tolist() for each in answer.goals_canceling] == [second.identity.uuid.tolist()]
-            assert second.result().status == GoalStatus.CANCELED
-            ros.soon(ros.still, 1.0)
-
-    talk(says)
+def test_the_independent_client_reaches_a_goal_and_cancels_another(ros):
+    first = Navigation(ros.sdk, ros.place.port)
+    assert first.send(0.3, -0.3).accepted
+    ended = ros.meanwhile(first.result)
+    assert (ended.status, ended.result.error_code, ended.result.error_msg) == (GoalStatus.SUCCEEDED, 0, "")
+    assert math.hypot(ros.robot.pose.x_m - 0.3, ros.robot.pose.y_m + 0.3) < 0.15
+    assert first.feedback[0].feedback.distance_remaining == pytest.approx(0.42, abs=0.15)
+    second = Navigation(ros.sdk, ros.place.port)
+    assert second.send(-0.6, 1.2).accepted
+    ros.soon(lambda: not ros.still())
+    answer = second.cancel()
+    assert answer.return_code == 0
+    assert [each.goal_id.uuid.tolist() for each in answer.goals_canceling] == [second.identity.uuid.tolist()]
+    assert ros.meanwhile(second.result).status == GoalStatus.CANCELED
+    assert ros.soon(ros.still) < 0.4
 
 
-def test_the_independent_client_drives_and_calls_the_services(talk, message_files):
-    def says(ros):
-        port, answers = ros.place.port, {"response_definition": "bool success\nstring message"}
-        with connected(port, message_files) as session:
-            goal = ROS2Publisher("/goal_pose", POSE, router_port=port)
-            to = stamped_by(session.store.types, 0.3, 0.0)
-            for _ in range(20):  # the router may not know the publisher at once
-                goal.publish(header=to.header, pose=to.pose)
-                time.sleep(0.5)
-                if not ros.still():
-                    break
-            ros.soon(lambda: ros.robot.pose.x_m > 0.15)
-            for name in ("pause", "step", "resume", "cancel"):
-                client = ROS2ServiceClient(
-                    f"/alice/{name}", TRIGGER, request_definition=EMPTY, **answers, router_port=port
-                )
-                told = client.call()
-                assert (told.success, told.message) == (True, name)
-            ros.soon(lambda: ros.events("outcome"))
+def test_the_independent_client_drives_and_calls_the_services(ros):
+    port, answers = ros.place.port, {"response_definition": "bool success\nstring message"}
+    goal, to = ROS2Publisher("/goal_pose", POSE, router_port=port), stamped_by(ros.sdk.store.types, 0.3, 0.0)
 
-    assert talk(says).message == "cancelled by ROS 2"
+    before = ros.bridge._node.handled
+    while ros.bridge._node.handled == before:  # the router may not know the publisher at once
+        goal.publish(header=to.header, pose=to.pose)
+        soon(lambda: ros.bridge._node.handled > before, 0.5)
+    ros.soon(lambda: ros.robot.pose.x_m > 0.15)
+    for name in ("pause", "step", "resume", "cancel"):
+        client = ROS2ServiceClient(f"/alice/{name}", TRIGGER, request_definition=EMPTY, **answers, router_port=port)
+        told = client.call()
+        assert (told.success, told.message) == (True, name)
+    ros.soon(lambda: "CANCELLED" in str(ros.events("outcome")))
 
 
 def plain(value):
@@ -205,24 +211,8 @@ def decoders(folder):
     return read
 
 
-def test_two_decoders_read_the_same_in_the_bytes_of_every_topic_of_a_run(talk, message_files):
-    raw, topics, read = {}, documented("Published") | action_topics(), decoders(message_files)
-
-    def says(ros):
-        provoke(ros)
-        ros.soon(lambda: raw.keys() >= topics.keys())
-
-    def keep(sample):
-        raw.setdefault("/" + "/".join(str(sample.key_expr).split("/")[1:-2]), sample.payload.to_bytes())
-
-    with ExitStack() as ends:
-
-        def listen(place):
-            session, history = ends.enter_context(open_session(place)).inner, ext.HistoryConfig(max_samples=1)
-            ends.callback(session.declare_subscriber("0/**", keep).undeclare)
-            ends.callback(ext.declare_advanced_subscriber(session, "0/map/**", keep, history=history).undeclare)
-
-        talk(says, before=listen)
+def test_two_decoders_read_the_same_in_the_bytes_of_every_topic_of_a_run(run_and_topics, message_files):
+    (_, topics, _, raw), read = run_and_topics, decoders(message_files)
     told = {topic: read(kind, raw[topic]) for topic, kind in topics.items()}
     assert [topic for topic, (one, other) in told.items() if one != other] == []
     assert told["/alice/object_destination"][0]["class_name"] == "coke"

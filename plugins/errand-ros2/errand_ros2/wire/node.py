@@ -90,7 +90,7 @@ def open_session(place: Place) -> Iterator[Session]:
         socket.create_connection((place.host.strip("[]"), place.port), timeout=0.5).close()
         client = True
     how = {"mode": "client", "connect": endpoints} if client else {"mode": "router", "listen": endpoints}
-    how |= {"scouting": {"multicast": {"enabled": False}}}
+    how |= {"scouting": {"multicast": {"enabled": False}, "delay": 0}}  # there is nothing to wait for
     how |= {"timestamping": {"enabled": True, "drop_future_timestamp": False}}  # which caches need
     try:
         opened = zenoh.open(zenoh.Config.from_json5(json.dumps(how)))

@@ -1,4 +1,4 @@
-"""Getting a real Spot ready, and every ending, with a scripted robot behind a server in real time.
+"""Getting a real Spot ready, and every ending, with a scripted robot behind a server, both by the robot's time.
 
 not ready         one error that names what is missing
 docked            leaves the dock, if the motors may be switched on
@@ -18,30 +18,28 @@ import pytest
 
 pytest.importorskip("bosdyn.client", reason="not installed: pip install errand-spot")
 from call_faults import Fault
-from lock_step import PASSWORD, USER, scripted_spot
+from lock_step import PASSWORD, USER, robot_time, scripted_spot
 
 from errand_spot import backend as real_spot
-from errand_spot.adapter import heartbeat
+from errand_spot.adapter import connection, heartbeat
 from errand_spot.adapter.connection import CALL_S, Address, Connection
 from errand_spot.backend import Access, Spot, connected
-from errand_spot.server import computer, identity, keepalive
-from errand_spot.server.computer import Motors
+from errand_spot.server import computer, estop, identity, keepalive, leases
+from errand_spot.server.computer import Motors, Pace
 from errand_spot.server.estop import Tablet
 from skills.inputs.errors import InputError
 from skills.robot import Pose2D, RobotStoppedError
 
 
-@pytest.fixture(scope="session")
-def credentials(tmp_path_factory):
-    return identity.credentials(tmp_path_factory.mktemp("credentials"))
-
-
 @pytest.fixture
 def serve(credentials, monkeypatch, request):
-    """Serves a robot; returns the server, the robot, and the access to it."""
+    """Serves a robot, whose time all but a real pace goes by; returns the server, the robot, and the access to it."""
     monkeypatch.setattr(computer, "POWER_ON_S", 0.1)
-    settings = getattr(request, "param", {})
+    settings = {"pace": Pace.CLIENT, **getattr(request, "param", {})}
     with scripted_spot(credentials, **settings) as (server, robot):
+        for module in (connection, heartbeat, real_spot, estop, keepalive, leases, request.module):
+            if settings["pace"] is Pace.CLIENT:
+                monkeypatch.setattr(module, "time", robot_time(server.computer))
         address = Address("127.0.0.1", server.port, credentials.certificate)
         yield SimpleNamespace(server=server, robot=robot, access=Access(address, USER, PASSWORD, power_on=True))
 
@@ -120,9 +118,7 @@ def test_the_motors_are_switched_on_only_with_a_yes(serve):
 
 def test_a_docked_robot_leaves_its_dock_only_when_that_is_allowed(serve):
     serve.server.computer.dock_O = Pose2D(0.0, 0.0, 0.0)
-    for _ in range(100):
-        if serve.server.computer.docked():
-            break
+    while not serve.server.computer.docked():
         time.sleep(0.05)
     refused = pytest.raises(InputError, match=r"stands on its dock.*power_on=yes")
     with refused, ready(serve, power_on=False, confirm=lambda question: True):
@@ -165,7 +161,8 @@ def without_elbow(whole=real_spot.spot_capabilities):
     return replace(can, arm=replace(can.arm, joint_names=(*can.arm.joint_names[:-1], "arm_knuckle")))
 
 
-def test_a_robot_that_answers_slowly_at_first_is_connected(serve):
+def test_a_robot_that_answers_slowly_at_first_is_connected(serve, monkeypatch):
+    monkeypatch.setattr(connection, "_ROUND_TRIPS", 3)
     slow = Fault(answer_s=1.2 * CALL_S)
     with serve.server.faults.fault("bosdyn.api.TimeSyncService/TimeSyncUpdate", slow), connected("Alice", serve.access):
         pass
@@ -186,15 +183,6 @@ class TestOwnEstop:
         assert is_as_before(serve)
         assert serve.server.computer.estop._held == {}
 
-    def test_our_own_stops_a_run_that_hangs(self, serve, monkeypatch):
-        monkeypatch.setattr(heartbeat, "ESTOP_S", 1.2)
-        monkeypatch.setattr(heartbeat, "CUT_S", 1.6)
-        with ready(serve, own_estop=True) as made:
-            time.sleep(2.0)
-            assert serve.server.computer.motors is Motors.OFF
-            with pytest.raises(RobotStoppedError, match="E-stop"):
-                made.clock.advance(0.05)
-
     def test_it_does_not_replace_another_while_the_motors_are_on(self, serve):
         with ready(serve, own_estop=True) as made, pytest.raises(InputError, match="motors are on"):
             made.make_ready()
@@ -204,6 +192,17 @@ class TestOwnEstop:
             serve.server.computer.estop._held.clear()
             with pytest.raises(RobotStoppedError, match=r"another program has changed|E-stop is pressed"):
                 beat(made, 60)
+
+
+@pytest.mark.parametrize("serve", [{"tablet": Tablet.NONE, "pace": Pace.REAL}], indirect=True)
+def test_our_own_stops_a_run_that_hangs(serve, monkeypatch):
+    monkeypatch.setattr(heartbeat, "ESTOP_S", 1.2)
+    monkeypatch.setattr(heartbeat, "CUT_S", 1.6)
+    with ready(serve, own_estop=True) as made:
+        time.sleep(2.0)
+        assert serve.server.computer.motors is Motors.OFF
+        with pytest.raises(RobotStoppedError, match="E-stop"):
+            made.clock.advance(0.05)
 
 
 def test_the_robot_does_not_act_alone_while_another_client_moves_it(serve):
@@ -256,10 +255,8 @@ def test_a_pressed_estop_ends_the_run(serve):
         serve.server.computer.estop._held["tablet"].level = 1
         with pytest.raises(RobotStoppedError, match="the E-stop is pressed"):
             beat(made, 20)
-        patience = time.monotonic() + 10.0
-        while serve.server.computer.motors is not Motors.OFF:  # the server cuts them in a thread of its own
-            assert time.monotonic() < patience
-            time.sleep(0.02)
+        time.sleep(0.05)
+        assert serve.server.computer.motors is Motors.OFF
 
 
 def test_a_robot_acts_alone_when_the_run_falls_silent(serve, monkeypatch):

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from threading import Event
 from typing import Any, Final, Protocol
 
 import bosdyn.client
@@ -260,7 +259,7 @@ class WallClock:
     def advance(self, dt_s: float) -> None:
         """Waits until dt_s have passed since the last advance; a late program goes on at once."""
         self._due_s = max(self._due_s + dt_s, self.now() - dt_s)
-        Event().wait(max(0.0, self._due_s - self.now()))
+        time.sleep(max(0.0, self._due_s - self.now()))
         for each in self.after:
             each()
 

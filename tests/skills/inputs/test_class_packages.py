@@ -1,19 +1,25 @@
 """Classes of objects that another distribution brings, by an entry point in `errand.classes`."""
 
-import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from plant.models.catalogue import MODELS_FOLDER
-from plant.worlds.world import WORLDS_FOLDER
+from executive.cli import plugins_command
+from executive.language import spelling
+from plant.models.catalogue import MODELS_FOLDER, load_catalogue
+from plant.worlds.seeding import place_objects
+from plant.worlds.world import WORLDS_FOLDER, load_world
+from skills.inputs.plugins import CLASSES
+from skills.perception.class_forms import class_forms
+from tests.executive.cli.calls import done, errand, json_of, refusal
 from tests.skills.exported_networks import export
 
 ROOT = Path(__file__).parents[3]
@@ -47,46 +53,48 @@ def site(tmp_path):
     return tmp_path
 
 
-def run(site, *command):
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site), str(ROOT)])}
-    return subprocess.run(
-        [sys.executable, *command], env=environment, cwd=site, capture_output=True, text=True, check=False
-    )
-
-
-def errand(site, *arguments):
-    return run(site, "-m", "executive.cli", *arguments)
+@pytest.fixture
+def installed(site, monkeypatch):
+    """Installs the distribution for this process, which has read no classes; afterwards it reads them again."""
+    read = (class_forms, load_catalogue, spelling._synonyms)
+    monkeypatch.chdir(site)
+    monkeypatch.syspath_prepend(str(site))
+    monkeypatch.setattr("skills.inputs.plugins._all_installed", entry_points)
+    for each in read:
+        each.cache_clear()
+    yield site
+    for each in read:
+        each.cache_clear()
 
 
 def test_a_sentence_may_name_the_class_by_its_own_synonym(site):
-    ended = errand(site, "parse", "bring me the beaker", "--world", "pantry")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site), str(ROOT)])}
+    command = [sys.executable, "-m", "executive.cli", "parse", "bring me the beaker", "--world", "pantry"]
+    ended = subprocess.run(command, env=environment, cwd=site, capture_output=True, text=True, check=False)
     assert (ended.returncode, "do [grasp] to [mug]" in ended.stdout) == (0, True), ended.stderr
 
 
-def test_its_models_stand_in_a_world(site):
-    code = "from plant.worlds.seeding import place_objects; from plant.worlds.world import load_world\n"
-    code += "placed = place_objects(load_world('pantry'), 4801)[0]; print(placed.class_name, placed.model_path)"
-    ended = run(site, "-c", code)
-    assert ended.stdout == f"mug {site / 'mugs' / 'plain' / 'mug.sdf'}\n", ended.stderr
+def test_its_models_stand_in_a_world(installed):
+    placed = place_objects(load_world("pantry"), 4801)[0]
+    assert (placed.class_name, placed.model_path) == ("mug", installed / "mugs" / "plain" / "mug.sdf")
 
 
-def test_a_mission_for_it_needs_a_detector_that_knows_it(site):
-    (site / "fetch.yaml").write_text("name: fetch\nsteps:\n  - say: bring me the mug\n")
-    ended = errand(site, "check", "fetch.yaml", "--world", "pantry")
-    assert ended.returncode != 0
-    assert "the robot does not know what mug looks like" in ended.stdout + ended.stderr
+def test_a_mission_for_it_needs_a_detector_that_knows_it(installed):
+    (installed / "fetch.yaml").write_text("name: fetch\nsteps:\n  - say: bring me the mug\n")
+    ended = errand("check", "fetch.yaml", "--world", "pantry")
+    assert ended.exit_code != 0
+    assert "the robot does not know what mug looks like" in ended.output
 
 
-def test_a_network_that_knows_it_needs_its_form_alone(site):
+def test_a_network_that_knows_it_needs_its_form_alone(installed):
     for name in ("catalogue.yaml", "synonyms.yaml"):
-        (site / "mugs" / name).unlink()
-    shutil.copy(WORLDS_FOLDER / "flat" / "objects.yaml", site / "pantry")
+        (installed / "mugs" / name).unlink()
+    shutil.copy(WORLDS_FOLDER / "flat" / "objects.yaml", installed / "pantry")
     output = {"output0": np.zeros((1, 5, 84), np.float32)}
-    export(site / "own.onnx", output, metadata={"names": "{0: 'cup'}"})
-    (site / "own.yaml").write_text("detector: {use: onnx, file: own.onnx, classes: {cup: mug}}\n")
-    (site / "fetch.yaml").write_text("name: fetch\nsteps:\n  - say: bring me the mug\n")
-    ended = errand(site, "check", "fetch.yaml", "--world", "pantry", "--stack", "own.yaml")
-    assert ended.returncode == 0, ended.stdout + ended.stderr
+    export(installed / "own.onnx", output, metadata={"names": "{0: 'cup'}"})
+    (installed / "own.yaml").write_text("detector: {use: onnx, file: own.onnx, classes: {cup: mug}}\n")
+    (installed / "fetch.yaml").write_text("name: fetch\nsteps:\n  - say: bring me the mug\n")
+    done("check", "fetch.yaml", "--world", "pantry", "--stack", "own.yaml")
 
 
 @pytest.mark.parametrize(
@@ -97,25 +105,23 @@ def test_a_network_that_knows_it_needs_its_form_alone(site):
         ("catalogue.yaml", MODELS.replace("rest_height_m", "height"), "mug.forms.plain"),
     ],
 )
-def test_a_broken_class_is_reported_with_its_file(site, file, text, says):
-    (site / "mugs" / file).write_text(text)
-    ended = errand(site, "check", "--say", "bring me the mug", "--world", "pantry")
-    assert ended.returncode == 2
-    assert says in ended.stderr
-    assert f"{site / 'mugs' / file}: " in ended.stderr
+def test_a_broken_class_is_reported_with_its_file(installed, file, text, says):
+    (installed / "mugs" / file).write_text(text)
+    said = refusal("check", "--say", "bring me the mug", "--world", "pantry")
+    assert says in said
+    assert f"{installed / 'mugs' / file}: " in said
 
 
-def test_a_broken_class_is_listed_among_the_plug_ins(site):
-    (site / "mugs" / "class_forms.yaml").write_text(FORM.replace("round", "oval"))
-    ended = errand(site, "plugins", "--json")
-    (plugin,) = (
-        each for each in json.loads(ended.stdout.splitlines()[-1])["plugins"] if each["distribution"] == "mugs"
-    )
-    assert ended.returncode == 1
+def test_a_broken_class_is_listed_among_the_plug_ins(installed, monkeypatch):
+    (installed / "mugs" / "class_forms.yaml").write_text(FORM.replace("round", "oval"))
+    monkeypatch.setattr(plugins_command, "groups", lambda: [CLASSES])
+    ended = errand("plugins", "--json")
+    (plugin,) = json_of(ended)["plugins"]
+    assert (ended.exit_code, plugin["distribution"]) == (1, "mugs")
     assert "class_forms.yaml: mug.form" in plugin["broken"]
 
 
-def test_an_entry_point_without_its_package_is_reported(site):
-    shutil.rmtree(site / "mugs")
-    ended = errand(site, "parse", "bring me the beer", "--world", "pantry")
-    assert "mugs of distribution mugs, which has classes, is no package" in ended.stderr
+def test_an_entry_point_without_its_package_is_reported(installed):
+    shutil.rmtree(installed / "mugs")
+    said = errand("parse", "bring me the beer", "--world", "pantry").stderr
+    assert "mugs of distribution mugs, which has classes, is no package" in said

@@ -30,13 +30,22 @@ def write(folder, **files):
 
 @pytest.fixture(scope="module")
 def output(tmp_path_factory):
-    """What pytest says of four files of skill tests, one of them broken, and a conftest with a fault of its own."""
+    """What pytest says of skill tests, one file broken, and a conftest with a fault and a skill of its own."""
     words = write(
         tmp_path_factory.mktemp("skill_tests"),
         conftest__py="""\
+        import sys
+        from pathlib import Path
+
         from skills.faults.fault_kinds import Effect, FaultKind
 
+        sys.path.insert(0, str(Path(__file__).parent))
+
         def pytest_errand_skill_tests(settings):
+            from crashing import Wave
+
+            settings.skills["wave"] = Wave
+
             def effect(match):
                 def act(call):
                     raise OSError("the moon is full")
@@ -66,16 +75,54 @@ def output(tmp_path_factory):
         tests:
           - {name: it loses the robot, faults: [robot dies at 0.3 s], expect: {outcome: failure}}
         """,
+        crashing__py="""\
+        from dataclasses import dataclass
+
+        from skills.api import Skill
+
+
+        @dataclass(frozen=True)
+        class Nothing:
+            \"""No inputs.\"""
+
+
+        class Wave(Skill[Nothing]):
+            \"""Waves.\"""
+
+            name = "wave"
+            Inputs = Nothing
+
+            def begin(self, inputs):
+                self.times = 0
+
+            def step(self):
+                return 1 / self.times
+        """,
+        wave__skilltest__yaml="""\
+        skill: wave
+        suite: true
+        tests:
+          - {name: it waves, expect: {outcome: success}}
+          - {name: its driver fails, faults: [stop raises], expect: {outcome: failure, cause: ERROR}}
+        """,
+        test_wave__py="""\
+        from crashing import Nothing, Wave
+
+        def test_it_waves(skill_bench):
+            assert skill_bench.run(Wave, Nothing()).outcome == "success"
+        """,
     )
-    with redirect_stdout(StringIO()) as shown:
+    with redirect_stdout(StringIO()) as shown, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "path", sys.path.copy())
         pytest.main(words)
+        patch.delitem(sys.modules, "crashing")
     return shown.getvalue()
 
 
 def test_skill_tests_are_collected_by_name_and_fail_with_line_and_messages(output):
     assert "stow.skilltest.yaml:5: skill 'stow'" in output
     assert "expected success, got failure EXECUTION" in output
-    assert "Traceback" not in output
+    assert "Traceback" not in output.partition("_ hopeful _")[2].partition("\n____")[0]
 
 
 def test_a_broken_file_is_one_error_with_its_line(output):
@@ -83,7 +130,7 @@ def test_a_broken_file_is_one_error_with_its_line(output):
 
 
 def test_tests_in_the_plant_and_with_faults_of_a_conftest_pass(output):
-    assert "1 failed, 3 passed, 1 error" in output, output
+    assert "4 failed, 6 passed, 1 error" in output, output
 
 
 def test_tests_that_use_nothing_of_it_load_nothing_heavy(tmp_path):
@@ -130,61 +177,11 @@ def test_the_small_plant_has_a_robot_a_table_and_a_can(small_plant):
     assert observation.position_W[2] == pytest.approx(0.81, abs=0.03)
 
 
-def test_a_skill_that_crashes_shows_its_traceback_with_the_line(tmp_path):
-    words = write(
-        tmp_path,
-        crashing__py="""\
-        from dataclasses import dataclass
-
-        from skills.api import Skill
-
-
-        @dataclass(frozen=True)
-        class Nothing:
-            \"""No inputs.\"""
-
-
-        class Wave(Skill[Nothing]):
-            \"""Waves.\"""
-
-            name = "wave"
-            Inputs = Nothing
-
-            def begin(self, inputs):
-                self.times = 0
-
-            def step(self):
-                return 1 / self.times
-        """,
-        conftest__py="""\
-        import sys
-        from pathlib import Path
-
-        sys.path.insert(0, str(Path(__file__).parent))
-
-        def pytest_errand_skill_tests(settings):
-            from crashing import Wave
-
-            settings.skills["wave"] = Wave
-        """,
-        wave__skilltest__yaml="""\
-        skill: wave
-        suite: true
-        tests:
-          - {name: it waves, expect: {outcome: success}}
-          - {name: its driver fails, faults: [stop raises], expect: {outcome: failure, cause: ERROR}}
-        """,
-        test_wave__py="""\
-        from crashing import Nothing, Wave
-
-        def test_it_waves(skill_bench):
-            assert skill_bench.run(Wave, Nothing()).outcome == "success"
-        """,
-    )
-    done = subprocess.run([sys.executable, "-m", "pytest", *words], capture_output=True, text=True, timeout=120)
-    reports = re.split(r"^_{3,} (.*) _{3,}$", done.stdout, flags=re.MULTILINE)
+def test_a_skill_that_crashes_shows_its_traceback_with_the_line(output):
+    reports = re.split(r"^_{3,} (.*) _{3,}$", output, flags=re.MULTILINE)
     said = dict(zip(reports[1::2], reports[2::2], strict=True))
-    assert {"it waves", "it waves: cancelled at every tick", "test_it_waves"} == said.keys(), done.stdout
-    for report in said.values():
+    crashed = ("it waves", "it waves: cancelled at every tick", "test_it_waves")
+    assert {*crashed, "hopeful", "ERROR collecting broken.skilltest.yaml"} == said.keys(), output
+    for report in map(said.get, crashed):
         assert re.search(r'crashing.py", line 21, in step\s+return 1 / self.times', report), report
         assert "ZeroDivisionError: division by zero" in report

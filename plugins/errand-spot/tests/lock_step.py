@@ -154,7 +154,7 @@ class LockStep:
 
     def ends(self, command):
         """Advances until a command has ended; returns its status."""
-        assert self.until(lambda: self.robot.command_status(command).state.value != "running", 40.0)
+        assert self.until(lambda: self.robot.command_status(command).state.value != "running", 40.0, every_s=0.1)
         return self.robot.command_status(command)
 
     def until_in(self, seconds):

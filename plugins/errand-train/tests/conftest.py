@@ -1,4 +1,4 @@
-"""An empty data set, and scenes of few models."""
+"""An empty data set, scenes of few models, and small networks."""
 
 import json
 
@@ -23,3 +23,23 @@ def few_models(monkeypatch):
     kinds = ("mug", "battery", "pliers", "tissue_box", "food_can", "book")
     monkeypatch.setattr("errand_train.dataset.compose.DISTRACTORS", kinds)
     monkeypatch.setattr("errand_train.dataset.compose.numbers", lambda name, **use: numbers(name, **use)[:1])
+
+
+@pytest.fixture(scope="module")
+def small_networks():
+    """Makes proposal and refinement networks with few channels and blocks."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, size in {"STEM": (8, 16), "LEVELS": (16, 24, 32), "NECK": (16, 16, 24), "_DEPTH": 1}.items():
+            patch.setattr(f"errand_train.detector.network.{name}", size)
+        for name, size in {"LEVELS": (16, 24, 32), "NECK": (16, 16, 24), "_RESIDUALS": (1, 1)}.items():
+            patch.setattr(f"errand_train.detector.refinement_network.{name}", size)
+        yield
+
+
+@pytest.fixture
+def unwritten(monkeypatch):
+    """Replaces a training's ONNX file and figures by nothing; its checkpoint and reports remain."""
+    for name in ("export", "offsets_by", "offsets_fact", "examine", "figures_of"):
+        monkeypatch.setattr(f"errand_train.detector.train.{name}", lambda *_, **__: {})
+    for module in ("train", "refine"):
+        monkeypatch.setattr(f"errand_train.detector.{module}.SETTLED_BY", 2)

@@ -55,7 +55,7 @@ class _Track:
         dt_s = max(0.0, stamp_s - self.seen.stamp_s)
         move = np.eye(4)
         move[0, 2] = move[1, 3] = min(dt_s, _PREDICTED_S)
-        gain = np.kron(np.array([[0.5 * dt_s**2], [dt_s]]), np.eye(2))
+        gain = np.array([[0.5 * dt_s**2, 0.0], [0.0, 0.5 * dt_s**2], [dt_s, 0.0], [0.0, dt_s]])
         state = move @ self.state
         return state, move @ self.covariance @ move.T + _ACCELERATION_M_S2**2 * gain @ gain.T
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,12 +122,6 @@ def distances_from(blocks: FloatArray, points: FloatArray) -> FloatArray:
     return distances
 
 
-def colours_of(blocks: Sequence[Block], hits: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """Colours RGB (N, 3) at the hits of rays; -1 stands for no hit, -2 for the floor."""
-    palette = np.array([*(b.colour for b in blocks), FLOOR_COLOUR, NOTHING_COLOUR], dtype=np.uint8)
-    return np.asarray(palette[hits])
-
-
 def grid_of(blocks: Sequence[Block], band_m: tuple[float, float], resolution_m: float = 0.05) -> GridMap:
     """Exact grid map of the blocks that reach into a band of heights."""
     x0, y0 = min(b.x0 for b in blocks) - 0.2, min(b.y0 for b in blocks) - 0.2
@@ -182,15 +177,21 @@ def take_scan(
     noise_m: float = 0.01,
 ) -> Scan:
     """Takes a LiDAR scan at the true pose X_WB."""
-    around = np.linspace(-math.pi, math.pi, azimuths, endpoint=False)
+    around, rays = _lidar_rays(azimuths)
     X_WL = X_WB @ X_BL
-    rays = unit_rays(ELEVATIONS_RAD, around).reshape(-1, 3)
     rays_W = np.ascontiguousarray(rays @ X_WL.rotation().matrix().T)
     ranges, _ = cast_rays(X_WL.translation(), rays_W, block_array(blocks), SCAN_LIMIT_M)
     ranges = ranges + noise_m * rng.standard_normal(ranges.shape)
     ranges[ranges < SCAN_NEAREST_M] = np.nan
     shaped = ranges.reshape(len(ELEVATIONS_RAD), -1).astype(np.float32)
     return Scan(stamp_s, shaped, ELEVATIONS_RAD, around, X_BL, X_OB)
+
+
+@cache
+def _lidar_rays(azimuths: int) -> tuple[FloatArray, FloatArray]:
+    """Azimuths of a scan, and its rays (N, 3) in the LiDAR's frame."""
+    around = np.linspace(-math.pi, math.pi, azimuths, endpoint=False)
+    return around, unit_rays(ELEVATIONS_RAD, around).reshape(-1, 3)
 
 
 def take_picture(
@@ -211,7 +212,8 @@ def take_picture(
     X_WC = X_WF @ mount.X_FC
     rays_W = np.ascontiguousarray(rays_C.reshape(-1, 3) @ X_WC.rotation().matrix().T)
     depth, hits = cast_rays(X_WC.translation(), rays_W, block_array(blocks), mount.reach_m)
-    colour = colours_of(blocks, hits).reshape(lens.height, lens.width, 3)
+    palette = np.array([*(b.colour for b in blocks), FLOOR_COLOUR, NOTHING_COLOUR], dtype=np.uint8)
+    colour = palette[hits].reshape(lens.height, lens.width, 3)
     grey = ((colour[..., 0].astype(np.uint16) + colour[..., 1] + colour[..., 2]) // 3).astype(np.uint8)
     edges = {**frames.edges, f"{source}_camera": (mount.frame, mount.X_FC)}
     depth_m = np.nan_to_num(depth + noise_m * rng.standard_normal(depth.shape)).reshape(grey.shape).astype(np.float32)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -108,10 +109,9 @@ class ScriptedRobot:
         self.velocity: FloatArray = np.zeros(3)
         self.odometry_scale, self.yaw_drift_rad_per_m, self.lidar = 1.0, 0.0, (360, 0.01)
         self.fine_camera = capabilities.object_camera
-        self.height_m, self.pitch_rad = capabilities.standing_height_m, 0.0
+        self.height_m, self.pitch_rad, self.head_rad = capabilities.standing_height_m, 0.0, (0.0, 0.0)
         arm = capabilities.arm
         self.q_rad = np.array([] if arm is None else start.arm_rad or arm.stowed_rad[: len(arm.joint_names)])
-        self.head_rad = (0.0, 0.0)
         self.opening = (start.in_gripper_rad or 0.3) if start.holding else 0.0
         self.in_gripper_rad = self.opening if start.holding else start.in_gripper_rad
         self.clamp_force_n = 20.0 if start.holding else 0.0
@@ -123,9 +123,8 @@ class ScriptedRobot:
         self.refuse_because: dict[str, str] = {}
         self.refusal_cause = CommandCause.REFUSED
         self.calls: list[str] = []
-        self._commands = ScriptedCommands()
+        self._commands, self._rng = ScriptedCommands(), np.random.default_rng(seed)
         self._scan: Scan | None = None
-        self._rng = np.random.default_rng(seed)
         clock.attach(self._pass_time)
 
     @property
@@ -151,7 +150,7 @@ class ScriptedRobot:
     def odometry(self) -> Odometry:
         """Latest dead reckoning."""
         self.calls.append("odometry")
-        vx, vy, wz = (float(v) for v in self.velocity)
+        vx, vy, wz = self.velocity.tolist()
         return Odometry(self._clock.now(), self._X_OB(), (vx, vy, wz))
 
     def own_localisation(self) -> None:
@@ -331,14 +330,16 @@ class ScriptedRobot:
         return self._commands.begin(part, goal, self._clock.now(), until_s)
 
     def _X_WB(self) -> RigidTransform:
-        return self._tilted(self.pose)
+        return self._tilted(self.pose, self.height_m, self.pitch_rad)
 
     def _X_OB(self) -> RigidTransform:
-        return self._tilted(self.odometry_pose)
+        return self._tilted(self.odometry_pose, self.height_m, self.pitch_rad)
 
-    def _tilted(self, pose: Pose2D) -> RigidTransform:
-        level = pose.transform(self.height_m)
-        return level @ RigidTransform(RotationMatrix.MakeYRotation(self.pitch_rad)) if self.pitch_rad else level
+    @staticmethod
+    @lru_cache(maxsize=64)  # the same object as long as nothing moves, so that the pose of a context is cached, too
+    def _tilted(pose: Pose2D, height_m: float, pitch_rad: float) -> RigidTransform:
+        level = pose.transform(height_m)
+        return level @ RigidTransform(RotationMatrix.MakeYRotation(pitch_rad)) if pitch_rad else level
 
     def _pass_time(self, dt_s: float) -> None:
         self._commands.expire(self._clock.now())
@@ -394,17 +395,14 @@ class ScriptedRobot:
         opening, self.clamp_force_n = active.goal
         if opening < self.opening and self.in_gripper_rad is None and self.clamp_force_n >= _LEAST_CLAMP_N:
             self._grasp()
-        if self.held is not None and self.clamp_force_n < _LEAST_CLAMP_N:
+        opens = self.in_gripper_rad is not None and opening > self.in_gripper_rad + 0.02
+        if self.held is not None and (opens or self.clamp_force_n < _LEAST_CLAMP_N):
             self._release(self.held)
-        if self.held is not None and self.in_gripper_rad is not None and opening > self.in_gripper_rad + 0.02:
-            self._release(self.held)
-        before, least = self.opening, self.in_gripper_rad
-        most = _GRIPPER_RAD_S * dt_s
+        before, least, most = self.opening, self.in_gripper_rad, _GRIPPER_RAD_S * dt_s
         self.opening += max(-most, min(most, opening - self.opening))
-        met = least is not None and before >= least > self.opening
-        if met and least is not None:
-            self.opening = least
-        if met or abs(self.opening - opening) < 1e-6:
+        if least is not None and before >= least > self.opening:
+            self.opening = opening = least
+        if abs(self.opening - opening) < 1e-6:
             self._commands.finish("set_gripper", CommandState.DONE)
 
     def _between_fingers_W(self) -> FloatArray:

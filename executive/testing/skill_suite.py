@@ -123,9 +123,8 @@ def exception_in_every_verb(case: SuiteCase) -> Iterator[str]:
 
 
 def _raising(case: SuiteCase, verb: str, calls: int) -> Iterator[str]:
-    bench, robot = case.bench()
+    (bench, robot), left = case.bench(), calls
     met: list[str] = []
-    left = calls
 
     def act(call: Call) -> Any:
         nonlocal left
@@ -215,10 +214,11 @@ def _raise_findings(found: Iterable[str]) -> None:
 
 
 class SkillTestSettings:
-    """Settings for all skill tests in a session; a conftest may extend `fault_kinds` or replace benches in `makers`."""
+    """Settings of a session's skill tests; a conftest may extend `fault_kinds`, set `samples` or replace `makers`."""
 
     def __init__(self, skills: Mapping[str, type[Skill[Any]]], makers: BenchMakers, capabilities: Capabilities) -> None:
         self.skills, self.makers, self.capabilities = dict(skills), dict(makers), capabilities
+        self.samples = SuiteCase.samples
         self.fault_kinds: list[FaultKind] = [*STANDARD_FAULTS]
 
     def use_robot(self, capabilities: Capabilities) -> None:
@@ -259,7 +259,7 @@ class SkillTestModule(pytest.File):
         """Returns the case that all checks of the suite use, built from a test, with a scripted robot."""
         test, skill = tests.tests[index], self.settings.skills[tests.skill]
         make = partial(bench_of_setup, self.settings.capabilities, test.robot or tests.robot, test.world or tests.world)
-        return SuiteCase(skill, tests.inputs(index, skill), make)
+        return SuiteCase(skill, tests.inputs(index, skill), make, self.settings.samples)
 
 
 class SkillTestItem(pytest.Item):

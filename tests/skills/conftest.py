@@ -10,6 +10,11 @@ from plant.robots.spot.kind import spot_capabilities
 sys.path.insert(0, str(Path(__file__).parent))
 
 
+def pytest_errand_skill_tests(settings):
+    """Cancels and freezes each skill at four ticks of its run, half of what authors of other skills get."""
+    settings.samples = 4
+
+
 @pytest.fixture(scope="session")
 def spot():
     """Spot's capabilities, for robots with an arm."""

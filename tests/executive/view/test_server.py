@@ -6,6 +6,7 @@ import json
 import socket
 import threading
 from contextlib import suppress
+from itertools import product
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
@@ -102,12 +103,12 @@ def test_each_server_has_a_token_of_its_own(feed, server):
         assert len(token_of(other)) >= 32
 
 
-@pytest.mark.parametrize("path", ["/", "/picture/0", "/scene"])
-def test_nothing_of_the_run_is_shown_without_the_token(server, feed, path):
+def test_nothing_of_the_run_is_shown_without_the_token(server, feed):
     feed("detections", 0.0, {"format": "png", "data": "AAAA"})
-    assert ask(server, "GET", path)[0] == 403
-    assert ask(server, "GET", f"{path}?token=wrong")[0] == 403
-    assert ask(server, "GET", f"{path}?token={token_of(server)}")[0] == 200
+    for path in ("/", "/picture/0", "/scene"):
+        assert ask(server, "GET", path)[0] == 403, path
+        assert ask(server, "GET", f"{path}?token=wrong")[0] == 403, path
+        assert ask(server, "GET", f"{path}?token={token_of(server)}")[0] == 200, path
 
 
 def test_the_files_to_which_the_report_links_are_sent_and_no_others(server, tmp_path):
@@ -126,9 +127,9 @@ def test_the_files_to_which_the_report_links_are_sent_and_no_others(server, tmp_
         assert ask(server, "GET", f"/file/{token}/{name}")[0] == 404
 
 
-@pytest.mark.parametrize(
-    "headers",
-    [
+def test_every_action_is_refused_without_the_token_or_from_elsewhere(server, control):
+    before = control.state
+    strange = (
         {"X_Errand_Token": ""},
         {"X_Errand_Token": "wrong"},
         {"X_Errand_Token": "ünï".encode().decode("latin-1")},
@@ -136,34 +137,29 @@ def test_the_files_to_which_the_report_links_are_sent_and_no_others(server, tmp_
         {"Origin": "null"},
         {"Origin": "http://127.0.0.1:1"},
         {"Host": "evil.example"},
-    ],
-)
-def test_every_action_is_refused_without_the_token_or_from_elsewhere(server, control, headers):
-    before = control.state
-    for name in ("pause", "resume", "step", "cancel", "stop", "release", "break", "unbreak", "answer", "say"):
-        assert act(server, name, {"text": "x", "node": "x", "id": "x"}, **headers)[0] == 403
+    )
+    names = ("pause", "resume", "step", "cancel", "stop", "release", "break", "unbreak", "answer", "say")
+    for headers, name in product(strange, names):
+        assert act(server, name, {"text": "x", "node": "x", "id": "x"}, **headers)[0] == 403, (headers, name)
     assert control.state == before
 
 
-@pytest.mark.parametrize(
-    ("query", "headers"),
-    [
-        ("", {}),
-        ("?token=wrong", {}),
-        ("right", {"Origin": "http://evil.example"}),
-        ("right", {"Origin": "null"}),
-        ("right", {"Host": "evil.example"}),
-    ],
-)
-def test_the_websocket_is_refused_without_the_token_or_from_elsewhere(server, query, headers):
-    address = f"ws://127.0.0.1:{server.port}/feed" + (f"?token={token_of(server)}" if query == "right" else query)
-    origin = headers.get("Origin", f"http://127.0.0.1:{server.port}")
-    extra = {name: value for name, value in headers.items() if name != "Origin"}
-    with (
-        pytest.raises((InvalidStatus, WebSocketException, TimeoutError)),
-        connect(address, origin=origin, additional_headers=extra, proxy=None) as socket,
+def test_the_websocket_is_refused_without_the_token_or_from_elsewhere(server):
+    here, right = f"http://127.0.0.1:{server.port}", f"?token={token_of(server)}"
+    for query, origin, extra in (
+        ("", here, {}),
+        ("?token=wrong", here, {}),
+        (right, "http://evil.example", {}),
+        (right, "null", {}),
+        (right, here, {"Host": "evil.example"}),
     ):
-        socket.recv(timeout=2)
+        with (
+            pytest.raises((InvalidStatus, WebSocketException, TimeoutError)),
+            connect(
+                f"ws://127.0.0.1:{server.port}/feed{query}", origin=origin, additional_headers=extra, proxy=None
+            ) as socket,
+        ):
+            socket.recv(timeout=2)
 
 
 def test_the_websocket_sends_all_messages_and_then_each_new_one(server, feed):
@@ -237,20 +233,17 @@ def test_the_page_gets_the_progress_of_each_robot():
     }
 
 
-@pytest.mark.parametrize(
-    ("name", "values", "status", "words"),
-    [
+def test_an_impossible_action_is_refused_with_a_reason(server):
+    for name, values, status, words in (
         ("break", {"node": "alice/nowhere"}, 409, "no node 'alice/nowhere'"),
         ("break", {}, 409, "needs a text under 'node'"),
         ("answer", {"id": "q", "text": "yes"}, 409, "not open"),
         ("say", {"text": "  "}, 409, "needs a text"),
         ("say", [1], 409, "no JSON object"),
         ("dance", {}, 404, "no action 'dance'"),
-    ],
-)
-def test_an_impossible_action_is_refused_with_a_reason(server, name, values, status, words):
-    given, answer = act(server, name, values)
-    assert (given, words in answer["error"]) == (status, True)
+    ):
+        given, answer = act(server, name, values)
+        assert (given, words in answer["error"]) == (status, True), (name, values)
 
 
 def test_garbage_as_values_is_refused(server):
@@ -258,14 +251,12 @@ def test_garbage_as_values_is_refused(server):
     assert (status, b"no JSON object" in body) == (409, True)
 
 
-@pytest.mark.parametrize(
-    "body",
-    [b"[" * 15_000, b'{"text": ' * 15_000, b'{"text": "\\ud800"}', b'{"robot": "\\udfff"}', b"9" * 5000, b"x" * 30_000],
-)
-def test_values_that_no_text_can_hold_are_refused_in_one_line(server, body):
+def test_values_that_no_text_can_hold_are_refused_in_one_line(server):
     own = {"X_Errand_Token": token_of(server), "Origin": f"http://127.0.0.1:{server.port}"}
-    status, answer = ask(server, "POST", "/action/say", body, **own)
-    assert (status, "the action's values are" in json.loads(answer)["error"]) == (409, True)
+    lone = (b'{"text": "\\ud800"}', b'{"robot": "\\udfff"}')
+    for body in (b"[" * 15_000, b'{"text": ' * 15_000, *lone, b"9" * 5000, b"x" * 30_000):
+        status, answer = ask(server, "POST", "/action/say", body, **own)
+        assert (status, "the action's values are" in json.loads(answer)["error"]) == (409, True), body[:20]
 
 
 def test_any_value_of_any_action_is_done_or_refused(control):
@@ -385,9 +376,9 @@ def test_a_tunnel_may_end_at_another_port(server, control):
     assert act(server, "pause", Host=there)[0] == 403  # from the page of another port
 
 
-@pytest.mark.parametrize(
-    ("host", "status"),
-    [
+def test_a_request_names_this_machine_by_an_address_or_its_own_name(server):
+    # else a name of another site that leads here would have the page's origin
+    for host, status in (
         ("192.168.1.5", 200),
         ("192.168.1.5:8080", 200),
         ("[fe80::1]:8080", 200),
@@ -397,11 +388,8 @@ def test_a_tunnel_may_end_at_another_port(server, control):
         ("127.0.0.1:80; script-src *", 403),
         ("127.0.0.1:80:80", 403),
         ("", 403),
-    ],
-)
-def test_a_request_names_this_machine_by_an_address_or_its_own_name(server, host, status):
-    # else a name of another site that leads here would have the page's origin
-    assert ask(server, "GET", f"/?token={token_of(server)}", Host=host)[0] == status
+    ):
+        assert ask(server, "GET", f"/?token={token_of(server)}", Host=host)[0] == status, host
 
 
 def test_a_page_for_other_machines_says_what_protects_the_robot(feed):

@@ -88,7 +88,7 @@ def test_a_scenario_that_names_an_unknown_world_is_refused_before_any_run(tmp_pa
 @pytest.mark.mission
 def test_the_runs_of_a_scenario_are_judged_and_kept(tmp_path):
     scenario = tmp_path / "scenario.yaml"
-    scenario.write_text("missions: [go to the living room]\nseeds: '1'\n", encoding="utf-8")
+    scenario.write_text("missions: [say hello]\nseeds: '1'\n", encoding="utf-8")
     (case,) = executive.evaluate(scenario, out=tmp_path / "out", jobs=1)
     assert (case.report.achieved, case.run.request.seed) == (True, 1)
     assert executive.evaluate(scenario, out=tmp_path / "out", jobs=1)[0] == case

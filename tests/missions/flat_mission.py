@@ -15,6 +15,7 @@ from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from plant.engine import Pipeline
+from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from skills.faults.faulty_robot import inject_faults
 from tests.visitors import OnMessage, OnTick
@@ -28,11 +29,13 @@ FETCH = (
 class FlatMission:
     """A mission in the flat, with what happened in it."""
 
-    def __init__(self, texts, *, seed=1, **plant):
+    def __init__(self, texts, *, seed=1, start=None, **plant):
         self.world = open_world("flat")
         self.knowledge = knowledge_of(self.world)
         mission = Mission(name="m", robot="Alice", steps=tuple(Do.from_command(parse_command(text)) for text in texts))
         self.tree = compile_mission(mission, knowledge=self.knowledge, registry=built_in_skills())
+        if start is not None:
+            plant["robots"] = [PlacedRobot("Alice", "spot", start, self.world.dock)]
         self.simulation = Simulation(self.world, seed=seed, visuals=False, **plant)
         self.clock = Pipeline(self.simulation.engine)
         robot, start = self.clock.robots["Alice"], self.simulation.starts["Alice"]

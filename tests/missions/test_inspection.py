@@ -1,6 +1,7 @@
 """Pictures that a mission asks for, taken in the plant and judged by the truth."""
 
 import json
+from pathlib import Path
 
 import cv2
 import pytest
@@ -9,6 +10,8 @@ from executive.app.prepare.from_request import prepare
 from executive.app.runs.one_run import run_request
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
+from executive.record.history import read_events
+from skills.robot import Pose2D
 
 pytestmark = pytest.mark.mission
 
@@ -27,7 +30,8 @@ steps:
 
 def test_the_pictures_show_what_they_are_of(tmp_path):
     (tmp_path / "round.yaml").write_text(ROUND, encoding="utf-8")
-    request = Request(file=tmp_path / "round.yaml", seed=1, out=tmp_path / "out", record=False)
+    start = Pose2D(9.8, 6.6, 3.14)
+    request = Request(file=tmp_path / "round.yaml", seed=1, out=tmp_path / "out", record=False, start=start)
     report = run_request(prepare(request)).report
     assert report.achieved, (report.message, report.referee.why)
     assert report.referee.why == (
@@ -46,11 +50,28 @@ def test_the_pictures_show_what_they_are_of(tmp_path):
     assert 0.0 < facts[0]["stamp_s"] < facts[1]["stamp_s"] < report.sim_time_s
 
 
-def test_no_picture_is_claimed_while_no_scan_confirms_where_the_robot_stands(tmp_path):
+JUMPS_S = 9.0
+
+
+@pytest.fixture(scope="module")
+def astray(tmp_path_factory):
     """Odometry jumps on the way while the LiDAR gives no scans: the robot does not stand where it believes to be."""
-    (tmp_path / "round.yaml").write_text(ROUND.partition("  - picture: {of: coke}")[0], encoding="utf-8")
-    faults = Scenario(("lidar is missing 7 s at 8 s", "odometry jumps -0.9 m at 9 s"))
-    request = Request(file=tmp_path / "round.yaml", seed=1, out=tmp_path / "out", record=False, scenario=faults)
-    report = run_request(prepare(request)).report
-    assert not report.false_claim, (report.message, report.referee.why)
-    assert report.achieved or report.cause == "POSTCONDITION", report.message
+    folder = tmp_path_factory.mktemp("astray")
+    (folder / "round.yaml").write_text(ROUND.partition("  - picture: {of: coke}")[0], encoding="utf-8")
+    faults = Scenario(("lidar is missing 7 s at 8 s", f"odometry jumps -0.9 m at {JUMPS_S} s"))
+    request = Request(file=folder / "round.yaml", seed=1, out=folder / "out", record=False, scenario=faults)
+    return run_request(prepare(request)).report
+
+
+def test_no_picture_is_claimed_while_no_scan_confirms_where_the_robot_stands(astray):
+    assert not astray.false_claim, (astray.message, astray.referee.why)
+    assert astray.achieved or astray.cause == "POSTCONDITION", astray.message
+
+
+def test_the_log_shows_how_far_a_jump_of_odometry_takes_the_estimate_from_the_truth(astray):
+    log = Path(astray.log)
+    errors_m = [(each.stamp_s, each.data["error_m"]) for each in read_events(log) if each.topic == "truth"]
+    before = [error_m for t_s, error_m in errors_m if t_s < JUMPS_S]
+    assert len(before) > 10 and max(before) < 0.1
+    assert max(error_m for _, error_m in errors_m) > 0.7
+    assert "Position error" in log.with_name("report.html").read_text(encoding="utf-8")

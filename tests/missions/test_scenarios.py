@@ -28,7 +28,7 @@ def test_a_robot_takes_another_door_when_one_closes(tmp_path):
     file = tmp_path / "door.yaml"
     file.write_text("events:\n  - {door: [kitchen, living room], closes: 1 s}\n", encoding="utf-8")
     out = tmp_path / "out"
-    report = errand_run(out, "go to the kitchen", "--scenario", str(file))
+    report = errand_run(out, "go to the kitchen", "--start", "8.2", "4.4", "0", "--scenario", str(file))
     assert (report["outcome"], report["referee"]["success"]) == ("success", True), report
     assert report["referee"]["collisions"] == 0
     assert "the door between kitchen and living room closes" in told(out)

@@ -20,12 +20,9 @@ from skills.robot import Intrinsics
 
 RENDERS = """
 from pathlib import Path
-from pydrake.math import RigidTransform
-from plant.diagram import DiagramConfig, build_diagram
-from plant.scene_pictures import render_view
+from tests.plant.test_rendering import box_scene, pictures
 
-built = build_diagram(DiagramConfig())
-render_view(built.scene.query_at(built.plant.GetPositions(built.plant.CreateDefaultContext())), RigidTransform())
+pictures(*box_scene())
 print(sum(each.read_text().startswith("llvmpipe") for each in Path("/proc/self/task").glob("*/comm")))
 """
 
@@ -42,7 +39,8 @@ def test_a_low_sun_is_one_beam_more():
 
 def test_software_renderer_draws_without_threads_of_its_own():
     usual = {name: value for name, value in os.environ.items() if name != MESA_THREADS}
-    ended = subprocess.run([sys.executable, "-c", RENDERS], env=usual, capture_output=True, text=True, check=True)
+    options = {"env": usual, "cwd": Path(__file__).parents[2], "capture_output": True, "text": True, "check": True}
+    ended = subprocess.run([sys.executable, "-c", RENDERS], **options)
     assert ended.stdout.split() == ["0"]
 
 
@@ -72,19 +70,27 @@ def children():
     return {int(each) for each in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()}
 
 
-def test_a_process_of_its_own_draws_the_same_bytes():
-    aside, camera = box_scene()
-    aside.render_aside()
-    for seen, expected in zip(pictures(aside, camera), pictures(*box_scene()), strict=True):
+@pytest.fixture(scope="module")
+def aside(tmp_path_factory):
+    """A scene that a process of its own draws, the camera's number, that process, and a file open at its beginning."""
+    before = children()
+    with (tmp_path_factory.mktemp("aside") / "lock").open("w") as file:
+        scene, camera = box_scene()
+        scene.render_aside()
+        (process,) = children() - before
+        yield scene, camera, process, Path(file.name)
+
+
+def test_a_process_of_its_own_draws_the_same_bytes(aside):
+    for seen, expected in zip(pictures(*aside[:2]), pictures(*box_scene()), strict=True):
         assert np.array_equal(seen, expected)
         assert len(np.unique(seen)) > 1  # the box and the sky
 
 
 def test_the_process_ends_with_the_scene():
     before = children()
-    scene, camera = box_scene()
+    scene, _ = box_scene()
     scene.render_aside()
-    pictures(scene, camera)
     assert len(children() - before) == 1
     del scene
     assert children() == before
@@ -96,7 +102,7 @@ def test_scenes_may_end_in_any_order():
     first.render_aside()
     second.render_aside()
     del first
-    assert pictures(second, camera)[0].shape == (48, 64, 3)
+    assert second.picture(NOWHERE, camera, depth=False).shape == (48, 64, 3)
     del second
     assert children() == before
 
@@ -111,31 +117,23 @@ def test_a_run_is_told_when_the_process_has_died():
         pictures(scene, camera)
 
 
-def test_a_run_is_told_why_rendering_failed():
-    scene, camera = box_scene()
-    scene.render_aside()
+def test_a_run_is_told_why_rendering_failed(aside):
+    scene, camera, *_ = aside
     with pytest.raises(RuntimeError, match="rendering failed: IndexError"):
         scene.picture(NOWHERE, camera + 1, depth=False)
     assert pictures(scene, camera)[0].shape == (48, 64, 3)
 
 
-def test_a_terminal_that_interrupts_the_run_leaves_the_process_to_the_run():
-    before = children()
-    scene, camera = box_scene()
-    scene.render_aside()
-    (process,) = children() - before
+def test_a_terminal_that_interrupts_the_run_leaves_the_process_to_the_run(aside):
+    scene, camera, process, _ = aside
     pictures(scene, camera)
     for each in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
         os.kill(process, each)
     assert pictures(scene, camera)[0].shape == (48, 64, 3)
 
 
-def test_the_process_holds_no_file_of_the_run(tmp_path):
-    before = children()
-    with (tmp_path / "lock").open("w") as file:
-        scene, camera = box_scene()
-        scene.render_aside()
-        (process,) = children() - before
-        pictures(scene, camera)
-        held = {each.resolve() for each in Path(f"/proc/{process}/fd").iterdir()}
-        assert Path(file.name).resolve() not in held
+def test_the_process_holds_no_file_of_the_run(aside):
+    scene, camera, process, file = aside
+    pictures(scene, camera)
+    held = {each.resolve() for each in Path(f"/proc/{process}/fd").iterdir()}
+    assert file.resolve() not in held

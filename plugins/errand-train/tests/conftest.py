@@ -1,6 +1,7 @@
 """An empty data set, scenes of few models, and small networks."""
 
 import json
+from contextlib import contextmanager
 
 import pytest
 
@@ -25,14 +26,28 @@ def few_models(monkeypatch):
     monkeypatch.setattr("errand_train.dataset.compose.numbers", lambda name, **use: numbers(name, **use)[:1])
 
 
-@pytest.fixture(scope="module")
-def small_networks():
-    """Makes proposal and refinement networks with few channels and blocks."""
+@contextmanager
+def small_sizes():
+    """Gives proposal and refinement networks few channels and blocks."""
     with pytest.MonkeyPatch.context() as patch:
         for name, size in {"STEM": (8, 16), "LEVELS": (16, 24, 32), "NECK": (16, 16, 24), "_DEPTH": 1}.items():
             patch.setattr(f"errand_train.detector.network.{name}", size)
         for name, size in {"LEVELS": (16, 24, 32), "NECK": (16, 16, 24), "_RESIDUALS": (1, 1)}.items():
             patch.setattr(f"errand_train.detector.refinement_network.{name}", size)
+        yield
+
+
+@pytest.fixture(scope="module")
+def small_networks():
+    """Makes all networks of a file small."""
+    with small_sizes():
+        yield
+
+
+@pytest.fixture
+def small_network():
+    """Makes the networks of one test small."""
+    with small_sizes():
         yield
 
 

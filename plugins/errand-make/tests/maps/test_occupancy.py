@@ -34,16 +34,20 @@ def round_wall(radius_m=3.0):
     return np.minimum(wall, floor[:, None])
 
 
-def most(grid, band, x, y):
+def most(seen, x, y):
     """The highest probability within 10 cm."""
     steps = (-0.1, -0.05, 0.0, 0.05, 0.1)
-    return max(at(grid, band, x + dx, y + dy)[0] for dx in steps for dy in steps)
+    return max(at(seen, x + dx, y + dy)[0] for dx in steps for dy in steps)
 
 
-def at(grid, band, x, y):
-    probability, observed = grid.probability(band)
-    column, row = (math.floor((v - o) / grid.resolution_m) for v, o in zip((x, y), grid.origin_m, strict=True))
+def at(seen, x, y):
+    (probability, observed), origin_m, cell_m = seen
+    column, row = (math.floor((v - o) / cell_m) for v, o in zip((x, y), origin_m, strict=True))
     return float(probability[row, column]), bool(observed[row, column])
+
+
+def seen_in(grid, band):
+    return grid.probability(band), grid.origin_m, grid.resolution_m
 
 
 def test_beams_free_the_cells_they_pass_and_occupy_their_end():
@@ -51,9 +55,10 @@ def test_beams_free_the_cells_they_pass_and_occupy_their_end():
     for _ in range(3):
         grid.insert(frame(round_wall()), Pose2D(1.0, 2.0, 0.5))
     for band in ("scan", "keepout"):
-        assert at(grid, band, 2.5, 2.0)[0] < 0.4
-        assert most(grid, band, 1.0, 5.025) > 0.8
-        assert not at(grid, band, 1.0, 6.0)[1]
+        seen = seen_in(grid, band)
+        assert at(seen, 2.5, 2.0)[0] < 0.4
+        assert most(seen, 1.0, 5.025) > 0.8
+        assert not at(seen, 1.0, 6.0)[1]
 
 
 def test_a_beam_over_a_low_box_leaves_it_occupied():
@@ -68,8 +73,8 @@ def test_a_beam_over_a_low_box_leaves_it_occupied():
     passing[above] = over[above]
     for _ in range(20):
         grid.insert(frame(passing), Pose2D(0.0, 0.0, 0.0))
-    assert most(grid, "keepout", 2.025, 0.0) > 0.6
-    assert at(grid, "scan", 2.025, 0.0)[0] < 0.1
+    assert most(seen_in(grid, "keepout"), 2.025, 0.0) > 0.6
+    assert at(seen_in(grid, "scan"), 2.025, 0.0)[0] < 0.1
 
 
 def under_table(away_m, *, top_m=0.85, thick_m=0.03):
@@ -89,7 +94,8 @@ def test_a_thin_table_top_is_found_in_layers_no_higher_than_it_is_thick(layer_m,
     grid = LayeredOccupancy(0.025, layer_m=layer_m)
     for away_m in np.arange(2.2, 5.0, 0.05):
         grid.insert(frame(under_table(away_m)), Pose2D(5.0 - away_m, 0.0, 0.0))
-    middle = [at(grid, "keepout", x, 0.0)[0] for x in np.arange(5.15, 5.65, 0.025)]
+    seen = seen_in(grid, "keepout")
+    middle = [at(seen, x, 0.0)[0] for x in np.arange(5.15, 5.65, 0.025)]
     assert (max(middle) > 0.65) == found
 
 
@@ -118,11 +124,12 @@ def test_a_beam_without_return_changes_nothing():
 def test_the_grid_grows_and_keeps_what_it_has():
     grid = LayeredOccupancy(0.05)
     grid.insert(frame(round_wall()), Pose2D(0.0, 0.0, 0.0))
-    before = at(grid, "scan", 3.025, 0.0)
+    before = at(seen_in(grid, "scan"), 3.025, 0.0)
     assert before[0] > 0.6
     grid.insert(frame(round_wall()), Pose2D(-30.0, 25.0, 0.0))
-    assert at(grid, "scan", 3.025, 0.0) == before
-    assert most(grid, "scan", -30.0, 28.025) > 0.6
+    seen = seen_in(grid, "scan")
+    assert at(seen, 3.025, 0.0) == before
+    assert most(seen, -30.0, 28.025) > 0.6
 
 
 def ground(width_m=1.0):

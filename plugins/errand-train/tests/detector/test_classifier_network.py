@@ -1,5 +1,6 @@
 """The parts of the classifier network's training; skipped without torch."""
 
+from copy import deepcopy
 from functools import partial
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from skills.perception.detector.onnx_detector import CROP_PX  # noqa: E402
 
 onnx = pytest.importorskip("onnx")
 CPU, NAMES = torch.device("cpu"), ("beer", "coke", "cube")
+SHIFT = (0.5, 0.0, -0.5)
 Given = tuple["torch.Tensor", "torch.Tensor", "torch.Tensor"]
 
 
@@ -47,9 +49,10 @@ def batch_of(count):
     return CropBatch(crops, boxes, logits, boxes + 4.0, torch.arange(count) % (len(NAMES) + 1) - 1)
 
 
-def trained(seed=1):
+@pytest.fixture(scope="module")
+def trained():
     """A network that says something of its own."""
-    torch.manual_seed(seed)
+    torch.manual_seed(1)
     network = ClassifierNetwork(len(NAMES))
     network.backbone.begin_with_imagenet()
     with torch.no_grad():
@@ -57,9 +60,17 @@ def trained(seed=1):
             layer.weight.normal_(0.0, 0.1)
         network.place.weight.normal_(0.0, 0.1)
         network.train()
-        for _ in range(30):
-            network(*given(6))
+        for _ in range(15):
+            network(*given(4))
     return network.eval()
+
+
+@pytest.fixture(scope="module")
+def exported(trained, tmp_path_factory):
+    """Its file, with scores shifted."""
+    file = tmp_path_factory.mktemp("exported") / "t.onnx"
+    export(trained, file, class_names=NAMES, facts={"score_offsets": str(list(SHIFT))}, score_offsets=SHIFT)
+    return file
 
 
 def test_a_fresh_network_says_what_the_refinement_network_said():
@@ -88,41 +99,39 @@ def test_classifier_starts_from_imagenets_weights_and_trains_all_but_the_early_l
 
 
 def test_crops_are_learnt_by_heart():
-    learner, batch = new_learner(1), batch_of(8)
+    learner, batch = new_learner(1), batch_of(4)
     learner.begin(Path("none"), [])
     learner.keep_early()
-    found = [learner.step(batch, 2e-3)[0] for k in range(30)]
+    found = [learner.step(batch, 2e-3)[0] for k in range(20)]
     assert np.mean(found[-5:]) < 0.6 * np.mean(found[:3])
 
 
-def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_it(tmp_path):
-    network, file, (crops, boxes, logits) = trained(), tmp_path / "t.onnx", given(3)
-    shift = (0.5, 0.0, -0.5)
-    export(network, file, class_names=NAMES, facts={"score_offsets": str(list(shift))}, score_offsets=shift)
+def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_it(trained, exported):
+    crops, boxes, logits = given(3)
     as_bytes = (crops * 255).round()
     told = {
         "chips": as_bytes.permute(0, 2, 3, 1).numpy().astype(np.uint8),
         "regions": boxes.numpy(),
         "logits": logits.numpy(),
     }
-    found, scores = load_network(file, CLASSIFIER).session.run(["boxes", "scores"], told)
-    in_use = fuse(network)
+    found, scores = load_network(exported, CLASSIFIER).session.run(["boxes", "scores"], told)
+    in_use = fuse(trained)
     in_use.stop_learning()
     with torch.no_grad():
         expected, expected_boxes = in_use(as_bytes / 255, boxes, logits)
     assert np.abs(found - expected_boxes.numpy()).max() < 0.05
-    assert np.abs(scores - (expected + torch.tensor(shift)).sigmoid().numpy()).max() < 5e-3
+    assert np.abs(scores - (expected + torch.tensor(SHIFT)).sigmoid().numpy()).max() < 5e-3
     learner = new_learner(2)
-    learner.start_from(file, [batch_of(4)])
+    learner.start_from(exported, [batch_of(4)])
     with torch.no_grad():
         again, boxes_again = learner.network.eval()(as_bytes / 255, boxes, logits)
-        before, boxes_before = network(as_bytes / 255, boxes, logits)
+        before, boxes_before = trained(as_bytes / 255, boxes, logits)
     assert torch.allclose(again, before, atol=5e-2)
     assert torch.allclose(boxes_again, boxes_before, atol=0.2)
 
 
-def test_in_use_it_adds_a_part_of_what_it_adds_while_learning():
-    network, (crops, boxes, logits) = trained(), given(3)
+def test_in_use_it_adds_a_part_of_what_it_adds_while_learning(trained):
+    network, (crops, boxes, logits) = deepcopy(trained), given(3)
     with torch.no_grad():
         learning, learning_boxes = network(crops, boxes, logits)
         network.stop_learning()
@@ -132,12 +141,10 @@ def test_in_use_it_adds_a_part_of_what_it_adds_while_learning():
     assert torch.allclose(used_boxes, boxes.lerp(learning_boxes, USED), atol=0.3)
 
 
-def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_path):
-    file = tmp_path / "t.onnx"
-    export(trained(), file, class_names=NAMES, facts={})
-    model = onnx.load(file)
+def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(exported):
+    model = onnx.load(exported)
     assert "Pad" not in {node.op_type for node in model.graph.node}
-    crops, boxes, logits = given(8)
+    crops, boxes, logits = given(3)
     told = {
         "chips": (crops * 255).permute(0, 2, 3, 1).numpy().astype(np.uint8),
         "regions": boxes.numpy(),
@@ -150,10 +157,10 @@ def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_pa
     assert sum(one.name.endswith("weight_quantized") for one in made.graph.initializer) == 45
 
 
-def test_normalisation_becomes_part_of_the_layers():
-    network, (crops, boxes, logits) = trained(), given(2)
+def test_normalisation_becomes_part_of_the_layers(trained):
+    crops, boxes, logits = given(2)
     with torch.no_grad():
-        for mine, theirs in zip(fuse(network)(crops, boxes, logits), network(crops, boxes, logits), strict=True):
+        for mine, theirs in zip(fuse(trained)(crops, boxes, logits), trained(crops, boxes, logits), strict=True):
             assert torch.allclose(mine, theirs, atol=1e-2)
 
 

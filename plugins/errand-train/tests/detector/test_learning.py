@@ -163,12 +163,14 @@ def trained(learner, steps):
     return [sum(learner.step(batch, 3e-3)) for _ in range(steps)]
 
 
+@pytest.mark.usefixtures("small_network")
 def test_four_pictures_are_learnt_by_heart():
     learner = ProposalLearner.new(len(NAMES), 1, CPU)
     found = trained(learner, 60)
     assert np.mean(found[-5:]) < 0.25 * np.mean(found[:5])
 
 
+@pytest.mark.usefixtures("small_network")
 def test_a_resumed_training_goes_on_to_the_bit(tmp_path):
     torch.set_num_threads(1)
     whole = ProposalLearner.new(len(NAMES), 1, CPU)
@@ -186,6 +188,7 @@ def test_a_resumed_training_goes_on_to_the_bit(tmp_path):
         assert all(torch.equal(one, other) for one, other in pairs)
 
 
+@pytest.mark.usefixtures("small_network")
 @pytest.mark.parametrize("content", [b"", b"no checkpoint"])
 def test_a_damaged_checkpoint_is_named(tmp_path, content):
     file = tmp_path / "checkpoint.pt"

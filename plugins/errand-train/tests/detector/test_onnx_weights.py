@@ -15,10 +15,10 @@ from errand_train.detector.quantisation import write_quantised  # noqa: E402
 NAMES = ("beer", "coke", "cube")
 
 
-@pytest.fixture
-def written(tmp_path):
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
     """A network and its file, with scores shifted."""
-    network, file = random_network(1, len(NAMES)), tmp_path / "made.onnx"
+    network, file = random_network(1, len(NAMES)), tmp_path_factory.mktemp("written") / "made.onnx"
     shift = {"score_offsets": "[0.5, -0.25, 0.0]"}
     export(network, file, class_names=NAMES, facts=shift, score_offsets=(0.5, -0.25, 0.0))
     return network, file

@@ -175,6 +175,7 @@ def test_a_background_crop_wants_low_scores_and_no_box():
     assert low.boxes == high.boxes == 0.0
 
 
+@pytest.mark.usefixtures("small_network")
 def test_crops_are_learnt_by_heart(feed):
     learner = new_learner(1)
     batch = feed.batch(0, 8)
@@ -222,6 +223,7 @@ def test_the_exported_file_says_what_the_network_says(tmp_path):
     assert np.abs(scores - shifted.numpy()).max() < 1e-3
 
 
+@pytest.mark.usefixtures("small_network")
 def test_learning_begins_with_the_proposal_networks_weights_and_keeps_its_early_layers(tmp_path, feed):
     first, file = random_network(1, len(CLASSES)), tmp_path / "m.onnx"
     export(first, file, class_names=CLASSES, facts={})
@@ -238,6 +240,7 @@ def test_learning_begins_with_the_proposal_networks_weights_and_keeps_its_early_
     assert not torch.equal(before["detector.neck.down8.mix.0.weight"], after["detector.neck.down8.mix.0.weight"])
 
 
+@pytest.mark.usefixtures("small_network")
 def test_learning_goes_on_from_a_refinement_networks_file(tmp_path, feed):
     file, network, batch = tmp_path / "r.onnx", unsettled(len(CLASSES)), feed.batch(0, 8)
     shift = (0.5, 0.0, -0.5)
@@ -257,12 +260,14 @@ def test_learning_goes_on_from_a_refinement_networks_file(tmp_path, feed):
     )
 
 
+@pytest.mark.usefixtures("small_network")
 def test_learning_goes_on_from_no_proposal_networks_file(tmp_path, feed):
     export(random_network(1, len(CLASSES)), tmp_path / "m.onnx", class_names=CLASSES, facts={})
     with pytest.raises(TrainingDataError, match=r"m\.onnx.*start again without it"):
         new_learner(2).start_from(tmp_path / "m.onnx", [feed.batch(0, 8)])
 
 
+@pytest.mark.usefixtures("small_network")
 @pytest.mark.parametrize("go_on", [CropLearner.restore, CropLearner.start_from_checkpoint])
 def test_a_checkpoint_of_the_other_network_is_named(tmp_path, go_on):
     ProposalLearner.new(len(CLASSES), 1, CPU).save(tmp_path / "checkpoint.pt")

@@ -13,6 +13,7 @@ from bosdyn.util import seconds_to_duration
 
 from errand_spot.server.computer import Pace
 from errand_spot.server.obstacles import Clearance
+from skills.testing.blocks import Block
 from tests.tables import table
 
 PACE = Pace.CLIENT
@@ -98,6 +99,15 @@ def test_a_walk_into_a_wall_stops_before_it_and_is_blocked(spot):
     assert told.body_movement_status == Walk.BODY_STATUS_MOVING  # settled means: at the goal
     assert 0.9 < spot.served.scripted.pose.x_m < 1.7 - 0.56
     assert 0.1 * len(standing) < 3.0
+
+
+@pytest.mark.parametrize("goal", [(2.6, 0.0), (-2.6, 0.0), (0.0, 2.6)], ids=["ahead", "backwards", "aside"])
+def test_a_walk_stops_before_a_low_table_between_the_beams(spot, goal):
+    x, y = goal
+    spot.served.scripted.blocks[:] = [Block(x - 0.4, y - 0.4, x + 0.4, y + 0.4, 0.40, 0.45)]
+    poses, told = walked(spot, sent(spot, path([(*goal, 0.0)])))
+    assert told.final_goal_status == Walk.FINAL_GOAL_STATUS_BLOCKED
+    assert 0.0 < 2.2 - np.hypot(*poses[-1, :2]) - (0.53 if x else 0.25) < 0.2
 
 
 def test_a_blocked_robot_goes_on_when_its_way_clears(spot):

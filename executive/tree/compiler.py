@@ -139,27 +139,27 @@ def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, s
         if port not in types:
             yield f"there is no input port '{port}'", suggestion(port, types, f"known: {', '.join(types)}")
         else:
-            yield from _misfit(port, binding, types[port], written)
+            for message in _misfit(port, binding, types[port], written):
+                yield message, f"give it {with_article(describe_type(types[port]))}"
     for port in outputs:
         if port not in skill.outputs:
             yield f"there is no output port '{port}'", f"known: {', '.join(skill.outputs) or 'none'}"
 
 
-def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yields the errors in one bound input, with hints."""
-    wanted = f"give it {with_article(describe_type(kind))}"
+def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) -> Iterator[str]:
+    """Yields the errors in one bound input."""
     if isinstance(binding, Constant) and not conforms(binding.value, kind):
-        yield f"input port '{port}' got {binding.value!r}", wanted
+        yield f"input port '{port}' got {binding.value!r}"
     if isinstance(binding, FromBoardOr) and not conforms(binding.default, kind):
-        yield f"input port '{port}' has the default {binding.default!r}", wanted
+        yield f"input port '{port}' has the default {binding.default!r}"
     if not isinstance(binding, FromBoard) or (isinstance(binding, FromBoardOr) and binding.key not in written):
         return
     if binding.key not in written:
-        yield f"input port '{port}' reads '{binding.key}', which nothing before it writes", wanted
+        yield f"input port '{port}' reads '{binding.key}', which nothing before it writes"
         return
     given = binding.gives or written[binding.key]
     if not assignable(given, kind):
-        yield f"input port '{port}' reads '{binding.key}', {with_article(describe_type(given))}", wanted
+        yield f"input port '{port}' reads '{binding.key}', {with_article(describe_type(given))}"
 
 
 def _error(node: NodeSpec, message: str, hint: str) -> InputError:

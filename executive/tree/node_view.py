@@ -6,6 +6,7 @@ import enum
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from functools import partial, reduce
 from pathlib import Path
 from typing import Any, Final
 
@@ -41,11 +42,9 @@ def _ports_of(spec: NodeSpec) -> Iterator[Port]:
     options = spec.options
     if spec.skill is None:
         parts = spec.path_id.split("/")
+        bases = ["/".join(parts[:n]) + "/" for n in (len(parts), len(parts) - 1, 2) if n > 1]  # of ids near it
         for name, value in options.items():
-            text = plain(value)
-            for length in (len(parts), len(parts) - 1, 2):  # ids below it, beside it, and in the same mission
-                text = text.replace("".join(f"{part}/" for part in parts[:length]), "") if length > 1 else text
-            yield Port(name, text)
+            yield Port(name, reduce(lambda text, base: text.replace(base, ""), bases, plain(value)))
         return
     skill, bound = options["skill"], options.get("inputs", {})
     types = field_types(skill.Inputs)
@@ -205,20 +204,19 @@ def _outline_row(node: NodeView, authored: set[str]) -> NodeView:
     while (following := _same_row(chain, authored)) is not None:
         chain.append(following)
     within = {each.path_id for each in chain}
-    below = [child for each in chain for child in each.children if child.path_id not in within]
+    below = tuple(child for each in chain for child in each.children if child.path_id not in within)
     main = next((each for each in chain if each.step), next(filter(_is_sequence, chain), chain[-1]))
-    row = replace(main, path_id=node.path_id, state=node.state, hidden=sum(each.hidden for each in chain))
-    row = replace(row, children=tuple(_outline_row(child, authored) for child in below), step=node.path_id in authored)
-    if not row.step:
+    row = partial(replace, main, path_id=node.path_id, state=node.state, hidden=sum(each.hidden for each in chain))
+    row = partial(row, children=tuple(_outline_row(child, authored) for child in below), step=node.path_id in authored)
+    if node.path_id not in authored:
         names = " › ".join((*(each.label for each in chain[:-1]), chain[-1].title()))
-        return replace(row, kind=chain[0].kind, name=names.removeprefix(f"{chain[0].kind} "))
+        return row(kind=chain[0].kind, name=names.removeprefix(f"{chain[0].kind} "))
     before = [each.name for each in chain[: chain.index(main)] if _is_sequence(each)]
     parts = [name for name in before if not (name in _UNNAMED or name.startswith("branch "))]
     others = [each for each in chain if each is not main and each.path_id in authored]
     policy = [each.name for each in others if not each.behaviour.container and each.name not in parts]
     name = ": ".join((*parts, f"{main.kind} {main.name}" if main.behaviour.spoken else main.title()))
-    kind = _ROWS[0 if main.path_id.count("/") == 1 else 1]
-    return replace(row, kind=kind, name=name, policy=", ".join(policy))
+    return row(kind=_ROWS[0 if main.path_id.count("/") == 1 else 1], name=name, policy=", ".join(policy))
 
 
 def _is_sequence(node: NodeView) -> bool:
@@ -266,7 +264,8 @@ def _with_expected(node: NodeView, inside: bool) -> NodeView:
     below = [child.state.expected for child in children if child.state.status is Status.FAILURE]
     found_none = node.behaviour.runs_skill and node.name in _LOOKS and state.cause is Cause.POSTCONDITION
     expected = failed and inside and (found_none or (bool(below) and all(below)))
-    return replace(node, state=state._replace(expected=expected), children=children)
+    same = expected is state.expected and [*map(id, children)] == [*map(id, node.children)]
+    return node if same else replace(node, state=state._replace(expected=expected), children=children)
 
 
 def _view_of(spec: NodeSpec, known: Mapping[str, NodeState]) -> NodeView:

@@ -61,6 +61,7 @@ def required_fields(record: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields if field.default is missing and field.default_factory is missing)
 
 
+@functools.lru_cache(maxsize=512)
 def describe_type(hint: Any) -> str:
     """Describes a type hint to users: "number above 0 and at most 3 m/s", "list of text", "text or nothing"."""
     if bounds(hint):

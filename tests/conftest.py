@@ -31,9 +31,11 @@ LONG_SUITES = ("approach.skilltest.yaml", "place.skilltest.yaml")
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Leaves long suites to the night; `test_every_skill` holds the same faults against every skill by day."""
+    """Leaves long suites to the night, and all but the first of a file; `test_every_skill` holds faults by day."""
+    first = {}
     for item in items:
-        if item.path.name in LONG_SUITES and ": " in item.name:
+        is_suite = item.path.name.endswith(".skilltest.yaml") and ": " in item.name
+        if is_suite and (item.path.name in LONG_SUITES or first.setdefault(item.path, item.index) != item.index):
             item.add_marker(pytest.mark.nightly)
 
 

@@ -2,9 +2,10 @@
 
 import gc
 import threading
-import time
 from contextlib import ExitStack, contextmanager
 from copy import deepcopy
+
+from ros_client import soon
 
 from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import described, served_file
@@ -59,6 +60,8 @@ class LockStep(RobotClock):
         session = self._ending.enter_context(open_session(place))
         self.node = Node(session, "driver", f"/{name.lower()}")
         self.robot = Ros2Robot(name, self.node, self, described(file or served_file(kind)))
+        topics = self.server.topics
+        assert soon(lambda: self.robot._velocity.is_heard and topics._odom.is_heard and topics._joints.is_heard)
         assert self.until(lambda: not self.robot.missing()), self.robot.missing()
         self._patience_s = PATIENCE_S
 
@@ -73,13 +76,15 @@ class LockStep(RobotClock):
             self.server = RobotServer(session, robot, clock, life=self.now)
             self.server.topics.image_period_s = 0.0
             self.served, self.clock = robot, clock
-            self._now_s = clock.now()
+            self._now_s, self._begun = clock.now(), state_of(robot) if isinstance(robot, ScriptedRobot) else None
             self._ready.set()
             while not self._stopping.is_set():
                 self.server.work.work_for(IDLE_S)
                 self.server.topics.publish_pictures(clock.now())
+        renders = not isinstance(robot, ScriptedRobot)
         del robot, clock, self.served, self.clock, self._build, self.server
-        gc.collect()  # a renderer ends in the thread in which it began
+        if renders:
+            gc.collect()  # a renderer ends in the thread in which it began
 
     def now(self):
         return self._now_s
@@ -104,9 +109,7 @@ class LockStep(RobotClock):
         return all_heard and self.server.parts.ended <= sum(each.ended for each in self.robot.actions.values())
 
     def _soon(self, true):
-        until_s = time.monotonic() + self._patience_s
-        while not self._is_cut and not true() and time.monotonic() < until_s:
-            time.sleep(0.0005)
+        soon(lambda: self._is_cut or true(), self._patience_s)
 
     @contextmanager
     def cut(self):
@@ -135,6 +138,14 @@ class LockStep(RobotClock):
         """Advances until a command has ended; returns its status."""
         assert self.until(lambda: self.robot.command_status(command).state.value != "running", 60.0)
         return self.robot.command_status(command)
+
+    def begin_anew(self):
+        """Takes the lease, stops the scripted robot, and puts it where it began."""
+        self.lease = self.robot.take_lease("test")
+        self.server.work.submit(lambda: self.served.stop(lease=self.server._lease)).result()
+        assert self.until(lambda: not self.served.moving_parts)
+        self.server.work.submit(restore, self.served, self._begun).result()
+        self.advance(0.2)
 
     def close(self):
         self._ending.close()

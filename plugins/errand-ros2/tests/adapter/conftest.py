@@ -12,9 +12,14 @@ from ros_lock_step import LockStep, scripted
 from errand_ros2.wire.node import Place
 
 
-@pytest.fixture
-def step():
-    """The robot with its `lease`, and `until` for the ends of commands."""
+@pytest.fixture(scope="module")
+def step_of_module():
     with closing(LockStep(scripted, Place(port=free_port()))) as made:
-        made.lease = made.robot.acquire_lease("test")
         yield made
+
+
+@pytest.fixture
+def step(step_of_module):
+    """The robot with its `lease`, where it began, and `until` for the ends of commands."""
+    step_of_module.begin_anew()
+    return step_of_module

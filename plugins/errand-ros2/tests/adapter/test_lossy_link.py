@@ -68,7 +68,6 @@ class LossyStep(LockStep):
     def __init__(self, link):
         self.link, link.now = link, self.now
         super().__init__(scripted, Place(port=free_port()))
-        self.lease = self.robot.acquire_lease("test")
 
     def advance(self, dt_s):
         for _ in range(max(1, round(dt_s / PERIOD_S))):
@@ -99,13 +98,23 @@ class LossyStep(LockStep):
         return not np.any(np.abs(self.served.velocity) > 0.01)
 
 
-@pytest.fixture(params=[1, 2, 3])
-def lossy(request, monkeypatch):
-    """A lock-step by a lossy link; the seed chooses what is lost."""
+@pytest.fixture(scope="module", params=[1, 2, 3])
+def step_of_seed(request):
     link = LossyLink(request.param, Node.subscribe)
-    monkeypatch.setattr(Node, "subscribe", lambda node, *given, **more: link.subscribe(node, *given, **more))
-    with closing(LossyStep(link)) as step:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Node, "subscribe", lambda node, *given, **more: link.subscribe(node, *given, **more))
+        step = LossyStep(link)
+    with closing(step):
         yield step
+
+
+@pytest.fixture
+def lossy(step_of_seed):
+    """A lock-step by a lossy link, over which nothing is on its way; the seed chooses what is lost."""
+    step_of_seed.link.is_open, step_of_seed.link.after = True, lambda: None
+    step_of_seed.advance(2 * LATEST_S)
+    step_of_seed.begin_anew()
+    return step_of_seed
 
 
 def test_a_drive_and_an_arm_motion_end_over_a_lossy_link(lossy):

@@ -1,14 +1,16 @@
 """Every verb of a robot of ROS 2 against the server in lock-step, expiry, refusals and silence."""
 
 import math
-import time
 
 import numpy as np
 import pytest
+from ros_client import soon
 
 from errand_ros2.adapter.description import served_file
 from errand_ros2.adapter.sensors import SILENT_S
 from errand_ros2.part_actions import GRIPPER, TRAJECTORY
+from errand_ros2.wire.actions import GoalStatus
+from errand_ros2.wire.node import Client
 from errand_ros2.wire.types import ActionType, Attachment, ros_types
 from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError
 
@@ -201,7 +203,12 @@ def test_random_bytes_on_every_topic_and_service_move_nothing(step, capfd):
     topics |= {"imu": "sensor_msgs/msg/Imu", "battery_state": "sensor_msgs/msg/BatteryState"}
     keys = [step.node.key.data_key(f"{space}/{name}", types.message(kind).key) for name, kind in topics.items()]
     keys.append(step.node.key.data_key("/tf_static", types.message("tf2_msgs/msg/TFMessage").key))
-    begun = step.served.pose, step.served.q_rad.copy(), step.served.opening
+    nodes, sent = (step.node, step.server.node), 0
+
+    def taken():
+        return sum(each.handled + each.dropped for each in nodes)
+
+    before, begun = taken(), (step.served.pose, step.served.q_rad.copy(), step.served.opening)
     for key in keys:
         left = length
         while left > 0:
@@ -209,6 +216,7 @@ def test_random_bytes_on_every_topic_and_service_move_nothing(step, capfd):
             left -= len(data)
             if not 52 <= len(data) < 68:  # the bytes of a velocity or a posture are one
                 session.put(key, data)
+                sent += 1
     attachment = Attachment(1, 2, bytes(16)).encoded()
     for name, kind in ((file.arm.action, TRAJECTORY), (file.gripper.action, GRIPPER)):
         action = ActionType(types, kind)
@@ -217,7 +225,9 @@ def test_random_bytes_on_every_topic_and_service_move_nothing(step, capfd):
             for _ in range(20):
                 payload = b"\0\1\0\0" + chance.bytes(length // 20)
                 session.get(key, timeout=0.2, payload=payload, attachment=attachment)
-    time.sleep(1.0)
+    answer = Client(step.node, f"{space}/{name}/_action/get_result", action.get_result).call({}, limit_s=20.0)
+    assert answer.status == GoalStatus.UNKNOWN  # all else has come
+    soon(lambda: taken() >= before + sent, 2.0)  # a message may be lost
     step.server.work.submit(step.server.step).result()
     assert "Traceback" not in capfd.readouterr().err
     assert (step.served.pose, step.served.opening) == (begun[0], begun[2])

@@ -55,14 +55,14 @@ def tablet_at(step):
     return robot
 
 
-def localised_by_a_person(step, X_SB=RigidTransform()):
+def localised_by_a_person(step, X_SB=None):
     """Uploads a map of the flat and localises the robot, by its pose at the start, as a person does with a tablet."""
     robot = tablet_at(step)
     client, flat = robot.ensure_client(GraphNavClient.default_service_name), world_map(open_world("flat"))
     client.upload_graph(graph=flat.graph)
     for snapshot in flat.waypoint_snapshots.values():
         client.upload_waypoint_snapshot(snapshot)
-    at_start = nav_pb2.Localization(waypoint_id="start", waypoint_tform_body=pose(X_SB))
+    at_start = nav_pb2.Localization(waypoint_id="start", waypoint_tform_body=pose(X_SB or RigidTransform()))
     client.set_localization(at_start, fiducial_init=graph_nav_pb2.SetLocalizationRequest.FIDUCIAL_INIT_NO_FIDUCIAL)
     return {}
 

@@ -94,17 +94,18 @@ class Clearance:
 
     def _outside(self, outline_B: FloatArray, region_B: FloatArray, velocity: FloatArray) -> FloatArray:
         """Returns a velocity (3,) with which the body enters a region no deeper, and walks along its side."""
-        now_m, towards = _gap_m(outline_B, region_B)
+        gaps_m, directions = _gaps_m(outline_B[None], region_B)
+        now_m, towards = float(gaps_m[0]), directions[0]
         if now_m > _NEAR_M:
             return velocity
         inwards = float(velocity[:2] @ towards)
         if now_m < self._padding_m + _SLIP_M and 0.0 < inwards < _ALONG * float(np.hypot(*velocity[:2])):
             velocity = velocity - np.array([*(inwards * towards), 0.0])
-        least_m, entered = min(now_m, self._padding_m) - _SLIP_M, list[bool]()
-        for x, y, turn in np.outer(_AHEAD_S, velocity).tolist():
-            c, s = math.cos(turn), math.sin(turn)
-            entered.append(_gap_m(outline_B @ np.array([[c, s], [-s, c]]) + [x, y], region_B)[0] < least_m)
-        return _slowed(velocity, np.array(entered))
+        moved = np.outer(_AHEAD_S, velocity)
+        c, s = np.cos(moved[:, 2]), np.sin(moved[:, 2])
+        turns = np.stack([c, s, -s, c], axis=1).reshape(-1, 2, 2)
+        ahead_m = _gaps_m(outline_B @ turns + moved[:, None, :2], region_B)[0]
+        return _slowed(velocity, np.less(ahead_m, min(now_m, self._padding_m) - _SLIP_M))
 
     def _points_B(self, computer: Computer) -> FloatArray:
         """Points (N, 2) near the body, without those at what the hand carries."""
@@ -168,18 +169,17 @@ def _slowed(velocity: FloatArray, touched: FloatArray) -> FloatArray:
     return velocity * (free_s / _BRAKING_S if free_s > _WAITS_S else 0.0)
 
 
-def _gap_m(a: FloatArray, b: FloatArray) -> tuple[float, FloatArray]:
-    """Gap between convex outlines (N, 2), negative by the depth of an overlap, and its direction from the first on.
+def _gaps_m(outlines: FloatArray, region: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Gaps (T,) of convex outlines (T, N, 2) to a region, negative by the overlap's depth, and directions (T, 2) to it.
 
     The axis of separation is normal to an edge of either outline.
     """
-    best_m, towards = -math.inf, np.zeros(2)
-    for one, other, sign in ((a, b, 1.0), (b, a, -1.0)):
-        normals, starts = _sides(one)
-        gaps_m = (other @ normals.T).min(axis=0) - starts
-        if gaps_m.max() > best_m:
-            best_m, towards = float(gaps_m.max()), sign * normals[gaps_m.argmax()]
-    return best_m, towards
+    (ours, our_starts), (theirs, their_starts) = _sides(outlines), _sides(region)
+    to_region = (region @ ours.swapaxes(1, 2)).min(axis=1) - our_starts
+    gaps_m = np.concatenate([to_region, (outlines @ theirs.T).min(axis=1) - their_starts], axis=1)
+    towards = np.concatenate([ours, np.broadcast_to(-theirs, (len(ours), *theirs.shape))], axis=1)
+    best = np.arange(len(gaps_m)), gaps_m.argmax(axis=1)
+    return gaps_m[best], towards[best]
 
 
 def _size(value: float, field: str) -> float:
@@ -195,7 +195,7 @@ def seen_from(pose: Pose2D, points_O: FloatArray) -> FloatArray:
 
 
 def _sides(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Outer normals (N, 2) of a convex outline's sides, and how far along them each side lies (N,)."""
-    along = np.roll(corners, -1, axis=0) - corners
-    normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
-    return normals, (corners * normals).sum(axis=1)
+    """Outer normals (..., N, 2) of a convex outline's sides, and how far along them each side lies (..., N)."""
+    along = np.roll(corners, -1, axis=-2) - corners
+    normals = np.stack([along[..., 1], -along[..., 0]], axis=-1) / np.linalg.norm(along, axis=-1)[..., None]
+    return normals, (corners * normals).sum(axis=-1)

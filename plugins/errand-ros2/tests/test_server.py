@@ -2,7 +2,8 @@
 
 import threading
 import time
-from contextlib import closing, nullcontext
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from functools import partial
 from types import SimpleNamespace
 
@@ -12,14 +13,14 @@ import pytest
 pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
 
 from mcap_ros2._dynamic import generate_dynamic
-from ros_client import connected, free_port
+from ros_client import connected, free_port, soon
 from rosbags.typesys import Stores, get_typestore
 from slow_link import SlowLink
 from zenoh import ext
 from zenoh_ros2_sdk import ROS2Subscriber
 
 from errand_ros2.part_actions import TRAJECTORY
-from errand_ros2.server import PERIOD_S, RobotServer
+from errand_ros2.server import RobotServer
 from errand_ros2.wire import actions
 from errand_ros2.wire.node import Node, Place, open_session
 from errand_ros2.wire.types import LATCHED, ros_types
@@ -64,27 +65,65 @@ STORED = {
 """Topics of which a late subscription gets the last message."""
 
 
+class Served:
+    """A server of the scripted robot, and a node of another session, which steps it."""
+
+    def __init__(self, session, other, place):
+        self.clock, self.place, self.node = VirtualClock(), place, Node(other, "other")
+        self.robot = ScriptedRobot(self.clock, capabilities=spot_capabilities(), blocks=ROOM)
+        self.session = session
+
+    def serve(self, **life):
+        grid, truth = GridMap(np.zeros((30, 30), bool), 0.1, (-1.0, -1.0)), lambda: self.robot.pose.transform()
+        self.server = RobotServer(self.session, self.robot, self.clock, grid=grid, truth=truth, **life)
+        return closing(self.server)
+
+    def step(self):
+        self.server.work.work_for(0.0)
+        self.server.step()
+
+    def soon(self, condition, limit_s=10.0):
+        """Steps the robot until a condition holds; returns the time that it took (robot's clock)."""
+        begun_s = self.clock.now()
+        while not condition() and self.clock.now() < begun_s + limit_s:
+            self.step()
+        assert condition(), "it did not come about"
+        return self.clock.now() - begun_s
+
+    def hears_all(self, heard, topics):
+        """Steps the robot, once every picture is subscribed to, until each topic was heard."""
+        streams = self.server.topics._streams
+        assert soon(lambda: all(out.is_heard for each in streams for out, _ in each.out))
+        self.soon(lambda: heard.keys() == {*topics})
+
+    def driver(self):
+        """Returns a function that sends a velocity and steps the robot with it."""
+        command = self.node.publisher("/alice/cmd_vel", TWIST)
+        assert soon(lambda: command.is_heard)
+
+        def drive(message):
+            wanted = self.server.node.handled + 1
+            command.put(message)
+            assert soon(lambda: self.server.node.handled >= wanted)
+            self.step()
+
+        return drive
+
+    def still(self):
+        return not np.any(np.abs(self.robot.velocity) > 0.01)
+
+
 @pytest.fixture
-def served():
-    """A server at real pace in a thread, and a node of another session."""
-    clock, ended = VirtualClock(), threading.Event()
-    robot = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=ROOM)
-    place, grid = Place(port=free_port()), GridMap(np.zeros((30, 30), bool), 0.1, (-1.0, -1.0))
+def unserved():
+    place = Place(port=free_port())
     with open_session(place) as session, open_session(place) as other:
-        server = RobotServer(session, robot, clock, grid=grid, truth=robot.pose.transform)
-        thread = threading.Thread(target=server.run, args=(ended,))
-        thread.start()
-        yield SimpleNamespace(server=server, robot=robot, node=Node(other, "other"), place=place)
-        ended.set()
-        thread.join()
-        server.close()
+        yield Served(session, other, place)
 
 
-def soon(condition, limit_s=5.0):
-    until_s = time.monotonic() + limit_s
-    while not condition() and time.monotonic() < until_s:
-        time.sleep(0.01)
-    return condition()
+@pytest.fixture
+def served(unserved):
+    with unserved.serve(life=unserved.clock.now):
+        yield unserved
 
 
 def twist(x, wz=0.0):
@@ -101,7 +140,7 @@ def test_the_independent_client_hears_every_topic(served, message_files):
         for topic, kind in {**TOPICS, **late}.items():
             hear = partial(heard.__setitem__, topic)
             ROS2Subscriber(topic, kind, hear, router_port=port, qos=LATCHED.text() if topic in late else None)
-        assert soon(lambda: heard.keys() == {*TOPICS, *late}, 20.0), {*TOPICS, *late} - heard.keys()
+        served.hears_all(heard, {*TOPICS, *late})
     assert heard["/alice/odom"].child_frame_id == "alice/body"
     assert heard["/map"].info.width == 30
     assert heard["/alice/frontleft/image"].encoding == "rgb8"
@@ -122,7 +161,7 @@ def test_another_decoder_reads_the_bytes_of_every_topic(served):
             if late
             else session.declare_subscriber(key, keep)
         )
-    assert soon(lambda: raw.keys() == (TOPICS | STORED).keys(), 20.0), (TOPICS | STORED).keys() - raw.keys()
+    served.hears_all(raw, TOPICS | STORED)
     for topic, kind in (TOPICS | STORED).items():
         definition, _ = store.generate_msgdef(kind, ros_version=2)
         decoded = generate_dynamic(kind, definition)[kind](raw[topic])
@@ -130,34 +169,25 @@ def test_another_decoder_reads_the_bytes_of_every_topic(served):
 
 
 def test_the_robot_drives_as_it_hears_and_stands_when_it_hears_nothing(served):
-    command = served.node.publisher("/alice/cmd_vel", TWIST)
-    assert soon(lambda: command.is_heard)
-    for _ in range(30):
-        command.put(twist(0.5, 0.2))
-        time.sleep(0.02)
+    drive = served.driver()
+    for _ in range(12):
+        drive(twist(0.5, 0.2))
     assert served.robot.velocity[0] == pytest.approx(0.5, abs=0.05)
-    silent_s = time.monotonic()
-    assert soon(lambda: not np.any(np.abs(served.robot.velocity) > 0.01))
-    assert time.monotonic() - silent_s < 0.6
+    assert served.soon(served.still) < 0.6
 
 
 @pytest.mark.parametrize("x", [float("nan"), float("inf")])
 def test_a_velocity_that_is_not_finite_moves_nothing(served, x):
-    command = served.node.publisher("/alice/cmd_vel", TWIST)
-    assert soon(lambda: command.is_heard)
-    for _ in range(10):
-        command.put(twist(x))
-        time.sleep(0.02)
+    drive = served.driver()
+    for _ in range(4):
+        drive(twist(x))
     assert not np.any(served.robot.velocity)
 
 
 def test_a_velocity_beyond_the_limits_is_reduced_to_them(served):
-    command = served.node.publisher("/alice/cmd_vel", TWIST)
-    assert soon(lambda: command.is_heard)
-    for _ in range(60):
-        command.put(twist(100.0, 100.0))
-        time.sleep(0.02)
-    most = served.robot.capabilities()
+    drive, most = served.driver(), served.robot.capabilities()
+    for _ in range(24):
+        drive(twist(100.0, 100.0))
     assert 0.0 < served.robot.velocity[0] <= most.max_speed_m_s + 1e-6
     assert 0.0 < served.robot.velocity[2] <= most.max_turn_rate_rad_s + 1e-6
 
@@ -170,55 +200,52 @@ def test_random_bytes_move_nothing(served, capfd):
         left -= len(data)
         if not 52 <= len(data) < 56:  # random bytes of a velocity's length are a velocity
             served.node.session.inner.put(key, data)
-    time.sleep(4 * PERIOD_S)
+    served.driver()(twist(0.0))  # all else has come
     assert not np.any(served.robot.velocity)
     assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.fixture
-def remote(served):
-    """A sender of velocities at 50 Hz behind a slow link; `speed` is that which it sends, None for nothing."""
-    with closing(SlowLink(served.place.port)) as link, open_session(Place(port=link.port)) as session:
-        command, ended = Node(session, "remote").publisher("/alice/cmd_vel", TWIST), threading.Event()
-        made = SimpleNamespace(link=link, speed=None, robot=served.robot)
-        made.still = lambda: not np.any(np.abs(served.robot.velocity) > 0.01)
+def remote(unserved):
+    """A sender of velocities at 50 Hz behind a slow link; `speed` is that which it sends, None for nothing.
+
+    A thread steps the robot in real time.
+    """
+    robot, stopping = unserved.robot, threading.Event()
+    with (
+        unserved.serve(),
+        ThreadPoolExecutor(2) as pool,
+        closing(SlowLink(unserved.place.port)) as link,
+        open_session(Place(port=link.port)) as session,
+    ):
+        command = Node(session, "remote").publisher("/alice/cmd_vel", TWIST)
+        made = SimpleNamespace(link=link, speed=0.5, robot=robot, still=unserved.still)
 
         def send():
-            while not ended.wait(0.02):
+            while not stopping.wait(0.02):
                 if made.speed is not None:
                     command.put(twist(made.speed))
 
-        thread = threading.Thread(target=send)
-        thread.start()
-        assert soon(lambda: command.is_heard)
-        made.speed = 0.5
-        assert soon(lambda: served.robot.velocity[0] > 0.45)
-        yield made
-        ended.set()
-        thread.join()
+        working = [pool.submit(unserved.server.run, stopping), pool.submit(send)]
+        try:
+            assert soon(lambda: robot.velocity[0] > 0.45)
+            yield made
+        finally:
+            stopping.set()
+        for each in working:
+            each.result()
 
 
-def test_the_robot_stands_while_the_link_of_its_sender_stalls_and_drives_on_afterwards(remote):
+def test_the_robot_drives_over_a_link_with_delays_and_stands_while_it_stalls_and_when_its_sender_is_silent(remote):
+    begun_m = remote.robot.pose.x_m
     with remote.link.stall():
         begun_s = time.monotonic()
         assert soon(remote.still)
         assert time.monotonic() - begun_s < 0.6
-        until_s = time.monotonic() + 0.6
-        while time.monotonic() < until_s:
-            assert remote.still()
-            time.sleep(0.01)
+        assert not soon(lambda: not remote.still(), 0.6)
     assert soon(lambda: remote.robot.velocity[0] > 0.45)
-
-
-def test_the_robot_drives_over_a_link_with_delays_and_short_stalls_until_its_sender_is_silent(remote):
-    chance, speeds, begun_m = np.random.default_rng(1), [], remote.robot.pose.x_m
-    until_s = time.monotonic() + 3.0
-    while time.monotonic() < until_s:
-        with remote.link.stall() if chance.uniform() < 0.3 else nullcontext():
-            time.sleep(0.3)
-        speeds.append(float(remote.robot.velocity[0]))
-    assert max(speeds) <= 0.5 + 1e-6 and min(speeds) >= 0.0
-    assert remote.robot.pose.x_m - begun_m > 0.5
+    assert soon(lambda: remote.robot.pose.x_m - begun_m > 0.5)
+    assert 0.0 <= remote.robot.velocity[0] <= 0.5 + 1e-6
     remote.speed, silent_s = None, time.monotonic()
     assert soon(remote.still)
     assert time.monotonic() - silent_s < 0.6 + 0.15  # the link's delay
@@ -227,22 +254,25 @@ def test_the_robot_drives_over_a_link_with_delays_and_short_stalls_until_its_sen
 def test_velocities_that_a_stalled_link_held_do_not_drive_after_their_sender_has_died(remote):
     with remote.link.stall():
         assert soon(remote.still)
-        time.sleep(0.5)
+        time.sleep(0.4)
         remote.speed = None
-        time.sleep(0.5)
+        time.sleep(0.4)
         stood_at_m = remote.robot.pose.x_m
-    time.sleep(0.8)
-    assert remote.robot.pose.x_m == stood_at_m
+    assert not soon(lambda: remote.robot.pose.x_m != stood_at_m, 0.8)
 
 
 def test_a_goal_of_the_arm_that_is_refused_is_told_with_its_reason(served, caplog):
     client = actions.ActionClient(served.node, "/alice/arm_controller/follow_joint_trajectory", TRAJECTORY)
-    assert client.send({"trajectory": {"joint_names": ["elbow"]}}, limit_s=5.0) is None
+    with ThreadPoolExecutor(1) as pool:
+        sent = pool.submit(client.send, {"trajectory": {"joint_names": ["elbow"]}}, limit_s=20.0)
+        served.soon(sent.done, 1000.0)
+    assert sent.result() is None
     assert "is refused: the trajectory moves elbow, not arm_sh0" in caplog.text
 
 
 def test_pictures_are_taken_only_while_somebody_looks(served):
-    time.sleep(0.5)
+    for _ in range(10):
+        served.step()
     assert "image" not in served.robot.calls
     served.node.subscribe("/alice/hand/image", IMAGE, lambda message: None)
-    assert soon(lambda: "image" in served.robot.calls) or "image" not in dir(served.robot)
+    served.soon(lambda: "image" in served.robot.calls)

@@ -17,8 +17,7 @@ pytestmark = pytest.mark.mission
 def test_it_finds_out_where_it_is_and_then_does_the_mission(localiser, tmp_path):
     stack = tmp_path / "stack.yaml"
     stack.write_text(f"localiser: {{use: {localiser}}}\n", encoding="utf-8")
-    near = {"x": 2.4, "y": 6.7, "yaw": 1.57}
-    request = Request(file=MISSION, given=near, seed=3, out=tmp_path, record=False, stack=stack, start="unknown")
+    request = Request(file=MISSION, seed=3, out=tmp_path, record=False, stack=stack, start="unknown")
     report = run_request(prepare(request)).report
     assert report.achieved, (report.message, report.referee.why)
     assert report.referee.collisions == 0

@@ -75,21 +75,34 @@ START = Pose2D(-3.0, 0.0, 0.0)
 PERSON = load_catalogue()["person"].forms["standing"].path()
 
 
+_BUILT = {}
+
+
+def built(folder, routes, robot, doors):
+    """A floor with a wall, a robot and people; it is built once for the same people and doors."""
+    kept, placed = (*routes, repr(doors)), PlacedRobot("Alice", "spot", robot)
+    models = [
+        LooseModel(name, PERSON, RigidTransform([*each.stops[0].at_W, 0.0]), route=each)
+        for name, each in routes.items()
+    ]
+    if kept not in _BUILT:
+        directives = box_world(folder, floor=("20 20 1", "0 0 -0.5"), wall=("0.2 6 2", "2 -2 1"))
+        config = DiagramConfig(directives=directives, models=models, robots=[placed], visuals=False, render=False)
+        _BUILT[kept] = build_diagram(replace(config, doors=doors))
+    world = _BUILT[kept]
+    world.robots["Alice"].robot = placed
+    return replace(world, config=replace(world.config, models=models))
+
+
 class Hall:
     """A floor with a wall, a robot and a person, and the referee."""
 
     def __init__(self, folder, route, robot=START, doors=(), **others):
-        directives = box_world(folder, floor=("20 20 1", "0 0 -0.5"), wall=("0.2 6 2", "2 -2 1"))
-        models = [
-            LooseModel(name, PERSON, RigidTransform([*each.stops[0].at_W, 0.0]), route=each)
-            for name, each in {"Kim": route, **others}.items()
-        ]
-        placed = [PlacedRobot("Alice", "spot", robot)]
-        config = DiagramConfig(directives=directives, models=models, robots=placed, visuals=False, render=False)
-        self.world = build_diagram(replace(config, doors=doors))
-        self.engine, persons = Engine(self.world), ["Kim", *others]
+        routes = {"Kim": route, **others}
+        self.world = built(folder, routes, robot, doors)
+        self.engine = Engine(self.world)
         self.referee = Referee(
-            self.world.plant, [], robots={"Alice": SPOT}, persons=persons, scenery=self.world.scenery
+            self.world.plant, [], robots={"Alice": SPOT}, persons=[*routes], scenery=self.world.scenery
         )
         self.engine.observe(lambda now_s: self.referee.observe(self.engine.context, now_s), every=4)
 

@@ -4,7 +4,7 @@ import pytest
 
 from executive.record.schemas import SPEECH
 from executive.words.mission import Route
-from plant.worlds.world import load_world
+from skills.robot import Pose2D
 from tests.benchmarks.plant_mission import PlantMission
 from tests.visitors import OnMessage
 
@@ -14,8 +14,11 @@ DOOR_W = (5.60, 3.60)
 
 
 def test_a_person_in_the_doorway_is_asked_and_makes_way(tmp_path):
-    world = load_world("flat").without_people().with_routes({"Robin": Route(waypoints=(DOOR_W,), start=0.0)})
-    mission = PlantMission(tmp_path, 0, change=lambda _: world, sentence="go to the office", time_limit_s=150.0)
+    def stands_in_doorway(prepared):
+        return prepared.world.without_people().with_routes({"Robin": Route(waypoints=(DOOR_W,), start=0.0)})
+
+    options = {"sentence": "go to the office", "start": Pose2D(6.4, 4.5, 3.14), "time_limit_s": 150.0}
+    mission = PlantMission(tmp_path, 0, change=stands_in_doorway, **options)
     said = []
 
     def hear(topic, message):

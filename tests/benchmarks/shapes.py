@@ -60,10 +60,15 @@ def written_shape(seed, folder):
     return folder / name
 
 
+def tool_mesh(name):
+    """The mesh of a thin tool, in mm."""
+    return trimesh.util.concatenate([made_part(**part) for part in TOOLS[name]["parts"]])
+
+
 def written_tool(name, folder):
     """Writes a thin tool as an imported object into a folder of its own within a folder; returns the former."""
     tool, mesh = TOOLS[name], folder / f"{name}_mesh.ply"
-    trimesh.util.concatenate([made_part(**part) for part in tool["parts"]]).export(mesh)
+    tool_mesh(name).export(mesh)
     (folder / name).mkdir()
     import_object(mesh, ImportOptions(name, tool["mass_kg"], None, 0.001, "z"), folder / name)
     return folder / name

@@ -17,7 +17,7 @@ from skills.robot import BaseKind, Pose2D
 from skills.testing.blocks import FRONT_CAMERAS, grid_of, mount_of
 from skills.testing.blocks import Block as Box
 from skills.testing.clock import VirtualClock
-from skills.testing.estimators import BlockCostmap
+from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import BASE_ONLY, ScriptedRobot, Start
 
 OUTLINE, BODY_HEIGHT_M = BASE_ONLY.footprint_m, BASE_ONLY.standing_height_m
@@ -118,6 +118,14 @@ class NamingWorker(LockStepWorker):
         return job
 
 
+class ExactPlace:
+    """Component of an exact localiser, for what does not depend on the estimate of the pose."""
+
+    @staticmethod
+    def build(grid, start, *, surely):
+        return KnownPlace(start)
+
+
 class Bench:
     """A robot among boxes with its estimators, advanced as the runner would do it. `surveyed` is what the maps know.
 
@@ -141,6 +149,8 @@ class Bench:
         self.clock = VirtualClock()
         world, capabilities = [*surveyed, *unmapped], capabilities_of(base_kind, cameras=cameras)
         self.robot = PlanarRobot(self.clock, world, start, capabilities=capabilities, seed=seed, azimuths=azimuths)
+        if isinstance(component, ExactPlace):
+            self.robot.odometry_scale, self.robot.yaw_drift_rad_per_m = 1.0, 0.0
         believed = (believed_start or start) if start_known else None
         scan_grid, keepout_grid = grids_of(tuple(surveyed))
         self.localiser = (component or LocaliserOptions()).build(scan_grid, believed, surely=start_known)

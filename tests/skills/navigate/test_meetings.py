@@ -29,7 +29,7 @@ def rooms():
     return grid_of(TWO_ROOMS, (0.05, 1.0))
 
 
-@pytest.mark.parametrize("kinds", [(OBLONG, OBLONG), (ROUND, OBLONG)])
+@pytest.mark.parametrize("kinds", [pytest.param((OBLONG, OBLONG), marks=pytest.mark.nightly), (ROUND, OBLONG)])
 def test_two_robots_that_swap_places_through_a_door_both_arrive(rooms, kinds):
     """One robot backs out, the other passes, then the first follows; they never touch."""
     floor = Floor(rooms)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planar_people import LateAnswer, PeopleDetector, person_at
-from planar_robot import Bench
+from planar_robot import Bench, ExactPlace
 
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
 from skills.doorway import Doorway
@@ -18,6 +18,7 @@ from skills.world_model import Zone, ZoneKind
 
 START, LANE_M = Pose2D(1.5, 5.4, 0.0), 5.4
 END = ((5.0, 4.5), (8.0, 4.5), (8.0, 6.5), (5.0, 6.5))
+EXACT = {"component": ExactPlace(), "azimuths": 360}
 QUICK = FollowPersonOptions(lost_s=2.0, finding_s=2.0, asking_s=2.0, search_s=4.0)
 
 
@@ -41,7 +42,7 @@ class Walk:
         zones=(),
         **inputs,
     ):
-        self.bench = Bench(START, unmapped=[person_at(3.2, LANE_M), *others], cameras=cameras)
+        self.bench = Bench(START, unmapped=[person_at(3.2, LANE_M), *others], cameras=cameras, **EXACT)
         self.to_m, self.speed_m_s, self.gone_s, self.back_s, self.x_m = to_m, speed_m_s, gone_s, back_s, 3.2
         self.questions = []
         self.bench.tick(10)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planar_people import person_at
-from planar_robot import TWO_ROOMS, Bench
+from planar_robot import Bench, ExactPlace
 
 from executive.run.control import Control
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
@@ -29,7 +29,7 @@ class Guided:
     """A bench with a person who walks along the robot's path, and what the robot says."""
 
     def __init__(self, at=ROBIN, unmapped=(), answer="yes", **options):
-        self.bench = Bench(START, unmapped=unmapped, surveyed=TWO_ROOMS, cameras=False)
+        self.bench = Bench(START, unmapped=unmapped, cameras=False, component=ExactPlace(), azimuths=360)
         self.at, self.trail, self.body = at, [], None
         self.stays = lambda now_s: False
         self.control = Control(pace=None)

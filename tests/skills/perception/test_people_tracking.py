@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planar_people import PeopleDetector, person_at
-from planar_robot import Bench, Box
+from planar_robot import Bench, Box, ExactPlace
 
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleTracker, PeopleWatch, predicted_place_W
@@ -20,7 +20,7 @@ PERSON = person_at(3.5, 5.5)
 
 def watched(*people, detector_changes=None, seconds=2.0, cameras=True):
     """Bench, detector and watch after some seconds."""
-    bench = Bench(START, unmapped=people, cameras=cameras)
+    bench = Bench(START, unmapped=people, cameras=cameras, component=ExactPlace())
     detector = PeopleDetector(bench, list(people), **(detector_changes or {}))
     watch = PeopleWatch(replace(bench.context(), detector=detector))
     look(bench, watch, seconds)
@@ -60,7 +60,7 @@ def test_a_person_in_a_picture_is_located_in_the_world(distance_m):
     ids=["nothing", "something ahead", "something behind"],
 )
 def test_cameras_take_pictures_only_while_an_unexplained_obstacle_is_in_view(unmapped, least, most):
-    bench = Bench(START, unmapped=unmapped)
+    bench = Bench(START, unmapped=unmapped, component=ExactPlace())
     detector = PeopleDetector(bench, [])
     look(bench, PeopleWatch(replace(bench.context(), detector=detector)), 4.0)
     assert set(detector.pictures) <= {2}

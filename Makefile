@@ -15,6 +15,8 @@ PYTHON ?= $(shell command -v python3.11 || echo python3)
 VENV := .venv
 BIN := $(VENV)/bin
 PLUGINS := $(wildcard plugins/*)
+# Modules are compiled when they are first imported; most of a package's never are.
+INSTALL = $(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt
 # Plug-ins as `make env` installs them, with the extras of theirs that it adds.
 EDITABLE := $(PLUGINS:%/errand-make=%/errand-make[mapping,xacro])
 # What the wheels need beyond Python: libraries of Drake, and software rendering through EGL for the cameras.
@@ -25,7 +27,8 @@ BROWSER := chromium
 # One more than there are processors, since tests of pages and of processes wait.
 JOBS ?= $(shell expr $$(nproc) + 1)
 SINCE ?= HEAD
-PYTEST = $(BIN)/pytest -n $(JOBS) --dist worksteal --ignore-glob='*_benchmarks.py'
+# Each file runs in one process, which sets up once what its tests share.
+PYTEST = $(BIN)/pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --ignore-glob='*_benchmarks.py'
 # Tests start many processes; compiled modules are kept even where an environment would have none written.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -47,7 +50,8 @@ endef
 env: $(VENV)/.ready
 
 $(VENV)/.ready: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,cluster,test,browser,bench,dev]' $(EDITABLE:%=--editable '%')
+	{ $(BIN)/python -m executive.cli warm-up >/dev/null 2>&1 & } ; \
+	$(INSTALL) --editable '.[visuals,speech,cluster,test,browser,bench,dev]' $(EDITABLE:%=--editable '%') && wait
 	$(BIN)/errand warm-up
 	@touch $@
 
@@ -55,13 +59,13 @@ $(VENV)/.run: pyproject.toml VERSION $(PLUGINS:%=%/pyproject.toml) constraints.t
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
 	  || { echo "Errand needs Python 3.11, 3.12 or 3.13; set PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals]'
+	$(INSTALL) --editable '.[visuals]'
 	@touch $@
 
 train: $(VENV)/.train
 
 $(VENV)/.train: $(VENV)/.ready
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[speech]' --editable 'plugins/errand-train[torch]'
+	$(INSTALL) --editable '.[speech]' --editable 'plugins/errand-train[torch]'
 	@touch $@
 
 debian:
@@ -80,7 +84,7 @@ demo: $(VENV)/.run
 	$(BIN)/errand run --say "Hey Alice, can you fetch me a drink from the kitchen" --world flat --seed 1
 
 test: env voices browser
-	$(PYTEST) --durations-file=out/tests/durations.json
+	$(PYTEST) --durations-file=out/tests/durations.json --costs-file=out/tests/costs.json
 
 affected: env
 	$(PYTEST) --affected=$(SINCE)
@@ -115,7 +119,7 @@ docs: $(VENV)/.docs
 	@echo "open out/site/index.html"
 
 $(VENV)/.docs: $(VENV)/.ready
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
+	$(INSTALL) --editable '.[docs]'
 	@touch $@
 
 clean:

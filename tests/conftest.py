@@ -2,14 +2,18 @@
 
 import gc
 import os
+from pathlib import Path
 
 import pytest
 
-from tests import affected, durations, missing
+from tests import affected, costs, durations, missing
 
 
 def pytest_addoption(parser):
     durations.add_option(parser)
+    parser.addoption(
+        "--costs-file", type=Path, help="counts what tests cost, and fails above the budgets of costs.yaml"
+    )
     affected.add_option(parser)
 
 
@@ -17,6 +21,8 @@ def pytest_configure(config):
     file, revision = config.getoption("durations_file"), config.getoption("affected")
     if file and not hasattr(config, "workerinput"):
         config.pluginmanager.register(durations.Durations(file))
+    if config.getoption("costs_file"):
+        config.pluginmanager.register(costs.Costs(config.getoption("costs_file"), not hasattr(config, "workerinput")))
     if os.environ.get("CI"):
         config.pluginmanager.register(missing.NothingMissing())
     if config.getoption("fast"):
@@ -37,6 +43,7 @@ def pytest_collection_modifyitems(items):
         is_suite = item.path.name.endswith(".skilltest.yaml") and ": " in item.name
         if is_suite and (item.path.name in LONG_SUITES or first.setdefault(item.path, item.index) != item.index):
             item.add_marker(pytest.mark.nightly)
+    durations.slowest_first(items)
 
 
 COLLECTED_AFTER = 30_000

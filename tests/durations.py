@@ -1,6 +1,7 @@
 """Durations of all tests of a run: a table at its end, and with `--durations-file` the whole list as JSON.
 
-`python -m tests.durations` writes the slow files of that list into `tests/slow.txt`; `--fast` leaves them out.
+`python -m tests.durations` writes the slow files of that list into `tests/slow.txt`, the slowest first. A run begins with
+them, so that no process is left with one at the end; `--fast` leaves them out.
 """
 
 from __future__ import annotations
@@ -71,11 +72,21 @@ class Durations:
         }
 
 
+def slowest_first(items):
+    """Sorts tests by the place of their files in the list of slow ones."""
+    order = {path: place for place, path in enumerate(slow_files())}
+    items.sort(key=lambda item: order.get(item.path, len(order)))
+
+
+def slow_files():
+    return [ROOT / line for line in SLOW.read_text().splitlines()]
+
+
 class Fast:
     """Plugin that collects no tests of slow files."""
 
     def __init__(self) -> None:
-        self.slow = frozenset(ROOT / line for line in SLOW.read_text().splitlines())
+        self.slow = frozenset(slow_files())
 
     def pytest_ignore_collect(self, collection_path):
         return True if collection_path in self.slow else None
@@ -93,7 +104,7 @@ def main():
     if not FILE.is_file():
         raise SystemExit(f"there is no {FILE.relative_to(ROOT)}: run `make test` first")
     files = json.loads(FILE.read_text())["files"]
-    SLOW.write_text("".join(f"{name}\n" for name in sorted(row["name"] for row in files if row["seconds"] > SLOW_S)))
+    SLOW.write_text("".join(f"{row['name']}\n" for row in files if row["seconds"] > SLOW_S))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from tests.missing import NothingMissing
 pytest_plugins = ["pytester"]
 
 
-def test_what_is_skipped_for_want_of_something_fails(pytester):
+def test_a_test_that_skips_for_want_of_something_fails(pytester):
     pytester.makepyfile(
         test_module="import pytest; pytest.importorskip('nothing_of_this_name')",
         test_one="""

@@ -30,11 +30,12 @@ from skills.estimate.grid_map import GridMap
 from skills.navigate.zone_map import zone_messages
 from skills.world_model import Zone, ZoneKind
 
-SIZES = [(1400, 900), (390, 844)]
+DESK, TELEPHONE = {"width": 1400, "height": 900}, {"width": 390, "height": 844}
 LONG = f"waits until sixty seconds are over, as the mission says, and goes on with the rest of the round {'x' * 60}"
 
 playwright_api = pytest.importorskip("playwright.sync_api", reason="not installed: pip install playwright")
 expect = playwright_api.expect
+pytest_plugins = ["tests.browser"]
 pytestmark = pytest.mark.browser
 
 OVERFLOWING = """() => [...document.querySelectorAll('body *')].filter((each) => {
@@ -47,12 +48,13 @@ OVERFLOWING = """() => [...document.querySelectorAll('body *')].filter((each) =>
 """Elements that stick out of the page, and do not scroll inside another one."""
 
 
-@pytest.fixture(params=[(*size, scheme) for size in SIZES for scheme in ("light", "dark")], ids=str)
-def page(browser, request):
-    width, height, scheme = request.param
-    context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
-    yield context.new_page()
-    context.close()
+@pytest.fixture(params=[(DESK, "light"), (TELEPHONE, "dark")], ids=["desk, light", "telephone, dark"])
+def page(tab, request):
+    """A page of a size and a colour scheme; each test has both of both, and some the other pairs of them."""
+    size, scheme = request.param
+    tab.set_viewport_size(size)
+    tab.emulate_media(color_scheme=scheme)
+    return tab
 
 
 @pytest.fixture
@@ -84,6 +86,11 @@ def running(nested):
         PageContent(feed, {name: lambda values: "" for name in ("pause", "step", "cancel", "stop", "say", "queue")})
     ) as server:
         yield server.url
+
+
+the_other_pairs = pytest.mark.parametrize(
+    "page", [(DESK, "dark"), (TELEPHONE, "light")], ids=["desk, dark", "telephone, light"], indirect=True
+)
 
 
 def expect_fit(page):
@@ -155,6 +162,7 @@ def test_the_page_of_several_robots_fits_and_no_name_on_the_map_covers_another(p
     page.wait_for_function(uncovered)  # the map is drawn once more when its panel has its size
 
 
+@the_other_pairs
 def test_the_page_of_a_fleet_fits_three_screens_of_a_telephone_and_its_stop_button_stays_in_view(page, fleet):
     page.goto(fleet)
     page.locator("#legend li").first.wait_for()
@@ -188,6 +196,7 @@ def driven():
         yield server.url
 
 
+@the_other_pairs
 def test_a_robot_is_driven_by_hand_by_its_own_cameras_with_map_events_and_stop_button(page, driven):
     page.goto(driven)
     expect(page.locator("#camera img")).to_have_count(3)
@@ -250,6 +259,7 @@ def report_page(tmp_path, nested):
     return path
 
 
+@the_other_pairs
 def test_the_report_fits_its_page_and_wide_parts_scroll_inside_themselves(page, report_page):
     page.goto(report_page.as_uri())
     assert page.locator(".verdict li").count() == 6

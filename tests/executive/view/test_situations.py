@@ -14,6 +14,7 @@ from executive.record.history import read_history
 
 playwright_api = pytest.importorskip("playwright.sync_api", reason="not installed: pip install playwright")
 expect = playwright_api.expect
+pytest_plugins = ["tests.browser"]
 pytestmark = [pytest.mark.browser, pytest.mark.mission, pytest.mark.nightly]
 
 ERRAND = (sys.executable, "-u", "-m", "executive.cli")

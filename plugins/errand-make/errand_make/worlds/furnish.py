@@ -174,13 +174,10 @@ def _spots(
                 continue
             for quarter in range(4):
                 moved = replace(piece, pose=Pose2D(float(x), float(y), quarter * math.pi / 2))
-                back = [moved.point(-depth / 2 - _BEHIND_M, side * width / 3) for side in (-1, 0, 1)]
-                inner = (moved.point(0.0, side * (width / 2 + _BESIDE_M)) for side in np.linspace(-1.0, 1.0, 9))
-                if (
-                    max(_free(grid, clearance, at) for at in back)
-                    <= 0.0
-                    < min(_free(grid, clearance, at) for at in inner)
-                ):
+                back = (moved.point(-depth / 2 - _BEHIND_M, side * width / 3) for side in (-1, 0, 1))
+                inner = (moved.point(0.0, side / 4 * (width / 2 + _BESIDE_M)) for side in range(-4, 5))
+                at_wall = all(_free(grid, clearance, at) <= 0.0 for at in back)
+                if at_wall and all(_free(grid, clearance, at) > 0.0 for at in inner):
                     yield round(far_m, 2), moved
 
 

@@ -1,5 +1,7 @@
 """Meshes, photographs, maps, and worlds of one's own, for the commands that make them."""
 
+import shutil
+
 import cv2
 import numpy as np
 import pytest
@@ -33,15 +35,23 @@ def map_file(tmp_path):
     return write_room(tmp_path, yaw=0.3)
 
 
-@pytest.fixture
-def own(tmp_path):
-    """Folder of a world of two rooms with a door of 0.9 m, a dock and Robin."""
+@pytest.fixture(scope="session")
+def rooms_world(tmp_path_factory):
+    """Folder with a map of two rooms with a door of 0.9 m, and its world `own` with a dock and Robin."""
+    folder = tmp_path_factory.mktemp("rooms")
     rooms = np.full((120, 240), 0, np.uint8)
     rooms[4:-4, 4:118] = rooms[4:-4, 122:-4] = 254
     rooms[51:69, 118:122] = 254
-    cv2.imwrite(str(tmp_path / "room.pgm"), rooms)
-    (tmp_path / "room.yaml").write_text(MAP.format(yaw=0.0))
-    done("world", "from-map", tmp_path / "room.yaml", "--out", tmp_path / "own")
+    cv2.imwrite(str(folder / "room.pgm"), rooms)
+    (folder / "room.yaml").write_text(MAP.format(yaw=0.0))
+    done("world", "from-map", folder / "room.yaml", "--out", folder / "own")
+    return folder
+
+
+@pytest.fixture
+def own(rooms_world, tmp_path):
+    """Folder of a world of two rooms, beside its map."""
+    shutil.copytree(rooms_world, tmp_path, dirs_exist_ok=True)
     return tmp_path / "own"
 
 

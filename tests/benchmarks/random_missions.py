@@ -409,6 +409,7 @@ class Trial:
                 settings=RunSettings(
                     seed=self.seed,
                     tick_period_s=TICK_S,
+                    verb_limit_s=60.0,
                     time_limit_s=LIMIT_S,
                     endings_limit_s=ENDINGS_S,
                     time_of_day_s=8 * 3600.0,

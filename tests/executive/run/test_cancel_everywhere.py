@@ -98,20 +98,22 @@ def cancelled(mission, tick):
     return result, moved, speed, parts, still
 
 
-def test_cancel_at_every_tick_leaves_the_robot_at_rest_within_its_time(mission):
+@pytest.mark.parametrize("first", [0, *(pytest.param(first, marks=pytest.mark.nightly) for first in (1, 2))])
+def test_cancel_at_every_tick_leaves_the_robot_at_rest_within_its_time(mission, first):
+    """Every third tick by day, in which each skill, of eight ticks, is met in another phase."""
     whole, _, _ = run_until(mission, 1_000_000, None)
     assert whole.outcome is Outcome.SUCCESS
     assert whole.ticks > 45
     in_motion = 0
-    for tick in range(whole.ticks):
+    for tick in range(first, whole.ticks, 3):
         result, moved, speed, parts, still = cancelled(mission, tick)
         assert (result.outcome, result.worst.cause) == (Outcome.CANCELLED, Cause.CANCELLED), f"tick {tick}"
         assert (speed, parts, still) == (0.0, (), True), f"tick {tick}: {parts} still moves"
         in_motion += "drive" in moved
-    assert in_motion > 20
+    assert in_motion > 6
 
 
-@pytest.mark.parametrize("tick", range(3, 48, 4))
+@pytest.mark.parametrize("tick", range(3, 48, 7))
 def test_pausing_leaves_the_robot_at_rest_within_its_time_and_the_mission_goes_on(mission, tick):
     speeds = {}
 

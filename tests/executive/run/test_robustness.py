@@ -2,7 +2,6 @@
 
 import dataclasses
 import threading
-import time
 from typing import ClassVar
 
 import numpy as np
@@ -37,7 +36,8 @@ SEEN = ("capabilities", "odometry", "own_localisation", "imu", "scan", "joints",
 MAYBE_NONE = {"own_localisation", "imu", "scan", "lease_holder"}
 ANSWERING = set(USED) - {"return_lease", "carry"}
 HANG_LIMITS = {"verb_limit_s": 0.2, "image_limit_s": 0.2}
-HANGS_S = 0.7
+OVER = threading.Event()
+"""Ends the hangs."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -127,7 +127,7 @@ def raising(call):
 
 
 def hanging(call):
-    time.sleep(HANGS_S)
+    OVER.wait(20.0)
     return call.proceed()
 
 
@@ -197,9 +197,12 @@ def test_a_hang_ends_a_run_that_is_not_in_the_main_thread(tmp_path, verb):
     thread.start()
     thread.join(timeout=10.0)
     result, robot, topics = ended[0]
+    OVER.set()  # what hung comes back, and finds that its lease no longer counts
+    for hung in (each for each in threading.enumerate() if each.name == f"errand-{verb}"):
+        hung.join(timeout=10.0)
+    OVER.clear()
     assert result.outcome is (Outcome.SUCCESS if verb == "return_lease" else Outcome.ERROR)
     assert "outcome" in topics or verb == "acquire_lease"
-    time.sleep(HANGS_S)  # what hung comes back, and finds that its lease no longer counts
     assert robot.moving_parts == () or verb == "return_lease"
 
 

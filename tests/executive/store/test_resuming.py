@@ -1,6 +1,7 @@
 """A mission is broken off at every moment and taken up by another process: nothing is done twice."""
 
 import dataclasses
+from functools import cache
 from typing import ClassVar
 
 import pytest
@@ -10,7 +11,7 @@ from executive.mission.request import Request
 from executive.run.mission_history import history_keys
 from executive.run.outcome import Outcome
 from executive.run.runner import run
-from executive.run.visitor import RunEntry, RunSettings, RunVisitor
+from executive.run.visitor import RunEntry, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.store.recollection import Memory, StepRecord
@@ -24,6 +25,7 @@ from executive.words.mission import Mission
 from executive.words.step import Policy
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Running, Succeeded, Surface
 from skills.quantities import Coordinate, Length
+from tests.executive.conftest import PATIENT
 
 TIDY = ("Take [Nothing] to [kitchen] and do [grasp] to [drink]", "Take [drink] to [bedroom] and do [place] to [drink]")
 FETCH_AND_ASK = (
@@ -137,13 +139,16 @@ def store(tmp_path):
 def live(store, clock, robot, make, world, script, handling, knowledge):
     """One life of the executive: it ends by itself, or is killed in some tick, before or after that was noted."""
 
+    @cache
+    def tree_of(texts, policy):
+        steps = tuple(Do.from_command(parse_command(text)) for text in texts)
+        mission = Mission(name="fetch drink", robot="Alice", steps=steps).with_policy(policy)
+        return compile_mission(mission, knowledge=knowledge, registry=handling)
+
     def one_life(texts, *, kill_after=None, kill_when=None, lag=0, policy=Policy()):  # noqa: B008 - frozen
         missions = store.missions()
         mission = missions[0] if missions else store.add(REQUEST, queued=False)
-        steps = [Do.from_command(parse_command(text)) for text in texts]
-        mission_file = Mission(name="fetch drink", robot="Alice", steps=tuple(steps)).with_policy(policy)
-        tree = compile_mission(mission_file, knowledge=knowledge, registry=handling)
-        journal, recollection = store.journal(mission.id), None
+        tree, journal, recollection = tree_of(texts, policy), store.journal(mission.id), None
         if missions:
             tree, recollection = resumed_tree(tree, store.memory(mission.id))
             journal.use_recollection(recollection)
@@ -154,9 +159,7 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
         robot.holder = None
         entry = RunEntry(tree, robot, make.StillLocaliser(), make.EmptyCostmap())
         try:
-            result = run(
-                [entry], clock=clock, worker=LockStepWorker(clock), visitors=[ticks], settings=RunSettings(seed=3)
-            )
+            result = run([entry], clock=clock, worker=LockStepWorker(clock), visitors=[ticks], settings=PATIENT)
         except KilledError:
             return None, ticks.count, recollection
         return result, ticks.count, recollection

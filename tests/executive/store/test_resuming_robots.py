@@ -8,7 +8,7 @@ from executive.mission.request import Request
 from executive.run.mission_history import BEFORE
 from executive.run.outcome import Outcome
 from executive.run.runner import run
-from executive.run.visitor import RunEntry, RunSettings, RunVisitor
+from executive.run.visitor import RunEntry, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.store.resuming import ended_tree, resumed_tree
@@ -19,6 +19,7 @@ from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from executive.words.robot_config import RobotConfig
 from skills.api import Cause, Failed, Running, Succeeded
+from tests.executive.conftest import PATIENT
 
 TAKE_AND_PUT = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
@@ -126,10 +127,12 @@ class Killing(RunVisitor):
 def live(store, clock, robots, make, handling, knowledge):
     """One life of the executive: it ends by itself, or is killed when so many ticks of robots were noted."""
 
+    steps = tuple(Do.from_command(parse_command(text)) for text in TAKE_AND_PUT)
+    missions = {name: Mission(name="tidy", robot=name, steps=steps) for name in robots}
+    trees = {name: compile_mission(each, knowledge=knowledge, registry=handling) for name, each in missions.items()}
+
     def entry_for(mission, name, made, kill_after, after):
-        steps = tuple(Do.from_command(parse_command(text)) for text in TAKE_AND_PUT)
-        tree = compile_mission(Mission(name="tidy", robot=name, steps=steps), knowledge=knowledge, registry=handling)
-        journal, robots[name].holder = store.journal(mission.id, name), None
+        tree, journal, robots[name].holder = trees[name], store.journal(mission.id, name), None
         if mission.starts:
             memory = store.memory(mission.id, name)
             tree, recollection = ended_tree(tree, memory) or resumed_tree(tree, memory)
@@ -150,7 +153,7 @@ def live(store, clock, robots, make, handling, knowledge):
                 clock=clock,
                 worker=LockStepWorker(clock),
                 visitors=[killing for _, killing in given],
-                settings=RunSettings(seed=3),
+                settings=PATIENT,
             )
         except KilledError:
             return None, len(made)

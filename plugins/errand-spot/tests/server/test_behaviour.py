@@ -22,7 +22,7 @@ from bosdyn.util import seconds_to_duration
 from errand_spot.server.computer import Pace
 from errand_spot.server.graph_nav import _impaired
 
-PACE = Pace.CLIENT
+PACE, SHARED = Pace.CLIENT, True
 Fault = robot_state_pb2.BehaviorFault
 Progress = basic_command_pb2.RobotCommandFeedbackStatus
 Walk = basic_command_pb2.SE2TrajectoryCommand.Feedback
@@ -193,8 +193,8 @@ def test_a_robot_that_does_not_stand_stands_up_before_it_walks(spot, before, com
     before(spot)
     scripted, seen, told = spot.served.scripted, [], set()
     number = sent(spot, command, ahead_s=9.0)
-    for _ in range(80):
-        time.sleep(0.05)
+    for _ in range(40):
+        time.sleep(0.1)
         seen.append((scripted.height_m, abs(scripted.pose.x_m), abs(scripted.velocity[0])))
         both = spot.commands.robot_command_feedback(number).feedback.synchronized_feedback
         told.add(both.mobility_command_feedback.se2_trajectory_feedback.final_goal_status)

@@ -22,7 +22,7 @@ from skills.robot import Pose2D
 from skills.testing.blocks import Block
 from tests.tables import table
 
-PACE = Pace.CLIENT
+PACE, SHARED = Pace.CLIENT, True
 Api = docking_pb2
 Answer, Progress, State = Api.DockingCommandResponse, Api.DockingCommandFeedbackResponse, Api.DockState
 

@@ -24,7 +24,7 @@ from errand_spot.server.rays import first_hit_m
 from tests.tables import table
 
 Api = manipulation_api_pb2
-PACE = Pace.CLIENT
+PACE, SHARED = Pace.CLIENT, True
 ENDS = (
     Api.MANIP_STATE_DONE,
     Api.MANIP_STATE_GRASP_SUCCEEDED,
@@ -57,9 +57,10 @@ class Scripted:
 @pytest.fixture
 def picker(spot):
     """A picker of the server."""
-    made = Scripted()
-    next(each for each in spot.served.server.services if each.name == "manipulation")._picker = made
-    return made
+    service = next(each for each in spot.served.server.services if each.name == "manipulation")
+    service._picker = made = Scripted()
+    yield made
+    service._picker = None
 
 
 def client(spot):

@@ -15,7 +15,7 @@ from bosdyn.util import seconds_to_duration
 
 from errand_spot.server.computer import Pace
 
-PACE = Pace.CLIENT
+PACE, SHARED = Pace.CLIENT, True
 Stand = basic_command_pb2.StandCommand.Feedback
 
 

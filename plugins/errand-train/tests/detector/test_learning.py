@@ -160,13 +160,13 @@ def trained(learner, steps):
         picture[8 + 4 * k : 40, 12 : 52 - 4 * k] = (250, 60 * k, 30)
         canvases.append(Canvas(picture, targets((12, 8 + 4 * k, 52 - 4 * k, 40), classes=(k,))))
     batch = batch_of(canvases)
-    return [sum(learner.step(batch, 3e-3)) for _ in range(steps)]
+    return [sum(learner.step(batch, 1e-2)) for _ in range(steps)]
 
 
 @pytest.mark.usefixtures("small_network")
 def test_four_pictures_are_learnt_by_heart():
     learner = ProposalLearner.new(len(NAMES), 1, CPU)
-    found = trained(learner, 60)
+    found = trained(learner, 30)
     assert np.mean(found[-5:]) < 0.25 * np.mean(found[:5])
 
 
@@ -174,15 +174,15 @@ def test_four_pictures_are_learnt_by_heart():
 def test_a_resumed_training_goes_on_to_the_bit(tmp_path):
     torch.set_num_threads(1)
     whole = ProposalLearner.new(len(NAMES), 1, CPU)
-    trained(whole, 6)
+    trained(whole, 4)
     part = ProposalLearner.new(len(NAMES), 1, CPU)
-    trained(part, 3)
-    part.progress.taken = 12
+    trained(part, 2)
+    part.progress.taken = 8
     part.save(tmp_path / "checkpoint.pt")
     resumed = ProposalLearner.new(len(NAMES), 2, CPU)
     resumed.restore(tmp_path / "checkpoint.pt")
-    trained(resumed, 3)
-    assert resumed.progress.taken == 12
+    trained(resumed, 2)
+    assert resumed.progress.taken == 8
     for mine, theirs in ((whole.network, resumed.network), (whole.average, resumed.average)):
         pairs = zip(mine.state_dict().values(), theirs.state_dict().values(), strict=True)
         assert all(torch.equal(one, other) for one, other in pairs)

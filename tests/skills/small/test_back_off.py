@@ -101,7 +101,7 @@ def test_it_backs_off_when_a_restart_resumes_it():
     assert gone(bench, IN_THE_OPEN) > 0.3
 
 
-@pytest.mark.mission
+@pytest.mark.nightly
 def test_spot_backs_off_in_the_plant_when_a_restart_resumes_it(small_plant):
     bench = small_plant.bench
     before, skill = bench.robot.odometry().pose, BackOff(bench.context())

@@ -117,7 +117,7 @@ def twin_bench(start, seed):
     return bench
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.nightly), 1])
 def test_in_one_of_two_equal_rooms_it_finds_out_which(seed):
     bench = twin_bench(Pose2D(2.0, 1.5, 0.3), seed)
     step, said = outcome(bench)

@@ -128,7 +128,8 @@ def test_channels_of_several_robots_have_their_names(server, tmp_path, clock):
         assert {topic for topic, _, _ in client.messages(2)} == {"alice/pose", "alice/transform"}
 
 
-def test_client_that_reads_nothing_delays_neither_the_run_nor_its_end(server, log):
+def test_client_that_reads_nothing_delays_neither_the_run_nor_its_end(server, log, monkeypatch):
+    monkeypatch.setattr("executive.view.serving.CLOSE_S", 0.2)
     log("mine", {"text": ""})
     with socket.create_connection(server.url.removeprefix("ws://").split(":")) as deaf:
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -146,15 +147,15 @@ def test_client_that_reads_nothing_delays_neither_the_run_nor_its_end(server, lo
         asked = json.dumps({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 1}]}).encode()
         deaf.sendall(bytes([0x81, 0x80 | len(asked)]) + bytes(4) + asked)
         begun_s = time.perf_counter()
-        for _ in range(2000):
-            log("mine", {"text": "z" * 20_000})  # 40 MB, far more than the socket holds
+        for _ in range(600):
+            log("mine", {"text": "z" * 20_000})  # 12 MB, far more than the socket holds
         server.close()
         assert time.perf_counter() - begun_s < 10.0
 
 
-@pytest.mark.parametrize(
-    ("origin", "host", "allowed"),
-    [
+def test_other_pages_and_other_hosts_are_refused(server):
+    address = server.url.removeprefix("ws://")
+    for origin, host, allowed in (
         (None, None, True),
         ("https://app.foxglove.dev", None, True),
         ("file://", None, True),
@@ -166,37 +167,31 @@ def test_client_that_reads_nothing_delays_neither_the_run_nor_its_end(server, lo
         (None, "evil.example:8765", False),
         ("http://evil.example:8765", "evil.example:8765", False),
         (None, "[", False),
-    ],
-)
-def test_other_pages_and_other_hosts_are_refused(server, origin, host, allowed):
-    address = server.url.removeprefix("ws://")
-    with socket.create_connection(address.split(":")) as client:
+    ):
         headers = [f"Host: {host or address}", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13"]
         headers += ["Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", *([f"Origin: {origin}"] if origin else [])]
-        client.sendall("\r\n".join(["GET / HTTP/1.1", *headers, "", ""]).encode())
-        assert client.recv(64).split()[1] == (b"101" if allowed else b"403")
+        with socket.create_connection(address.split(":")) as client:
+            client.sendall("\r\n".join(["GET / HTTP/1.1", *headers, "", ""]).encode())
+            assert client.recv(64).split()[1] == (b"101" if allowed else b"403"), (origin, host)
 
 
-@pytest.mark.parametrize(
-    "said",
-    [
-        "{",
-        "[]",
-        "{}",
-        b"\x01",
-        {"op": "subscribe"},
-        {"op": "subscribe", "subscriptions": [{"id": -1, "channelId": 1}]},
-        {"op": "subscribe", "subscriptions": [{"id": "x", "channelId": [1]}]},
-        {"op": "subscribe", "subscriptions": [{"id": 3, "channelId": 99}]},
-        {"op": "unsubscribe", "subscriptionIds": [[]]},
-        {"op": "unsubscribe", "subscriptionIds": 7},
-    ],
-)
-def test_a_message_that_makes_no_sense_is_ignored(server, log, said):
+def test_a_message_that_makes_no_sense_is_ignored(server, log):
     with client_of(server) as client:
-        client.socket.send(json.dumps(said) if isinstance(said, dict) else said)
-        log("pose", POSE)
-        assert len(client.messages(2)) == 2
+        for said in (
+            "{",
+            "[]",
+            "{}",
+            b"\x01",
+            {"op": "subscribe"},
+            {"op": "subscribe", "subscriptions": [{"id": -1, "channelId": 1}]},
+            {"op": "subscribe", "subscriptions": [{"id": "x", "channelId": [1]}]},
+            {"op": "subscribe", "subscriptions": [{"id": 3, "channelId": 99}]},
+            {"op": "unsubscribe", "subscriptionIds": [[]]},
+            {"op": "unsubscribe", "subscriptionIds": 7},
+        ):
+            client.socket.send(json.dumps(said) if isinstance(said, dict) else said)
+            log("pose", POSE)
+            assert len(client.messages(2)) == 2, said
 
 
 def test_a_client_that_unsubscribes_gets_no_more(server, log, clock):

@@ -229,7 +229,7 @@ class _LazyGroup(TyperGroup):
         """Imports a command; for a group, loads the subcommand that is typed. Raises InputError."""
         if name in COMMANDS:
             command = shipped_command(name)
-            if isinstance(command, TyperGroup):
+            if isinstance(command, TyperGroup) and isinstance(command.commands.get(typed), _Listed | None):
                 with_plugin_commands(name, command, typed)
             self.add_command(command, name)
         elif name and "." not in name and (found := plugin_command(name)) is not None:

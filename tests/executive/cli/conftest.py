@@ -13,6 +13,7 @@ from executive.app.evaluate.workers import WorkResult as Done
 from executive.app.report.run_report import RunReport
 from executive.app.runs.one_run import FinishedRun
 from executive.cli import entry, listen_command
+from executive.language.parser import DependencyParser
 from executive.record.event_log import EventLog
 from executive.tree.node_view import node_view
 from executive.words.goal import RefereeReport
@@ -29,6 +30,12 @@ def commands_are_built_once():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(entry, "shipped_command", cache(entry.shipped_command))
         yield
+
+
+@pytest.fixture(autouse=True)
+def language_model_stays(monkeypatch):
+    """A run releases the model that its sentence needed; here the next call needs it again."""
+    monkeypatch.setattr(DependencyParser, "release", lambda _: None)
 
 
 @pytest.fixture

@@ -29,7 +29,13 @@ def shown(simulation):
 
 @pytest.fixture(scope="module")
 def page(simulation):
-    return gzip.decompress(simulation.show_live().page()).decode()
+    """A page that is built while no Meshcat can be made here.
+
+    Its server takes any number of clients, and its end in another thread ends the process.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recording, "Meshcat", None)
+        return gzip.decompress(simulation.show_live().page()).decode()
 
 
 def commands(page):
@@ -62,12 +68,6 @@ def test_the_page_counts_the_commands_that_come_before_the_poses(page):
     scripts, overlay = page.rsplit("<!-- Moves the bodies", 1)
     assert scripts.count(counted) == len(commands(page)) > 100
     assert overlay.rstrip().endswith("</html>")
-
-
-def test_no_meshcat_is_made_in_the_process_of_the_run(simulation, monkeypatch):
-    # its server takes any number of clients, and its end in another thread ends the process
-    monkeypatch.setattr(recording, "Meshcat", None)
-    assert simulation.show_live().page()
 
 
 def test_a_page_that_cannot_be_built_says_why(simulation, monkeypatch):

@@ -9,8 +9,9 @@ from typer.testing import CliRunner
 
 from executive.cli.entry import app
 
-FETCH = ("run", "--say", "Hey Alice, can you fetch me a drink from the kitchen", "--seed", "1", "--json")
-REPEATED_S = 28.0
+SAID, IN_KITCHEN = "Hey Alice, can you fetch me a drink from the kitchen", ("9.2", "6.6", "0")
+FETCH = ("run", "--say", SAID, "--seed", "1", "--json", "--start", *IN_KITCHEN)
+REPEATED_S = 24.0
 """The grasp has begun."""
 
 

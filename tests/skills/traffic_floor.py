@@ -5,6 +5,7 @@ What they do is what `navigate` makes of the others' ways; so a meeting takes a 
 
 import math
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -83,6 +84,7 @@ class Floor:
     robots: dict[str, ScriptedRobot] = field(default_factory=dict)
     trips: dict[str, Trip] = field(default_factory=dict)
     apart_m: float = math.inf
+    discs: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self):
         self.table = TrafficTable({}, self.clock.now)
@@ -92,7 +94,8 @@ class Floor:
         """One more robot; what its skills may use."""
         robot = ScriptedRobot(self.clock, name=name, capabilities=capabilities_of(base_kind), start=Start(start))
         self.robots[name] = robot
-        self.table.join(name, Footprint.of(robot.capabilities()).discs)
+        self.discs[name] = Footprint.of(robot.capabilities()).discs
+        self.table.join(name, self.discs[name])
         self.table.report(name, start)
         return SkillContext(
             robot,
@@ -117,7 +120,7 @@ class Floor:
             self.table.report(name, robot.pose)
         for _, trip in sorted(self.trips.items()):
             trip.step(self.table)
-        self.apart_m = min(self.apart_m, least_apart_m(self.robots))
+        self.apart_m = min(self.apart_m, self.least_apart_m())
 
     def run(self, until_s):
         """Tick until all have ended; whether all are there within the time."""
@@ -125,16 +128,11 @@ class Floor:
             self.tick()
         return all(isinstance(trip.ended, Succeeded) for trip in self.trips.values())
 
-
-def least_apart_m(robots):
-    """The least distance between the outlines of two robots; negative where they overlap."""
-    placed = []
-    for robot in robots.values():
-        footprint = Footprint.of(robot.capabilities())
-        placed.append((disc_centres(footprint.discs, pose_array([robot.pose]))[0], footprint.discs[:, 2]))
-    least = math.inf
-    for number, (centres, radii) in enumerate(placed):
-        for others, other_radii in placed[number + 1 :]:
+    def least_apart_m(self):
+        """The least distance between the outlines of two robots; negative where they overlap."""
+        least, outlines = math.inf, [(self.discs[name], robot.pose) for name, robot in self.robots.items()]
+        placed = [(disc_centres(discs, pose_array([pose]))[0], discs[:, 2]) for discs, pose in outlines]
+        for (centres, radii), (others, other_radii) in combinations(placed, 2):
             apart = np.linalg.norm(centres[:, None] - others[None], axis=2) - radii[:, None] - other_radii[None]
             least = min(least, float(apart.min()))
-    return least
+        return least

@@ -15,7 +15,7 @@ from skills.navigate.surroundings import NavigateOptions
 from skills.robot import Pose2D
 
 FOOTPRINT = Footprint.rectangle(OUTLINE)
-START, GOAL = Pose2D(1.2, 5.6, 0.0), Pose2D(8.5, 5.6, 0.0)
+START, GOAL = Pose2D(1.2, 5.6, 0.0), Pose2D(6.8, 5.6, 0.0)
 
 
 class Drive:

@@ -102,7 +102,7 @@ def test_robot_keeps_behind_a_person_until_they_stand_in_the_place():
 
 def test_robot_stays_out_of_a_keep_out_zone_through_which_the_person_goes():
     zone = Zone("lab", ZoneKind.KEEP_OUT, ((4.4, 4.0), (5.6, 4.0), (5.6, 7.0), (4.4, 7.0)))
-    walk = Walk(zones=(zone,), time_limit_s=20.0)
+    walk = Walk(zones=(zone,), time_limit_s=12.0)
     assert walk.run().cause is Cause.TIMEOUT
     assert 2.5 < walk.bench.robot.pose.x_m < 4.4  # as near as the zone allows
 

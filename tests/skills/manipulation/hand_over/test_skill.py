@@ -163,7 +163,7 @@ def _ticks(robot, skill):
         assert robot.now() < 60.0
 
 
-TICKS = pytest.mark.parametrize("every", [13, pytest.param(3, marks=pytest.mark.nightly)])
+TICKS = pytest.mark.parametrize("every", [23, pytest.param(3, marks=pytest.mark.nightly)])
 
 
 @TICKS

@@ -61,13 +61,14 @@ def serve_ros2(
     from errand_ros2.adapter.description import capabilities_of
     from errand_ros2.server import RobotServer
     from errand_ros2.wire.node import Place, open_session
+    from errand_ros2.wire.types import topic_name
     from executive.app.prepare.placed_robots import only_robot, refuse_blocked
     from executive.app.prepare.worlds import open_world
     from executive.app.runs.simulated import compile_first, simulate
     from executive.record.other_tools import ros_name
     from skills.estimate.grid_map import load_grid_map
 
-    at, opened = Place.parse(place), open_world(world)
+    at, opened, space = Place.parse(place), open_world(world), topic_name(f"/{ros_name(robot)}")
     capabilities_of(kind)
     placed = only_robot(robot, opened, seed=seed, start=start_pose(start), kind=kind)
     if start is not None:
@@ -83,6 +84,6 @@ def serve_ros2(
             truth=(lambda: simulation.engine.poses_W()[robot]) if truth else None,
         )
         router = "the router is here" if session.is_router else "by its router"
-        typer.echo(f"ROS 2: /{ros_name(robot)}, domain {at.domain}, {at.endpoint} ({router}; Ctrl-C ends it)")
+        typer.echo(f"ROS 2: {space}, domain {at.domain}, {at.endpoint} ({router}; Ctrl-C ends it)")
         with closing(server), suppress(KeyboardInterrupt):
             server.run(Event(), limit)

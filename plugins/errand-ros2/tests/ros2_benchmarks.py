@@ -46,7 +46,7 @@ def free_place():
 class TimedBridge(Bridge):
     """A bridge that measures its own CPU time, in the run's thread."""
 
-    cpu_s = 0.0
+    cpu_s, run = 0.0, staticmethod(lambda work: work())
 
     def tick(self, progress):
         begun_s = time.thread_time()
@@ -54,14 +54,14 @@ class TimedBridge(Bridge):
         self.cpu_s += time.thread_time() - begun_s
 
 
-def in_flat(client):
+def in_flat(client, pace=TimedBridge):
     """Runs a mission that waits in the flat, while `client(place, bridge)` runs in a thread; then cancels it."""
     with tempfile.TemporaryDirectory() as folder:
         mission = Path(folder) / "wait.yaml"
         mission.write_text("name: wait\nsteps:\n  - wait: {seconds: 3000}\n")
         prepared = prepare(Request(file=mission, world="flat", out=Path(folder) / "out", seed=1, record=False))
         place, control = free_place(), Control(pace=None)
-        bridge = TimedBridge(prepared, control, place)
+        bridge = pace(prepared, control, place)
 
         def talk():
             try:
@@ -70,7 +70,7 @@ def in_flat(client):
                 control.cancel("measured")
 
         threading.Thread(target=talk).start()
-        run_request(prepared, visitors=[bridge], control=control)
+        bridge.run(lambda: run_request(prepared, visitors=[bridge], control=control))
 
 
 def listen(port, limit_s):

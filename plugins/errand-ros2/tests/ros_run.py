@@ -8,7 +8,7 @@ import time
 import uuid
 from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -114,6 +114,12 @@ class SteppedBridge(Bridge):
             self.has_ended = True
             self._stands.release()
 
+    def finish(self):
+        """Cancels the run, and steps it to its end."""
+        self._control.cancel("the test is over")
+        while not self.has_ended:
+            self.step()
+
 
 class RealBridge(SteppedBridge):
     """Bridge of a run in real time; a step of its client waits for the run's next tick."""
@@ -163,10 +169,10 @@ class RosClient:
         assert condition() or (self.bridge.has_ended and soon(condition)), "it did not come about"
         return self.bridge.now() - begun_s
 
-    def meanwhile(self, call):
+    def meanwhile(self, call, limit_s=60.0):
         """Steps the run until a call has returned; returns what it returned."""
         made = self._pool.submit(call)
-        self.soon(made.done)
+        self.soon(made.done, limit_s)
         return made.result()
 
     def events(self, topic):
@@ -215,10 +221,6 @@ class RosClient:
             each.clear()
 
     def close(self):
-        """Cancels the run, and steps it to its end."""
-        self.bridge._control.cancel("the test is over")
-        while not self.bridge.has_ended:
-            self.bridge.step()
         self._pool.shutdown()
 
 
@@ -244,7 +246,7 @@ class ActionClient:
         return self._send.call({"goal_id": self.identity, "goal": self.goal}, limit_s=PATIENCE_S).accepted
 
     def result(self, limit_s=60.0):
-        return self.ros.meanwhile(partial(self.asked, limit_s))
+        return self.ros.meanwhile(partial(self.asked, limit_s), limit_s)
 
     def asked(self, limit_s=60.0):
         """Asks for the result while somebody else steps the run."""
@@ -306,14 +308,11 @@ def run_of_alice(folder, place=None, *, pace=SteppedBridge, before=lambda place:
         run = pool.submit(bridge.run, work)
         bridge.stands()
         try:
-            with open_session(place) as session:
-                ros = RosClient(session, bridge, backend)
+            with open_session(place) as session, closing(RosClient(session, bridge, backend)) as ros:
                 ros.prepared = prepared
-                try:
-                    yield ros
-                finally:
-                    ros.close()
+                yield ros
         finally:
+            bridge.finish()
             report = run.result()
         ros.report = report
 

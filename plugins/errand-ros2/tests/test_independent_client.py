@@ -186,10 +186,9 @@ def plain(value):
     names = getattr(value, "__dataclass_fields__", getattr(value, "__slots__", ()))
     if names and not isinstance(value, (np.ndarray, np.generic)):  # constants are in capital letters
         return {name: plain(getattr(value, name)) for name in names if name.islower() and name != "__msgtype__"}
-    if isinstance(value, (bytes, bytearray, memoryview, np.ndarray)):
-        return plain(list(value))
-    if isinstance(value, (list, tuple)):
-        return [plain(each) for each in value]
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    if isinstance(value, (bytes, bytearray, memoryview, list, tuple)):
+        return list(value) if len(value) and type(value[0]) is int else [plain(each) for each in value]
     value = value.item() if isinstance(value, np.generic) else value
     return "nan" if isinstance(value, float) and math.isnan(value) else value
 

@@ -70,7 +70,8 @@ def test_a_connected_robot_drives_and_is_still_at_the_end(place):
 
 
 def test_a_robot_that_falls_silent_ends_the_run_after_15_s(place, monkeypatch):
-    monkeypatch.setattr("errand_ros2.adapter.robot.GONE_S", 1.5)
+    monkeypatch.setattr("errand_ros2.adapter.robot.GONE_S", 0.3)
+    monkeypatch.setattr("errand_ros2.adapter.clocks._GRACE_S", 0.1)
     with served(place) as it, driver(place).connect("alice", "Alice") as made:
         made.make_ready()
         made.clock.advance(0.05)

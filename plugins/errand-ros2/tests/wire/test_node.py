@@ -3,7 +3,6 @@
 import subprocess
 import sys
 import threading
-import time
 from contextlib import ExitStack
 from types import SimpleNamespace
 
@@ -13,7 +12,7 @@ import pytest
 pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
 
 import zenoh
-from ros_client import EMPTY, connected, free_port
+from ros_client import EMPTY, connected, free_port, soon
 from zenoh_ros2_sdk import ROS2ServiceClient, ROS2Subscriber
 
 from errand_ros2.wire.node import Client, Node, Place, open_session
@@ -25,14 +24,6 @@ STRING, TRIGGER = "std_msgs/msg/String", "std_srvs/srv/Trigger"
 
 def text(value):
     return {"data": value}
-
-
-def soon(condition, limit_s=5.0):
-    """Waits until a condition holds; returns whether it does."""
-    until_s = time.monotonic() + limit_s
-    while not condition() and time.monotonic() < until_s:
-        time.sleep(0.01)
-    return condition()
 
 
 @pytest.fixture
@@ -85,8 +76,9 @@ def test_a_service_that_nobody_offers_gives_no_answer(other):
 def test_domains_do_not_hear_each_other(router):
     chatter = router.node.publisher("chatter", STRING)
     with open_session(Place(domain=7, port=router.place.port)) as session:
-        Node(session, "other").subscribe("/alice/chatter", STRING, lambda message: None)
-        time.sleep(0.3)
+        other = Node(session, "other")
+        other.subscribe("/alice/chatter", STRING, lambda message: None)
+        other.claim("/none")  # the router's answer comes after it has taken the subscription
         assert not chatter.is_heard
 
 

@@ -31,15 +31,15 @@ bosdyn.client.util.authenticate(robot)
 robot.time_sync.wait_for_sync()
 commands, states = robot.ensure_client("robot-command"), robot.ensure_client("robot-state")
 with LeaseKeepAlive(robot.ensure_client("lease"), must_acquire=True, return_at_exit=True):
-    robot.power_on(timeout_sec=20)
-    blocking_stand(commands, timeout_sec=10)
+    robot.power_on(timeout_sec=20, update_frequency=5.0)
+    blocking_stand(commands, timeout_sec=10, update_frequency=5.0)
     command = RobotCommandBuilder.synchro_se2_trajectory_point_command(GOAL_M, 0.0, 0.0, "odom")
     sent = commands.robot_command(command, end_time_secs=time.time() + 20)
     assert block_for_trajectory_cmd(commands, sent, timeout_sec=20)
     x_m = get_odom_tform_body(states.get_robot_state().kinematic_state.transforms_snapshot).x
     (picture,) = robot.ensure_client("image").get_image_from_sources(["hand_color_image"])
-    robot.power_off(cut_immediately=False, timeout_sec=20)
-print("walked", round(x_m, 1), picture.shot.image.cols)
+    robot.power_off(cut_immediately=False, timeout_sec=20, update_frequency=5.0)
+print("walked", round(x_m, 1), picture.shot.image.cols, sys.argv[2:], sys.flags.quiet)
 sys.exit(7)
 """
 
@@ -55,13 +55,18 @@ def test_a_map_that_cannot_be_written_is_one_error(tmp_path):
 @pytest.mark.mission
 @pytest.mark.parametrize("pace", ["real", "client"])
 def test_a_program_walks_the_robot_and_its_exit_code_is_kept(tmp_path, capfd, pace):
+    """At a client's pace it runs under the interpreter and from the start that are named."""
     pytest.importorskip("bosdyn.client", reason="not installed: pip install errand-spot")
     (tmp_path / "beside.py").write_text("GOAL_M = 0.2\n")
-    program = tmp_path / "walk.py"
+    program, interpreter = tmp_path / "walk.py", tmp_path / "python-with-the-sdk"
     program.write_text(PROGRAM)
-    result = errand("sdk", "--seed", "2", "--pace", pace, str(program), "127.0.0.1")
+    interpreter.write_text(f'#!/bin/sh\nexec {sys.executable} -q "$@"\n')
+    interpreter.chmod(0o755)
+    named = ["--start", "8.6", "3.9", "1.5", "--python", str(interpreter)] if pace == "client" else []
+    result = errand("sdk", "--seed", "2", "--pace", pace, *named, str(program), "127.0.0.1", "--start", "5")
     said = capfd.readouterr().out
-    assert (result.exit_code, "walked 0.2 640" in said) == (7, True), said + result.output
+    quiet = int(pace == "client")
+    assert (result.exit_code, f"walked 0.2 640 ['--start', '5'] {quiet}" in said) == (7, True), said + result.output
 
 
 def test_the_robot_starts_on_free_floor_away_from_people_with_space_ahead():
@@ -90,19 +95,6 @@ def test_a_start_or_an_interpreter_that_cannot_be_used_is_refused(tmp_path, opti
     (tmp_path / "walk.py").write_text("")
     result = errand("sdk", *options, str(tmp_path / "walk.py"))
     assert (result.exit_code, said in result.output.replace("\n", " ")) == (2, True), result.output
-
-
-@pytest.mark.mission
-def test_the_program_runs_under_the_interpreter_and_from_the_start_that_are_named(tmp_path, capfd):
-    pytest.importorskip("bosdyn.client", reason="not installed: pip install errand-spot")
-    program, interpreter = tmp_path / "which.py", tmp_path / "python-with-the-sdk"
-    program.write_text("import sys; print('runs under', sys.argv, sys.flags.dev_mode); sys.exit(3)")
-    interpreter.write_text(f'#!/bin/sh\nexec {sys.executable} -X dev "$@"\n')
-    interpreter.chmod(0o755)
-    options = ["--start", "8.6", "3.9", "1.5", "--python", str(interpreter)]
-    result = errand("sdk", *options, str(program), "--start", "5")
-    said = capfd.readouterr().out
-    assert (result.exit_code, "'--start', '5'] True" in said) == (3, True), said + result.output
 
 
 def test_nothing_but_the_server_loads_the_sdk():

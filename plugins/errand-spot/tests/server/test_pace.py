@@ -15,7 +15,7 @@ from errand_spot.messages import duration, seconds
 from errand_spot.server.computer import PERIOD_S, Pace
 
 PROGRAM = """
-import sys, time
+import time
 import bosdyn.client
 from bosdyn.client.lease import LeaseKeepAlive
 from bosdyn.client.robot_command import RobotCommandBuilder as Build, blocking_stand, block_until_arm_arrives
@@ -29,7 +29,7 @@ with LeaseKeepAlive(robot.ensure_client("lease"), must_acquire=True, return_at_e
     blocking_stand(commands, timeout_sec=10, update_frequency=20.0)
     for vx, wz in ((0.5, 0.3), (-0.2, 0.8)):
         commands.robot_command(Build.synchro_velocity_command(vx, 0.0, wz), end_time_secs=time.time() + 1.0)
-        time.sleep(float(sys.argv[1]))
+        time.sleep(1.3)
     block_until_arm_arrives(commands, commands.robot_command(Build.arm_ready_command()), timeout_sec=20)
 """
 
@@ -72,10 +72,10 @@ def test_a_robot_in_real_time_is_not_stepped_by_clients(credentials):
 def test_an_unchanged_program_moves_the_robot_the_same_way_each_time(credentials, tmp_path):
     program, ends = tmp_path / "walk.py", []
     program.write_text(PROGRAM)
-    for sleeps in ("1.3", "1.3", "0.7"):
+    for _ in range(2):
         with stepped(credentials) as (server, robot):
             launch = ["-m", "errand_spot.launch", str(server.certificate), str(server.port), "client", str(program)]
-            ended = subprocess.run([sys.executable, *launch, sleeps], capture_output=True, text=True, timeout=60.0)
+            ended = subprocess.run([sys.executable, *launch], capture_output=True, text=True, timeout=60.0)
             assert ended.returncode == 0, ended.stderr
             ends.append((robot.pose, tuple(robot.q_rad), server.computer.clock.now()))
-    assert ends[0] == ends[1] != ends[2] and ends[0][0].x_m > 0.2
+    assert ends[0] == ends[1] and ends[0][0].x_m > 0.2 and ends[0][2] > 2.6

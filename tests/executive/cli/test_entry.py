@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -15,21 +16,21 @@ from tests.executive.cli.calls import done, errand
 MISSIONS = Path(__file__).parents[3] / "missions"
 HEAVY = {"pydrake", "spacy", "onnxruntime", "cv2", "numba", "scipy"}
 
-CHECK = ["check", str(MISSIONS / "fetch_drink.yaml")]
+CHECK = ("check", str(MISSIONS / "fetch_drink.yaml"))
 
 # Commands that one process calls one after the other, and which heavy libraries it has imported after each.
 IMPORTS = [
     [
-        (["--help"], ""),
-        (["run", "--help"], ""),
-        (["run", "--wake", "--say", "get a beer"], ""),
-        (["evaluate", "--help"], ""),
-        (["log", "--help"], ""),
-        (["new", "skill", "--help"], ""),
-        (["parse", "--open", "fetch me a drink"], "spacy"),
-        (["parse", "Hey Alice, fetch me a drink"], "spacy"),
+        (("--help",), ""),
+        (("run", "--help"), ""),
+        (("run", "--wake", "--say", "get a beer"), ""),
+        (("evaluate", "--help"), ""),
+        (("log", "--help"), ""),
+        (("new", "skill", "--help"), ""),
+        (("parse", "--open", "fetch me a drink"), "spacy"),
+        (("parse", "Hey Alice, fetch me a drink"), "spacy"),
     ],
-    [(["queue", "--help"], "pydrake"), (["queue", "add", "--wake", "--say=go"], "pydrake"), (CHECK, "cv2 pydrake")],
+    [(("queue", "--help"), "pydrake"), (("queue", "add", "--wake", "--say=go"), "pydrake"), (CHECK, "cv2 pydrake")],
 ]
 PROGRAM = f"""
 import sys
@@ -50,12 +51,13 @@ print(*sorted({{entry.module for entry in entry_points(group="errand.skills")}} 
 
 @pytest.fixture(scope="module")
 def call_in_process(tmp_path_factory):
-    """Calls commands in a process of its own; returns its lines and its errors. The paths of `check` are planned."""
+    """Calls commands once in a process of their own; returns its lines and errors. The paths of `check` are planned."""
     environment = {"XDG_CACHE_HOME": str(tmp_path_factory.mktemp("cache"))}
     done(*CHECK, env=environment)
 
+    @cache
     def call(commands):
-        command, variables = [sys.executable, "-c", PROGRAM % commands], {**os.environ, **environment}
+        command, variables = [sys.executable, "-c", PROGRAM % (commands,)], {**os.environ, **environment}
         run = subprocess.run(command, capture_output=True, text=True, check=True, env=variables)
         return run.stdout.splitlines(), run.stderr
 
@@ -64,14 +66,14 @@ def call_in_process(tmp_path_factory):
 
 @pytest.mark.parametrize("calls", IMPORTS)
 def test_a_command_imports_no_heavy_library_that_it_does_not_use(call_in_process, calls):
-    lines, errors = call_in_process([words for words, _ in calls])
+    lines, errors = call_in_process(tuple(words for words, _ in calls))
     imported = [line.removeprefix("imported:").strip() for line in lines if line.startswith("imported:")]
     assert imported == [libraries for _, libraries in calls]
     assert errors.count("--no-wake") == sum("--wake" in words for words, _ in calls)
 
 
 def test_a_check_imports_nothing_that_understands_sentences_and_only_skills_of_the_mission(call_in_process):
-    language, skills = (line.split() for line in call_in_process([CHECK])[0][-2:])
+    language, skills = (line.split() for line in call_in_process(tuple(words for words, _ in IMPORTS[1]))[0][-2:])
     assert language == [f"executive.language.{name}" for name in ("lexicon", "parser", "questions")]
     assert {"skills.navigate.skill", "skills.manipulation.grasp.skill"} < set(skills)
     assert not {"skills.small.speak", "skills.small.doors"} & set(skills)

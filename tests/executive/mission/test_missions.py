@@ -64,7 +64,8 @@ def run_mission(parser, knowledge_in, skills, run_tree, script, missions, make):
         loaded = loaded if part is None else mission_of_robot(loaded, "Alice", part)
         knowledge = knowledge_in(loaded)
         mission = mission_from_file(loaded, parser=parser, knowledge=knowledge)
-        return run_tree(compile_mission(mission, knowledge=knowledge, registry=registry)).robots[0]
+        tree = compile_mission(mission, knowledge=knowledge, registry=registry)
+        return run_tree(tree, settings={"tick_period_s": 0.5}).robots[0]
 
     return run_file
 

@@ -19,8 +19,11 @@ from executive.store.resuming import resumed_tree
 from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.manipulation.posture import StowInputs
+from skills.testing.clock import VirtualClock
 from tests.executive.conftest import PATIENT
+from tests.executive.store.copies import copy_database
 from tests.tables import yaml_beside
+from tests.visitors import OnTick
 
 BLOCKS = yaml_beside(__file__, "blocks.yaml")
 REQUEST = Request("blocks", seed=3, name="m", world_name="flat", robot="Alice", fingerprint="print")
@@ -70,8 +73,8 @@ def works(done):
 
 
 @pytest.fixture
-def live(tmp_path, clock, robot, make, works, registry, knowledge, script, done):
-    """One life of the executive: to its end, or until it is killed after some tick.
+def live(tmp_path, make, works, registry, knowledge, script, done):
+    """One life of the executive: to its end, or until it is killed after some tick. It begins at `since_s`.
 
     What is looked for is there once "a" was done twice.
     """
@@ -90,8 +93,10 @@ def live(tmp_path, clock, robot, make, works, registry, knowledge, script, done)
         mission = load_mission("blocks.yaml", text=yaml.safe_dump(facts, sort_keys=False))
         return compile_mission(mission, knowledge=knowledge, registry=skills)
 
-    def one_life(name, number, kill_after=None):
-        tree = tree_of(name)
+    def one_life(name, number, kill_after=None, *, since_s=0.0, visitor=None):
+        tree, clock = tree_of(name), VirtualClock()
+        robot = make.StandingRobot(clock)
+        clock.advance(since_s)
         with MissionStore(tmp_path / f"{number}.sqlite") as store:
             missions = store.missions()
             mission = missions[0] if missions else store.add(REQUEST, queued=False)
@@ -100,7 +105,6 @@ def live(tmp_path, clock, robot, make, works, registry, knowledge, script, done)
                 tree, recollection = resumed_tree(tree, store.memory(mission.id))
                 journal.use_recollection(recollection)
             store.begin(mission.id)
-            robot.holder = None
             entry = RunEntry(tree, robot, make.StillLocaliser(), make.EmptyCostmap())
             with LockStepWorker(clock) as worker:
                 try:
@@ -108,7 +112,7 @@ def live(tmp_path, clock, robot, make, works, registry, knowledge, script, done)
                         [entry],
                         clock=clock,
                         worker=worker,
-                        visitors=[Killing(journal, kill_after)],
+                        visitors=[Killing(journal, kill_after), *([] if visitor is None else [visitor])],
                         settings=replace(PATIENT, tick_period_s=0.1, time_limit_s=60.0),
                         control=Control(pace=None),
                     )
@@ -133,21 +137,27 @@ class Killing(RunVisitor):
 
 
 @pytest.mark.parametrize("name", BLOCKS)
-def test_a_kill_in_any_tick_neither_repeats_nor_leaves_out_anything(live, done, name):
-    """Nor does it add a finding: each look, and a check of several objects, is one."""
+def test_a_kill_in_any_tick_neither_repeats_nor_leaves_out_anything(live, tmp_path, done, name):
+    """Nor does it add a finding: each look, and a check of several objects, is one.
+
+    A copy of the store after each tick is what a kill would leave.
+    """
     expected = (Outcome.SUCCESS, BLOCKS[name]["done"], BLOCKS[name].get("findings", ""))
 
     def achieved(result):
         found = "".join("Y" if finding.answer else "N" for finding in result.worst.findings)
         return result.outcome, "".join(done), found
 
-    whole = live(name, "whole")
+    left, wrong = [], []
+
+    def copy(progress):
+        left.append((progress.now_s, done[:]))
+        copy_database(tmp_path / "whole.sqlite", tmp_path / f"{len(left)}.sqlite")
+
+    whole = live(name, "whole", visitor=OnTick(copy))
     assert achieved(whole) == expected
-    wrong = []
-    for tick in range(1, whole.ticks):
-        done.clear()
-        assert live(name, tick, kill_after=tick) is None
-        result = live(name, tick)
+    for tick, (since_s, done[:]) in enumerate(left[: whole.ticks - 1], start=1):
+        result = live(name, tick, since_s=since_s)
         if achieved(result) != expected:
             wrong.append((tick, *achieved(result), result.worst.message[:120]))
     assert not wrong, wrong

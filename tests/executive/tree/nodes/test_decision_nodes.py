@@ -48,6 +48,12 @@ def decision(condition, *answers):
 # Decisions: true, false, or not known yet.
 
 
+@pytest.fixture
+def long_steps(monkeypatch):
+    """Advances the clock in steps of a minute, through hours."""
+    monkeypatch.setattr("skills.testing.clock.STEP_S", 60.0)
+
+
 # at (s), when the robot has taken something and lost charge; expression -> whether it holds
 @pytest.mark.parametrize(
     ("at_s", "text", "holds"),
@@ -61,6 +67,7 @@ def decision(condition, *answers):
         (17 * 3600.0, "clock == '01:00'", True),
     ],
 )
+@pytest.mark.usefixtures("long_steps")
 def test_readings_are_those_of_the_moment(view, clock, robot, at_s, text, holds):
     if at_s:
         clock.advance(at_s)
@@ -280,6 +287,7 @@ def test_wait_for_a_button_counts_presses_from_when_it_begins(wait, run_context,
     ("until_s", "after_s"),
     [(8.5 * 3600, 1800.0), (8 * 3600, 0.0), (7 * 3600, 0.0), (20 * 3600, 12 * 3600.0), (20.1 * 3600, 0.0)],
 )
+@pytest.mark.usefixtures("long_steps")
 def test_wait_until_a_time_of_day(run_context, clock, until_s, after_s):
     root = WaitUntilClock(path_id="alice/w", name="w", time_s=until_s, words="then", context=run_context)
     tick(root)

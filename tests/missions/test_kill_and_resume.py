@@ -48,38 +48,50 @@ def began_s(leaf, out):
     return None
 
 
+def events_of(out):
+    """Events of both lives, in order."""
+    return [event for log in sorted((out / "last").glob("log*.mcap")) for event in read_events(log)]
+
+
 def done_leaves(out):
     """The leaves that came to a good end by their own work, in both lives."""
-    events = [
-        event.data
-        for log in sorted((out / "last").glob("log*.mcap"))
-        for event in read_events(log)
-        if "node" in event.data
-    ]
+    events = [event.data for event in events_of(out) if "node" in event.data]
     good = [event for event in events if event.get("to") == "SUCCESS" and not event.get("restored", False)]
     return [event["node"].rsplit("/", 1)[-1] for event in good]
 
 
-@pytest.mark.mission
-@pytest.mark.parametrize(
-    ("sentence", "leaf", "after_s", "done"),
-    [
-        pytest.param(FETCH, "grasp", 7.0, CARRIED, marks=pytest.mark.nightly, id="in grasp"),
-        pytest.param(TIDY, "place", 6.0, CARRIED, marks=pytest.mark.nightly, id="in place"),
-        pytest.param(TELL, "speak", 2.5, TOLD, id="on the way"),
-    ],
-)
-def test_a_killed_mission_is_taken_up_and_ends_right(sentence, leaf, after_s, done, tmp_path):
-    options = ("--seed", "1", "--out", str(tmp_path), "--no-record", "--quiet")
-    with (tmp_path / "told.txt").open("wb") as told:
+def killed_and_resumed(sentence, leaf, after_s, done, out, *more):
+    """Kills a run in a leaf and takes it up; checks that it ends right and that each leaf was done as often as said."""
+    options = ("--seed", "1", "--out", str(out), "--no-record", "--quiet", *more)
+    with (out / "told.txt").open("wb") as told:
         process = subprocess.Popen((*ERRAND, "run", "--say", sentence, *options), stdout=told, stderr=told)
-        kill_in(leaf, after_s, process, tmp_path)
-    ended = CliRunner().invoke(app, ["resume", "--out", str(tmp_path), "--quiet", "--json"])
+        kill_in(leaf, after_s, process, out)
+    ended = CliRunner().invoke(app, ["resume", "--out", str(out), "--quiet", "--json"])
     assert ended.exit_code == 0, ended.stderr
     report = json.loads(ended.stdout.splitlines()[-1])
     assert (report["outcome"], report["referee"]["success"], report["referee"]["drops"]) == ("success", True, 0)
     assert any(" success before the restart: " in told for told in report["resumed"])
     lifted = sum(" lifted the " in line for line in ended.stderr.splitlines() if line.startswith("  Alice"))
     assert lifted == done.get("grasp", 0)
-    leaves = done_leaves(tmp_path)
+    leaves = done_leaves(out)
     assert {name: leaves.count(name) for name in done} == done
+    return report
+
+
+@pytest.mark.mission
+@pytest.mark.nightly
+@pytest.mark.parametrize(("sentence", "leaf", "after_s"), [(FETCH, "grasp", 7.0), (TIDY, "place", 6.0)])
+def test_a_killed_mission_is_taken_up_and_ends_right(sentence, leaf, after_s, tmp_path):
+    killed_and_resumed(sentence, leaf, after_s, CARRIED, tmp_path)
+
+
+@pytest.mark.mission
+def test_a_killed_mission_is_taken_up_on_the_way_and_takes_another_door_when_one_has_closed(tmp_path):
+    file = tmp_path / "door.yaml"
+    file.write_text("events:\n  - {door: [kitchen, living room], closes: 1 s}\n", encoding="utf-8")
+    report = killed_and_resumed(TELL, "speak", 2.5, TOLD, tmp_path, "--scenario", str(file))
+    assert report["referee"]["collisions"] == 0
+    events = events_of(tmp_path)
+    told = [event.data["message"] for event in events if event.topic == "control"]
+    assert "the door between kitchen and living room closes" in told
+    assert min(event.data["pose"]["position"]["x"] for event in events if event.topic == "pose") < 7.4  # by the hall

@@ -24,18 +24,6 @@ def told(out):
     return [event.data["message"] for event in read_history(out / "last").events if event.topic == "control"]
 
 
-def test_a_robot_takes_another_door_when_one_closes(tmp_path):
-    file = tmp_path / "door.yaml"
-    file.write_text("events:\n  - {door: [kitchen, living room], closes: 1 s}\n", encoding="utf-8")
-    out = tmp_path / "out"
-    report = errand_run(out, "go to the kitchen", "--start", "8.2", "4.4", "0", "--scenario", str(file))
-    assert (report["outcome"], report["referee"]["success"]) == ("success", True), report
-    assert report["referee"]["collisions"] == 0
-    assert "the door between kitchen and living room closes" in told(out)
-    poses = [event.data["pose"]["position"] for event in read_history(out / "last").events if event.topic == "pose"]
-    assert min(pose["x"] for pose in poses) < 7.4  # through the hall
-
-
 @pytest.mark.nightly
 def test_an_object_that_is_moved_before_it_is_grasped_is_found_where_it_is_now(tmp_path):
     file = tmp_path / "moved.yaml"

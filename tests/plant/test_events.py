@@ -30,10 +30,10 @@ def rule(name, at, **times):
     return DoorRule(name=name, at=at, yaw=math.pi, width=0.9, **times)
 
 
-DOOR, CALLED = rule("door", AT, closes=1.0, opens=5.0), rule("called", CALLED_AT, opens=900.0)
+DOOR, CALLED = rule("door", AT, closes=0.75, opens=3.4), rule("called", CALLED_AT, opens=900.0)
 DOORS = (DOOR, CALLED, *(rule(name, at, **times) for name, (at, times, _) in FIRST.items()))
 MOVES = (
-    MoveRule(name="beer", at=1.0, to="kitchen table"),
+    MoveRule(name="beer", at=0.75, to="kitchen table"),
     MoveRule(name="hammer", at=0.5, to=(9.0, 3.0, 0.0)),
     MoveRule(name="coke", at=0.5, to="stool"),
 )
@@ -78,15 +78,15 @@ def slid(at):
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """Seven seconds of the flat: the simulation, what was seen by time, and another that goes on from 2 s."""
+    """Five seconds of the flat: the simulation, what was seen by time, and another that goes on from 1.8 s."""
     simulation, after, file = simulated(), simulated(), tmp_path_factory.mktemp("run") / "flat.plant"
     seen = {0.0: Seen.of(simulation)}
-    for now_s in (0.2, 0.9, 2.0, 3.9, 6.9):
+    for now_s in (0.2, 0.5, 1.8, 2.4, 5.1):
         simulation.clock.advance(now_s - simulation.clock.now())
         seen[now_s] = Seen.of(simulation)
         if now_s == 0.2:
             simulation.engine.doors.call(CALLED_AT)
-        if now_s == 2.0:
+        if now_s == 1.8:
             simulation.save_snapshots(file)
             after.restore(file)
     return simulation, seen, after
@@ -94,19 +94,19 @@ def run(tmp_path_factory):
 
 def test_a_door_closes_and_opens_at_its_times_and_the_lidar_sees_it(run):
     simulation, seen, _ = run
-    assert [seen[now_s].panels["door"] for now_s in (0.9, 3.9)] == [slid(AT), pytest.approx(AT)]
-    assert [seen[now_s].rays > 500 for now_s in (0.9, 3.9, 6.9)] == [False, True, False]
-    assert seen[0.9].rays == seen[6.9].rays == 0
+    assert [seen[now_s].panels["door"] for now_s in (0.5, 2.4)] == [slid(AT), pytest.approx(AT)]
+    assert [seen[now_s].rays > 500 for now_s in (0.5, 2.4, 5.1)] == [False, True, False]
+    assert seen[0.5].rays == seen[5.1].rays == 0
     said = [sentence for _, sentence in simulation.clock.events]
     assert [sentence for sentence in said if "the door " in sentence] == ["the door closes", "the door opens"]
     changes = simulation.engine.doors.history()[AT]
     assert [share for _, share in changes] == [0.0, 0.5, 1.0, 0.5, 0.0]
-    assert [begun_s for begun_s, _ in changes] == pytest.approx([0.0, 1.0, 2.5, 5.0, 6.5], abs=0.05)
+    assert [begun_s for begun_s, _ in changes] == pytest.approx([0.0, 0.75, 2.25, 3.4, 4.9], abs=0.05)
 
 
 def test_a_door_that_is_called_opens_and_stays_open(run):
     simulation, seen, _ = run
-    places = [seen[now_s].panels["called"] for now_s in (0.2, 2.0, 6.9)]
+    places = [seen[now_s].panels["called"] for now_s in (0.2, 1.8, 5.1)]
     assert places == [pytest.approx(CALLED_AT), *[slid(CALLED_AT)] * 2]
     assert [share for _, share in simulation.engine.doors.history()[CALLED_AT]] == [1.0, 0.5, 0.0]
 
@@ -120,32 +120,32 @@ def test_the_earlier_time_says_how_a_door_is_at_first(run, name):
 
 def test_an_object_is_moved_to_a_free_spot_of_a_surface_and_no_robot_did_it(run):
     simulation, seen, _ = run
-    x, y, z = seen[3.9].things["beer"]
+    x, y, z = seen[2.4].things["beer"]
     assert (11.05 < x < 11.85, 5.95 < y < 7.05, 0.75 < z < 1.0) == (True, True, True)
-    assert seen[0.9].things["beer"][0] < 10.0
-    others = [place_W for name, place_W in seen[3.9].things.items() if name != "beer"]
+    assert seen[0.5].things["beer"][0] < 10.0
+    others = [place_W for name, place_W in seen[2.4].things.items() if name != "beer"]
     assert min(math.dist(other[:2], (x, y)) for other in others) > 0.06
-    moved = ("Somebody moved the beer at 1.00 s.", "Somebody moved the hammer at 0.50 s.")
+    moved = ("Somebody moved the beer at 0.75 s.", "Somebody moved the hammer at 0.50 s.")
     assert tuple(sorted(simulation.referee.events)) == moved
     assert (simulation.referee.drops, simulation.referee.lifts("Alice")) == (0, ())
 
 
 def test_an_object_is_put_on_the_floor_at_a_point(run):
     _, seen, _ = run
-    assert seen[2.0].things["hammer"] == pytest.approx((9.0, 3.0, 0.03), abs=0.03)
+    assert seen[1.8].things["hammer"] == pytest.approx((9.0, 3.0, 0.03), abs=0.03)
 
 
 def test_an_object_stays_when_the_goal_surface_has_no_free_spot(run):
     simulation, seen, _ = run
-    assert seen[2.0].things["coke"] == pytest.approx(seen[0.0].things["coke"], abs=0.01)
+    assert seen[1.8].things["coke"] == pytest.approx(seen[0.0].things["coke"], abs=0.01)
     assert (0.5, "nobody moves the coke, because the stool has no free spot") in simulation.clock.events
 
 
 def test_doors_and_moves_go_on_after_a_restart(run):
     _, seen, after = run
-    before, now = seen[2.0], Seen.of(after)
+    before, now = seen[1.8], Seen.of(after)
     assert (now.panels["door"], after.clock.events) == (pytest.approx(AT), [])
-    assert now.history[AT][:2] == before.history[AT] == ((0.0, 0.0), (1.0, 0.5))
+    assert now.history[AT][:2] == before.history[AT] == ((0.0, 0.0), (0.75, 0.5))
     assert now.things["beer"] == pytest.approx(before.things["beer"], abs=0.01)
 
 

@@ -1,7 +1,7 @@
 """Durations of all tests of a run: a table at its end, and with `--durations-file` the whole list as JSON.
 
-`python -m tests.durations` writes the slow files of that list into `tests/slow.txt`, the slowest first. A run begins with
-them, so that no process is left with one at the end; `--fast` leaves them out.
+`python -m tests.durations` writes the slow files of that list into `tests/slow.txt`, the slowest first. A run begins
+with them, so that no process is left with one at the end; `--fast` leaves them out.
 """
 
 from __future__ import annotations

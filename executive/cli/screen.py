@@ -35,11 +35,11 @@ from executive.speech.voice import Silence, Voice, queued_voice
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeState, Snapshot
 from executive.tree.node_view import NodeView, node_view
-from executive.view.foxglove import LiveServer
 from executive.view.text import Styles, printable, style_of, to_rich
 
 if TYPE_CHECKING:
     from executive.app.runs.page_view import PageView
+    from executive.view.foxglove import LiveServer
 
 SILENCE: Final = Silence()
 
@@ -140,17 +140,19 @@ class ConsoleScreen:
         control = Control(attended=attended, pace=1.0 if attended else None) if page is None else page.control
         speech = SpeechOutput(self.console, self.voice, self.quiet)
         joining = [observe(prepared, control) for observe in self.observing]
-        if self.quiet and page is None:  # no user can speak to the run
+        if page is None and (self.quiet or sys.stdin is None or not sys.stdin.isatty()):  # no user can speak to the run
             load_parser().release()
-            yield RunOptions(control, (speech, *joining), page, self.live, self.profile)
+            with nullcontext() if self.quiet else live_view(self.console) as view:
+                shown = (speech, *joining) if view is None else (view, speech, *joining)
+                yield RunOptions(control, shown, page, self.live, self.profile)
             return
         from executive.app.runs.conversations import Conversations, load_ahead  # the grammar of sentences
 
         own = None if page is None else page.conversations
         conversations = own or Conversations(prepared, control)
         conversations.set_missions()
-        shown = live_view(self.console, control, say=lambda text: conversations.hear(text).text)
-        with nullcontext() if self.quiet else shown as view:
+        answered = live_view(self.console, control, say=lambda text: conversations.hear(text).text)
+        with nullcontext() if self.quiet else answered as view:
             if control.attended and page is None:
                 load_ahead()
             visitors = (speech, conversations) if view is None else (view, speech, conversations)

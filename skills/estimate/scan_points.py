@@ -26,12 +26,7 @@ _BODY_M = 0.3  # LiDAR returns nearer than this are the robot's own
 
 
 def scan_of_points(
-    points_L: FloatArray,
-    rings: FloatArray,
-    columns: int,
-    stamp_s: float,
-    X_BL: RigidTransform,
-    X_OB: RigidTransform,
+    points_L: FloatArray, rings: FloatArray, columns: int, stamp_s: float, X_BL: RigidTransform, X_OB: RigidTransform
 ) -> Scan:
     """Returns points (N, 3) in the lidar frame as a revolution; the nearest of a ray counts.
 

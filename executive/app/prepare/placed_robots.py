@@ -197,7 +197,7 @@ def shared_detector(stack: RobotStack | None = None, world: World | None = None)
     Loads the networks once in a process. Raises InputError if a model cannot be read.
     """
     networks = _built((stack or default_stack()).detector)
-    if world is None:
+    if world is None or not world.own_objects:
         return networks
     from skills.perception.model_matching import with_models
 

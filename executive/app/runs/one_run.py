@@ -33,7 +33,6 @@ from executive.run.worker import LockStepWorker, ThreadWorker, TimedWorker
 from executive.tree.context import RunContext
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.nodes.skill_leaf import ERROR_TOPIC, SkillLeaf
-from executive.view.foxglove import LiveServer
 from executive.words.goal import RefereeReport
 from executive.words.knowledge import Knowledge
 from executive.words.robot_config import named_robot
@@ -49,6 +48,7 @@ from skills.robot import Pose2D, Robot
 
 if TYPE_CHECKING:
     from executive.app.runs.page_view import PageView  # understands sentences
+    from executive.view.foxglove import LiveServer  # imports asyncio
 
 _FILES_RESERVED, _FILES_FREE = 32, 8
 _MOST_STARTS: Final = 1000
@@ -70,7 +70,7 @@ def run_request(
     visitors: Sequence[RunVisitor] = (),
     control: Control | None = None,
     page: "PageView | None" = None,
-    live: LiveServer | None = None,
+    live: "LiveServer | None" = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
     worker: ThreadWorker | None = None,

@@ -25,11 +25,11 @@ from executive.store.journal import StoreJournal
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.recollection import Recollection
 from executive.store.resuming import ended_tree, resumed_tree
-from executive.view.foxglove import LiveServer
 from skills.inputs.errors import InputError, shortage, shortage_of_files
 
 if TYPE_CHECKING:
     from executive.app.runs.page_view import PageView
+    from executive.view.foxglove import LiveServer
 
 FILES_OF_A_MISSION: Final = 200
 """Files that must be free when a queued mission begins."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
-from skills.detection import Detector
+from skills.detection import Detector, DetectorWrapper
 
 
 @dataclass(frozen=True)
@@ -21,17 +22,31 @@ class Cascade:
     objects: tuple[Path, ...] = ()
 
     def build(self) -> Detector:
-        """Loads the detector. Raises InputError when a file cannot be used."""
+        """Returns the detector; the project's own loads when used first. Raises InputError if a file is unusable."""
+        from skills.perception.model_matching import with_models
+
+        cascade = _LoadedWhenUsed(self)
+        return with_models(cascade if self.file is None else cascade._detector, self.objects)
+
+
+@dataclass(frozen=True)
+class _LoadedWhenUsed(DetectorWrapper):
+    """Cascade whose networks load when its classes or a picture are first asked for."""
+
+    _options: Cascade
+
+    @cached_property
+    def _detector(self) -> Detector:  # type: ignore[override]
         from skills.perception.detector.augmentation import AugmentedDetector
         from skills.perception.detector.exported import ExportedNetwork, load_exported
         from skills.perception.detector.layouts import LAYOUTS
         from skills.perception.detector.model_files import MODEL_FILE, ModelFileError, is_cascade
         from skills.perception.detector.onnx_detector import load_detector
-        from skills.perception.model_matching import with_models
 
-        if self.file is not None and not is_cascade(self.file):
-            about = LAYOUTS[load_exported(ExportedNetwork(self.file), every=True).layout].about
+        file = self._options.file
+        if file is not None and not is_cascade(file):
+            about = LAYOUTS[load_exported(ExportedNetwork(file), every=True).layout].about
             hint = "write 'detector: {use: onnx, file: ...}'; other detectors come as a class of errand.detectors"
-            raise ModelFileError(f"it is no cascade of Errand, but {about}", hint=hint, file=self.file)
-        single = load_detector(self.file or MODEL_FILE)
-        return with_models(AugmentedDetector(single) if self.views else single, self.objects)
+            raise ModelFileError(f"it is no cascade of Errand, but {about}", hint=hint, file=file)
+        single = load_detector(file or MODEL_FILE)
+        return AugmentedDetector(single) if self._options.views else single

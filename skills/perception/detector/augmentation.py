@@ -1,8 +1,7 @@
 """Test-time augmentation: detections in mirrored and smaller views of one picture, fused.
 
 Boxes of one object in several views are fused after Solovyev et al., "Weighted boxes fusion" (2021). Only the views in
-which an object is neither small nor very large contribute. The detector skips the other views when the first one leaves
-no doubt.
+which an object is neither small nor very large contribute.
 """
 
 from __future__ import annotations

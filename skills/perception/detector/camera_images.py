@@ -1,7 +1,4 @@
-"""Detection in camera images, first turned upright and brightened like the detector's training pictures.
-
-Spot's right camera is mounted upside down. Dim pictures are brightened as a camera's automatic exposure would do.
-"""
+"""Detection in camera images, first turned upright and brightened like the detector's training pictures."""
 
 from __future__ import annotations
 

@@ -5,14 +5,11 @@ The proposal network takes `images` uint8 (N, 480, 640, 3) RGB, and returns `box
 
 The refinement network of detector.onnx is detector_refinement.onnx. It takes the crops `chips` uint8
 (N, 128, 128, 3) RGB, the proposals `regions` float32 (N, 4) in pixels of the crops, and their `logits` float32 (N, K),
-and returns `boxes` float32 (N, 4) in pixels of the crops and `scores` float32 (N, K). Its metadata entry `first` holds
-the digest of the proposal network's file: it works only with the network with which it was trained.
+and returns `boxes` float32 (N, 4) in pixels of the crops and `scores` float32 (N, K). The classifier network,
+detector_classifier.onnx, is alike, and takes the refinement network's logits. Both later networks may be missing; each
+works only with the one with which it was trained, and holds the digest of its file as `first` or `second`.
 
-The classifier network, detector_classifier.onnx, has the same inputs and outputs, takes the refinement network's
-logits, and holds the digest of that network's file as `second`. Both later networks may be missing.
-
-The metadata of each file hold its `format`, `class_names` as a JSON list, and, in a sealed file, the digest of all
-bytes before the seal.
+The metadata also hold the `format`, `class_names` as a JSON list, and, in a sealed file, the digest of all before it.
 """
 
 from __future__ import annotations
@@ -77,9 +74,7 @@ PROPOSAL: Final = NetworkKind(
 )
 """Proposes regions in a whole picture."""
 REFINEMENT: Final = NetworkKind(
-    "errand-regions-1",
-    "remove it, or make a new one: errand dataset refine --data DIR --out DIR",
-    _crop_inputs,
+    "errand-regions-1", "remove it, or make a new one: errand dataset refine --data DIR --out DIR", _crop_inputs
 )
 """Refines boxes and scores of regions."""
 CLASSIFIER: Final = NetworkKind(

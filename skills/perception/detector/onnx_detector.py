@@ -95,8 +95,7 @@ class OnnxDetector(Detector):
     def detect(self, pictures: Sequence[Picture], least_score: float | None = None) -> list[Detections]:
         """Detects the objects in each picture, best first; boxes are in the picture's own pixels.
 
-        Pictures are (H, W, 3) RGB or (H, W) grey, of any size. `least_score` replaces the threshold. Raises ValueError
-        when an array is no picture.
+        Pictures are (H, W, 3) RGB or (H, W) grey. `least_score` replaces the threshold. Raises ValueError for others.
         """
         threshold = self.options.threshold if least_score is None else least_score
         return _in_parallel(partial(self._detect, threshold=threshold), pictures)
@@ -104,8 +103,7 @@ class OnnxDetector(Detector):
     def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[Detections]:
         """Detects the objects of one class in each picture, quickly.
 
-        The later networks judge only the proposals that may be of the class. Raises ValueError when an array is no
-        picture, or the class is unknown.
+        The later networks judge only its proposals. Raises ValueError for a wrong array, or an unknown class.
         """
         if class_name not in self.class_names:
             raise ValueError(f"the detector knows no class {class_name!r}")

@@ -1,6 +1,7 @@
 """`errand fleet`: what is left to do in a store, and whose faults are whose."""
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import pytest
 
@@ -125,6 +126,7 @@ def test_runs_show_the_verdict_on_a_fleet(store, monkeypatch, verdicts, shown):
     rows = [{"referee": None if verdict is None else {"success": verdict}} for verdict in verdicts]
     monkeypatch.setattr(Dispatch, "rows", rows)
     monkeypatch.setattr(fleet_run, "run_fleet", lambda *_, **__: Verdict("The fleet", True, "done", ""))
+    monkeypatch.setattr(fleet_run, "SimulatedBackend", Mock())
     store.add(replace(REQUEST, commands=(GO,)), queued=True)
     done("fleet", "run", store.path, "--robots", "alice=spot", "--no-record")
     (kept,) = json_of(done("runs", "--out", store.path.parent, "--json"))["runs"]
@@ -147,6 +149,7 @@ def test_the_folder_of_a_run_is_never_hidden(tmp_path, monkeypatch, named, folde
         return Verdict("The fleet", True, "1 of 1 missions achieved", "")
 
     monkeypatch.setattr(fleet_run, "run_fleet", run)
+    monkeypatch.setattr(fleet_run, "SimulatedBackend", Mock())
     path = tmp_path / ("out/.errand/missions.sqlite" if named == "out" else named)
     with MissionStore(path) as store:
         store.add(replace(REQUEST, commands=(GO,), world_name="flat"), queued=True)

@@ -1,6 +1,7 @@
 """A mission is broken off at every moment and taken up by another process: nothing is done twice."""
 
 import dataclasses
+import shutil
 from functools import cache
 from typing import ClassVar
 
@@ -26,6 +27,7 @@ from executive.words.step import Policy
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Running, Succeeded, Surface
 from skills.quantities import Coordinate, Length
 from tests.executive.conftest import PATIENT
+from tests.executive.store.copies import copy_database
 
 TIDY = ("Take [Nothing] to [kitchen] and do [grasp] to [drink]", "Take [drink] to [bedroom] and do [place] to [drink]")
 FETCH_AND_ASK = (
@@ -145,7 +147,7 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
         mission = Mission(name="fetch drink", robot="Alice", steps=steps).with_policy(policy)
         return compile_mission(mission, knowledge=knowledge, registry=handling)
 
-    def one_life(texts, *, kill_after=None, kill_when=None, lag=0, policy=Policy()):  # noqa: B008 - frozen
+    def one_life(texts, *, kill_after=None, kill_when=None, policy=Policy(), store=store, copy=lambda: None):  # noqa: B008 - frozen
         missions = store.missions()
         mission = missions[0] if missions else store.add(REQUEST, queued=False)
         tree, journal, recollection = tree_of(texts, policy), store.journal(mission.id), None
@@ -153,7 +155,7 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
             tree, recollection = resumed_tree(tree, store.memory(mission.id))
             journal.use_recollection(recollection)
         store.begin(mission.id)
-        ticks = Ticks(journal, kill_after, kill_when, lag, world.transitions)
+        ticks = Ticks(journal, kill_after, kill_when, copy, world.transitions)
         for each in (script.begun, world.work, world.transitions):
             each.clear()
         robot.holder = None
@@ -168,10 +170,10 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
 
 
 class Ticks(RunVisitor):
-    """Passes notes on, the last few excepted, and kills."""
+    """Passes notes on, calls `copy`, and kills."""
 
-    def __init__(self, journal, kill_after, kill_when, lag, transitions):
-        self.journal, self.kill_after, self.kill_when, self.lag, self.count = journal, kill_after, kill_when, lag, 0
+    def __init__(self, journal, kill_after, kill_when, copy, transitions):
+        self.journal, self.kill_after, self.kill_when, self.copy, self.count = journal, kill_after, kill_when, copy, 0
         self.transitions = transitions
 
     def message(self, topic, message):
@@ -181,8 +183,8 @@ class Ticks(RunVisitor):
 
     def tick(self, progress):
         self.count += 1
-        if self.kill_after is None or self.count <= self.kill_after - self.lag:
-            self.journal.tick(progress)
+        self.journal.tick(progress)
+        self.copy()
         changes = [change for note in progress.notes.values() for change in note.changes]
         if self.count == self.kill_after or (self.kill_when is not None and any(map(self.kill_when, changes))):
             raise KilledError
@@ -193,19 +195,27 @@ def begins(leaf):
 
 
 @pytest.fixture
-def moved_once(live, store, robot, world):
-    """Kills a mission that moves so many objects in any tick, or every second one: each object is moved once."""
+def moved_once(live, store, robot, world, tmp_path):
+    """Resumes a mission that moves so many objects after any tick, or every second one: each object is moved once.
 
-    def kill(texts, objects, *, lag=0, every=1, in_the_way=(), says="", **options):
-        world.in_the_way = in_the_way
-        result, ticks, _ = live(texts, **options)
+    A kill leaves the world of its tick, and a store that may lack the last notes, as many as each of `lags` says.
+    """
+
+    def kill(texts, objects, *, lags=(0,), every=1, in_the_way=(), says="", **options):
+        left, world.in_the_way = [], in_the_way
+
+        def copy():
+            copy_database(store.path, tmp_path / f"{len(left) + 1}.sqlite")
+            left.append((robot.holding, world.grasps, world.places, world.in_the_way))
+
+        result, ticks, _ = live(texts, copy=copy, **options)
         assert (result.outcome, world.grasps, world.places) == (Outcome.SUCCESS, objects, objects)
-        for moment in range(1 + lag, ticks, every):
-            store.remove(store.missions()[0].id)
-            robot.holding, world.grasps, world.places, world.in_the_way = False, 0, 0, in_the_way
-            assert live(texts, kill_after=moment, lag=lag, **options)[0] is None
-            result, _, recollection = live(texts, **options)
-            told = (moment, result.worst.message, recollection.log, world.work)
+        for moment, lag in ((each, late) for late in lags for each in range(1 + late, ticks, every)):
+            robot.holding, world.grasps, world.places, world.in_the_way = left[moment - 1]
+            shutil.copy(tmp_path / f"{moment - lag}.sqlite", tmp_path / "left.sqlite")
+            with MissionStore(tmp_path / "left.sqlite") as resumed:
+                result, _, recollection = live(texts, store=resumed, **options)
+            told = (lag, moment, result.worst.message, recollection.log, world.work)
             assert (result.outcome, result.worst.message.startswith(says)) == (Outcome.SUCCESS, True), told
             assert (world.grasps, world.places, robot.holding) == (objects, objects, False), told
 
@@ -225,9 +235,8 @@ def resumed(live):
     return run_twice
 
 
-@pytest.mark.parametrize("lag", [0, 1, 3])
-def test_a_kill_in_any_tick_repeats_nothing(moved_once, lag):
-    moved_once(TIDY, 1, lag=lag)
+def test_a_kill_in_any_tick_repeats_nothing(moved_once):
+    moved_once(TIDY, 1, lags=(0, 1, 3))
 
 
 def test_kills_one_after_another_lead_to_the_end_all_the_same(live, script, world):
@@ -239,8 +248,7 @@ def test_kills_one_after_another_lead_to_the_end_all_the_same(live, script, worl
     assert lives >= 2
 
 
-@pytest.mark.parametrize("lag", [0, 3])
-def test_a_kill_in_any_round_moves_each_object_once(moved_once, world, script, make, lag):
+def test_a_kill_in_any_round_moves_each_object_once(moved_once, world, script, make):
     def look(skill):
         if world.places == 2:
             return Failed(Cause.POSTCONDITION, "nothing is left")
@@ -248,7 +256,7 @@ def test_a_kill_in_any_round_moves_each_object_once(moved_once, world, script, m
         return Succeeded("seen", {"observation": seen, "observations": (seen,)})
 
     script.ends["detect"] = look
-    moved_once(CLEAR, 2, lag=lag, every=2, says="moved two cokes")
+    moved_once(CLEAR, 2, lags=(0, 3), every=2, says="moved two cokes")
 
 
 def test_after_a_kill_in_any_tick_each_person_has_been_greeted(live, store, script, make):

@@ -13,6 +13,7 @@ from executive.words.mission import Route
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
+from plant.people import walkers
 from plant.people.walk import Leg, Walk
 from plant.referee import Referee
 from plant.robots.robot_kind import PlacedRobot
@@ -200,18 +201,20 @@ def test_a_robot_that_drives_into_a_person_causes_the_collision(hall):
     assert (stage.blame, stage.person_xy) == ((1, 1, 0), pytest.approx((-1.0, 0.0), abs=0.02))
 
 
-def test_a_person_who_has_yielded_for_long_walks_around_the_robot(hall):
+def test_a_person_who_has_yielded_for_long_walks_around_the_robot(hall, monkeypatch):
+    monkeypatch.setattr(walkers, "PATIENCE_S", 1.5)
     stage = hall((-1.0, -1.0), (-1.0, 2.2), robot=Pose2D(-1.0, 0.5, 0.0))
-    stage.engine.advance(9.0)
+    stage.engine.advance(6.5)
     assert stage.person_xy == pytest.approx((-1.0, 2.2), abs=1e-6) and not stage.referee.collisions
 
 
-def test_a_standing_person_asked_by_a_robot_lets_it_pass_and_comes_back(hall):
+def test_a_standing_person_asked_by_a_robot_lets_it_pass_and_comes_back(hall, monkeypatch):
+    monkeypatch.setattr(walkers, "LETS_PASS_S", 5.0)
     stage = hall((0.5, 0.0), robot=Pose2D(-1.5, 0.0, 0.0))
     stage.engine.walkers.let_pass("Alice", "Kim")
     stage.engine.advance(3.0)
     assert abs(stage.person_W.y_m) > 0.9
-    stage.engine.advance(22.0)
+    stage.engine.advance(7.0)
     assert stage.person_xy == pytest.approx((0.5, 0.0), abs=0.1) and not stage.referee.collisions
 
 
@@ -348,19 +351,19 @@ def flat_walkers(**routes):
 
 
 def test_people_who_meet_in_a_doorway_make_way():
-    walkers = flat_walkers(Kim=(HALL_W, ROOM_W), Lee=(ROOM_W, HALL_W), Robin=((8.1, 3.6), (4.6, 4.5)))
+    people = flat_walkers(Kim=(HALL_W, ROOM_W), Lee=(ROOM_W, HALL_W), Robin=((8.1, 3.6), (4.6, 4.5)))
     apart_m = []
     for _ in range(600):
-        walkers.before_step(0.05)
-        apart_m.extend(math.dist(*pair) for pair in itertools.combinations(walkers.places_W(), 2))
-    assert all(walkers[name].done for name in ("Kim", "Lee", "Robin")) and min(apart_m) > 0.4
+        people.before_step(0.05)
+        apart_m.extend(math.dist(*pair) for pair in itertools.combinations(people.places_W(), 2))
+    assert all(people[name].done for name in ("Kim", "Lee", "Robin")) and min(apart_m) > 0.4
 
 
 def test_a_person_stops_beside_somebody_who_stands_at_the_end_of_the_route():
-    walkers = flat_walkers(Kim=(ROOM_W,), Robin=(HALL_W, ROOM_W))
+    people = flat_walkers(Kim=(ROOM_W,), Robin=(HALL_W, ROOM_W))
     for _ in range(300):
-        walkers.before_step(0.05)
-    assert walkers["Robin"].done and 0.4 < math.dist(walkers["Robin"].place_W, ROOM_W) < 1.3
+        people.before_step(0.05)
+    assert people["Robin"].done and 0.4 < math.dist(people["Robin"].place_W, ROOM_W) < 1.3
 
 
 def test_wandering_people_walk_to_free_points_that_their_seeds_draw(hall):

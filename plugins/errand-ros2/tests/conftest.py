@@ -1,5 +1,6 @@
 """The log of a mission of the scripted robot, with messages of every kind that has a type in ROS 2."""
 
+import shutil
 from contextlib import closing
 
 import numpy as np
@@ -24,8 +25,8 @@ from skills.testing.robot import ScriptedRobot, Start
 START = Pose2D(1.0, -0.5, 0.3)
 
 
-@pytest.fixture
-def log_file(tmp_path):
+@pytest.fixture(scope="session")
+def log_of_session(tmp_path_factory):
     """Alice speaks; walls stand 2 m away on all sides but straight behind. There are a map, a picture and two paths."""
     clock, knowledge = VirtualClock(), room_knowledge()
     robot = ScriptedRobot(clock, start=Start(START))
@@ -38,14 +39,19 @@ def log_file(tmp_path):
     tree = compile_mission(mission, knowledge=knowledge, registry=installed_skills())
     occupied, unknown = np.zeros((4, 6), bool), np.zeros((4, 6), bool)
     occupied[0, 0] = unknown[3, 5] = True
-    with closing(EventLog(tmp_path / "log.mcap", clock)) as log:
+    with closing(EventLog(file := tmp_path_factory.mktemp("log") / "log.mcap", clock)) as log:
         log("map", map_message(GridMap(occupied, 0.5, (-1.0, -2.0), unknown), knowledge, world="room"))
         log("detections", {"image": np.full((24, 32, 3), 200, np.uint8), "source": "hand", "detections": []})
         log("path", {"robot": "Alice", "frame": "world", "poses": [[1.0, 2.0, 0.0], [3.0, 4.0, 0.5]]})
         log("path", {"robot": "Bob", "frame": "world", "poses": [[0.0, 0.0, 0.0]]})
         entry = RunEntry(tree, robot, KnownPlace(START), BlockCostmap())
         run([entry], clock=clock, worker=LockStepWorker(clock), visitors=[log])
-    return tmp_path / "log.mcap"
+    return file
+
+
+@pytest.fixture
+def log_file(log_of_session, tmp_path):
+    return shutil.copy(log_of_session, tmp_path / "log.mcap")
 
 
 @pytest.fixture(scope="session")

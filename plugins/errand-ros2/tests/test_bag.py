@@ -18,20 +18,20 @@ from executive.record.schemas import DERIVED
 from skills.inputs.errors import InputError
 
 
-@pytest.fixture
-def events(log_file):
-    return read_history(log_file).events
+@pytest.fixture(scope="module")
+def events(log_of_session):
+    return read_history(log_of_session).events
 
 
-@pytest.fixture
-def bag(tmp_path, events):
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory, events):
     """Folder of the bag."""
-    (tmp_path / "bag").mkdir()
-    write_bag(events, tmp_path / "bag", "bag")
-    return tmp_path / "bag"
+    folder = tmp_path_factory.mktemp("bag")
+    write_bag(events, folder, "bag")
+    return folder
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def decoded(bag):
     """Messages of the bag: (schema name, topic, time in ns, message)."""
     with (bag / "bag.mcap").open("rb") as file:

@@ -65,7 +65,7 @@ def feedbacks():
         verbs = VERBS_OF.get(path.split(".")[-2], ())
         for verb, (number, name) in product(verbs, statuses(enum)):
             by_day = verb == verbs[number % len(verbs)] or name == "STATUS_COMMAND_TIMED_OUT"
-            marks = [pytest.mark.nightly] * (not by_day)
+            marks = () if by_day else pytest.mark.nightly
             yield pytest.param(verb, path, enum, number, name, marks=marks, id=f"{verb}-{name}")
 
 

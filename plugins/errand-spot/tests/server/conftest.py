@@ -9,6 +9,7 @@ import sys
 import time
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 
@@ -46,11 +47,6 @@ class Served:
         robot.update_secure_channel_port(self.server.port)
         robot.authenticate(USER, password)
         return robot
-
-    def start(self):
-        """State of a scripted robot at its start, but for its clock and its time."""
-        fresh = vars(scripted(blocks=[WALL])[0])
-        return {name: value for name, value in fresh.items() if name != "_clock"}
 
 
 @contextmanager
@@ -100,9 +96,9 @@ class Spot:
         return True
 
     def _restart(self):
-        computer = self.served.server.computer
+        computer, (fresh, _) = self.served.server.computer, scripted(blocks=[WALL])
         computer.stop_parts((MOBILITY, ARM, GRIPPER))
-        vars(computer.robot).update(self.served.start())
+        vars(computer.robot).update({**vars(fresh), "_clock": computer.clock})
         computer.lease = computer.robot.take_lease("the server of Spot's API")
         computer.grip, computer.scan_points, computer.dock_O, computer.feet_O = Grip(), ScanPoints(), None, None
         computer.step()
@@ -125,24 +121,22 @@ def standing(credentials, module):
 
 
 @pytest.fixture(scope="module")
-def spots(credentials, request):
-    """Returns a function that gives the standing robot of the module, another one where that cannot stand again."""
+def shared():
+    """The standing robot of a module, if it has one, and its ending."""
     with ExitStack() as ending:
-        shared = []
-
-        def spot():
-            if shared and not (getattr(request.module, "SHARED", False) and shared[0].stands_again()):
-                ending.close()
-                shared.clear()
-            shared[:] = shared or [ending.enter_context(standing(credentials, request.module))]
-            return shared[0]
-
-        yield spot
+        yield SimpleNamespace(spot=None, ending=ending)
 
 
 @pytest.fixture
-def spot(spots):
-    return spots()
+def spot(credentials, shared, request):
+    if shared.spot is None or not shared.spot.stands_again():
+        shared.ending.close()
+        shared.spot = None
+        shared.spot = shared.ending.enter_context(standing(credentials, request.module))
+    yield shared.spot
+    if not getattr(request.module, "SHARED", False):
+        shared.ending.close()
+        shared.spot = None
 
 
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")

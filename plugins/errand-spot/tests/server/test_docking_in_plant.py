@@ -10,6 +10,7 @@ from skills.robot import Pose2D
 from tests.benchmarks import spot_docking
 
 pytestmark = pytest.mark.mission
+DOOR, SIDEBOARD = Pose2D(10.6, 6.6, -1.57), Pose2D(11.1, 4.0, 1.57)
 
 
 @pytest.fixture
@@ -19,13 +20,7 @@ def _patches_end():
 
 
 @pytest.mark.usefixtures("_patches_end")
-@pytest.mark.parametrize(
-    "start",
-    [
-        pytest.param(Pose2D(10.6, 6.6, -1.57), id="door"),
-        pytest.param(Pose2D(11.1, 4.0, 1.57), id="sideboard", marks=pytest.mark.nightly),
-    ],
-)
+@pytest.mark.parametrize("start", [DOOR, pytest.param(SIDEBOARD, marks=pytest.mark.nightly)], ids=["door", "sideboard"])
 def test_the_robot_docks_without_touching_anything(start, tmp_path, monkeypatch):
     monkeypatch.setattr(spot_docking, "drawn", lambda _number: start)
     found = spot_docking.run_case(1, tmp_path)

@@ -98,7 +98,7 @@ def expect_fit(page):
     assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
 
 
-def test_the_page_of_a_nested_mission_is_readable(page, running):
+def test_the_page_of_a_nested_mission_is_readable_and_has_no_empty_panel_for_a_scene(page, running):
     page.goto(running)
     note = page.locator(".row.leaf[data-look=running] .note")
     expect(note).to_contain_text(LONG)
@@ -106,6 +106,8 @@ def test_the_page_of_a_nested_mission_is_readable(page, running):
     widths = page.locator(".tree li:not([hidden]) > .row .name").evaluate_all("rows => rows.map((r) => r.clientWidth)")
     assert min(width for width in widths if width) > 150
     assert page.locator(".tree").evaluate("tree => tree.scrollHeight") < 900
+    assert page.locator("#scene-panel").is_hidden()
+    assert page.locator("#map-panel").bounding_box()["height"] > 300
 
 
 @pytest.fixture
@@ -211,13 +213,6 @@ def test_a_robot_is_driven_by_hand_by_its_own_cameras_with_map_events_and_stop_b
     else:
         boxes = [page.locator(f"#{each}-panel").bounding_box() for each in ("teleop", "map", "camera", "events")]
         assert all(box["y"] + box["height"] <= page.viewport_size["height"] for box in boxes)
-
-
-def test_no_empty_panel_is_shown_for_a_scene_that_is_not_there(page, running):
-    page.goto(running)
-    page.locator("#map-panel").wait_for()
-    assert page.locator("#scene-panel").is_hidden()
-    assert page.locator("#map-panel").bounding_box()["height"] > 300
 
 
 def test_the_picture_of_a_nested_mission_has_the_size_of_a_page(page, nested, tmp_path):

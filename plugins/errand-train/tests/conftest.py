@@ -1,7 +1,6 @@
 """An empty data set, scenes of few models, and small networks."""
 
 import json
-from contextlib import contextmanager
 
 import pytest
 
@@ -26,29 +25,17 @@ def few_models(monkeypatch):
     monkeypatch.setattr("errand_train.dataset.compose.numbers", lambda name, **use: numbers(name, **use)[:1])
 
 
-@contextmanager
 def small_sizes():
     """Gives proposal and refinement networks few channels and blocks."""
+    sizes = {"STEM": (8, 16), "LEVELS": (16, 24, 32), "NECK": (16, 16, 24), "_DEPTH": 1, "_RESIDUALS": (1, 1)}
     with pytest.MonkeyPatch.context() as patch:
-        for name, size in {"STEM": (8, 16), "LEVELS": (16, 24, 32), "NECK": (16, 16, 24), "_DEPTH": 1}.items():
-            patch.setattr(f"errand_train.detector.network.{name}", size)
-        for name, size in {"LEVELS": (16, 24, 32), "NECK": (16, 16, 24), "_RESIDUALS": (1, 1)}.items():
-            patch.setattr(f"errand_train.detector.refinement_network.{name}", size)
+        for name, size in sizes.items():
+            for module in ("network", "refinement_network"):
+                patch.setattr(f"errand_train.detector.{module}.{name}", size, raising=False)
         yield
 
 
-@pytest.fixture(scope="module")
-def small_networks():
-    """Makes all networks of a file small."""
-    with small_sizes():
-        yield
-
-
-@pytest.fixture
-def small_network():
-    """Makes the networks of one test small."""
-    with small_sizes():
-        yield
+small_networks, small_network = pytest.fixture(scope="module")(small_sizes), pytest.fixture(small_sizes)
 
 
 @pytest.fixture

@@ -1,10 +1,5 @@
 """Proposal networks of random weights, as learning may meet them in a file."""
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    pass
-
 
 def random_network(seed, classes):
     """One whose normalisation has statistics unlike the first ones, and whose scores are not all alike. Needs torch."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from random_networks import random_network
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
@@ -13,24 +14,13 @@ from errand_train.detector.export import export, fuse  # noqa: E402
 from errand_train.detector.labels import TrainingDataError  # noqa: E402
 from errand_train.detector.learner import Learner, ProposalLearner  # noqa: E402
 from errand_train.detector.losses import Losses, complete_overlap, losses  # noqa: E402
-from errand_train.detector.network import DetectorNetwork, cells  # noqa: E402
+from errand_train.detector.network import cells  # noqa: E402
 from errand_train.detector.overlaps import overlap  # noqa: E402
 from errand_train.detector.placing import Targets  # noqa: E402
 from skills.perception.detector.model_files import load_model  # noqa: E402
 
 NAMES = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "person", "cylinder", "cube")
 CPU = torch.device("cpu")
-
-
-def unsettled(seed=0):
-    """A network whose normalisation has statistics unlike the first ones."""
-    torch.manual_seed(seed)
-    network = DetectorNetwork(len(NAMES))
-    for module in network.modules():
-        if isinstance(module, torch.nn.BatchNorm2d):
-            module.running_mean.normal_(0.0, 0.1)
-            module.running_var.uniform_(0.5, 2.0)
-    return network.eval()
 
 
 def targets(*boxes, classes=(), ignored=False):
@@ -55,7 +45,7 @@ def test_cells_come_in_the_networks_order():
     assert middles[1].tolist() == [12, 4]
     assert middles[96].tolist() == [8, 8]
     assert steps[[0, 95, 96, 119, 120]].tolist() == [8, 8, 16, 16, 32]
-    logits, boxes = unsettled()(torch.rand(1, 3, 64, 96))
+    logits, boxes = random_network(0, len(NAMES))(torch.rand(1, 3, 64, 96))
     assert logits.shape == (1, len(middles), len(NAMES))
     assert ((boxes[0, :, :2] < middles) & (middles < boxes[0, :, 2:])).all()
 
@@ -131,7 +121,7 @@ def test_the_average_follows_fast_at_first():
 
 
 def test_without_normalisation_the_network_says_the_same():
-    network, pictures = unsettled(), torch.rand(2, 3, 64, 64)
+    network, pictures = random_network(0, len(NAMES)), torch.rand(2, 3, 64, 64)
     with torch.no_grad():
         for mine, theirs in zip(network(pictures), fuse(network)(pictures), strict=True):
             assert torch.allclose(mine, theirs, atol=1e-3)
@@ -139,7 +129,7 @@ def test_without_normalisation_the_network_says_the_same():
 
 
 def test_the_exported_file_says_what_the_network_says(tmp_path):
-    network, file = unsettled(), tmp_path / "made.onnx"
+    network, file = random_network(0, len(NAMES)), tmp_path / "made.onnx"
     export(network, file, class_names=NAMES, facts={"seed": "1", "data": "abc"})
     model = load_model(file)
     assert model.class_names == NAMES

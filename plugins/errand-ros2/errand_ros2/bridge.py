@@ -86,8 +86,7 @@ class Bridge(RunVisitor):
         self, prepared: Prepared, control: Control, place: Place, life: Callable[[], float] = time.monotonic
     ) -> None:
         """Opens the session; velocities die by the clock `life` (s). Raises InputError."""
-        self._open, self._control, self._life = ExitStack(), control, life
-        self._hurry = threading.Event()
+        self._open, self._control, self._life, self._hurry = ExitStack(), control, life, threading.Event()
         self.session = self._open.enter_context(open_session(place))
         self._pool = self._open.enter_context(ThreadPoolExecutor(1, thread_name_prefix="errand-ros2"))
         self._node = Node(self.session, "errand")

@@ -77,13 +77,11 @@ def within_limits(velocity: tuple[float, float, float], can: Capabilities) -> tu
 class HeardVelocity:
     """Last velocity of a topic, and when it came on the clock `now` (s). Any thread may call `hear`.
 
-    `late_s` is the delay (wall clock) from which on a velocity does not count; infinite on a clock that stands between
-    steps.
+    One that is `late_s` late by the wall clock does not count; on another clock than the wall's, none is late.
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
-        self._now, self.late_s = now, LIFE_S if now is time.monotonic else math.inf
-        self.last = STILL
+        self._now, self.last, self.late_s = now, STILL, LIFE_S if now is time.monotonic else math.inf
 
     def hear(self, twist: Any) -> None:
         """Takes a velocity; one that is not finite stops the robot."""

@@ -34,9 +34,7 @@ class Clock:
         return self.true.time() + self.off_s + self.monotonic() - self.true.monotonic()
 
     def module(self):
-        clocks = {"monotonic": self.monotonic, "time": self.time}
-        in_ns = {f"{name}_ns": lambda clock=clock: round(clock() * 1e9) for name, clock in clocks.items()}
-        return SimpleNamespace(**clocks, **in_ns, sleep=self.true.sleep)
+        return SimpleNamespace(monotonic=self.monotonic, time=self.time, sleep=self.true.sleep)
 
 
 @pytest.fixture

@@ -59,6 +59,7 @@ def pytest_collection_finish(session):
     gc.collect()
     gc.freeze()
     gc.disable()
+    gc.set_threshold(0)  # some libraries enable it again
     gc.freeze = gc.unfreeze = lambda: None
 
 

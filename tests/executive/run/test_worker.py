@@ -145,6 +145,7 @@ def test_garbage_is_never_collected_in_a_job(worker, clock):
     for _ in range(50):
         Cycle(threads)
     gc.enable()
+    gc.set_threshold(700)
     job = worker.submit(lambda: (gc.isenabled(), [[] for _ in range(50_000)])[0], latency_s=0.1, name="allocate")
     clock.advance(0.1)
     assert job.result() is False
@@ -154,4 +155,5 @@ def test_garbage_is_never_collected_in_a_job(worker, clock):
     gc.collect()
     assert gc.isenabled()
     gc.disable()  # as in all tests
+    gc.set_threshold(0)
     assert (len(threads), set(threads)) == (50, {threading.current_thread().name})

@@ -51,7 +51,7 @@ class Costs:
         owner, _, name = name.rpartition(".")
         owner = getattr(module, owner) if owner else module
         function = getattr(owner, name)
-        if hasattr(function, "counts"):
+        if getattr(function, "counter", None) is self:
             return
 
         def counting(*arguments, **options):
@@ -59,7 +59,7 @@ class Costs:
             self.now[what] += amount(found, *arguments, **options)
             return found
 
-        counting.counts = what
+        counting.counter = self
         setattr(owner, name, counting)
 
     @pytest.hookimpl(tryfirst=True)

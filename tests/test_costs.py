@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 import yaml
 
+from plant.engine import TIME_STEP_S
 from tests import costs
 from tests.costs import Costs, folder_of
 
@@ -45,12 +46,11 @@ def test_a_run_fails_where_a_folder_costs_more_than_its_budget(run):
     assert (code, sums["processes"]) == (pytest.ExitCode.TESTS_FAILED, 1)
 
 
-def test_the_steps_of_a_plant_are_counted_as_seconds(monkeypatch):
-    engine = SimpleNamespace(_do_steps=lambda steps, holding: None, TIME_STEP_S=0.0125)
-    monkeypatch.setitem(costs.sys.modules, "plant.engine", engine)
-    counted = Costs(None, reports=True)
-    counted.count(engine, "_do_steps", "plant_s", lambda _, steps, holding: steps * costs.plant_step_s())
-    engine._do_steps(80, ())
+def test_the_steps_of_a_plant_are_counted_as_seconds():
+    counted, module = Costs(None, reports=True), SimpleNamespace(do_steps=lambda engine, steps: None)
+    (amount,) = (amount for name, _, _, amount in costs.IMPORTED if name == "plant.engine")
+    counted.count(module, "do_steps", "plant_s", amount)
+    module.do_steps(object(), round(1.0 / TIME_STEP_S))
     assert counted.now["plant_s"] == pytest.approx(1.0)
 
 

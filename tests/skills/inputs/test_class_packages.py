@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from executive.app.prepare import feasibility
 from executive.cli import plugins_command
 from executive.language import spelling
 from plant.models.catalogue import MODELS_FOLDER, load_catalogue
@@ -56,7 +57,7 @@ def site(tmp_path):
 @pytest.fixture
 def installed(site, monkeypatch):
     """Installs the distribution for this process, which has read no classes; afterwards it reads them again."""
-    read = (class_forms, load_catalogue, spelling._synonyms)
+    read = (class_forms, load_catalogue, spelling._synonyms, feasibility.abilities_of)
     monkeypatch.chdir(site)
     monkeypatch.syspath_prepend(str(site))
     monkeypatch.setattr("skills.inputs.plugins._all_installed", entry_points)

@@ -8,6 +8,8 @@ import pytest
 
 from tests import affected, costs, durations, missing
 
+os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")  # as errand_spot sets it; gRPC reads it when it is imported
+
 
 def pytest_addoption(parser):
     durations.add_option(parser)

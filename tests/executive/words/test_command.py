@@ -1,7 +1,7 @@
 import dataclasses
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from executive.words.command import SPEAKER, Command, Task, parse_command, parse_object
@@ -96,6 +96,7 @@ def test_a_name_that_ends_in_a_comma_is_no_beginning_of_a_relation():
     assert parse_command(str(command)) == command
 
 
+@settings(suppress_health_check=[HealthCheck.too_slow])
 @given(commands())
 def test_every_command_parses_back_from_its_text(command):
     assert parse_command(str(command)) == command

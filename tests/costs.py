@@ -34,8 +34,11 @@ COUNTED = {
 }
 LONG_S = 0.05
 """Shortest sleep that counts as one on purpose; shorter ones look whether something has come about."""
-MARGIN, ONCE = 1.1, {"networks": 9, "processes": 3, "browsers": 3, "waited_s": 3}
-"""A budget is what was counted times the margin, plus what each of three processes does once, in whichever folder."""
+MARGIN, ONCE = 1.25, {"networks": 9, "processes": 9, "browsers": 3, "waited_s": 9}
+"""A budget is what was counted times the margin, plus what each of three processes does once, in whichever folder.
+
+Another processor rounds in another way, and a mission then takes another way, too: 14 % more plant seconds were seen.
+"""
 
 
 class Costs:

@@ -5,8 +5,11 @@ import pytest
 from executive.record.history import read_history
 from executive.record.schemas import WALL
 from tests.missions.conftest import REPEATED_S
+from tests.tables import yaml_beside
 
 pytestmark = pytest.mark.mission
+
+BUDGETS = yaml_beside(__file__, "test_fetch_drink.yaml")
 
 ARTIFACTS = {"tree.svg", "log.mcap", "recording.html", "map.png", "detection.png", "grasp.png", "hand_over.png"}
 
@@ -37,3 +40,12 @@ def test_the_same_seed_gives_the_same_events(recorded, repeated):
     first, second = ([event for event in log if event.topic != WALL and event.stamp_s < REPEATED_S] for log in logs)
     assert any(event.data.get("node", "").endswith("/grasp") for event in first)
     assert first == second
+
+
+def test_it_computes_no_more_than_its_budgets_so_that_no_slower_path_comes_in_unseen(recorded):
+    out, report, _ = recorded
+    work = report["work"]
+    logged = [event.data for event in read_history(out / "last").events if event.topic == "work"]
+    assert logged == [work]
+    assert {name: work.get(name) for name in BUDGETS if work.get(name, 0) > BUDGETS[name]} == {}
+    assert set(work) == set(BUDGETS), "a counter has no budget, or a budget no counter"

@@ -63,11 +63,13 @@ def astray(tmp_path_factory):
     return run_request(prepare(request)).report
 
 
+@pytest.mark.nightly
 def test_no_picture_is_claimed_while_no_scan_confirms_where_the_robot_stands(astray):
     assert not astray.false_claim, (astray.message, astray.referee.why)
     assert astray.achieved or astray.cause == "POSTCONDITION", astray.message
 
 
+@pytest.mark.nightly
 def test_the_log_shows_how_far_a_jump_of_odometry_takes_the_estimate_from_the_truth(astray):
     log = Path(astray.log)
     errors_m = [(each.stamp_s, each.data["error_m"]) for each in read_events(log) if each.topic == "truth"]

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import takewhile
 from typing import Final
 
 from executive.language.items import (
@@ -17,7 +17,7 @@ from executive.language.items import (
     Verb,
     spoken_words,
 )
-from executive.language.lexicon import PrepositionRole, VerbKind
+from executive.language.lexicon import PrepositionRole, VerbKind, word_list
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
@@ -46,9 +46,30 @@ def repair_disfluencies(items: Iterable[Item]) -> tuple[Item, ...]:
 
 
 def unwanted_phrases(items: Sequence[Item]) -> tuple[Phrase, ...]:
-    """Noun phrases directly after "not"."""
-    pairs = pairwise(item for item in items if not isinstance(item, Separator))
-    return tuple(b.phrase for a, b in pairs if isinstance(a, Negation) and isinstance(b, Chunk))
+    """Noun phrases directly after "not" or "except", and the objects of a verb directly after "not"."""
+    found = list[Phrase]()
+    for n, mark in enumerate(items):
+        behind = items[n + 1 :] if isinstance(mark, Negation) else []
+        words = [item for item in behind if not isinstance(item, Separator)]
+        if words and isinstance(words[0], Verb):
+            acted = takewhile(lambda item: isinstance(item, Chunk), words[1:])
+            named = [item for item in acted if isinstance(item, Chunk) and item.role is None]
+            found += [item.phrase for item in named if not item.phrase.receiver]
+        elif words and isinstance(words[0], Chunk):
+            found += [item.phrase for item in _listed(mark, behind) if isinstance(item, Chunk)]
+    return tuple(phrase for phrase in found if not phrase.pronoun)
+
+
+def _listed(mark: Item, behind: Sequence[Item]) -> list[Item]:
+    """Items from a noun phrase on that are negated together: "not the beer or the coke", "except beer and coke"."""
+    end = next((n for n, item in enumerate(behind) if not isinstance(item, Separator)), len(behind)) + 1
+    joints = ("or", "and", ",") if isinstance(mark, Negation) and mark.word in word_list("exceptions") else ("or",)
+    while True:
+        at = next((n for n in range(end, len(behind)) if getattr(behind[n], "word", None) not in joints), len(behind))
+        item = behind[at] if end < at < len(behind) else None
+        if not isinstance(item, Chunk) or (item.role is not None and joints != ("or",)):
+            return [*behind[:end]]
+        end = at + 1
 
 
 def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[Item], list[Item]]:
@@ -72,9 +93,7 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
         phrase = next((item.phrase for item in ahead if isinstance(item, Chunk) and item.role is None), None)
         return done, rest if phrase is None or phrase.pronoun or phrase.speaker else _one_of_them(rest, phrase)
     if isinstance(first, Chunk):
-        rest = ahead[1:]  # behind all that "or" joins
-        while len(rest) > 1 and isinstance(rest[0], Separator) and rest[0].word == "or" and isinstance(rest[1], Chunk):
-            rest = rest[2:]
+        rest = ahead[len(_listed(mark, ahead)) :]
         at = next((n for n, item in enumerate(rest) if not isinstance(item, Separator)), len(rest))
         new = rest[at] if at < len(rest) else None
         if isinstance(new, Chunk) and new.phrase.stands_for_one:  # not the red cup but the blue one

@@ -20,7 +20,7 @@ from executive.language.roles import HERE, Location
 from executive.language.spelling import look_alikes, synonyms_for, synonyms_of
 from executive.language.tokens import Token
 from executive.words.command import Command, Task
-from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
+from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge, except_for, split_exceptions
 from skills.api import ObjectKind
 from skills.inputs.errors import known_names, listing
 from skills.perception.class_forms import known_attributes
@@ -51,17 +51,30 @@ def ground(
     return commands, tuple(dict.fromkeys(grounder.notes))
 
 
-def check_unwanted(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge) -> None:
-    """Refuses to exclude one kind among several that a command takes: "a drink, but not a beer".
+def leave_out(
+    unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge
+) -> tuple[Command, ...]:
+    """Leaves unwanted classes out of the categories that commands take: "a drink, but not a beer".
 
-    Raises RefusalError if the excluded kind is one of several that a command may take.
+    Raises RefusalError for an unwanted object that cannot be left out so, since it is told by more than its class.
     """
-    for phrase in unwanted:
-        names = filter(None, (knowledge.object_name(form) for _, form in _readings(phrase)))
-        kinds = {kind for name in names for kind in knowledge.classes(name)}
-        taken = (one for command in commands for one in (command.object, command.item) if one is not None)
-        if any(not one.attributes and kinds & {*knowledge.classes(one.name)} for one in taken):
+
+    def without(kind: ObjectKind | None, phrase: Phrase, names: Sequence[str]) -> ObjectKind | None:
+        kinds = {one for name in names for one in knowledge.classes(name)}
+        if kind is None or kind.attributes or not kinds & {*knowledge.classes(kind.name)}:
+            return kind
+        kept, *others = split_exceptions(kind.name)
+        rest = except_for(kept, *dict.fromkeys((*others, names[0])))
+        told = any(attributes for attributes, _ in _readings(phrase)) or phrase.relations
+        if told or kept in (ANYTHING, EVERYTHING) or not knowledge.classes(rest):
             raise RefusalError(f"I cannot follow 'not {phrase.spoken}'; name what I am to take", [phrase.spoken])
+        return replace(kind, name=rest)
+
+    for phrase in unwanted:
+        names = [name for _, form in _readings(phrase) if (name := knowledge.object_name(form)) is not None]
+        taken = ((without(one.item, phrase, names), without(one.object, phrase, names)) for one in commands)
+        commands = [replace(one, item=k, object=o) for one, (k, o) in zip(commands, [*taken], strict=True)]
+    return tuple(commands)
 
 
 @dataclass

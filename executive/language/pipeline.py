@@ -8,7 +8,7 @@ from executive.language.actions import Action, read_actions
 from executive.language.command_frames import CommandFrame, command_frames, spoken_command
 from executive.language.coverage import cover, left_out
 from executive.language.disfluency import repair_disfluencies, unwanted_phrases
-from executive.language.grounding import check_unwanted, ground
+from executive.language.grounding import ground, leave_out
 from executive.language.items import Item, Predicate, drop_name, predicates
 from executive.language.lexicon import VerbKind
 from executive.language.limits import check_feasible, check_routes_and_speaker, not_understood, refuse_harm
@@ -152,7 +152,7 @@ class Pipeline:
         if self.knowledge is None:
             return replace(trace, commands=tuple(map(spoken_command, trace.frames)))
         commands, notes = ground(trace.frames, self.knowledge, self.parser)
-        check_unwanted(trace.unwanted, commands, self.knowledge)
+        commands = leave_out(trace.unwanted, commands, self.knowledge)
         return replace(trace, commands=commands, notes=(*trace.notes, *notes))
 
 

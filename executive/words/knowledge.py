@@ -222,13 +222,23 @@ class Knowledge(Strict):
         return self.surfaces[place].viewpoints[0] if place in self.surfaces else self.places[place].pose
 
     def object_name(self, name: str) -> str | None:
-        """Name in the file of the class or category that `name` means; None when `name` is unknown."""
+        """Name in the file of the class or category that `name` means; None when `name` is unknown.
+
+        "drink except beer and coke" is a category without some of its classes.
+        """
         own = _resolve(name, self.things) or next((c for c in self.categories() if c.lower() == name.lower()), None)
+        kept, *others = split_exceptions(name)
+        if own is None and others:
+            return except_for(*map(str, map(self.object_name, (kept, *others)))) if self.classes(name) else None
         return own or _UNNAMED.get(name.lower())
 
     def classes(self, name: str) -> tuple[str, ...]:
         """Classes that a class, alias or category includes, in the file's order; empty when the name is unknown."""
         known = _resolve(name, self.things)
+        kept, *others = split_exceptions(name)
+        if known is None and others:
+            left_out = [self.classes(one) for one in others]
+            return tuple(c for c in self.classes(kept) if all(left_out) and not any(c in each for each in left_out))
         if known is None and self.object_name(name) in _UNNAMED:
             return tuple(self.things)
         return (known,) if known else tuple(c for c, facts in self.things.items() if name.lower() in facts.categories)
@@ -281,6 +291,20 @@ class Knowledge(Strict):
         groups = (self.places, self.surfaces, self.things, self.people)
         aliases = {name: facts.aliases for group in groups for name, facts in group.items()}
         return tuple(word for name in names for word in (name, *aliases.get(name, ())))
+
+
+_EXCEPT: Final = " except "
+
+
+def except_for(kept: str, *left_out: str) -> str:
+    """Name of a category without some of its classes: "drink except beer and coke"."""
+    return f"{kept}{_EXCEPT}{' and '.join(left_out)}"
+
+
+def split_exceptions(name: str) -> tuple[str, ...]:
+    """Category and the classes that are left out of it; only the name itself if none are."""
+    kept, _, left_out = name.partition(_EXCEPT)
+    return (kept, *left_out.split(" and ")) if left_out else (name,)
 
 
 def _resolve(

@@ -356,10 +356,14 @@ class Builder:
         if not steps:
             what = join_clauses(body)
             raise RefusalError(f"'{what}' is nothing to do; leave it out", [what])
-        if len(steps) == 1 and isinstance(inner := steps[0], Repeat) and inner.loop.is_endless:
-            if not ends:
+        if len(steps) == 1 and isinstance(inner := steps[0], Repeat):  # every hour .. until noon: one loop with both
+            ends_inside = inner.loop.times is None and inner.loop.every_s is None
+            if inner.loop.is_endless and not ends:
                 raise RefusalError("an endless repetition cannot be repeated again; say how often", [])
-            loop, steps = loop.model_copy(update={"every_s": inner.loop.every_s}), inner.steps
+            if inner.loop.is_endless:
+                loop, steps = loop.model_copy(update={"every_s": inner.loop.every_s}), inner.steps
+            elif loop.is_endless and ends_inside:
+                loop, steps = inner.loop.model_copy(update={"every_s": loop.every_s}), inner.steps
         self.put((Repeat(loop=loop, steps=steps),), state)
 
     def _put_together(self, where: str, body: Sequence[Clause]) -> None:

@@ -191,7 +191,7 @@ def _seen(match: Match, words: str, state: State, reader: PlainReader) -> Spoken
 def _joined(words: str, state: State, reader: PlainReader) -> SpokenCondition | RefusalError | None:
     """Joins two conditions by "and" or "or"; if that fails, returns the first question that a half raised, or None."""
     left_open: RefusalError | None = None
-    for word, kind in (("and", AllOf), ("or", AnyOf)):
+    for word, kind in (("or", AnyOf), ("and", AllOf)):  # "and" joins more closely
         for joint in re.finditer(rf" {word} (?:if )?(?:that )?", words, re.IGNORECASE):
             before = re.sub(r"^(?:both |either )", "", words[: joint.start()]).strip(" ,")
             halves = attempt(_both, before, words[joint.end() :], state, reader)

@@ -96,14 +96,20 @@ def _parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) 
     if (match := _PICTURE.fullmatch(text)) is None or trailing_cue(text) is not None:
         return None
     state, steps = known(), list[Step]()
-    at = (match["at"] or None) and reader.go_to(match["at"], state).commands[0].goal
-    for what in re.split(r",? and |, ", match["of"]):
+    stands = reader.go_to(match["at"], state).commands if match["at"] else ()
+    if len(stands) > 1:
+        raise RefusalError(f"I take a picture from one place at a time, not from {match['at']}", [match["at"]])
+    at = stands[0].goal if stands else None
+    for what in re.split(r",? and |,? then |, ", match["of"]):
         of = reader.knowledge.place(re.sub(r"^(?:the|a|an|my|our|your) ", "", what, flags=re.IGNORECASE))
         if of is None:
-            found = reader.read_commands(what, state, (verb("find"),)).commands[0].object
-            if found is not None and found.relations:
+            finds, *more = reader.read_commands(what, state, (verb("find"),)).commands
+            usual = finds.object and reader.knowledge.default_place(Task.FIND, finds.object.name)
+            if more or finds.object is None or finds.object.relations or finds.object_count != 1:
                 raise RefusalError(f"I cannot tell in a picture which one is '{what}'", [what])
-            of = str(found)
+            if finds.goal != usual:
+                raise RefusalError(f"I take a picture of the first {finds.object} that I see, not of '{what}'", [what])
+            of = str(finds.object)
         steps.append(Picture(subject=Subject(of=of, at=at, camera=match["camera"] or None)))
     return tuple(steps), state.elsewhere
 

@@ -6,14 +6,15 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from executive.language.clauses import CHECKS, CLAUSES, Clause, Cue, end_of_scope, trailing_cue
-from executive.language.items import Chunk
-from executive.language.lexicon import lexicon
+from executive.language.items import Chunk, predicates
+from executive.language.lexicon import lexicon, read_table
+from executive.language.limits import refuse_harm
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.structure.builder import Builder
 from executive.language.structure.conditions import parse_condition
-from executive.language.structure.plain import PlainReader, names_of_world, person_named
-from executive.language.templates import Match, page
+from executive.language.structure.plain import PlainReader, attempt, names_of_world, person_named
+from executive.language.templates import Match, page, words_of
 from executive.words.command import PEOPLE_TASKS
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Speak
@@ -39,7 +40,8 @@ def says(row: Builder, clause: Clause) -> bool:
     if not SPEECH["speaks"].match(text) or SPEECH["asks_back"].match(text):
         return False
     if (everywhere := ROOMS["says_everywhere"].fullmatch(text)) is not None:
-        say_in_each_room(row, everywhere["said"])
+        left_out = [row.reader.room(each, row.state) for each in re.split(r",? and |, ", everywhere["except"]) if each]
+        say_in_each_room(row, everywhere["said"], left_out)
         return True
     found = trailing_cue(text)
     counts = found is not None and found.kind in (Cue.TIMES, Cue.EVERY) and found.text
@@ -48,7 +50,11 @@ def says(row: Builder, clause: Clause) -> bool:
         return True
     if (said := _parse_speech(text, row.reader)) is None:
         return False
-    if not (words := said["text"] or row.statement):
+    places = re.split(r",? and (?:in |at )?|, ", said["where"])
+    if len(places) > 1:
+        row.clauses[row.at : row.at] = [Clause("", f"announce in {place} that {said['text']}") for place in places]
+        return True
+    if not (words := said["text"] or row.statement) or words.startswith("and "):
         raise RefusalError(f"what am I to say in '{text}'?", [text])
     row.flush()
     _goes_to_listener(row, said)
@@ -56,9 +62,9 @@ def says(row: Builder, clause: Clause) -> bool:
     return True
 
 
-def say_in_each_room(row: Builder, said: str) -> None:
-    """Goes on with speech in every room."""
-    goes = (f"go to the {room}" for room in row.reader.knowledge.rooms)
+def say_in_each_room(row: Builder, said: str, left_out: Sequence[str] = ()) -> None:
+    """Goes on with speech in every room but some."""
+    goes = (f"go to the {room}" for room in row.reader.knowledge.rooms if room not in left_out)
     row.clauses[row.at : row.at] = [Clause("", text) for go in goes for text in (go, said)]
 
 
@@ -86,11 +92,23 @@ def _parse_speech(text: str, reader: PlainReader) -> Match | None:
     forms = page("speech", **names_of_world(reader.knowledge))
     if forms["say_within"].fullmatch(text) is not None:
         raise RefusalError(f"I do not understand to whom to say '{text}'; name one person at the end", [text])
-    for intent in ("says_to", "says", "formula", "tells", "relays"):
+    for intent in ("says_to", "greets_there", "says", "formula", "tells", "relays"):
         if (match := forms[intent].fullmatch(text)) is not None:
+            if match["polite"]:
+                _refuse_harm(match["text"], reader)
             return replace(match, slots={**match.slots, "text": _words(match, intent, reader.pipeline.parser)})
     _refuse_stranger(text, reader.knowledge)
     return None
+
+
+def _refuse_harm(told: str, reader: PlainReader) -> None:
+    """Raises RefusalError for a request to somebody that could hurt somebody or break something."""
+    words, table = {*words_of(told).words}, read_table("harm.yaml")
+    if words & {*table["swallows"]} and words & {*table["poisons"]}:
+        raise RefusalError(f"{told!r} could hurt somebody", [told])
+    items = attempt(reader.read_items, told)
+    if not isinstance(items, RefusalError):
+        refuse_harm(predicates(items))
 
 
 def _refuse_stranger(text: str, knowledge: Knowledge) -> None:

@@ -18,6 +18,7 @@ from executive.language.zone_rules import RoomRules, read_rules
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands
+from executive.words.second_look import second_look
 from executive.words.step import Step
 from executive.words.steps import steps_to_data, steps_to_yaml
 from skills.inputs.errors import requote
@@ -152,7 +153,18 @@ def understand(
         found = under_rules(rules, meaning(Trace(rules.rest, memory or Memory()), Pipeline(parser, rules.knowledge)))
     except RefusalError as refusal:
         found = _of_trace(Trace(said.text, refusal=refusal, refused_at="rules"))
+    found = looked_over(said.text, found, knowledge)
     return replace(found, text=sentence, notes=(*said.notes, *found.notes), addressed=addressed)
+
+
+def looked_over(text: str, found: Understanding, knowledge: Knowledge | None) -> Understanding:
+    """Refuses what a second look finds to lack a word that forbids, limits or shares."""
+    if found.status is not Status.OK or knowledge is None:
+        return found
+    steps = [step for meant in (found, *(part.meaning for part in found.parts)) for step in meant.all_steps]
+    word = second_look(text, steps, knowledge, robots=bool(found.parts))
+    refusal = RefusalError(f"I cannot follow '{word}' there; say only what I am to do", [word or ""])
+    return found if word is None else _of_trace(Trace(text, refusal=refusal, refused_at="second look"))
 
 
 def under_rules(rules: RoomRules, meant: Understanding) -> Understanding:

@@ -1,0 +1,73 @@
+"""Second, independent look at a sentence: each word that forbids, limits or shares must be carried by its mission.
+
+It knows no grammar: something of the mission's own text must carry each such word of the sentence (see `cues.yaml`), or
+the clause of the word names only objects and places with which the mission does nothing.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
+from importlib import resources
+from typing import Any, Final
+
+import yaml
+
+from executive.words.command import Command, Task
+from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import Speak
+from executive.words.step import Step
+from executive.words.steps import steps_to_yaml
+
+_CLAUSE: Final = re.compile(r"[,;.!?:]|\b(?:and|but|then|so)\b", re.IGNORECASE)
+
+
+def second_look(text: str, steps: Sequence[Step], knowledge: Knowledge, *, robots: bool = False) -> str | None:
+    """First word of a sentence, or words in a row, that nothing of its mission carries; None if all are carried."""
+    walked = [each for step in steps for each in step.walk()]
+    commands = [command for each in walked for command in each.commands]
+    spoken = [each.speak for each in walked if isinstance(each, Speak)]
+    heard = text.replace("\u2019", "'")
+    for silent in (_any_of(spoken), *_table()["harmless"]):
+        heard = re.sub(rf"\b(?:{silent})", lambda match: " " * len(match[0]), heard, flags=re.IGNORECASE)
+    mission = "\n".join((*steps_to_yaml(steps), *map(str, commands), *_marks(commands), *["<robots>"] * robots))
+    for row in _table()["rows"]:
+        for cue in re.finditer(rf"\b(?:{row['cue']})\b", heard, re.IGNORECASE):
+            apart = "<apart>" in row["carried"] and _is_apart(_clause(heard, cue), commands, knowledge)
+            if not apart and re.search(row["carried"], mission) is None:
+                return cue[0]
+    return None
+
+
+@cache
+def _table() -> Any:
+    return yaml.safe_load(resources.files(__package__).joinpath("cues.yaml").read_text(encoding="utf-8"))
+
+
+def _any_of(phrases: Iterable[str]) -> str:
+    return "|".join(map(re.escape, sorted(phrases, key=len, reverse=True))) or "(?!)"
+
+
+def _marks(commands: Sequence[Command]) -> Iterator[str]:
+    """Yields what the table calls several errands, and a thing that is taken."""
+    taken = [command for command in commands if command.item is not None]
+    visits = {command.goal for command in commands if command.item is None and command.task is not Task.GRASP}
+    if len(taken) > 1 or len(visits) > 1:
+        yield "<several>"
+    if taken:
+        yield "<takes>"
+
+
+def _clause(text: str, cue: re.Match[str]) -> str:
+    """Clause around a word: from the mark or joining word before it to the next."""
+    begin = max((each.end() for each in _CLAUSE.finditer(text, 0, cue.start())), default=0)
+    return text[begin : next((each.start() for each in _CLAUSE.finditer(text, cue.end())), len(text))]
+
+
+def _is_apart(clause: str, commands: Sequence[Command], knowledge: Knowledge) -> bool:
+    """Returns whether a clause names something, and the commands do nothing with it: "the wrench, not the hammer"."""
+    names = knowledge.spellings((*knowledge.object_names(), *knowledge.place_names()))
+    said = {one.lower() for one in re.findall(rf"\b(?:{_any_of(names)})(?=e?s?\b)", clause, re.IGNORECASE)}
+    used = [each for command in commands for each in (command.item, command.object) if each is not None]
+    taken = {kind for each in used if not each.attributes for kind in knowledge.classes(each.name)}
+    goals = {command.goal.lower() for command in commands if command.goal is not None}
+    return bool(said) and not said & goals and taken.isdisjoint(kind for one in said for kind in knowledge.classes(one))

@@ -32,7 +32,7 @@ def second_look(text: str, steps: Sequence[Step], knowledge: Knowledge, *, robot
     mission = "\n".join((*steps_to_yaml(steps), *map(str, commands), *_marks(commands), *["<robots>"] * robots))
     for row in _table()["rows"]:
         for cue in re.finditer(rf"\b(?:{row['cue']})\b", heard, re.IGNORECASE):
-            apart = "<apart>" in row["carried"] and _is_apart(_clause(heard, cue), commands, knowledge)
+            apart = "<apart>" in row["carried"] and _is_apart(heard, cue, commands, knowledge)
             if not apart and re.search(row["carried"], mission) is None:
                 return cue[0]
     return None
@@ -57,17 +57,14 @@ def _marks(commands: Sequence[Command]) -> Iterator[str]:
         yield "<takes>"
 
 
-def _clause(text: str, cue: re.Match[str]) -> str:
-    """Clause around a word: from the mark or joining word before it to the next."""
+def _is_apart(text: str, cue: re.Match[str], commands: Sequence[Command], knowledge: Knowledge) -> bool:
+    """Returns whether the commands do nothing with what is named behind a cue, or else before it, in its clause."""
     begin = max((each.end() for each in _CLAUSE.finditer(text, 0, cue.start())), default=0)
-    return text[begin : next((each.start() for each in _CLAUSE.finditer(text, cue.end())), len(text))]
-
-
-def _is_apart(clause: str, commands: Sequence[Command], knowledge: Knowledge) -> bool:
-    """Returns whether a clause names something, and the commands do nothing with it: "the wrench, not the hammer"."""
-    names = knowledge.spellings((*knowledge.object_names(), *knowledge.place_names()))
-    said = {one.lower() for one in re.findall(rf"\b(?:{_any_of(names)})(?=e?s?\b)", clause, re.IGNORECASE)}
+    end = next((each.start() for each in _CLAUSE.finditer(text, cue.end())), len(text))
+    names = rf"\b(?:{_any_of(knowledge.spellings((*knowledge.object_names(), *knowledge.place_names())))})(?=e?s?\b)"
+    parts = (text[cue.end() : end], text[begin : cue.start()])
+    said = next(filter(None, (re.findall(names, part.lower(), re.IGNORECASE) for part in parts)), [])
     used = [each for command in commands for each in (command.item, command.object) if each is not None]
     taken = {kind for each in used if not each.attributes for kind in knowledge.classes(each.name)}
     goals = {command.goal.lower() for command in commands if command.goal is not None}
-    return bool(said) and not said & goals and taken.isdisjoint(kind for one in said for kind in knowledge.classes(one))
+    return bool(said) and goals.isdisjoint(said) and taken.isdisjoint(k for one in said for k in knowledge.classes(one))

@@ -11,11 +11,11 @@ import pytest
 from tests.sources import PRODUCT, dotted, import_graph, modules, read
 
 LINES = {
-    "executive/words": 3666,
-    "executive/language": 8277,
+    "executive/words": 3762,  # the second look at sentences, and categories without some of their classes (84)
+    "executive/language": 8350,  # 84 asks for 8 000 at its end
     "executive/speech": 1663,
     "executive/mission": 1724,
-    "executive/tree": 8879,
+    "executive/tree": 8887,  # a place that was said is meant (84)
     "executive/run": 3324,
     "executive/record": 1100,
     "executive/store": 1604,
@@ -27,8 +27,8 @@ LINES = {
     "skills": 28950,
     "plant": 11491,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 426, 59, 7
-"""All modules; those that one other imports; file names that stand more than once."""
+MODULES, ONE_IMPORTER, SAME_NAME = 427, 60, 7
+"""All modules; those that one other imports; file names that stand more than once. One more of each by 84."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""
 

@@ -51,9 +51,7 @@ def ground(
     return commands, tuple(dict.fromkeys(grounder.notes))
 
 
-def leave_out(
-    unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge
-) -> tuple[Command, ...]:
+def leave_out(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge) -> tuple[Command, ...]:
     """Leaves unwanted classes out of the categories that commands take: "a drink, but not a beer".
 
     Raises RefusalError for an unwanted object that cannot be left out so, since it is told by more than its class.

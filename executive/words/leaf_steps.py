@@ -25,7 +25,9 @@ from skills.inputs.schema import Name, Strict, Text
 from skills.quantities import Duration, Share, clock_text
 
 COMMAND_KEYS: Final = ("take", "to", "do", "object")
-_ELSEWHERE: Final = "Whether the robot also searches elsewhere for an object that is not in its place; by default, yes."
+_ELSEWHERE: Final = (
+    "Whether the robot also searches elsewhere for an object that is not there; by default, if it is its usual place."
+)
 _GIVES: Final = (
     "Names for the skill's output ports, or for the answer; later steps read them with {from: NAME} and in expressions."
 )

@@ -49,7 +49,7 @@ def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembl
         raise InputError("a step has no commands", hint="give it 'say', a command, a skill or a file to use")
     builder = replace(
         builder,
-        anywhere=step.elsewhere is not False,
+        anywhere=_in_usual_place(builder) if step.elsewhere is None else step.elsewhere,
         pick_ups=assembler.pick_ups if step.pick_ups is None else step.pick_ups,
         move_aside=assembler.move_aside if step.move_aside is None else step.move_aside,
     )
@@ -106,6 +106,14 @@ def _giving(assembler: Assembler, step: Do | Say, node: NodeSpec, builder: PlanB
         option, kind = _ANSWERS[port]
         keys[option] = assembler.give(name, builder.key(port), kind, builder, COUNTED if port == "count" else None)
     return set_answer_options(node, keys) if keys else node
+
+
+def _in_usual_place(builder: PlanBuilder) -> bool:
+    """Returns whether an object is asked for in its usual place, or in none; a place that was said is meant."""
+    command, knowledge = builder.command, builder.knowledge
+    if command.goal is None or command.object is None:
+        return True
+    return knowledge.place(command.goal) == knowledge.default_place(command.task, command.object.name)
 
 
 def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:

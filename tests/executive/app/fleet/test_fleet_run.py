@@ -330,7 +330,8 @@ def only_alice_takes_and_only_bob_goes_to_the_bedroom(name, command):
 
 
 @pytest.fixture
-def chain(fleet):
+def chain(fleet, script):
+    script.seen_on = {*script.seen_on, "shelf"}  # where the first robot puts it
     fleet.cannot = only_alice_takes_and_only_bob_goes_to_the_bedroom
     fleet.queue((TAKE, PUT))
     return fleet

@@ -93,9 +93,13 @@ def test_a_drive_to_a_pose_asks_for_the_body_there(conditions_by):
     assert not condition.goal[0].contains((4.5, -1.0, 0.5))
 
 
-def test_an_object_may_be_taken_from_another_searched_place(conditions_by):
-    (condition,) = conditions_by(step("Take [Nothing] to [bedroom] and do [grasp] to [coke]"))
-    assert {region.name for region in condition.source} == {"bedside table", "counter", "shelf"}
+# place that is said      surfaces from which the object may come: the kitchen is a coke's usual place
+@pytest.mark.parametrize(
+    ("place", "surfaces"), [("kitchen", {"bedside table", "counter", "shelf"}), ("bedroom", {"bedside table"})]
+)
+def test_an_object_may_come_from_elsewhere_unless_another_than_its_usual_place_is_said(conditions_by, place, surfaces):
+    (condition,) = conditions_by(step(f"Take [Nothing] to [{place}] and do [grasp] to [coke]"))
+    assert {region.name for region in condition.source} == surfaces
 
 
 def test_an_answer_belongs_to_its_own_check(conditions_by, script):

@@ -21,7 +21,8 @@ _AND: Final = re.compile(r"(?<=\s)[&+](?=\s)")
 _PERCENT: Final = re.compile(r"(?<=\d)\s?%")
 _SIGNS: Final = r"$€£%#@&+=|\\/^~_{}<>\[\]"
 _PLACEHOLDER: Final = re.compile(
-    rf"\$?(?:(?<!\{{)\{{++[^{{}}]*+\}}+|<[^<>]*+>|\[[^\[\]]*+\])|(?<!\S)[^\s{_SIGNS}]*+[{_SIGNS}]\S*|(?<!\S)-\d\S*(?= times)"
+    rf"\$?(?:(?<!\{{)\{{++[^{{}}]*+\}}+|<[^<>]*+>|\[[^\[\]]*+\])|(?<!\S)[^\s{_SIGNS}]*+[{_SIGNS}]\S*"
+    r"|(?<!\S)-\d\S*(?= times)"
 )  # possessive, so that the time grows with the length of a sentence and not with its square
 
 

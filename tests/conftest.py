@@ -48,7 +48,7 @@ def pytest_collection_modifyitems(items):
     durations.slowest_first(items)
 
 
-COLLECTED_AFTER = 60_000
+COLLECTED_AFTER = 100_000
 """Objects from which on garbage is collected after a test."""
 
 

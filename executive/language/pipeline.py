@@ -126,7 +126,7 @@ class Pipeline:
         if unknown or lost:
             raise not_understood([*unknown, *lost], self.knowledge)
         if trace.taken_back:
-            notes.append(f"I take {listing(map(repr, trace.taken_back))} not to be meant")
+            notes.append(_NOT_MEANT.format(listing(map(repr, trace.taken_back))))
         for choice, kind in ((choice, action.kind) for action in trace.actions for choice in action.choices):
             any_will_do = all(one.tokens[0].word in ("a", "an", "any", "some") and not one.person for one in choice)
             if kind is VerbKind.FIND or not any_will_do:
@@ -151,9 +151,15 @@ class Pipeline:
     def _command(self, trace: Trace) -> Trace:
         if self.knowledge is None:
             return replace(trace, commands=tuple(map(spoken_command, trace.frames)))
-        commands, notes = ground(trace.frames, self.knowledge, self.parser)
-        commands = leave_out(trace.unwanted, commands, self.knowledge)
-        return replace(trace, commands=commands, notes=(*trace.notes, *notes))
+        grounded, notes = ground(trace.frames, self.knowledge, self.parser)
+        commands = leave_out(trace.unwanted, grounded, self.knowledge)
+        carried = "" if commands == grounded else _NOT_MEANT.format(listing(map(repr, trace.taken_back)))
+        notes = (*(note for note in trace.notes if note != carried), *notes)
+        return replace(trace, commands=commands, notes=notes)
+
+
+_NOT_MEANT: Final = "I take {} not to be meant"
+"""Note on what the speaker has corrected or denied, where the commands do not carry it."""
 
 
 def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError:

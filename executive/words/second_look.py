@@ -7,16 +7,15 @@ the clause of the word names only objects and places with which the mission does
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import Any, Final
-
-import yaml
 
 from executive.words.command import Command, Task
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Speak
 from executive.words.step import Step
 from executive.words.steps import steps_to_yaml
+from skills.inputs.yaml_source import read_yaml
 
 _CLAUSE: Final = re.compile(r"[,;.!?:]|\b(?:and|but|then|so)\b", re.IGNORECASE)
 
@@ -40,7 +39,7 @@ def second_look(text: str, steps: Sequence[Step], knowledge: Knowledge, *, robot
 
 @cache
 def _table() -> Any:
-    return yaml.safe_load(resources.files(__package__).joinpath("cues.yaml").read_text(encoding="utf-8"))
+    return read_yaml(Path(__file__).with_name("cues.yaml")).data
 
 
 def _any_of(phrases: Iterable[str]) -> str:

@@ -65,7 +65,9 @@ def leave_out(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge
         rest = except_for(kept, *dict.fromkeys((*others, names[0])))
         told = any(attributes for attributes, _ in _readings(phrase)) or phrase.relations
         if told or kept in (ANYTHING, EVERYTHING) or not knowledge.classes(rest):
-            raise RefusalError(f"I cannot follow 'not {phrase.spoken}'; name what I am to take", [phrase.spoken])
+            raise RefusalError(
+                f"I cannot follow what is not '{phrase.spoken}'; name what I am to take", [phrase.spoken]
+            )
         return replace(kind, name=rest)
 
     for phrase in unwanted:

@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from executive.words.command import Command, Task
+from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Speak
 from executive.words.step import Step
@@ -29,10 +29,14 @@ def second_look(text: str, steps: Sequence[Step], knowledge: Knowledge, *, robot
     for silent in (_any_of(spoken), *_table()["harmless"]):
         heard = re.sub(rf"\b(?:{silent})", lambda match: " " * len(match[0]), heard, flags=re.IGNORECASE)
     mission = "\n".join((*steps_to_yaml(steps), *map(str, commands), *_marks(commands), *["<robots>"] * robots))
+    people = _any_of(knowledge.spellings(knowledge.people))
     for row in _table()["rows"]:
-        for cue in re.finditer(rf"\b(?:{row['cue']})\b", heard, re.IGNORECASE):
+        cues = rf"(?<!\w)(?:{row['cue'].replace('<people>', people)})\b"
+        for cue in re.finditer(cues, heard, re.IGNORECASE):
+            who = cue.groupdict().get("who") or ""
+            name = re.escape(knowledge.person(who) or START) + "|speak"
             apart = "<apart>" in row["carried"] and _is_apart(heard, cue, commands, knowledge)
-            if not apart and re.search(row["carried"], mission) is None:
+            if not apart and re.search(row["carried"].replace("<who>", name), mission) is None:
                 return cue[0]
     return None
 

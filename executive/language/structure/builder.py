@@ -356,15 +356,17 @@ class Builder:
         if not steps:
             what = join_clauses(body)
             raise RefusalError(f"'{what}' is nothing to do; leave it out", [what])
-        if len(steps) == 1 and isinstance(inner := steps[0], Repeat):  # every hour .. until noon: one loop with both
+        behind: Steps = ()
+        if isinstance(inner := steps[0], Repeat):  # every hour .. until noon: one loop with both
             ends_inside = inner.loop.times is None and inner.loop.every_s is None
-            if inner.loop.is_endless and not ends:
+            if len(steps) == 1 and inner.loop.is_endless and not ends:
                 raise RefusalError("an endless repetition cannot be repeated again; say how often", [])
-            if inner.loop.is_endless:
+            if len(steps) == 1 and inner.loop.is_endless:
                 loop, steps = loop.model_copy(update={"every_s": inner.loop.every_s}), inner.steps
             elif loop.is_endless and ends_inside:
-                loop, steps = inner.loop.model_copy(update={"every_s": loop.every_s}), inner.steps
-        self.put((Repeat(loop=loop, steps=steps),), state)
+                loop, behind = inner.loop.model_copy(update={"every_s": loop.every_s}), steps[1:]
+                steps = inner.steps
+        self.put((Repeat(loop=loop, steps=steps), *behind), state)
 
     def _put_together(self, where: str, body: Sequence[Clause]) -> None:
         """Adds speech in parallel to a drive."""

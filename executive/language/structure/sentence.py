@@ -382,6 +382,10 @@ def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, mem
         raise RefusalError("three conditions or repetitions within each other are too many; say it in two sentences")
     parts = tuple(" | ".join(filter(None, (each.joint.strip(" ,;."), each.cue, each.text))) for each in clauses)
     walked = [each for step in steps for each in step.walk()]
+    for each in (each for each in walked if isinstance(each, Repeat)):
+        paced = each.loop.times is not None or each.loop.every_s is not None
+        if not paced and all(isinstance(step, Speak) for step in each.steps):
+            raise RefusalError("how often am I to say it? Say 'every minute', for example", question=True)
     commands = tuple(command for step in walked for command in step.commands)
     moved = next((n for n, one in enumerate(commands) if str(one.object) == SPEAKER), len(commands))
     back = any(one.item is not None and one.goal == START for one in commands[moved:])

@@ -44,6 +44,9 @@ def says(row: Builder, clause: Clause) -> bool:
         say_in_each_room(row, everywhere["said"], left_out)
         return True
     found = trailing_cue(text)
+    if found is not None and found.kind is not Cue.IF and re.search(r" that ", found.before):
+        said = f"{found.cue} {found.text}".strip()
+        raise RefusalError(f"it is not clear whether '{said}' is a part of what I am to say; say it first", [said])
     counts = found is not None and found.kind in (Cue.TIMES, Cue.EVERY) and found.text
     if found is not None and (not counts or re.match(r"for|until|every", found.text)):
         row.modify(clause, found)  # unless it is a part of what is said
@@ -54,7 +57,9 @@ def says(row: Builder, clause: Clause) -> bool:
     if len(places) > 1:
         row.clauses[row.at : row.at] = [Clause("", f"announce in {place} that {said['text']}") for place in places]
         return True
-    if not (words := said["text"] or row.statement) or words.startswith("and "):
+    if said["text"] and SPEECH["instructs"].fullmatch(said["text"]) and not re.match(r"\w+ that ", text):
+        raise RefusalError(f"I cannot tell what I am to say from where or when in '{text}'; say 'say that ..'", [text])
+    if not (words := said["text"] or row.statement):
         raise RefusalError(f"what am I to say in '{text}'?", [text])
     row.flush()
     _goes_to_listener(row, said)

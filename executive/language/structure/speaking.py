@@ -45,8 +45,8 @@ def says(row: Builder, clause: Clause) -> bool:
         return True
     found = trailing_cue(text)
     if found is not None and found.kind is not Cue.IF and re.search(r" that ", found.before):
-        said = f"{found.cue} {found.text}".strip()
-        raise RefusalError(f"it is not clear whether '{said}' is a part of what I am to say; say it first", [said])
+        cue = f"{found.cue} {found.text}".strip()
+        raise RefusalError(f"it is not clear whether '{cue}' is a part of what I am to say; say it first", [cue])
     counts = found is not None and found.kind in (Cue.TIMES, Cue.EVERY) and found.text
     if found is not None and (not counts or re.match(r"for|until|every", found.text)):
         row.modify(clause, found)  # unless it is a part of what is said

@@ -6,6 +6,7 @@ question.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from typing import Final
 
@@ -57,7 +58,8 @@ def leave_out(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge
     Raises RefusalError for an unwanted object that cannot be left out so, since it is told by more than its class.
     """
 
-    def without(kind: ObjectKind | None, phrase: Phrase, names: Sequence[str]) -> ObjectKind | None:
+    def exclude(phrase: Phrase, names: Sequence[str], kind: ObjectKind | None) -> ObjectKind | None:
+        """Leaves the classes with these names out of a kind of object."""
         kinds = {one for name in names for one in knowledge.classes(name)}
         if kind is None or kind.attributes or not kinds & {*knowledge.classes(kind.name)}:
             return kind
@@ -65,15 +67,13 @@ def leave_out(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge
         rest = except_for(kept, *dict.fromkeys((*others, names[0])))
         told = any(attributes for attributes, _ in _readings(phrase)) or phrase.relations
         if told or kept in (ANYTHING, EVERYTHING) or not knowledge.classes(rest):
-            raise RefusalError(
-                f"I cannot follow what is not '{phrase.spoken}'; name what I am to take", [phrase.spoken]
-            )
+            raise RefusalError(f"I cannot follow the exclusion of '{phrase.spoken}'; name a kind", [phrase.spoken])
         return replace(kind, name=rest)
 
     for phrase in unwanted:
         names = [name for _, form in _readings(phrase) if (name := knowledge.object_name(form)) is not None]
-        taken = ((without(one.item, phrase, names), without(one.object, phrase, names)) for one in commands)
-        commands = [replace(one, item=k, object=o) for one, (k, o) in zip(commands, [*taken], strict=True)]
+        rest = partial(exclude, phrase, names)
+        commands = [replace(one, item=rest(one.item), object=rest(one.object)) for one in commands]
     return tuple(commands)
 
 

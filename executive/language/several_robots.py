@@ -15,7 +15,7 @@ from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.spelling import CorrectedText, correct_spelling
-from executive.language.understand import Part, Status, Understanding, looked_over, meaning, under_rules, understand
+from executive.language.understand import Part, Status, Understanding, look_again, meaning, under_rules, understand
 from executive.language.zone_rules import read_rules
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
@@ -75,7 +75,7 @@ def understand_for_robots(
         else:
             reader = _Reader(tuple(robots), Pipeline(parser, rules.knowledge), rules.knowledge)
             found = under_rules(rules, reader.addressed(sentence, listener, clauses, memory))
-            found = looked_over(said.text, found, knowledge)
+            found = look_again(said.text, found, knowledge)
     except RefusalError as refusal:
         found = Understanding(sentence, Status.REFUSED, reason=refusal.reason, unknown_words=refusal.unknown)
         return replace(found, addressed=addressed)

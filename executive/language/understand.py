@@ -153,17 +153,17 @@ def understand(
         found = under_rules(rules, meaning(Trace(rules.rest, memory or Memory()), Pipeline(parser, rules.knowledge)))
     except RefusalError as refusal:
         found = _of_trace(Trace(said.text, refusal=refusal, refused_at="rules"))
-    found = looked_over(said.text, found, knowledge)
+    found = look_again(said.text, found, knowledge)
     return replace(found, text=sentence, notes=(*said.notes, *found.notes), addressed=addressed)
 
 
-def looked_over(text: str, found: Understanding, knowledge: Knowledge | None) -> Understanding:
+def look_again(text: str, found: Understanding, knowledge: Knowledge | None) -> Understanding:
     """Refuses what a second look finds to lack a word that forbids, limits or shares."""
     if found.status is not Status.OK or knowledge is None:
         return found
     steps = [step for meant in (found, *(part.meaning for part in found.parts)) for step in meant.all_steps]
     word = second_look(text, steps, knowledge, robots=bool(found.parts))
-    refusal = RefusalError(f"I cannot follow '{word}' there; say only what I am to do", [word or ""])
+    refusal = RefusalError(f"I cannot follow '{word}' in this sentence; say only what I am to do", [word or ""])
     return found if word is None else _of_trace(Trace(text, refusal=refusal, refused_at="second look"))
 
 

@@ -58,7 +58,7 @@ def says(row: Builder, clause: Clause) -> bool:
         row.clauses[row.at : row.at] = [Clause("", f"announce in {place} that {said['text']}") for place in places]
         return True
     if said["text"] and SPEECH["instructs"].fullmatch(said["text"]) and not re.match(r"\w+ that ", text):
-        raise RefusalError(f"I cannot tell what I am to say from where or when in '{text}'; say 'say that ..'", [text])
+        raise RefusalError(f"I cannot tell the words to say from where or when in '{text}'; begin 'say that'", [text])
     if not (words := said["text"] or row.statement):
         raise RefusalError(f"what am I to say in '{text}'?", [text])
     row.flush()

@@ -42,6 +42,7 @@ class RelationKind(enum.Enum):
     BIGGEST = "biggest of all"
     SMALLEST = "smallest of all"
     SEEN_FROM = "seen from"  # the viewer of all other relations
+    NOT_AT = "not at"  # a surface or a room, which a search leaves out
 
 
 _K = RelationKind

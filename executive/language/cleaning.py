@@ -62,6 +62,20 @@ def foreign_reason(text: str) -> str | None:
     return f"I understand English only, and this looks like {language}"
 
 
+def unkept_reason(text: str, lost: str) -> str | None:
+    """Reason to refuse a text with words of a kind that no mission keeps, as a deadline.
+
+    None if no such words are among those that are `lost`, or more others are than the row allows.
+    """
+    words = {*lost.lower().split()}
+    for row in read_table("unkept.yaml"):
+        found = re.search(rf"\b(?:{row['said']})", text, re.IGNORECASE)
+        kept = words - {*found[0].lower().split()} if found else words
+        if found and kept < words and len(kept) <= int(row.get("most", len(words))):
+            return str(row["reason"]).format(found[0])
+    return None
+
+
 _PAGE: Final = page("wake")
 SAME_NAME: Final = 0.13
 """Largest distance in sound (see `sound_distance`) of a misheard name after a greeting."""

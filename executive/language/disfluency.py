@@ -122,9 +122,14 @@ def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> 
 
 
 def _meant_instead(negated: Chunk, mark: Negation, done: Sequence[Item], rest: Sequence[Item]) -> bool:
-    """Returns whether another phrase replaces the negated one: "the milk, not the juice"."""
+    """Returns whether another phrase replaces the negated one ("the milk, not the juice"), or it is to be left out."""
     if negated.role is not None and mark.word.startswith("but"):
         return False
+    phrase, place = negated.phrase, negated.phrase.kind is NounKind.PLACE
+    every = any(isinstance(item, Chunk) and item.phrase.universal for item in done)
+    thing = not (place or phrase.person or phrase.receiver or phrase.stands_for_one)
+    if negated.role is None and any(isinstance(item, Verb) for item in done) and (every if place else thing):
+        return True
     before = next((n for n in range(len(done) - 1, -1, -1) if isinstance(done[n], Verb)), 0)
     meant = [item for item in (*done[before:], *rest) if _corrects(negated, item)]
     contents = (item.phrase.content for item in meant if isinstance(item, Chunk))

@@ -14,6 +14,7 @@ from executive.language.command_frames import CommandFrame
 from executive.language.indirect import CONTENTS
 from executive.language.lexicon import read_table, word_list
 from executive.language.limits import check_relation, relation_refusal
+from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase, SpokenRelation
 from executive.language.questions import ABLE, ClarifyingQuestion, RefusalError, Slot, perhaps_question, which_question
@@ -53,9 +54,10 @@ def ground(
 
 
 def leave_out(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge) -> tuple[Command, ...]:
-    """Leaves unwanted classes out of the categories that commands take: "a drink, but not a beer".
+    """Leaves unwanted classes out of the categories that commands take, and unwanted rooms out of visits to each room.
 
-    Raises RefusalError for an unwanted object that cannot be left out so, since it is told by more than its class.
+    Raises RefusalError for an unwanted object that cannot be left out so, since it is told by more than its class, and
+    for an unknown place.
     """
 
     def exclude(phrase: Phrase, names: Sequence[str], kind: ObjectKind | None) -> ObjectKind | None:
@@ -74,6 +76,12 @@ def leave_out(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge
         names = [name for _, form in _readings(phrase) if (name := knowledge.object_name(form)) is not None]
         rest = partial(exclude, phrase, names)
         commands = [replace(one, item=rest(one.item), object=rest(one.object)) for one in commands]
+        visits = [one for one in commands if one.item is None and one.task is None and one.goal in knowledge.rooms]
+        if phrase.kind is NounKind.PLACE and len(visits) > 1 and not names:
+            room = knowledge.place(phrase.text)
+            if room is None:
+                raise RefusalError(f"I know no place {phrase.text!r} to leave out", [phrase.text])
+            commands = [one for one in commands if one not in visits or one.goal != room]
     return tuple(commands)
 
 
@@ -125,6 +133,10 @@ class _Grounder:
         if goal is None and target is not None and frame.task in (Task.GRASP, Task.FIND):
             goal = self.knowledge.default_place(frame.task, target.name)
         target = target and self._described(frame, target, goal)
+        if target is not None and frame.goal is None and goal is not None:
+            left_out = [each.landmarks[0].name for each in target.relations if each.kind is RelationKind.NOT_AT]
+            inside = set(self.knowledge.surfaces_in(goal))
+            goal = None if any(inside <= set(self.knowledge.surfaces_in(one)) for one in left_out) else goal
         if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or place is None):
             raise RefusalError(f"which object? Known are {listing(self.knowledge.object_names())}", [target.name])
         counts = _count(frame.item, item), _count(frame.object, target)
@@ -169,6 +181,9 @@ class _Grounder:
         named = known or (DOOR if door else ROBOT if phrase.text == "you" else None)
         compares, seen = said.kind in ORDERS, said.kind is RelationKind.SEEN_FROM
         fits = act == "look" if compares else seen and known in self.knowledge.people
+        fits = fits or (
+            said.kind is RelationKind.NOT_AT and act == "look" and self.knowledge.place(phrase.text) is not None
+        )
         if fits and named:
             return Landmark(named)
         one = phrase.count == 1 or said.kind is RelationKind.BETWEEN

@@ -13,10 +13,12 @@ from typing import Any, Final
 
 from pydantic import TypeAdapter
 
+from executive.language.amounts import parse_seconds
 from executive.language.lexicon import any_of, expression, lexicon, read_table
 from executive.language.nouns import NounKind
 from executive.words.command import is_attribute, may_be_attribute
 from executive.words.knowledge import Knowledge
+from skills.perception.class_forms import NON, known_attributes
 
 
 @dataclass(frozen=True)
@@ -144,6 +146,7 @@ def name_table(knowledge: Knowledge) -> NameTable:
     """Table of the names of a world."""
     known = {THING: knowledge.object_names(), PLACE: knowledge.place_names(), PERSON: tuple(knowledge.people)}
     stand_ins = {name.lower(): word for word, names in known.items() for name in knowledge.spellings(names)}
+    stand_ins |= {word: word.removeprefix(NON) for word in known_attributes() if word.startswith(NON)}
     return re.compile(rf"\b({any_of(stand_ins) or '(?!)'})(e?s)?\b", re.IGNORECASE), stand_ins
 
 
@@ -167,12 +170,16 @@ def parse_with_names(
     for n, token in enumerate(tokens):
         if (found := names.get(token.start)) is not None:
             entity = "PERSON" if token.text == PERSON else ""
-            tokens[n] = replace(token, text=found[0], lemma=found[1].lower(), entity=entity, known=True)
+            known = not is_attribute(found[1])
+            tokens[n] = replace(token, text=found[0], lemma=found[1].lower(), entity=entity, known=known)
     return tuple(tokens)
 
 
-_Rule = tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]
-_SMOOTHED: Final = ("smoothed", "asked")
+_Rule = tuple[re.Pattern[str], str | Callable[[re.Match[str]], str], bool]
+_SMOOTHED: Final = ("smoothed", "limited", "asked")
+_OF_WORK: Final = ("limited", "shared")
+"""Families that leave alone what is to be said."""
+_SAID: Final = re.compile(r"\b(?:say|announce|inform|remind|shout|(?:tell|ask|let) (?!me\b|us\b))", re.IGNORECASE)
 
 
 def rephrase(text: str) -> str:
@@ -191,18 +198,20 @@ def smooth(text: str) -> str:
 
 def _rewritten(text: str, families: tuple[str, ...] | None) -> str:
     """Applies the rules of some families, or of all."""
-    for pattern, instead in _rules(families):
-        text = pattern.sub(instead, text)
+    for pattern, instead, of_work in _rules(families):
+        said = next((mark.start() for mark in _SAID.finditer(text)), len(text)) if of_work else len(text)
+        text = pattern.sub(instead, text[:said]) + text[said:]
     return " ".join(text.split()).strip(" ,;:-.")
 
 
 @cache
 def _rules(families: tuple[str, ...] | None) -> tuple[_Rule, ...]:
     table = read_table("rephrasing.yaml")
-    rules = (rule for name in families or [*table][1:] for rule in table[name])
-    pairs = ((expression(rule), rule["instead"]) if isinstance(rule, dict) else rule for rule in rules)
+    rules = ((rule, name in _OF_WORK) for name in families or [*table][1:] for rule in table[name])
+    pairs = (((expression(rule), rule["instead"]) if isinstance(rule, dict) else rule, of) for rule, of in rules)
     return tuple(
-        (re.compile(_filled(pattern), re.IGNORECASE), _FUNCTIONS.get(instead, instead)) for pattern, instead in pairs
+        (re.compile(_filled(pattern), re.IGNORECASE), _FUNCTIONS.get(instead, instead), of)
+        for (pattern, instead), of in pairs
     )
 
 
@@ -225,7 +234,30 @@ def _break(match: re.Match[str]) -> str:
     return ", " if match.string[: match.start()].strip() and match.string[match.end() :].strip(" .!?") else " "
 
 
+def _each(match: re.Match[str]) -> str:
+    """Says an act for each of some places: "wait in each of the hall and the office"."""
+    places = re.split(r",? and (?:(?:in|on|at|to|of) )?|, ", match["places"])
+    return " and ".join(f"{match['main']} {place if ' ' in place else f'the {place}'}" for place in places)
+
+
+def _span(match: re.Match[str]) -> str:
+    """Says a time in whole minutes or seconds: "half an hour" is 30 minutes."""
+    seconds = parse_seconds(match[0]) or 0.0
+    if seconds < 1.0 or not seconds.is_integer():
+        return match[0]
+    return f"{int(seconds / 60)} minutes" if seconds % 60 == 0 else f"{int(seconds)} seconds"
+
+
+def _wait(match: re.Match[str]) -> str:
+    """Puts the wait for the time of an act first; leaves alone what could be the time of a part of it."""
+    at = match["at"].replace("at ", "until ").removeprefix("in ")
+    return match[0] if re.search(r"\b(?:and|now|call)\b", match["main"]) else f"wait {at}, then {match['main']}"
+
+
 _FUNCTIONS: Final[Mapping[str, Callable[[re.Match[str]], str]]] = {
     "$full": lambda match: lexicon().short_forms[match[0].lower()],
     "$break": _break,
+    "$each": _each,
+    "$span": _span,
+    "$wait": _wait,
 }

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from html import escape
 from typing import TYPE_CHECKING, Any, Final
 
-from executive.language.cleaning import clean, foreign_reason, placeholder, strip_wake
+from executive.language.cleaning import clean, foreign_reason, placeholder, strip_wake, unkept_reason
 from executive.language.parser import DependencyParser
 from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, insert_answer
@@ -195,6 +195,9 @@ def _of_trace(trace: Trace) -> Understanding:
     found = Understanding(trace.text, Status.OK, notes=trace.notes, trace=trace)
     if refusal is None:
         return replace(found, commands=trace.commands, memory=trace.memory, steps=trace.steps)
+    lost = " ".join((*refusal.unknown, (refusal.question and refusal.question.heard) or ""))
+    if (reason := unkept_reason(trace.text, lost)) is not None:
+        return replace(found, status=Status.REFUSED, reason=reason, unknown_words=refusal.unknown)
     status = Status.QUESTION if refusal.question else Status.REFUSED
     reason = foreign_reason(trace.text) or refusal.reason
     reason = reason if refusal.question else requote(reason, trace.text)

@@ -117,7 +117,7 @@ def _starts(text: str) -> Iterator[tuple[int, int]]:
         if (joint := _PAGE["joint"].match(text, at)) is not None:
             at = joint.after
             yield at, first
-        elif words[at] == "without":
+        elif _PAGE["begins"].match(text, at) is not None:
             yield at, at
         if joint is None:
             at = first = at + 1

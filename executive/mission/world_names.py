@@ -105,6 +105,7 @@ def _landmark(name: str, knowledge: Knowledge) -> str:
 def in_world(relations: Sequence[Relation], knowledge: Knowledge, place: str | None) -> tuple[Relation, ...]:
     """Adds the classes of their objects, and the outlines of furniture, places and people, to relations at a place.
 
+    What is not at a place is no relation on a surface: the search skips that place.
     Raises ValueError for a door of a room that does not have exactly one.
     """
 
@@ -127,4 +128,5 @@ def in_world(relations: Sequence[Relation], knowledge: Knowledge, place: str | N
         pose = (facts and facts.pose) or knowledge.place_pose(facts.at if facts else name)
         return replace(landmark, outline_W=((pose.x, pose.y),))
 
-    return tuple(replace(each, landmarks=tuple(map(grounded, each.landmarks))) for each in relations)
+    there = (each for each in relations if each.kind is not RelationKind.NOT_AT)
+    return tuple(replace(each, landmarks=tuple(map(grounded, each.landmarks))) for each in there)

@@ -9,6 +9,7 @@ from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.goal import GoalCondition, GoalKind, Region, When
 from executive.words.knowledge import ANYBODY, Knowledge, Pose
 from skills.api import ObjectKind
+from skills.relations import RelationKind
 
 BELOW_TOP_M: Final = 0.05
 ABOVE_TOP_M: Final = 0.30
@@ -47,14 +48,24 @@ def door_goal(knowledge: Knowledge, between: tuple[str, str], kind: GoalKind = G
     return GoalCondition(kind, source=(square,), when=when)
 
 
-def surfaces_to_search(knowledge: Knowledge, item: str, place: str | None) -> tuple[str, ...]:
+def surfaces_to_search(knowledge: Knowledge, item: ObjectKind, place: str | None) -> tuple[str, ...]:
     """Returns the surfaces to search, those where the object usually is first; without a place, all surfaces.
 
-    The surfaces of a room that is a usual place count as usual.
+    The surfaces of a room that is a usual place count as usual. None is at a place where the object is said not to be.
     """
-    inside = knowledge.tops if place is None else knowledge.surfaces_in(place)
-    usual = (name for spot in knowledge.usual_surfaces(item) for name in knowledge.surfaces_in(spot))
+    left_out = surfaces_left_out(knowledge, item)
+    inside = [
+        name for name in (knowledge.tops if place is None else knowledge.surfaces_in(place)) if name not in left_out
+    ]
+    usual = (name for spot in knowledge.usual_surfaces(item.name) for name in knowledge.surfaces_in(spot))
     return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
+
+
+def surfaces_left_out(knowledge: Knowledge, item: ObjectKind) -> frozenset[str]:
+    """Surfaces at the places where an object is said not to be ("not at the desk")."""
+    places = (each.landmarks[0].name for each in item.relations if each.kind is RelationKind.NOT_AT)
+    known = (knowledge.place(name) for name in places)
+    return frozenset(surface for place in known if place for surface in knowledge.surfaces_in(place))
 
 
 def surface_region(knowledge: Knowledge, surface: str) -> Region:
@@ -72,7 +83,7 @@ def _classes(item: ObjectKind | None, knowledge: Knowledge) -> tuple[str, ...]:
 def _regions(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> tuple[Region, ...]:
     assert command.object is not None
     place = None if command.goal is None else knowledge.place(command.goal)
-    surfaces = (*surfaces_to_search(knowledge, command.object.name, place), *elsewhere)
+    surfaces = (*surfaces_to_search(knowledge, command.object, place), *elsewhere)
     return tuple(surface_region(knowledge, name) for name in surfaces)
 
 

@@ -302,16 +302,15 @@ class PlanBuilder:
         return self.knowledge.surfaces[name].surface(name)
 
     def relations(self, relations: tuple[Relation, ...]) -> dict[str, object]:
-        """Returns the port for the relations of an object or a spot; none without relations.
+        """Returns the port for the relations of an object or a spot on a surface; none without such relations.
 
         Raises InputError when a landmark cannot be told.
         """
-        if not relations:
-            return {}
         try:
-            return {"relations": in_world(relations, self.knowledge, self.command.goal)}
+            meant = in_world(relations, self.knowledge, self.command.goal)
         except ValueError as error:
             raise self.error(str(error), "name a surface, an object or a person") from error
+        return {"relations": meant} if meant else {}
 
     def place(self, name: str) -> str:
         """Returns the known place that `name` means. Raises InputError when there is no such place."""

@@ -17,7 +17,8 @@ from skills.api import ObjectKind
 from skills.relations import ORDERS, PARTS, Landmark, Relation, RelationKind
 
 _ATTRIBUTE: Final = re.compile(
-    r"red|green|blue|yellow|orange|white|black|gr[ae]y|brown|pink|purple|violet|silver|golden|dark|bright|light"
+    r"(?:non-)?(?:red|green|blue|yellow|orange|white|black|gr[ae]y|brown|pink|purple|violet|silver)"
+    r"|golden|dark|bright|light"
     r"|big|small|large|little|tiny|huge|tall|short|long|wide|thin|thick|heavy|round|square|full|empty|open|closed"
     r"|clean|dirty|new|old|hot|cold|warm|fresh|wooden|plastic|metal|other|same|left|right|\w{3,}est",
     re.IGNORECASE,

@@ -78,6 +78,7 @@ class ObjectPhrase(_Related):
     name: Text = Field(description="The object; a number or attributes may stand before its name.")
     nearest_to: Text | None = Field(default=None, description='A landmark; it is the nearest. "robot": to the robot.')
     order: Order | None = Field(default=None, description="Its number in a row or by size.")
+    not_at: Text | None = Field(default=None, description="A surface or a room from which it is not to be taken.")
 
 
 class SpotPhrase(_Related):

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
-from executive.words.leaf_steps import Speak
+from executive.words.leaf_steps import Dock, Picture, Speak
 from executive.words.step import Step
 from executive.words.steps import steps_to_yaml
 from skills.inputs.yaml_source import read_yaml
@@ -28,16 +28,20 @@ def second_look(text: str, steps: Sequence[Step], knowledge: Knowledge, *, robot
     heard = text.replace("\u2019", "'")
     for silent in (_any_of(spoken), *_table()["harmless"]):
         heard = re.sub(rf"\b(?:{silent})", lambda match: " " * len(match[0]), heard, flags=re.IGNORECASE)
-    mission = "\n".join((*steps_to_yaml(steps), *map(str, commands), *_marks(commands), *["<robots>"] * robots))
+    mission = "\n".join((*steps_to_yaml(steps), *map(str, commands), *_marks(walked), *["<robots>"] * robots))
     people = _any_of(knowledge.spellings(knowledge.people))
     for row in _table()["rows"]:
         cues = rf"(?<!\w)(?:{row['cue'].replace('<people>', people)})\b"
         for cue in re.finditer(cues, heard, re.IGNORECASE):
             who = cue.groupdict().get("who") or ""
             name = re.escape(knowledge.person(who) or START) + "|speak"
-            apart = "<apart>" in row["carried"] and _is_apart(heard, cue, commands, knowledge)
+            following = "<next apart>" in row["carried"]
+            looks = following or "<apart>" in row["carried"]
+            apart = looks and _is_apart(heard, cue, commands, knowledge, following=following)
             if not apart and re.search(row["carried"].replace("<who>", name), mission) is None:
                 return cue[0]
+        if row.get("settles"):
+            heard = re.sub(cues, lambda match: " " * len(match[0]), heard, flags=re.IGNORECASE)
     return None
 
 
@@ -50,23 +54,31 @@ def _any_of(phrases: Iterable[str]) -> str:
     return "|".join(map(re.escape, sorted(phrases, key=len, reverse=True))) or "(?!)"
 
 
-def _marks(commands: Sequence[Command]) -> Iterator[str]:
+def _marks(walked: Sequence[Step]) -> Iterator[str]:
     """Yields what the table calls several errands, and a thing that is taken."""
+    commands = [command for each in walked for command in each.commands]
     taken = [command for command in commands if command.item is not None]
     visits = {command.goal for command in commands if command.item is None and command.task is not Task.GRASP}
-    if len(taken) > 1 or len(visits) > 1:
+    acts = sum(isinstance(each, Speak | Picture | Dock) for each in walked) + len(taken) + len(visits)
+    if acts > 1:
         yield "<several>"
     if taken:
         yield "<takes>"
 
 
-def _is_apart(text: str, cue: re.Match[str], commands: Sequence[Command], knowledge: Knowledge) -> bool:
-    """Returns whether the commands do nothing with what is named behind a cue, or else before it, in its clause."""
+def _is_apart(
+    text: str, cue: re.Match[str], commands: Sequence[Command], knowledge: Knowledge, *, following: bool
+) -> bool:
+    """Returns whether the commands do nothing with what is named behind a cue, or else before it, in its clause.
+
+    With `following`, only the name that follows the cue counts.
+    """
     begin = max((each.end() for each in _CLAUSE.finditer(text, 0, cue.start())), default=0)
     end = next((each.start() for each in _CLAUSE.finditer(text, cue.end())), len(text))
     names = rf"\b(?:{_any_of(knowledge.spellings((*knowledge.object_names(), *knowledge.place_names())))})(?=e?s?\b)"
     parts = (text[cue.end() : end], text[begin : cue.start()])
     said = next(filter(None, (re.findall(names, part.lower(), re.IGNORECASE) for part in parts)), [])
+    said = said[:1] if following else said
     used = [each for command in commands for each in (command.item, command.object) if each is not None]
     taken = {kind for each in used if not each.attributes for kind in knowledge.classes(each.name)}
     goals = {command.goal.lower() for command in commands if command.goal is not None}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -209,7 +209,10 @@ def with_article(noun: str) -> str:
 
 
 def requote(reason: str, text: str) -> str:
-    """Replaces each quotation in a reason by the part of the speaker's text that has its words in their order."""
+    """Replaces each quotation in a reason by the part of the speaker's text that has its words in their order.
+
+    Words that the speaker did not say are left out of a quotation that has others.
+    """
     said = list(_SAID.finditer(text[:_MOST_QUOTED]))
     spoken = [match[0].lower() for match in said]
 
@@ -224,11 +227,26 @@ def requote(reason: str, text: str) -> str:
                     break
             if last >= 0:
                 return f"'{text[said[first].start() : said[last].end()]}'"
-        return part[0]
+        if reason[: part.start()].endswith(_HINTS):
+            return part[0]
+        runs = [_near(words[start:], spoken) for start in range(len(words))]
+        best = max(runs, key=len, default=[])
+        return f"'{text[said[best[0]].start() : said[best[-1]].end()]}'" if best else part[0]
 
     return _QUOTED.sub(own, reason)
 
 
+def _near(words: Sequence[str], spoken: Sequence[str]) -> list[int]:
+    """Indices of spoken words that are some words in their order, each near the one before."""
+    found = list[int]()
+    for word in words:
+        ahead = range(found[-1] + 1, min(found[-1] + _APART + 2, len(spoken))) if found else range(len(spoken))
+        found += [at for at in ahead if spoken[at] == word][:1]
+    return found
+
+
+_HINTS: Final = ("say ", "as in ", "begin ", "write ", "mean ", "known are ", "or ")
+"""Words before what the speaker did not say."""
 _QUOTED: Final = re.compile(r"(?<!\w)'((?:[^']|(?<=\w)'(?=\w))+)'(?!\w)")
 _SAID: Final = re.compile(r"[\w'-]+")
 _MOST_QUOTED: Final = 800

@@ -18,6 +18,8 @@ from skills.inputs.yaml_source import read_yaml
 FORMS_FILE: Final = "class_forms.yaml"
 ANY_OBJECT: Final = "thing"
 """The class word for any object that stands on a surface, whether the detector knows its class or not."""
+NON: Final = "non-"
+"""Before a colour: an object without it."""
 MEANS_BIG: Final[Mapping[str, bool]] = MappingProxyType(
     dict.fromkeys(("big", "large", "huge"), True) | dict.fromkeys(("small", "little", "tiny"), False)
 )
@@ -98,5 +100,5 @@ def colour_words() -> Mapping[str, ColourRange]:
 
 
 def known_attributes() -> frozenset[str]:
-    """Attribute words that can be verified by the pixels or the size of a detected object."""
-    return frozenset(colour_words()) | frozenset(MEANS_BIG)
+    """Attribute words that can be verified by the pixels or the size of a detected object: "red", "non-red", "big"."""
+    return frozenset(colour_words()) | {f"{NON}{colour}" for colour in colour_words()} | frozenset(MEANS_BIG)

@@ -10,7 +10,7 @@ from pydrake.math import RollPitchYaw
 
 from skills.api import FLOOR, Detection, LocalisationEstimate, ObjectKind, ObjectObservation, Surface
 from skills.geometry import inside_polygon
-from skills.perception.class_forms import MEANS_BIG, class_form, class_forms, colour_words
+from skills.perception.class_forms import MEANS_BIG, NON, class_form, class_forms, colour_words
 from skills.perception.point_cloud import Mask, camera_pose_W, closed_mask, project
 from skills.perception.position import Position, locate
 from skills.robot import FloatArray, Image
@@ -172,6 +172,8 @@ def has_attribute(detected: Detection3D, attribute: str) -> bool:
     Raises KeyError for an unknown word.
     """
     word = attribute.lower()
+    if word.startswith(NON):
+        return len(detected.colours) > 0 and not has_attribute(detected, word.removeprefix(NON))
     if word in MEANS_BIG:
         form = class_forms().get(detected.class_name)
         if form is None:

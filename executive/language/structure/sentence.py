@@ -7,7 +7,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.amounts import parse_share
+from executive.language.amounts import parse_seconds, parse_share
 from executive.language.clauses import CHECKS, Clause, Cue, split, trailing_cue
 from executive.language.coverage import TOLD, note_adverbs
 from executive.language.items import verb, without_objects
@@ -39,7 +39,18 @@ from executive.language.templates import Match, page
 from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.condition import Look
 from executive.words.knowledge import ANYBODY, Knowledge
-from executive.words.leaf_steps import Charging, Check, Do, Dock, Picture, Speak, Subject, steps_of_commands
+from executive.words.leaf_steps import (
+    Awaited,
+    Charging,
+    Check,
+    Do,
+    Dock,
+    Picture,
+    Speak,
+    Subject,
+    Wait,
+    steps_of_commands,
+)
 from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Repeat, Together, Try
 from skills.api import ObjectKind
@@ -100,7 +111,7 @@ def _parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) 
     if len(stands) > 1:
         raise RefusalError(f"I take a picture from one place at a time, not from {match['at']}", [match["at"]])
     at = stands[0].goal if stands else None
-    for what in re.split(r",? and |,? then |, ", match["of"]):
+    for what in _of_each(match["of"], reader.knowledge) or re.split(r",? and |,? then |, ", match["of"]):
         of = reader.knowledge.place(re.sub(r"^(?:the|a|an|my|our|your) ", "", what, flags=re.IGNORECASE))
         if of is None:
             finds, *more = reader.read_commands(what, state, (verb("find"),)).commands
@@ -112,6 +123,21 @@ def _parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) 
             of = str(finds.object)
         steps.append(Picture(subject=Subject(of=of, at=at, camera=match["camera"] or None)))
     return tuple(steps), state.elsewhere
+
+
+def _of_each(text: str, knowledge: Knowledge) -> list[str]:
+    """Rooms, or surfaces of a kind, that "every table except the desk" means; none for other texts."""
+    every, *others = re.split(r",? (?:except(?: for)?|but not|other than|apart from) ", text)
+    kind = re.fullmatch(r"(?:every|each|all(?: of)?(?: the)?) (?:single )?(\w+?)s?", every, re.IGNORECASE)
+    if kind is None:
+        return []
+    named = knowledge.rooms if kind[1].lower() == "room" else knowledge.surfaces
+    of_kind = [name for name in named if kind[1].lower() in ("room", "surface", name.split()[-1].lower())]
+    said = re.split(r",? (?:and|or) |, ", others[0]) if others else []
+    left_out = [knowledge.place(re.sub(r"^(?:the|my|our) ", "", one, flags=re.IGNORECASE)) for one in said]
+    if len(others) > 1 or None in left_out:
+        raise RefusalError(f"I do not know what to leave out of '{text}'; name places", [text])
+    return [name for name in of_kind if name not in left_out]
 
 
 _REQUESTS: Final[tuple[RequestParser, ...]] = (parse_opening, _parse_pictures, _parse_charging, parse_wait)
@@ -156,9 +182,12 @@ def _brings_to_everyone(row: Builder, clause: Clause) -> bool:
 def _meets_people(row: Builder, clause: Clause) -> bool:
     """Adds a request about people; finding somebody counts only before another request about the same person."""
     knowledge, found, then = row.reader.knowledge, trailing_cue(clause.text), row.ahead()
+    timed = _PEOPLE["timed"].fullmatch(clause.text)
+    seconds = None if timed is None else parse_seconds(timed["span"])
     if found is not None and found.kind in (Cue.WHILE, Cue.UNTIL):
         found = None  # how long the robot follows
-    request = _parse_people(clause.text if found is None else found.before, knowledge)
+    text = clause.text if timed is None or seconds is None else timed["clause"]
+    request = _parse_people(text if found is None else found.before, knowledge)
     if request is None:
         return False
     refers = _PEOPLE["refers"].search(then) is not None
@@ -170,7 +199,13 @@ def _meets_people(row: Builder, clause: Clause) -> bool:
         row.modify(clause, found)
     else:
         _flush_reasons(row)
-        row.put(*_steps_on_people(request, row.state, row.reader))
+        steps, state = _steps_on_people(request, row.state, row.reader)
+        if seconds is not None and request["task"] == Task.FOLLOW.value:
+            wait = Wait(awaited=Awaited(seconds=seconds))
+            steps = (*steps[:-1], Together(steps=(steps[-1], wait), done_when="any"))
+        elif seconds is not None:
+            raise RefusalError(f"I do not do '{clause.text}' for a time", [clause.text])
+        row.put(steps, state)
     return True
 
 

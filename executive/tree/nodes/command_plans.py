@@ -121,7 +121,7 @@ def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
     command, knowledge = builder.command, builder.knowledge
     if command.task is not Task.GRASP or command.object is None or command.goal is None or not builder.anywhere:
         return ()
-    return surfaces_elsewhere(knowledge, command.object.name, builder.place(command.goal), builder.avoided)
+    return surfaces_elsewhere(knowledge, command.object, builder.place(command.goal), builder.avoided)
 
 
 def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
@@ -137,7 +137,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     place = None if builder.command.goal is None else builder.place(builder.command.goal)
     surfaces = set(surfaces_first_known(builder, item, place))
     if anywhere and builder.anywhere:
-        surfaces |= set(surfaces_elsewhere(builder.knowledge, item.name, place, builder.avoided))
+        surfaces |= set(surfaces_elsewhere(builder.knowledge, item, place, builder.avoided))
     around = tuple(builder.surface(name) for name in builder.knowledge.surfaces if name in surfaces)
     if (floor := last_known_floor(builder, item)) is not None:
         around = (*around, floor)
@@ -209,7 +209,7 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     if get.goal is None:
         raise builder.error(f"it is not said where to take {several} from", "name the place")
     brought = set(builder.knowledge.surfaces_in(builder.place(goal))) if goal is not None else set()
-    if item is not None and brought & set(surfaces_to_search(builder.knowledge, item.name, builder.place(get.goal))):
+    if item is not None and brought & set(surfaces_to_search(builder.knowledge, item, builder.place(get.goal))):
         hint = "name the surface that they are to be taken from"
         raise builder.error(
             f"{several} that lie in the {get.goal} already look like those that are brought there", hint

@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from executive.tree.behaviour import Explained, ExplainedDecorator
 from executive.tree.board import Board, FromBoard, SurfaceOfDetection
-from executive.tree.goals import surfaces_to_search
+from executive.tree.goals import surfaces_left_out, surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import floor_square
 from executive.tree.nodes.pick_up import go_near_plan
@@ -138,7 +138,7 @@ def _looked(leaves: Sequence[str], nodes: Mapping[str, Explained]) -> bool:
 
 
 def surfaces_elsewhere(
-    knowledge: Knowledge, item: str, place: str | None, avoided: frozenset[str] = frozenset()
+    knowledge: Knowledge, item: ObjectKind, place: str | None, avoided: frozenset[str] = frozenset()
 ) -> tuple[str, ...]:
     """Returns the surfaces to search when the object is not in its place, at most `MOST_ELSEWHERE`, none in `avoided`.
 
@@ -146,13 +146,14 @@ def surfaces_elsewhere(
     """
     if place is None:
         return ()
-    usual = (name for spot in knowledge.usual_surfaces(item) for name in knowledge.surfaces_in(spot))
+    usual = (name for spot in knowledge.usual_surfaces(item.name) for name in knowledge.surfaces_in(spot))
     near = knowledge.surfaces_in(knowledge.room(place))
     inside = knowledge.surfaces_in(place)
     here = knowledge.place_pose(place)
     poses = {name: knowledge.place_pose(name) for name in knowledge.tops}
     far = sorted(poses, key=lambda name: math.hypot(here.x - poses[name].x, here.y - poses[name].y))
-    others = dict.fromkeys(name for name in (*usual, *near, *far) if name not in {*inside, *avoided})
+    left_out = {*inside, *avoided, *surfaces_left_out(knowledge, item)}
+    others = dict.fromkeys(name for name in (*usual, *near, *far) if name not in left_out)
     return tuple(others)[:MOST_ELSEWHERE]
 
 
@@ -244,17 +245,15 @@ def search_plan(
     """
     surfaces = surfaces_first_known(builder, item, place)
     elsewhere = (
-        surfaces_elsewhere(builder.knowledge, item.name, place, builder.avoided)
-        if anywhere and builder.anywhere
-        else ()
+        surfaces_elsewhere(builder.knowledge, item, place, builder.avoided) if anywhere and builder.anywhere else ()
     )
     known = builder.last_known_of(item)
     first = tuple(each for each in surfaces if known is not None and each == known.surface)
     floor = builder.optional_ports("detect", {"floor": True})
     looks = (*look_plans(builder, item, first, key, floor), *look_plans(builder, item, surfaces[len(first) :], key))
     further = look_plans(builder.at("elsewhere"), item, elsewhere, key)
-    looked = place_phrase(builder.knowledge, place)
-    looked += f", nor on the {listing(elsewhere)}" if elsewhere and not item.relations else ""
+    looked, meant = place_phrase(builder.knowledge, place), bool(builder.relations(item.relations))
+    looked += f", nor on the {listing(elsewhere)}" if elsewhere and not meant else ""
     return builder.first_of(
         f"find the {item}",
         find_again_plan(builder.at("again"), item, (*surfaces, *elsewhere), key),
@@ -263,8 +262,8 @@ def search_plan(
         *_looks_from_aside(builder, item, surfaces, key),
         *(look for _, look in further),
         exhausted_cause=Cause.PRECONDITION,
-        exhausted_message=f"{'did not find the one' if item.relations else 'found no'} {item} {looked}",
-        one_goal=bool(item.relations),
+        exhausted_message=f"{'did not find the one' if meant else 'found no'} {item} {looked}",
+        one_goal=meant,
     )
 
 
@@ -313,7 +312,7 @@ def surfaces_first_known(builder: PlanBuilder, item: ObjectKind, place: str | No
 
 def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
     """Returns the surfaces to search. Raises InputError when the place has no surfaces."""
-    surfaces = surfaces_to_search(builder.knowledge, item.name, place)
+    surfaces = surfaces_to_search(builder.knowledge, item, place)
     if place in builder.knowledge.bins:
         raise builder.error(
             f"the robot neither looks into the {place} nor takes anything out of it", "name a surface or a room"

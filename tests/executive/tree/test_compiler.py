@@ -61,7 +61,8 @@ def test_compiling_twice_gives_equal_trees(compiled, make):
 
 
 def test_usual_surfaces_come_first_and_the_others_after(knowledge):
-    asked = (("drink", "kitchen"), ("hammer", "kitchen"), ("drink", None), ("drink", "shelf"))
+    drink, hammer = ObjectKind("drink"), ObjectKind("hammer")
+    asked = ((drink, "kitchen"), (hammer, "kitchen"), (drink, None), (drink, "shelf"))
     assert [surfaces_to_search(knowledge, *each) for each in asked] == [
         ("counter", "shelf"),
         ("shelf", "counter"),

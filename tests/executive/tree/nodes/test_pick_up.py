@@ -148,14 +148,15 @@ def test_a_status_check_looks_only_where_it_was_asked_to(worst, script):
 
 
 def test_places_elsewhere_are_few_and_the_usual_ones_first(knowledge):
-    assert surfaces_elsewhere(knowledge, "coke", "bedroom") == ("counter", "shelf")
-    assert surfaces_elsewhere(knowledge, "coke", "shelf") == ("counter", "bedside table")
-    assert surfaces_elsewhere(knowledge, "coke", None) == ()
+    assert surfaces_elsewhere(knowledge, ObjectKind("coke"), "bedroom") == ("counter", "shelf")
+    assert surfaces_elsewhere(knowledge, ObjectKind("coke"), "shelf") == ("counter", "bedside table")
+    assert surfaces_elsewhere(knowledge, ObjectKind("coke"), None) == ()
 
 
 def test_places_elsewhere_are_the_nearest_ones_where_none_is_usual():
     knowledge = load_knowledge(Path(__file__).parents[4] / "plant" / "worlds" / "lab" / "knowledge.yaml")
-    assert surfaces_elsewhere(knowledge, "cube", "workshop") == ("kitchen table", "lab bench", "kitchen counter")
+    found = surfaces_elsewhere(knowledge, ObjectKind("cube"), "workshop")
+    assert found == ("kitchen table", "lab bench", "kitchen counter")
 
 
 def test_in_a_good_run_no_node_fails(worst, make, published):

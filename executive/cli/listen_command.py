@@ -28,6 +28,7 @@ from executive.speech.whisper import load_whisper
 from executive.words.knowledge import Knowledge
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.robot_config import RobotConfig, display_name
+from executive.words.steps import steps_to_yaml
 from skills.inputs.errors import InputError, listing
 
 _METER_WIDTH = 24
@@ -131,7 +132,7 @@ def hear_request(wav: Path, request: Request, *, console: Console) -> str:
 def answer_line(meaning: Understanding) -> str:
     """Returns the robot's answer to a sentence, in one line."""
     if meaning.status is Status.OK:
-        return "All right: " + "; ".join(map(str, meaning.commands))
+        return "All right: " + "; ".join(steps_to_yaml(meaning.steps) or map(str, meaning.commands))
     return (meaning.reason or "I did not understand.").split(";")[0]
 
 
@@ -177,7 +178,13 @@ def _answer(listener: Listener, file: Path, *, jsonl: bool) -> Recording | None:
     except InputError as error:
         typer.echo(f"errand: {error}", err=True)
         if jsonl:
-            nothing = {"transcript": "", "addressed": False, "status": Status.REFUSED.value, "commands": []}
+            nothing = {
+                "transcript": "",
+                "addressed": False,
+                "status": Status.REFUSED.value,
+                "commands": [],
+                "mission": [],
+            }
             print_json({"file": str(file), **nothing, "reason": str(error), "notes": [], "utterances": []})
         return None
     if jsonl:
@@ -196,7 +203,7 @@ def _show_recording(recording: Recording) -> None:
         typer.echo(f"errand: {recording.file}: {recording.reason}", err=True)
     for part in recording.parts:
         who = part.robot if isinstance(part.robot, str) else f"{part.robot.value} of the robots"
-        for command in part.meaning.commands:
-            typer.echo(f"  {who}: {command}")
-    for command in () if recording.parts else recording.commands:
-        typer.echo(f"  {command}")
+        for line in steps_to_yaml(part.meaning.steps) or map(str, part.meaning.commands):
+            typer.echo(f"  {who}: {line}")
+    for line in () if recording.parts else steps_to_yaml(recording.steps) or map(str, recording.commands):
+        typer.echo(f"  {line}")

@@ -54,6 +54,8 @@ def unwanted_phrases(items: Sequence[Item]) -> tuple[Phrase, ...]:
         if words and isinstance(words[0], Verb):
             acted = takewhile(lambda item: isinstance(item, Chunk), words[1:])
             named = [item for item in acted if isinstance(item, Chunk) and item.role is None]
+            if any(isinstance(item, Chunk) and item.phrase.head.word in ("it", "them") for item in behind):
+                continue  # what is forbidden is the act, not the object: "don't drop the beer, put it down"
             found += [item.phrase for item in named if not item.phrase.receiver]
         elif words and isinstance(words[0], Chunk):
             found += [item.phrase for item in _listed(mark, behind) if isinstance(item, Chunk)]

@@ -49,8 +49,24 @@ def ground(
     Raises RefusalError when an object, place or person is unknown or ambiguous; with a question if that helps.
     """
     grounder = _Grounder(knowledge, parser)
-    commands = tuple(command for frame in grounder.needed_there(frames) for command in grounder.commands(frame))
-    return commands, tuple(dict.fromkeys(grounder.notes))
+    commands = [command for frame in grounder.needed_there(frames) for command in grounder.commands(frame)]
+    return tuple(_one_by_one(commands, knowledge)), tuple(dict.fromkeys(grounder.notes))
+
+
+def _one_by_one(commands: Sequence[Command], knowledge: Knowledge) -> Iterator[Command]:
+    """Yields the commands; several objects for a person are fetched and handed over one by one."""
+    rest = list(commands)
+    while rest:
+        gets, brings = rest.pop(0), rest[0] if rest else None
+        count, to = gets.object_count, None if brings is None else brings.goal
+        person = to == HERE.name or (to is not None and knowledge.person(to) is not None)
+        if brings is None or gets.task is not Task.GRASP or count < 2 or not person or brings.item != gets.object:
+            yield gets
+            continue
+        rest.pop(0)
+        for _ in range(count):
+            yield replace(gets, object_count=1)
+            yield replace(brings, item_count=1)
 
 
 def leave_out(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge) -> tuple[Command, ...]:

@@ -160,7 +160,7 @@ def _does_harm(clause: Predicate) -> bool:
     if said in words["throws"]:
         return any(chunk.preposition in words["flies"] for chunk in chunks) or bool(met)
     moves = isinstance(verb, Verb) and not verb.kinds <= {VerbKind.FIND, VerbKind.CHECK}
-    over = "over" if said.endswith(" over") else ""
+    over = "over" if said.endswith(" over") and isinstance(verb, Verb) and VerbKind.GO in verb.kinds else ""
     return moves and any((chunk.preposition or over) in words["upon"] for chunk in met)
 
 

@@ -147,7 +147,10 @@ def name_table(knowledge: Knowledge) -> NameTable:
     known = {THING: knowledge.object_names(), PLACE: knowledge.place_names(), PERSON: tuple(knowledge.people)}
     stand_ins = {name.lower(): word for word, names in known.items() for name in knowledge.spellings(names)}
     stand_ins |= {word: word.removeprefix(NON) for word in known_attributes() if word.startswith(NON)}
-    return re.compile(rf"\b({any_of(stand_ins) or '(?!)'})(e?s)?\b", re.IGNORECASE), stand_ins
+    letters = [name for name in stand_ins if len(name) == 1]  # "A" is a place, and "a" is none
+    names = [any_of(name for name in stand_ins if name not in letters)]
+    names += [rf"(?<=\w )(?-i:{letter.upper()})" for letter in letters]
+    return re.compile(rf"\b({'|'.join(filter(None, names)) or '(?!)'})(e?s)?\b", re.IGNORECASE), stand_ins
 
 
 def parse_with_names(

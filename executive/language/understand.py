@@ -142,7 +142,8 @@ def understand(
     if require_wake and not addressed:
         reason = f'the robot\'s name was not said; begin with "Hey {name}"'
         return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
-    if (blank := placeholder(sentence)) is not None:
+    names = () if knowledge is None else (*knowledge.place_names(), *knowledge.object_names(), *knowledge.people)
+    if (blank := placeholder(sentence)) is not None and not any(blank in each for each in names):
         odd = RefusalError(f"{blank!r} is no word; say it in words", [blank])
         return replace(_of_trace(Trace(sentence, refusal=odd, refused_at="cleaning")), addressed=addressed)
     said = CorrectedText(called.text)

@@ -117,10 +117,10 @@ def _starts(text: str) -> Iterator[tuple[int, int]]:
         if (joint := _PAGE["joint"].match(text, at)) is not None:
             at = joint.after
             yield at, first
-        elif _PAGE["begins"].match(text, at) is not None:
+            continue
+        if first == at and _PAGE["begins"].match(text, at) is not None:
             yield at, at
-        if joint is None:
-            at = first = at + 1
+        at = first = at + 1
 
 
 def _rest(text: str, rule: Match, start: int, first: int) -> str | None:

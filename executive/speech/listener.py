@@ -19,6 +19,8 @@ from executive.speech.interpret import choose_opening, interpret
 from executive.speech.recogniser import Recogniser
 from executive.speech.sound import RATE_HZ, Loudness, Samples, concatenate, level_db, read_sound
 from executive.words.command import Command
+from executive.words.step import Step
+from executive.words.steps import steps_to_data
 from skills.inputs.errors import InputError
 
 NOBODY_SPOKE: Final = "nobody is heard to speak"
@@ -123,6 +125,13 @@ class Recording:
         return tuple(command for one in self.decisive for command in one.meant.commands)
 
     @property
+    def steps(self) -> tuple[Step, ...]:
+        """Mission of all utterances, if one has conditions, loops or waits; empty if any was not understood."""
+        if self.status is not Status.OK or not any(one.meant.steps for one in self.decisive):
+            return ()
+        return tuple(step for one in self.decisive for step in one.meant.all_steps)
+
+    @property
     def parts(self) -> tuple[Part, ...]:
         """Part of the mission for each of several robots; empty if any utterance was not understood."""
         return tuple(part for one in self.decisive for part in one.meant.parts) if self.status is Status.OK else ()
@@ -148,6 +157,7 @@ class Recording:
             "addressed": self.addressed,
             "status": self.status.value,
             "commands": [command.to_json() for command in self.commands],
+            "mission": steps_to_data(self.steps),
             "reason": self.reason,
             "notes": list(self.notes),
             **({"parts": [part.to_json() for part in self.parts]} if self.parts else {}),

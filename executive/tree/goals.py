@@ -133,7 +133,10 @@ def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) ->
     assert command.goal is not None
     person = knowledge.person(command.goal)
     if person is not None:
-        return GoalCondition(GoalKind.MET, person=person, when=When.END_OF_STEP)  # the person may walk on
+        at = None if command.goal_at is None else knowledge.place(command.goal_at)
+        rooms = () if at is None else (knowledge.room(at),)
+        regions = tuple(Region(room, knowledge.rooms[room]) for room in rooms)
+        return GoalCondition(GoalKind.MET, person=person, goal=regions, when=When.END_OF_STEP)  # the person may walk on
     return GoalCondition(GoalKind.WENT, goal=(_place_region(knowledge, command.goal),))
 
 

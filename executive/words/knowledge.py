@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -290,9 +293,24 @@ class Knowledge(Strict):
         groups: tuple[Mapping[str, Place | SurfaceFacts | ObjectFacts | Person], ...]
         groups = (self.places, self.surfaces, self.things, self.people)
         aliases = {name: facts.aliases for group in groups for name, facts in group.items()}
-        return tuple(word for name in names for word in (name, *aliases.get(name, ())))
+        words = (word for name in names for word in (name, *aliases.get(name, ())))
+        return tuple(dict.fromkeys(form for word in words for form in (word, *spoken_forms(word))))
 
 
+@lru_cache(maxsize=4096)
+def spoken_forms(name: str) -> tuple[str, ...]:
+    """Other forms of a name as it is said, in lower case: "lab 2" and "lab two" for "lab #2", "cafe" for "café"."""
+    plain = "".join(c for c in unicodedata.normalize("NFKD", name.lower()) if not unicodedata.combining(c))
+    words = re.sub(r"[^\w\s.'-]|_", " ", plain).split()
+    numbered = [_NUMBERS[int(word)] if word.isdecimal() and int(word) < len(_NUMBERS) else word for word in words]
+    forms = dict.fromkeys((" ".join(words), " ".join(numbered)))
+    return tuple(form for form in forms if form and form != name.lower())
+
+
+_NUMBERS: Final = (
+    *("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"),
+    *("eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen", "twenty"),
+)
 _EXCEPT: Final = " except "
 
 
@@ -313,7 +331,11 @@ def _resolve(
 ) -> str | None:
     wanted = name.lower()
     own = (known for known in group if known.lower() == wanted)
-    alias = (known for known, facts in group.items() if wanted in (a.lower() for a in facts.aliases))
+    alias = (
+        known
+        for known, facts in group.items()
+        if any(wanted in (each.lower(), *spoken_forms(each)) for each in (known, *facts.aliases))
+    )
     return next(own, None) or next(alias, None)
 
 

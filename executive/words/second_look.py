@@ -64,6 +64,10 @@ def _marks(walked: Sequence[Step]) -> Iterator[str]:
         yield "<several>"
     if taken:
         yield "<takes>"
+    done = {command.task for command in commands} | ({Task.GRASP} if taken else set())
+    yield from (f"<NO {task.name}>" for task in Task if task not in done)
+    if not any(isinstance(each, Speak) for each in walked):
+        yield "<NO SPEECH>"
 
 
 def _is_apart(

@@ -34,8 +34,8 @@ from skills.quantities import Coordinate, Height
 from skills.robot import Pose2D
 
 
-def carry_plan(builder: PlanBuilder) -> NodeSpec:
-    """Carries the item to a person, to the start, or to a surface of a place."""
+def carry_plan(builder: PlanBuilder, meet: NodeSpec | None = None) -> NodeSpec:
+    """Carries the item to a person, to the start, or to a surface of a place; `meet` finds the person at a place."""
     command = builder.command
     item = builder.required_object(command.item or command.object).plain
     goal = command.goal
@@ -47,18 +47,20 @@ def carry_plan(builder: PlanBuilder) -> NodeSpec:
     if person is not None:
         met = person in builder.met and command.goal_at is None
         pose = FromBoard(builder.met_key(person, "-beside")) if met else person_pose(builder, person, command.goal_at)
-        return _hand_over_plan(builder, item, pose, person)
+        return _hand_over_plan(builder, item, pose, person, meet)
     place = builder.place(goal)
     put, guards = put_down_plan(builder, item, place)
     skills = tuple(guard.children[0] for guard in guards if guard.children[0].kind == "skill")
     return recover_fallen_plan(builder.at("carry-on"), item, f"to the {place}", put, guards, skills)
 
 
-def _hand_over_plan(builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
+def _hand_over_plan(
+    builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromBoard, person: str, meet: NodeSpec | None = None
+) -> NodeSpec:
     """Carries the item to a person and holds it out; the gripper opens when the person takes it."""
     to = "the start" if builder.command.goal == START else person
     ports = {"person": person, **builder.optional_ports("hand_over", {"thing": str(item)})}
-    way = _holding(builder, item, f"to {to}", go_near_plan(builder, pose, to))
+    way = _holding(builder, item, f"to {to}", meet or go_near_plan(builder, pose, to))
     hand_over = builder.skill("hand_over", ports, _released(builder, "hand_over"))
     give = _holding(builder.at("give"), item, f"to {to}", hand_over, until_put_down=True)
     bring = builder.at("bring").sequence(f"bring it to {person}", way, give)

@@ -12,7 +12,7 @@ from executive.tree.nodes.carry import carried_along_plan, carry_plan, goal_in_w
 from executive.tree.nodes.clearing import clear_plan, is_clearing, refuse_everything
 from executive.tree.nodes.dock import charge_plan
 from executive.tree.nodes.guard import HoldsNothingElse
-from executive.tree.nodes.people import follow_plan, go_to_goal_plan, greet_plan, guide_plan
+from executive.tree.nodes.people import follow_plan, go_to_goal_plan, greet_plan, guide_plan, meet_plan
 from executive.tree.nodes.pick_up import held_plan, known_held_plan, pick_up_plan
 from executive.tree.nodes.search import (
     find_plan,
@@ -34,7 +34,7 @@ from skills.inputs.errors import InputError, listing
 from skills.quantities import Quantity
 
 MAX_TRIPS: Final = 20
-LONGEST_WAIT_S: Final = 3600.0
+LONGEST_WAIT_S: Final = 86400.0
 
 
 COUNTED: Final = Annotated[float, Quantity(ge=0.0, le=1_000.0)]
@@ -158,7 +158,10 @@ def go_plan(builder: PlanBuilder) -> NodeSpec:
     """Drives to a place, a person or the start; carries the item if the command has one."""
     command = builder.command
     if command.item is not None:
-        return carry_plan(builder)
+        person, at = builder.knowledge.person(command.goal or ""), command.goal_at
+        there = person is not None and at is not None and builder.has_ports("find_people", ())
+        meet = meet_plan(builder.at("meet"), person or "", builder.place(at or "")) if there else None
+        return carry_plan(builder, meet)
     if command.goal is None:
         raise builder.error("the command asks for nothing", "name a place to go to, or an object")
     to = goal_in_words(builder, command.goal)
@@ -174,7 +177,7 @@ def wait_plan(builder: PlanBuilder) -> NodeSpec:
     unit = TIME_UNITS_S.get("" if command.object is None else command.object.name)
     duration_s = 0.0 if unit is None else unit * command.object_count
     if not 0.0 < duration_s <= LONGEST_WAIT_S:
-        raise builder.error("it is not said for how long to wait", 'name a time up to an hour, such as "10 seconds"')
+        raise builder.error("it is not said for how long to wait", 'name a time up to a day, such as "10 seconds"')
     pause = builder.pause("wait", f"wait {duration_s:g} s", duration_s)
     if command.goal is None:
         return builder.sequence("wait here", pause)

@@ -43,13 +43,14 @@ STILL_NEAR_S: Final = 120.0
 
 
 class OnlyIfNear(OnlyIfKnown):
-    """Composite that applies while the robot is near the person under `key` and saw them a short time ago.
+    """Composite that applies while the robot is near the person under `key` and saw them a short time ago, in `area_W`.
 
-    Has the status of its only child.
+    Has the status of its only child. Without an area, any place will do.
     """
 
     kind = "only if near"
     context: RunContext
+    area_W: tuple[tuple[float, float], ...] = ()
 
     def applies(self) -> bool:
         """Returns whether the robot is near where it saw the person a short time ago."""
@@ -57,7 +58,31 @@ class OnlyIfNear(OnlyIfKnown):
             return False
         met, here = self.board.get(self.key), self.context.pose()
         near = math.dist(met.position_W[:2], (here.x_m, here.y_m)) <= STILL_NEAR_M
+        if self.area_W and not inside(self.area_W, met.position_W[:2]):
+            return False
         return near and self.context.clock.now() - met.stamp_s <= STILL_NEAR_S
+
+
+class LastSeen(ExplainedLeaf):
+    """Leaf that says where the person under `key` was last seen.
+
+    FAILURE with POSTCONDITION if the person was seen before, else with PRECONDITION.
+    """
+
+    kind = "last seen"
+    person: str
+    key: str
+    rooms: Mapping[str, tuple[tuple[float, float], ...]]
+    context: RunContext
+
+    def update(self) -> Status:
+        """Fails with the place in its message."""
+        seen: ObjectObservation | None = self.context.board.get(self.key, None)
+        if seen is None:
+            return self.fail(Failed(Cause.PRECONDITION, f"{self.person} was not seen before"))
+        x_m, y_m = seen.position_W[:2]
+        room = next((f" in the {name}" for name, outline in self.rooms.items() if inside(outline, (x_m, y_m))), "")
+        return self.fail(Failed(Cause.POSTCONDITION, f"{self.person} was last seen at ({x_m:.2f}, {y_m:.2f}){room}"))
 
 
 class AskWhoItIs(AskPeople):
@@ -257,24 +282,30 @@ def person_of(builder: PlanBuilder) -> str:
 def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> NodeSpec:
     """Finds a person and goes to them: near the robot if it has just met them, else by a search.
 
-    The search begins at `place`, or else in the person's usual room; then come all other rooms, nearest first.
+    At a `place` that is given, the person is met there or not at all; else the search begins in the person's usual
+    room, and then come all other rooms, nearest first.
     """
     knowledge, met = builder.knowledge, builder.met_key(person)
     usual = knowledge.room(builder.place(knowledge.people[person].at))
     said = usual if place is None else knowledge.room(place)
     others = tuple(dict.fromkeys(room for room in (usual, *knowledge.rooms) if room != said))
-    here = builder.at("here")
-    near = here.node("only if near", f"{person} is near", _go_beside(here, person, met), key=met)
+    here, area_W = builder.at("here"), () if place is None else knowledge.rooms[said]
+    beside = _go_beside(here, person, met)
+    near = here.node("only if near", f"{person} is near", beside, key=met, area_W=area_W)
     ports = {"area_W": knowledge.rooms[said], "place": said}
     there = _in_room(builder.at(said), said, _meet_one_plan(builder.at(said), person, ports))
-    elsewhere = (_elsewhere_plan(builder.at("elsewhere"), person, others),) if others else ()
+    if place is not None:
+        last = {"person": person, "key": met, "rooms": MappingProxyType(dict(knowledge.rooms))}
+        further = [builder.node("last seen", f"where was {person}?", part="last", **last)]
+    else:
+        further = [_elsewhere_plan(builder.at("elsewhere"), person, others)] if others else []
     return builder.first_of(
         f"find {person}",
         near,
         there,
-        *elsewhere,
+        *further,
         exhausted_cause=Cause.POSTCONDITION,
-        exhausted_message=f"{person} is not found",
+        exhausted_message=f"{person} is not found" if place is None else f"{person} is not in the {said}",
     )
 
 

@@ -48,7 +48,7 @@ def test_each_action_has_its_roles_in_plain_values(explained):
 
 def test_command_frames_keep_the_spoken_names_and_commands_the_worlds(explained):
     assert "Take [Nothing] to [Nothing] and do [grasp] to [2 cokes]" in explained["frames"]
-    assert "Take [Nothing] to [kitchen] and do [grasp] to [2 coke]" in explained["commands"]
+    assert explained["commands"].count("Take [Nothing] to [kitchen] and do [grasp] to [coke]") == 2  # one by one
 
 
 def test_explanation_gives_the_meaning_of_pronouns(parser):

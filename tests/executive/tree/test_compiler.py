@@ -116,15 +116,18 @@ def test_placing_is_carrying(compiled):
     assert first == second
 
 
-@pytest.mark.parametrize(
-    ("person", "goal"),
-    [("Sam", (0.0, 4.0, 0.7854)), ("Sam at bedroom", (-4.0, 0.0, 0.0))],  # faced, or at another place
-)
-def test_a_person_gets_it_where_they_are(compiled, person, goal):
-    navigate, hand_over = skills_of(compiled(f"Take [coke] to [{person}] and do [Nothing] to [Nothing]"))
+def test_a_person_gets_it_where_they_usually_are(compiled):
+    navigate, hand_over = skills_of(compiled("Take [coke] to [Sam] and do [Nothing] to [Nothing]"))
     pose = port(navigate, "goal").value
-    assert (pose.x_m, pose.y_m, round(pose.yaw_rad, 4)) == goal
+    assert (pose.x_m, pose.y_m, round(pose.yaw_rad, 4)) == (0.0, 4.0, 0.7854)  # faced
     assert port(hand_over, "person").value == "Sam"
+
+
+def test_a_person_at_a_place_is_found_there_before_they_get_it(compiled):
+    *way, hand_over = skills_of(compiled("Take [coke] to [Sam at bedroom] and do [Nothing] to [Nothing]"))
+    looks = [each for each in way if each.skill.name == "find_people"]
+    assert [port(each, "place").value for each in looks] == ["bedroom"]
+    assert (way[-1].skill.name, port(hand_over, "person").value) == ("meet_person", "Sam")
 
 
 def test_the_person_at_the_start_is_named_when_known(compiled, make):

@@ -72,7 +72,6 @@ class LastSeen(ExplainedLeaf):
     kind = "last seen"
     person: str
     key: str
-    rooms: Mapping[str, tuple[tuple[float, float], ...]]
     context: RunContext
 
     def update(self) -> Status:
@@ -80,9 +79,8 @@ class LastSeen(ExplainedLeaf):
         seen: ObjectObservation | None = self.context.board.get(self.key, None)
         if seen is None:
             return self.fail(Failed(Cause.PRECONDITION, f"{self.person} was not seen before"))
-        x_m, y_m = seen.position_W[:2]
-        room = next((f" in the {name}" for name, outline in self.rooms.items() if inside(outline, (x_m, y_m))), "")
-        return self.fail(Failed(Cause.POSTCONDITION, f"{self.person} was last seen at ({x_m:.2f}, {y_m:.2f}){room}"))
+        where = describe_seen(seen).removeprefix("somebody ")
+        return self.fail(Failed(Cause.POSTCONDITION, f"{self.person} was last seen {where}"))
 
 
 class AskWhoItIs(AskPeople):
@@ -295,8 +293,7 @@ def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> No
     ports = {"area_W": knowledge.rooms[said], "place": said}
     there = _in_room(builder.at(said), said, _meet_one_plan(builder.at(said), person, ports))
     if place is not None:
-        last = {"person": person, "key": met, "rooms": MappingProxyType(dict(knowledge.rooms))}
-        further = [builder.node("last seen", f"where was {person}?", part="last", **last)]
+        further = [builder.node("last seen", f"where was {person}?", part="last", person=person, key=met)]
     else:
         further = [_elsewhere_plan(builder.at("elsewhere"), person, others)] if others else []
     return builder.first_of(

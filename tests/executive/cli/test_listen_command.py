@@ -157,3 +157,10 @@ def test_answers_are_one_line():
     refused = Understanding("", Status.REFUSED, reason="I know no object 'x'; known: y")
     assert answer_line(refused) == "I know no object 'x'"
     assert answer_line(Understanding("", Status.REFUSED)) == "I did not understand."
+
+
+def test_a_sentence_with_a_condition_is_shown_and_written_as_its_mission(says, wav):
+    says("Hey Alice, go to the kitchen if there is a beer in the hall.")
+    (told,) = _lines(errand("listen", wav, "--jsonl"))
+    assert told["mission"][0].keys() == {"if", "then"}
+    assert "- if: {object: beer, at: hall}" in errand("listen", wav).stdout

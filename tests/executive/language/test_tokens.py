@@ -47,3 +47,10 @@ def test_every_word_still_hangs_on_a_root(parser, text):
 @pytest.mark.parametrize(*table(__file__, "polite_forms"))
 def test_polite_forms_become_plain_commands(text, command):
     assert rephrase(text) == command
+
+
+def test_a_letter_is_a_name_only_in_its_own_case_and_behind_a_word(parser, knowledge):
+    pose = next(iter(knowledge.places.values()))
+    table = name_table(knowledge.model_copy(update={"places": {**knowledge.places, "A": pose}}))
+    known = lambda text: [t.text for t in parse_with_names(text, parser.parse, table) if t.known]  # noqa: E731
+    assert (known("go to A"), known("A beer please"), known("bring a beer to A")) == (["A"], ["beer"], ["beer", "A"])

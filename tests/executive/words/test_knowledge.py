@@ -111,3 +111,20 @@ def test_a_tag_of_a_dock_needs_the_dock(write):
     world = WORLD.replace("dock: {x: -1.0, y: 0.0, yaw: 0.0}\n", "")
     with pytest.raises(InputError, match="this world has no dock"):
         load_knowledge(write(f"{world}tags:\n  - {{id: 5, size: 0.1, on: dock, at: [0, 0, 0.4]}}\n"))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("lab #2", "lab 2"),
+        ("lab #2", "Lab Two"),
+        ("pantry/left", "pantry left"),
+        ("café", "cafe"),
+        ("room 2", "room two"),
+    ],
+)
+def test_a_place_is_found_by_the_form_in_which_its_name_is_said(write, name, said):
+    text = WORLD.replace("places:\n", f'places:\n  "{name}": {{pose: {{x: 3.5, y: 0.2, yaw: 1.5}}}}\n')
+    knowledge = load_knowledge(write(text))
+    assert (knowledge.place(said), knowledge.place(name)) == (name, name)
+    assert said.lower() in knowledge.spellings([name])

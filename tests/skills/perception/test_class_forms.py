@@ -41,6 +41,12 @@ def test_a_third_of_the_pixels_is_enough():
     assert not has_attribute(coloured((190, 20, 25), *[(120, 120, 125)] * 6), "red")
 
 
+def test_an_object_without_a_colour_is_told_by_its_pixels():
+    assert has_attribute(coloured((20, 30, 190)), "non-red")
+    assert not has_attribute(coloured((190, 20, 25)), "non-red")
+    assert not has_attribute(detected_3d(), "non-red")  # without pixels nothing is known
+
+
 def test_an_object_in_a_grey_picture_has_no_colour():
     assert not has_attribute(detected_3d(), "red")
 

@@ -23,11 +23,14 @@ def rows(file, kind=None):
     return [pytest.param(*row, id=f"{row[0]}: {row[1]}") for row in found]
 
 
-@pytest.mark.parametrize(("world", "sentence", "lines"), rows("sentences.yaml", "understood"))
+UNDERSTOOD = [*rows("sentences.yaml", "understood"), *rows("limits.yaml", "understood")]
+
+
+@pytest.mark.parametrize(("world", "sentence", "lines"), UNDERSTOOD)
 def test_a_sentence_becomes_its_mission_whose_yaml_reads_back(meant, world, sentence, lines):
     answer = meant(sentence, world)
-    assert (answer.reason, noted(answer.steps)) == (None, as_noted(lines))
-    assert steps_from_yaml(steps_to_yaml(answer.steps)) == answer.steps
+    assert (answer.reason, noted(answer.all_steps)) == (None, as_noted(lines))
+    assert steps_from_yaml(steps_to_yaml(answer.all_steps)) == answer.all_steps
 
 
 @pytest.mark.parametrize(("world", "sentence", "part"), rows("refused.yaml"))

@@ -163,6 +163,24 @@ def test_a_person_who_was_met_is_followed_without_a_second_search(result_of, the
     assert (script.begun.count("follow_person"), len(asked[0])) == (1, 1)
 
 
+@pytest.mark.parametrize(
+    ("texts", "says"),
+    [
+        (["Take [Nothing] to [Robin at bedroom] and do [Nothing] to [Nothing]"], "Robin is not in the bedroom: nobody"),
+        (
+            [TO_ROBIN, "Take [Nothing] to [Robin at bedroom] and do [Nothing] to [Nothing]"],
+            "Robin is not in the bedroom",
+        ),
+    ],
+)
+def test_a_person_at_a_place_is_met_there_alone_and_else_last_seen_elsewhere(result_of, there, texts, says):
+    there["Robin"] = (4.0, 1.0, "kitchen")
+    result = result_of(*texts)
+    assert (result.outcome, result.cause) == (Outcome.FAILURE, POST)
+    assert result.message.startswith(says)
+    assert ("Robin was last seen at (4.00, 1.00) in the kitchen" in result.message) == (len(texts) == 2)
+
+
 def test_a_person_who_left_is_looked_for_again(result_of, there, script):
     there["Robin"] = (4.0, 1.0, "kitchen")
     leave = lambda skill: there.update(Robin=(0.0, 0.0, "hall")) or Succeeded("said")  # noqa: E731

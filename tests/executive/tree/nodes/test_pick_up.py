@@ -9,6 +9,7 @@ from executive.run.outcome import Outcome
 from executive.run.visitor import RunSettings
 from executive.tree.board import FromBoard
 from executive.tree.compiler import compile_mission
+from executive.tree.goals import surfaces_to_search
 from executive.tree.nodes.search import surfaces_elsewhere
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
@@ -16,6 +17,7 @@ from executive.words.knowledge import load_knowledge
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from skills.api import Cause, Failed, ObjectKind, Succeeded
+from skills.relations import Landmark, Relation, RelationKind
 from skills.robot import Pose2D
 from tests.executive.conftest import COKE
 from tests.executive.tree.scripted import CAUSES, told
@@ -539,3 +541,10 @@ def test_an_object_dropped_in_a_hand_over_is_picked_up_and_handed_over_again(wor
     result = worst(*make.FETCH)
     assert result.outcome is Outcome.SUCCESS, result.message
     assert (script.begun.count("hand_over"), script.begun.count("grasp")) == (2, 2)
+
+
+def test_no_surface_where_the_object_is_not_to_be_taken_from_is_searched():
+    knowledge = load_knowledge(Path(__file__).parents[4] / "plant" / "worlds" / "lab" / "knowledge.yaml")
+    cube = ObjectKind("cube", relations=(Relation(RelationKind.NOT_AT, (Landmark("kitchen"),)),))
+    assert surfaces_elsewhere(knowledge, cube, "workshop") == ("lab bench", "shelf", "side table")
+    assert not {"kitchen table", "kitchen counter"} & {*surfaces_to_search(knowledge, cube, None)}

@@ -88,6 +88,7 @@ def result_of(compiled, run_tree, control, asked):
     return run
 
 
+TO_BEDROOM = "Take [Nothing] to [Robin at bedroom] and do [Nothing] to [Nothing]"
 ELSEWHERE, HERE = {"Maya": (4.0, 1.0, "kitchen")}, {"Sam": (1.0, 0.0, "hall")}
 
 
@@ -166,9 +167,9 @@ def test_a_person_who_was_met_is_followed_without_a_second_search(result_of, the
 @pytest.mark.parametrize(
     ("texts", "says"),
     [
-        (["Take [Nothing] to [Robin at bedroom] and do [Nothing] to [Nothing]"], "Robin is not in the bedroom: nobody"),
+        ([TO_BEDROOM], "Robin is not in the bedroom: nobody"),
         (
-            [TO_ROBIN, "Take [Nothing] to [Robin at bedroom] and do [Nothing] to [Nothing]"],
+            [TO_ROBIN, TO_BEDROOM],
             "Robin is not in the bedroom",
         ),
     ],

@@ -32,13 +32,16 @@ def second_look(text: str, steps: Sequence[Step], knowledge: Knowledge, *, robot
     people = _any_of(knowledge.spellings(knowledge.people))
     for row in _table()["rows"]:
         cues = rf"(?<!\w)(?:{row['cue'].replace('<people>', people)})\b"
+        left = 0
         for cue in re.finditer(cues, heard, re.IGNORECASE):
             who = cue.groupdict().get("who") or ""
             name = re.escape(knowledge.person(who) or START) + "|speak"
             following = "<next apart>" in row["carried"]
             looks = following or "<apart>" in row["carried"]
-            apart = looks and _is_apart(heard, cue, commands, knowledge, following=following)
-            if not apart and re.search(row["carried"].replace("<who>", name), mission) is None:
+            if looks and _is_apart(heard, cue, commands, knowledge, following=following):
+                continue
+            left += 1
+            if len(re.findall(row["carried"].replace("<who>", name), mission)) < (left if row.get("each") else 1):
                 return cue[0]
         if row.get("settles"):
             heard = re.sub(cues, lambda match: " " * len(match[0]), heard, flags=re.IGNORECASE)

@@ -56,8 +56,9 @@ class MemorySelector(MemoryComposite):
 
     The failure has the messages of all children that could begin, the decisive messages first. Its cause is ERROR if a
     child failed with ERROR, else the first cause that is neither PRECONDITION nor POSTCONDITION, else `exhausted_cause`
-    if given, else the cause of the last child, or PRECONDITION if no child applied. With `one_goal` all children lead
-    to the same goal: after a final failure of one child, the others are skipped.
+    if given, else the cause of the last child, or PRECONDITION if no child applied. Children behind the first `needed`
+    are an extra, and only their ERROR counts. With `one_goal` all children lead to the same goal: after a final failure
+    of one child, the others are skipped.
     """
 
     kind = "selector"
@@ -67,6 +68,7 @@ class MemorySelector(MemoryComposite):
     exhausted_cause: Cause | None = None
     exhausted_message: str = ""
     one_goal: bool = False
+    needed: int | None = None
 
     @classmethod
     def usual_children(cls, node: NodeSpec) -> tuple[NodeSpec, ...]:
@@ -87,9 +89,9 @@ class MemorySelector(MemoryComposite):
         failed = [one for one in self.children if one.status == Status.FAILURE]
         if not failed:
             return self.exhausted_cause or Cause.PRECONDITION, self.exhausted_message or "nothing of it applies"
-        causes = [cause_of(one) for one in failed]
-        obstacles = [each for each in causes if each not in _MERELY_NOT_SO]
-        cause = Cause.ERROR if Cause.ERROR in obstacles else next(iter(obstacles), self.exhausted_cause or causes[-1])
+        causes, needed = [cause_of(one) for one in failed], self.children[: self.needed]
+        obstacles = [cause_of(one) for one in failed if one in needed and cause_of(one) not in _MERELY_NOT_SO]
+        cause = Cause.ERROR if Cause.ERROR in causes else next(iter(obstacles), self.exhausted_cause or causes[-1])
         tried = [one for one in failed if cause_of(one) is not Cause.PRECONDITION] or failed
         tried.sort(key=lambda one: cause_of(one) is not cause)
         sentences = list(dict.fromkeys(map(message_of, tried)))

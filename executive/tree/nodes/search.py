@@ -254,16 +254,20 @@ def search_plan(
     further = look_plans(builder.at("elsewhere"), item, elsewhere, key)
     looked, meant = place_phrase(builder.knowledge, place), bool(builder.relations(item.relations))
     looked += f", nor on the {listing(elsewhere)}" if elsewhere and not meant else ""
-    return builder.first_of(
-        f"find the {item}",
+    needed = (
         find_again_plan(builder.at("again"), item, (*surfaces, *elsewhere), key),
         *_looks_at_last_known(builder.at("last-known"), item, key),
         *(look for _, look in looks),
+    )
+    return builder.first_of(
+        f"find the {item}",
+        *needed,
         *_looks_from_aside(builder, item, surfaces, key),
         *(look for _, look in further),
         exhausted_cause=Cause.PRECONDITION,
         exhausted_message=f"{'did not find the one' if meant else 'found no'} {item} {looked}",
         one_goal=meant,
+        needed=len(needed),
     )
 
 

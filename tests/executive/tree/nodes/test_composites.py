@@ -46,6 +46,8 @@ def test_a_selector_keeps_failures_in_sight():
         ("OO", {"exhausted_cause": Cause.PRECONDITION}, "B", "a O; b O"),
         ("OPO", {"exhausted_cause": Cause.PRECONDITION}, "P", "b P; a O; c O"),
         ("PE", {}, "E", "b E; a P"),
+        ("OP", {"needed": 1, "exhausted_cause": Cause.PRECONDITION}, "B", "a O; b P"),
+        ("OE", {"needed": 1}, "E", "b E; a O"),
         ("BOP", {"exhausted_message": "found nothing"}, "P", "found nothing: c P; b O"),
     ],
 )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Final
 
-from executive.language.items import PLACES, Adverb, Being, Chunk, Item, Outside, Separator, Unknown, Verb, Whether
+from executive.language.items import Adverb, Being, Chunk, Item, Outside, Separator, Unknown, Verb, Whether
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, read_table, word_list
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase, SpokenRelation
@@ -224,7 +224,7 @@ def _nested(spoken: Sequence[_Placed], puts: bool) -> Iterator[_Placed]:
         apart = puts and first.chunk.role is PrepositionRole.SOURCE
         while rest and not apart:
             before, chunk = chain[-1], rest[0].chunk
-            place = before.role in PLACES
+            place = before.placed
             place = place or (before.role in (None, PrepositionRole.FOR) and before.phrase.somebody)
             closer = chunk.role in _CLOSER and not rest[0].joint and chunk.preposition != before.preposition
             if not (place and closer):

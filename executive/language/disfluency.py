@@ -31,9 +31,7 @@ _PRONOUNS: Final = frozenset({"it", "them"})
 
 
 def repair_disfluencies(items: Iterable[Item]) -> tuple[Item, ...]:
-    """Applies the speaker's corrections and negations to the items.
-
-    A correction or negation that fits nothing becomes an unknown word.
+    """Applies the speaker's corrections and negations; one that fits nothing becomes an unknown word.
 
     Raises RefusalError when the speaker forbids an action.
     """
@@ -79,11 +77,8 @@ def _listed(mark: Negation, items: Sequence[Item]) -> Sequence[Item]:
 
 
 def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[Item], list[Item]]:
-    """Removes a negated clause or noun phrase that only distinguishes the requested one.
-
-    Raises RefusalError when the negation forbids an action ("but don't go to the kitchen").
-    """
-    ahead = _without_separators(rest)
+    """Removes what is negated to distinguish the requested one. Raises RefusalError for an action that is forbidden."""
+    ahead = [*dropwhile(lambda item: isinstance(item, Separator | Correction), rest)]
     match [] if done and isinstance(done[-1], Being) else ahead:
         case [Verb() as act, *words]:
             clause = [*takewhile(lambda item: not isinstance(item, Verb | Being | Correction), words)]
@@ -113,10 +108,7 @@ def _first_object(items: Sequence[Item]) -> Chunk | None:
 
 
 def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> bool:
-    """Returns whether the next verb replaces the negated verb: both go somewhere, or both handle objects.
-
-    If no action comes before it, a negated verb that handles objects is replaced by any verb.
-    """
+    """Returns whether the next verb replaces the negated one: both go, both handle objects, or a first one handles."""
     after = next((item for item in rest if isinstance(item, Verb)), None)
     goes = negated.kinds == {VerbKind.GO}
     first = not goes and not any(isinstance(item, Verb) for item in done)
@@ -145,7 +137,10 @@ def _with_meaning(items: list[Item], said: Item | None, meant: Phrase, pronouns:
 
 def _corrected(done: list[Item], rest: list[Item], mark: Correction) -> tuple[list[Item], list[Item]]:
     """Replaces the corrected item by the item that follows it."""
-    ahead, verb = _without_separators(rest), last_index(done, lambda item: isinstance(item, Verb))
+    ahead, verb = (
+        [*dropwhile(lambda item: isinstance(item, Separator | Correction), rest)],
+        last_index(done, lambda item: isinstance(item, Verb)),
+    )
     before, clause = done[:verb], done[verb:]
     match ahead:
         case _ if all(isinstance(item, Separator) for item in done):
@@ -157,18 +152,14 @@ def _corrected(done: list[Item], rest: list[Item], mark: Correction) -> tuple[li
             return [*before, *reduce(_replaced, news, clause)], ahead[len(news) :]
         case [] if verb is not None and not mark.soft:  # the bag to the hall, the trunk I mean
             *clause, new = [*dropwhile(lambda item: isinstance(item, Separator), reversed(clause))][::-1]
-            if isinstance(new, Chunk) and _corrected_index(clause, new) is not None:
+            if isinstance(new, Chunk) and last_index(clause, partial(_corrects, new)) is not None:
                 return [*before, *_replaced(clause, new)], rest
     return done if mark.soft else [*done, Unknown(mark.word)], rest
 
 
-def _without_separators(items: Sequence[Item]) -> list[Item]:
-    return [*dropwhile(lambda item: isinstance(item, Separator | Correction), items)]
-
-
 def _replaced(clause: Sequence[Item], new: Item) -> list[Item]:
     """Replaces the noun phrase that `new` corrects, or appends `new` when there is none."""
-    at = _corrected_index(clause, new)
+    at = last_index(clause, partial(_corrects, new))
     if at is None:
         return [*clause, new]
     old = clause[at]
@@ -180,11 +171,6 @@ def _replaced(clause: Sequence[Item], new: Item) -> list[Item]:
             phrase = replace(old.phrase, numbered=phrase.count)
         new = replace(old, phrase=phrase)
     return [*clause[:at], new, *clause[at + 1 :]]
-
-
-def _corrected_index(clause: Sequence[Item], new: Item) -> int | None:
-    """Index of the last item that `new` can replace; None if there is none."""
-    return last_index(clause, partial(_corrects, new))
 
 
 def _corrects(new: Item, old: Item) -> bool:

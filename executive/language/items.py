@@ -1,7 +1,6 @@
 """Represents a sentence as a row of items: verbs, noun phrases with their prepositions, and small words.
 
-Parsers err most in the attachment of prepositions; the row keeps the order of the words, and the verbs assign roles to
-the places later.
+Parsers err most in the attachment of prepositions; the row keeps the order, and verbs give places their roles later.
 """
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
@@ -44,7 +43,7 @@ class Chunk:
     @property
     def placed(self) -> bool:
         """Returns whether the preposition makes the noun phrase a place."""
-        return self.role in _PLACES
+        return self.role not in (None, PrepositionRole.FOR, PrepositionRole.PATH)
 
 
 @dataclass(frozen=True)
@@ -58,9 +57,8 @@ class Adverb:
 class Being:
     """Form of "to be"; `existential` with "there", `asked` before its subject.
 
-    `teller` is the person who left an object at its place ("Anna left her umbrella"). `narrated` marks any verb in a
-    narration ("somebody spilled milk on the floor"), and `topic` is what the narration is about ("the ball rolled under
-    the sofa").
+    `teller` is who left an object at its place ("Anna left her umbrella"), `narrated` marks any verb in a narration
+    ("somebody spilled milk on the floor"), `topic` is what a narration is about ("the ball rolled under the sofa").
     """
 
     text: str
@@ -113,11 +111,8 @@ Item = Verb | Chunk | Adverb | Being | Whether | Separator | Unknown | Outside |
 
 def spoken_words(items: Iterable[Item]) -> str:
     """Words of the items as spoken, without small words."""
-    words = (
-        item.spoken if isinstance(item, Chunk) else getattr(item, "word", getattr(item, "text", ""))
-        for item in items
-        if not isinstance(item, Separator)
-    )
+    kept = (item for item in items if not isinstance(item, Separator))
+    words = (one.spoken if isinstance(one, Chunk) else getattr(one, "word", getattr(one, "text", "")) for one in kept)
     return " ".join(filter(None, words))
 
 
@@ -148,10 +143,7 @@ LONGEST: Final = 8
 
 @dataclass
 class Row:
-    """Words of a sentence, the noun phrases by their first word, and the reader's position.
-
-    The reader skips words in `silent`.
-    """
+    """Words of a sentence, the noun phrases by their first word, the reader's position, and words that it skips."""
 
     tokens: Sequence[Token]
     phrases: Mapping[int, Phrase]
@@ -192,10 +184,9 @@ def may_begin_command(items: Sequence[Item]) -> bool:
 
 @dataclass(frozen=True)
 class Predicate:
-    """Verb, or a form of "to be", with the items after it; the robot may not know the verb.
+    """Verb, or a form of "to be", with the items after it; `verb` is None for items before the first verb.
 
-    `verb` is None for items before the first verb; `subject` precedes a form of "to be"; `whether` is True if "if" or
-    "whether" precedes the subject.
+    `subject` precedes a form of "to be", and `whether` is True if "if" or "whether" precedes the subject.
     """
 
     verb: Verb | Being | Outside | None
@@ -219,8 +210,7 @@ def predicates(items: Iterable[Item]) -> tuple[Predicate, ...]:
             found.append(Predicate(item))
         else:
             found[-1] = replace(found[-1], items=(*found[-1].items, item))
-    whole = (clause for clause in found if clause.verb is not None or clause.content)
-    return tuple(part for clause in whole for part in _ungapped(clause))
+    return tuple(part for clause in found if clause.verb or clause.content for part in _ungapped(clause))
 
 
 def _ungapped(clause: Predicate) -> Iterator[Predicate]:
@@ -328,15 +318,8 @@ def _without_checks(clauses: Sequence[Predicate]) -> Iterator[Predicate]:
     for clause, after in zip_longest(clauses, clauses[1:]):
         if clause.whether and not asks:
             clause = replace(clause, verb=Outside("if"))
-        bare = after is not None and _is_bare_check(clause)
+        checks = after is not None and isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
+        bare = checks and all(isinstance(item, Separator | Whether) for item in clause.items)
         asks = bare and after.whether
         if not asks and not (bare and isinstance(after.verb, Verb)):
             yield clause
-
-
-def _is_bare_check(clause: Predicate) -> bool:
-    checks = isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
-    return checks and all(isinstance(item, Separator | Whether) for item in clause.items)
-
-
-_PLACES: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})

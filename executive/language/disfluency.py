@@ -162,14 +162,11 @@ def _replaced(clause: Sequence[Item], new: Item) -> list[Item]:
     at = last_index(clause, partial(_corrects, new))
     if at is None:
         return [*clause, new]
-    old = clause[at]
-    if isinstance(new, Chunk) and new.role is None and isinstance(old, Chunk):
-        phrase = new.phrase  # "two" and "the red one" take their noun from the old one
-        if phrase.stands_for_one:
-            phrase = phrase.replace_one(old.phrase)
-        elif phrase.counts:
-            phrase = replace(old.phrase, numbered=phrase.count)
-        new = replace(old, phrase=phrase)
+    match new, clause[at]:
+        case Chunk(role=None, phrase=said), Chunk(phrase=meant) as old:
+            # "two" and "the red one" take their noun from the old one
+            counted = replace(meant, numbered=said.count) if said.counts else said
+            new = replace(old, phrase=said.replace_one(meant) if said.stands_for_one else counted)
     return [*clause[:at], new, *clause[at + 1 :]]
 
 
@@ -179,11 +176,10 @@ def _corrects(new: Item, old: Item) -> bool:
             return True
         case Chunk(role=role), Adverb():
             return role in _WHERE_TO
-        case Chunk(role=None, phrase=phrase), Chunk(role=role, phrase=other):
-            receives = phrase.person and other.receiver
-            return (
-                receives if phrase.person or other.receiver else (phrase.kind is NounKind.PLACE) == (role is not None)
-            )
+        case Chunk(role=None, phrase=phrase), Chunk(phrase=other) if phrase.person or other.receiver:
+            return phrase.person and other.receiver
+        case Chunk(role=None, phrase=phrase), Chunk(role=role):
+            return (phrase.kind is NounKind.PLACE) == (role is not None)
         case Chunk(), Chunk():
             return any({old.role, new.role} <= group for group in (_WHERE_FROM, _WHERE_TO))
     return False

@@ -72,10 +72,7 @@ class Pipeline:
     knowledge: Knowledge | None
 
     def run(self, trace: Trace, *, behind: str | None = None, upto: str | None = None) -> Trace:
-        """Runs all steps, or only the steps after one named step and up to another.
-
-        Never raises, whatever the text. The text must not contain the wake phrase.
-        """
+        """Runs all steps, or those after one step and up to another, on a text without wake phrase. Never raises."""
         names = tuple(_STEPS)
         last = len(names) if upto is None else names.index(upto) + 1
         for name in names[0 if behind is None else names.index(behind) + 1 : last]:
@@ -89,9 +86,8 @@ class Pipeline:
         if (words := len(trace.text.split())) > _MOST_WORDS:
             raise RefusalError(f"{words} words are too many for one sentence; say it in {_MOST_WORDS} at most")
         if len(trace.text) > _MOST_CHARACTERS:
-            raise RefusalError(
-                f"{len(trace.text)} characters are too many for one sentence; {_MOST_CHARACTERS} at most"
-            )
+            what = f"{len(trace.text)} characters are too many for one sentence; {_MOST_CHARACTERS} at most"
+            raise RefusalError(what)
         return replace(trace, opened=rephrase(trace.text))
 
     def _parse(self, trace: Trace) -> Trace:

@@ -221,18 +221,16 @@ def _nested(spoken: Sequence[_Placed], puts: bool) -> Iterator[_Placed]:
     rest = list(spoken)
     while rest:
         first, within = rest.pop(0), None
-        chain = [first.chunk]
-        while rest and not (puts and first.chunk.role is PrepositionRole.SOURCE) and _contains(rest[0], chain[-1]):
+        chain, apart = [first.chunk], puts and first.chunk.role is PrepositionRole.SOURCE
+        while rest and not apart:
+            before, chunk = chain[-1], rest[0].chunk
+            place = before.placed or (before.role in _TO and before.phrase.somebody)
+            if not place or chunk.role not in _CLOSER or rest[0].joint or chunk.preposition == before.preposition:
+                break
             chain.append(rest.pop(0).chunk)
         for chunk in reversed(chain[1:]):
             within = Location(chunk.phrase, chunk.preposition, within)
         yield replace(first, within=within)
-
-
-def _contains(place: _Placed, before: Chunk) -> bool:
-    someone = before.role in _TO and before.phrase.somebody
-    closer = place.chunk.role in _CLOSER and not place.joint and place.chunk.preposition != before.preposition
-    return closer and (before.placed or someone)
 
 
 def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
@@ -295,16 +293,14 @@ class _Row:
                 self.verb, self.named, self.place = item, None, None
             case Being():
                 self.verb = item
-            case Chunk(role=role):
-                relation = self._relation(item)
-                if relation is not None and self._attach(item, relation):
-                    return
-                if role in _TO and not item.phrase.receiver:
-                    self.named, item = len(self.found), replace(item, phrase=self._ordered(item.phrase))
-                elif _is_placed(item):
-                    self.place = len(self.found)
-                elif role in _PLACED:
-                    self.named = None
+            case Chunk() if self._attach(item):
+                return
+            case Chunk(role=None | PrepositionRole.FOR, phrase=Phrase(receiver=False) as phrase):
+                self.named, item = len(self.found), replace(item, phrase=self._ordered(phrase))
+            case Chunk() if _is_placed(item):
+                self.place = len(self.found)
+            case Chunk(role=PrepositionRole.AT | PrepositionRole.GOAL):
+                self.named = None
         self.found.append(item)
 
     def _ordered(self, phrase: Phrase) -> Phrase:
@@ -343,8 +339,11 @@ class _Row:
         self.rest = self.rest[2:]
         return SpokenRelation(beside, f"{item.spoken} and {other.spoken}", (item.phrase, other.phrase))
 
-    def _attach(self, item: Chunk, relation: SpokenRelation) -> bool:
-        """Attaches a relation to the object, or to the surface; returns whether it belongs to one of them."""
+    def _attach(self, item: Chunk) -> bool:
+        """Attaches a relation to the object, or to the surface; returns whether there is one for them."""
+        relation = self._relation(item)
+        if relation is None:
+            return False
         spot, own = self._is_spot(), not relation.landmarks and item.spoken.lower() not in _kinds("parts")
         surface, at = replace(item, preposition="on", role=PrepositionRole.AT), self.place if spot else self.named
         if spot and (own or at is None):
@@ -385,9 +384,8 @@ def _is_relative(item: Item) -> bool:
 
 def _is_aim(item: Item) -> bool:
     """Returns whether a noun phrase says whereto, or to whom."""
-    return isinstance(item, Chunk) and (
-        item.role is PrepositionRole.GOAL or (item.phrase.receiver and item.role in _TO)
-    )
+    to = isinstance(item, Chunk) and item.phrase.receiver and item.role in _TO
+    return to or (isinstance(item, Chunk) and item.role is PrepositionRole.GOAL)
 
 
 def _is_placed(item: Chunk) -> bool:

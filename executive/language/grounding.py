@@ -1,7 +1,6 @@
 """Grounds spoken names in the names of the world, and open places in their defaults.
 
-A name is looked up as spoken, then by its synonyms, then by its noun alone; an ambiguous or similar name makes a
-question.
+A name is looked up as spoken, then by its synonyms, then by its noun alone; ambiguous and similar ones make a question.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -39,10 +38,9 @@ def known_line(knowledge: Knowledge | None) -> str:
 def ground(
     frames: Sequence[CommandFrame], knowledge: Knowledge, parser: DependencyParser
 ) -> tuple[tuple[Command, ...], tuple[str, ...]]:
-    """Converts frames to commands in the world's own names, with default places for omitted ones.
+    """Converts frames to commands in the world's own names, with default places, and notes on names taken for others.
 
-    Also returns a note on each name that was interpreted as another; the parser tells how similar words are. Raises
-    RefusalError when an object, place or person is unknown or ambiguous; with a question if that helps.
+    Raises RefusalError when an object, place or person is unknown or ambiguous; with a question if that helps.
     """
     grounder = _Grounder(knowledge, parser)
     commands = [command for frame in grounder.needed_there(frames) for command in grounder.commands(frame)]
@@ -283,11 +281,16 @@ class _Grounder:
         return goal, goal_at
 
     def _goal(self, location: Location) -> tuple[str, str | None]:
-        """Place that a location means, or a person with the place where the person is."""
-        person = None if location.phrase is None else self._person(location.phrase)
-        if location == HERE or person is None:
-            return HERE.name if location == HERE else self.place(location), None
-        return person, None if location.within is None else self.place(location.within)
+        """Place that a location means, or a known person with the place where the person is."""
+        phrase, within = location.phrase, location.within
+        person = None if phrase is None else self.knowledge.person(phrase.text)
+        if location == HERE or person is not None:
+            return person or HERE.name, None if within is None else self.place(within)
+        if phrase is None or not phrase.person or self.knowledge.place(phrase.text) is not None:
+            return self.place(location), None
+        if self.knowledge.people and not phrase.named_person:
+            raise _asking(which_question(Slot.PERSON, phrase.text, tuple(self.knowledge.people)))
+        raise self._unknown(Slot.PERSON, (phrase.text,), self._known(self.knowledge.people))
 
     def object_kind(self, phrase: Phrase) -> ObjectKind:
         """Known class or category that a phrase names, with the adjectives before it."""
@@ -366,15 +369,6 @@ class _Grounder:
         spellings = self.knowledge.spellings([name, self.knowledge.room(name)])
         known = (other for spelling in spellings for other in (spelling, *synonyms_for(spelling)))
         return not said <= {word.lower() for other in known for word in other.split()}
-
-    def _person(self, phrase: Phrase) -> str | None:
-        """Known person; None if the words name no known person."""
-        name = self.knowledge.person(phrase.text)
-        if name is not None or not phrase.person or self.knowledge.place(phrase.text) is not None:
-            return name
-        if self.knowledge.people and not phrase.named_person:
-            raise _asking(which_question(Slot.PERSON, phrase.text, tuple(self.knowledge.people)))
-        raise self._unknown(Slot.PERSON, (phrase.text,), self._known(self.knowledge.people))
 
     def _only(self, candidates: Sequence[str], slot: Slot, heard: str) -> str:
         """Single candidate. Raises RefusalError with a question if there are several."""

@@ -1,13 +1,12 @@
 """Grounds spoken names in the names of the world, and open places in their defaults.
 
-A name is looked up as spoken, then by its synonyms, then by its noun alone; an ambiguous or similar name makes a
-question.
+A name is looked up as spoken, then by its synonyms, then by its noun alone; ambiguous and similar ones make a question.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Final
 
 from executive.language.command_frames import CommandFrame
@@ -20,7 +19,6 @@ from executive.language.phrases import Phrase, SpokenRelation
 from executive.language.questions import ABLE, ClarifyingQuestion, RefusalError, Slot, perhaps_question, which_question
 from executive.language.roles import HERE, Location
 from executive.language.spelling import look_alikes, synonyms_for, synonyms_of
-from executive.language.tokens import Token
 from executive.words.command import Command, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge, except_for, split_exceptions
 from skills.api import ObjectKind
@@ -33,18 +31,14 @@ def known_line(knowledge: Knowledge | None) -> str:
     """Abilities of the robot and known names, in one line."""
     if knowledge is None:
         return ABLE
-    return (
-        f"{ABLE}; known objects: {listing(knowledge.object_names())}; known places: {listing(knowledge.place_names())}"
-    )
+    objects, places = listing(knowledge.object_names()), listing(knowledge.place_names())
+    return f"{ABLE}; known objects: {objects}; known places: {places}"
 
 
 def ground(
     frames: Sequence[CommandFrame], knowledge: Knowledge, parser: DependencyParser
 ) -> tuple[tuple[Command, ...], tuple[str, ...]]:
-    """Converts frames to commands in the world's own names, with default places for omitted ones.
-
-    Also returns a note on each name that was interpreted as another. Unknown names are compared with known ones by the
-    parser's similarity of words.
+    """Converts frames to commands in the world's own names, with default places, and notes on names taken for others.
 
     Raises RefusalError when an object, place or person is unknown or ambiguous; with a question if that helps.
     """
@@ -55,42 +49,25 @@ def ground(
 
 def _one_by_one(commands: Sequence[Command], knowledge: Knowledge) -> Iterator[Command]:
     """Yields the commands; several objects for a person are fetched and handed over one by one."""
-    rest = list(commands)
-    while rest:
-        gets, brings = rest.pop(0), rest[0] if rest else None
-        count, to = gets.object_count, None if brings is None else brings.goal
-        person = to == HERE.name or (to is not None and knowledge.person(to) is not None)
-        if brings is None or gets.task is not Task.GRASP or count < 2 or not person or brings.item != gets.object:
-            yield gets
-            continue
-        rest.pop(0)
-        for _ in range(count):
-            yield replace(gets, object_count=1)
-            yield replace(brings, item_count=1)
+    match commands:
+        case [Command(task=Task.GRASP, object_count=count) as gets, Command(goal=str(to)) as brings, *rest] if (
+            count > 1 and brings.item == gets.object and (to == HERE.name or knowledge.person(to) is not None)
+        ):
+            yield from (replace(gets, object_count=1), replace(brings, item_count=1)) * count
+            yield from _one_by_one(rest, knowledge)
+        case [command, *rest]:
+            yield command
+            yield from _one_by_one(rest, knowledge)
 
 
 def leave_out(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge) -> tuple[Command, ...]:
     """Leaves unwanted classes out of the categories that commands take, and unwanted rooms out of visits to each room.
 
-    Raises RefusalError for an unwanted object that cannot be left out so, since it is told by more than its class, and
-    for an unknown place.
+    Raises RefusalError for an object that is told by more than its class, and for an unknown place.
     """
-
-    def exclude(phrase: Phrase, names: Sequence[str], kind: ObjectKind | None) -> ObjectKind | None:
-        """Leaves the classes with these names out of a kind of object."""
-        kinds = {one for name in names for one in knowledge.classes(name)}
-        if kind is None or kind.attributes or not kinds & {*knowledge.classes(kind.name)}:
-            return kind
-        kept, *others = split_exceptions(kind.name)
-        rest = except_for(kept, *dict.fromkeys((*others, names[0])))
-        told = any(attributes for attributes, _ in _readings(phrase)) or phrase.relations
-        if told or kept in (ANYTHING, EVERYTHING) or not knowledge.classes(rest):
-            raise RefusalError(f"I cannot follow the exclusion of '{phrase.spoken}'; name a kind", [phrase.spoken])
-        return replace(kind, name=rest)
-
     for phrase in unwanted:
-        names = [name for _, form in _readings(phrase) if (name := knowledge.object_name(form)) is not None]
-        rest = partial(exclude, phrase, names)
+        names = [*filter(None, (knowledge.object_name(form) for _, form in _readings(phrase)))]
+        rest = partial(_without, knowledge, phrase, names)
         commands = [replace(one, item=rest(one.item), object=rest(one.object)) for one in commands]
         visits = [one for one in commands if one.item is None and one.task is None and one.goal in knowledge.rooms]
         if phrase.kind is NounKind.PLACE and len(visits) > 1 and not names:
@@ -99,6 +76,19 @@ def leave_out(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge
                 raise RefusalError(f"I know no place {phrase.text!r} to leave out", [phrase.text])
             commands = [one for one in commands if one not in visits or one.goal != room]
     return tuple(commands)
+
+
+def _without(world: Knowledge, unwanted: Phrase, names: Sequence[str], kind: ObjectKind | None) -> ObjectKind | None:
+    """Leaves the classes with the names of an unwanted phrase out of a kind of object."""
+    kinds = {one for name in names for one in world.classes(name)}
+    if kind is None or kind.attributes or kinds.isdisjoint(world.classes(kind.name)):
+        return kind
+    kept, *others = split_exceptions(kind.name)
+    rest = except_for(kept, *dict.fromkeys((*others, names[0])))
+    told = any(attributes for attributes, _ in _readings(unwanted)) or unwanted.relations
+    if told or kept in (ANYTHING, EVERYTHING) or not world.classes(rest):
+        raise RefusalError(f"I cannot follow the exclusion of '{unwanted.spoken}'; name a kind", [unwanted.spoken])
+    return replace(kind, name=rest)
 
 
 @dataclass
@@ -114,52 +104,59 @@ class _Grounder:
         found = list(frames)
         for k, (takes, brings) in enumerate(pairwise(frames)):
             place, fetched = takes.goal, takes.task is Task.GRASP and brings.item == takes.object
-            inside = place is not None and place.preposition in ("in", "at", "inside")
-            if not fetched or place is None or not inside or brings.goal != HERE:
-                continue
-            name = None if place.phrase is None else self.knowledge.place(place.name)
-            if name is not None and not self.knowledge.surfaces_in(name):
-                self.notes.append(f"I bring it to the {name}: nothing can be taken from there")
-                found[k : k + 2] = [replace(takes, goal=None), replace(brings, goal=replace(place, preposition="to"))]
+            if fetched and place is not None and place.preposition in ("in", "at", "inside") and brings.goal == HERE:
+                name = self.knowledge.place(place.name)
+                if name is not None and not self.knowledge.surfaces_in(name):
+                    self.notes.append(f"I bring it to the {name}: nothing can be taken from there")
+                    there = replace(place, preposition="to")
+                    found[k : k + 2] = [replace(takes, goal=None), replace(brings, goal=there)]
         return tuple(found)
 
     def commands(self, frame: CommandFrame) -> Iterator[Command]:
         """Converts one frame to a command, or to one for each room."""
-        rooms = frame.goal is not None and frame.goal.every_room and frame.goal.within is None
-        if rooms and frame.item is None and frame.task is None:
-            yield from (Command(goal=room, verb=frame.verb) for room in self.knowledge.rooms)
-            return
-        if frame.verb in word_list("stacks"):
-            raise RefusalError("I put objects side by side, and stack none", [frame.verb])
-        home = frame.goal is not None and frame.goal.name.lower() == _HOME and self.knowledge.place(_HOME) is None
-        if home and frame.item is None and frame.task is None:
-            self.notes.append(f"I take 'home' to be {'the dock' if self.knowledge.dock else 'here'}")
-            at_dock = Command(task=Task.CHARGE, verb=frame.verb)
-            yield at_dock if self.knowledge.dock else Command(goal=HERE.name, verb=frame.verb)
-            return
+        match frame:
+            case CommandFrame(item=None, task=None, goal=Location(every_room=True, within=None)):
+                yield from (Command(goal=room, verb=frame.verb) for room in self.knowledge.rooms)
+            case CommandFrame(verb=verb) if verb in word_list("stacks"):
+                raise RefusalError("I put objects side by side, and stack none", [verb])
+            case CommandFrame(item=None, task=None, goal=Location(name=name)) if (
+                name.lower() == _HOME and self.knowledge.place(_HOME) is None
+            ):
+                dock = self.knowledge.dock
+                self.notes.append(f"I take 'home' to be {'the dock' if dock else 'here'}")
+                yield Command(task=Task.CHARGE, verb=frame.verb) if dock else Command(goal=HERE.name, verb=frame.verb)
+            case _:
+                yield self._command(frame)
+
+    def _command(self, frame: CommandFrame) -> Command:
         item = None if frame.item is None else self.taken(frame.item)
         target = None if frame.object is None else self.target(frame.object, frame.task)
         for kind in filter(None, (item, target)):
             self._check_seen(kind)
         place, spot = self._spot(frame.goal)
-        people = target is not None and frame.task is Task.FIND and self.knowledge.somebody(target.name) is not None
-        goal, goal_at = (None, None) if place is None else self._supported_goal(frame, place, people)
-        if goal is None and target is not None and target.name == EVERYTHING:
-            raise RefusalError("everything from where? Name the surface or the room", [target.name])
-        if goal is None and target is not None and frame.task in (Task.GRASP, Task.FIND):
-            goal = self.knowledge.default_place(frame.task, target.name)
-        target = target and self._described(frame, target, goal)
-        if target is not None and frame.goal is None and goal is not None:
-            left_out = [each.landmarks[0].name for each in target.relations if each.kind is RelationKind.NOT_AT]
-            inside = set(self.knowledge.surfaces_in(goal))
-            goal = None if any(inside <= set(self.knowledge.surfaces_in(one)) for one in left_out) else goal
-        if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or place is None):
-            raise RefusalError(f"which object? Known are {listing(self.knowledge.object_names())}", [target.name])
+        goal, goal_at = (None, None) if place is None else self._supported_goal(frame, place, target)
+        if target is not None:
+            target, goal = self._target_there(frame, target, goal)
         counts = _count(frame.item, item), _count(frame.object, target)
         try:
-            yield Command(item, goal, goal_at, frame.task, target, *counts, frame.verb, spot)
+            return Command(item, goal, goal_at, frame.task, target, *counts, frame.verb, spot)
         except ValueError as error:  # two relations of one kind
             raise RefusalError(str(error)) from error
+
+    def _target_there(self, frame: CommandFrame, target: ObjectKind, goal: str | None) -> tuple[ObjectKind, str | None]:
+        """Object of a task with its relations, and its default place if none is given."""
+        if goal is None and target.name == EVERYTHING:
+            raise RefusalError("everything from where? Name the surface or the room", [target.name])
+        if goal is None and frame.task in _LOOKS:
+            goal = self.knowledge.default_place(frame.task, target.name)
+        target = self._described(frame, target, goal)
+        if target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
+            raise RefusalError(f"which object? Known are {listing(self.knowledge.object_names())}", [target.name])
+        left_out = [each.landmarks[0].name for each in target.relations if each.kind is RelationKind.NOT_AT]
+        if frame.goal is None and goal is not None:
+            inside = set(self.knowledge.surfaces_in(goal))
+            goal = None if any(inside <= set(self.knowledge.surfaces_in(one)) for one in left_out) else goal
+        return target, goal
 
     def _check_seen(self, kind: ObjectKind | Landmark) -> None:
         """Raises RefusalError for attributes that the robot cannot see."""
@@ -170,19 +167,23 @@ class _Grounder:
     def _described(self, frame: CommandFrame, target: ObjectKind, place: str | None) -> ObjectKind:
         """Object with the relations that say which one at a place is meant. Raises RefusalError for impossible ones."""
         phrase = frame.object
-        if phrase is None or frame.task not in (Task.GRASP, Task.FIND) or not phrase.relations:
+        if phrase is None or frame.task not in _LOOKS or not phrase.relations:
             return target
         said, relations = phrase.relations[0].said, self._relations(phrase, "look")
         if self.knowledge.somebody(target.name) or target.name in (ANYTHING, EVERYTHING):
             raise RefusalError(f"I cannot tell who or what is '{said}'; name one kind of object", [said])
-        several = phrase.count == 0 or (phrase.count != 1 and any(each.nth > 1 for each in relations))
-        if (several or frame.verb == "be") and any(each.kind in ORDERS for each in relations):
+        orders = [each for each in relations if each.kind in ORDERS]
+        several = phrase.count == 0 or (phrase.count != 1 and any(each.nth > 1 for each in orders))
+        if orders and (several or frame.verb == "be"):
             raise RefusalError(f"I take or find the one '{said}'; I cannot tell how many, or whether one is", [said])
-        room = None if place is None else self.knowledge.room(place)
+        self._check_door(relations, None if place is None else self.knowledge.room(place))
+        return replace(target, relations=relations)
+
+    def _check_door(self, relations: Iterable[Relation], room: str | None) -> None:
+        """Raises RefusalError for the door of a room that has several doors, or none."""
         doors = sum(room in door.between for door in self.knowledge.doors)
         if doors != 1 and any(one.name == DOOR for each in relations for one in each.landmarks):
             raise RefusalError(f"I cannot tell which door is meant: the {room or 'place'} has {doors}", [DOOR])
-        return replace(target, relations=relations)
 
     def _relations(self, phrase: Phrase, act: str) -> tuple[Relation, ...]:
         """Relations of an object or a spot. Raises RefusalError for a landmark that a relation cannot have."""
@@ -192,19 +193,18 @@ class _Grounder:
         return tuple(Relation(e.kind, tuple(self._landmark(p, e, act) for p in e.landmarks), e.nth) for e in said)
 
     def _landmark(self, phrase: Phrase, said: SpokenRelation, act: str) -> Landmark:
-        known = self.knowledge.place(phrase.text) or self.knowledge.person(phrase.text)
-        door = phrase.text in read_table("relations.yaml")["doors"]
-        named = known or (DOOR if door else ROBOT if phrase.text == "you" else None)
-        compares, seen = said.kind in ORDERS, said.kind is RelationKind.SEEN_FROM
-        fits = act == "look" if compares else seen and known in self.knowledge.people
-        fits = fits or (
-            said.kind is RelationKind.NOT_AT and act == "look" and self.knowledge.place(phrase.text) is not None
-        )
+        place, looks = self.knowledge.place(phrase.text), act == "look"
+        known = place or self.knowledge.person(phrase.text)
+        named = known or {**dict.fromkeys(read_table("relations.yaml")["doors"], DOOR), "you": ROBOT}.get(phrase.text)
+        fits = {
+            **dict.fromkeys(ORDERS, looks),
+            RelationKind.SEEN_FROM: known in self.knowledge.people,
+            RelationKind.NOT_AT: (looks and place is not None) or None,  # or not at an object
+        }.get(said.kind)
         if fits and named:
             return Landmark(named)
-        one = phrase.count == 1 or said.kind is RelationKind.BETWEEN
-        unfit = known or phrase.speaker or phrase.somebody or phrase.addressed or phrase.pronoun or not one
-        if unfit or seen or (compares and not fits):
+        other = known or phrase.speaker or phrase.somebody or phrase.addressed or phrase.pronoun
+        if other or fits is False or (phrase.count != 1 and said.kind is not RelationKind.BETWEEN):
             raise relation_refusal(act, "", said.said)
         kind = self.object_kind(phrase)
         self._check_seen(kind)
@@ -235,9 +235,8 @@ class _Grounder:
         """Object of a task: a known object or person, or a duration."""
         if task is Task.WAIT:
             return ObjectKind(phrase.head.lemma)
-        if task is not Task.FIND:
-            return self.taken(phrase)
-        return self.object_kind(phrase) if (person := self._sought(phrase)) is None else ObjectKind(person)
+        person = self._sought(phrase) if task is Task.FIND else None
+        return ObjectKind(person) if person else self.object_kind(phrase) if task is Task.FIND else self.taken(phrase)
 
     def taken(self, phrase: Phrase) -> ObjectKind:
         """Known class or category that a phrase names; "all the objects" means everything."""
@@ -245,10 +244,7 @@ class _Grounder:
         return replace(kind, name=EVERYTHING) if kind.name == ANYTHING and phrase.count == 0 else kind
 
     def _sought(self, phrase: Phrase) -> str | None:
-        """Person to look for, a known person or anybody; None if the phrase names an object.
-
-        Raises RefusalError for a person whom the robot cannot distinguish from others.
-        """
+        """Person to look for, or anybody; None for an object. Raises RefusalError for one whom it cannot tell."""
         person = self.knowledge.person(phrase.text)
         if person is not None and len(self.knowledge.people) > 1:
             others = listing((name for name in self.knowledge.people if name != person), last="or")
@@ -264,25 +260,37 @@ class _Grounder:
             raise RefusalError(what, [phrase.text])
         return None
 
-    def _supported_goal(self, frame: CommandFrame, location: Location, people: bool) -> tuple[str, str | None]:
+    def _supported_goal(
+        self, frame: CommandFrame, place: Location, target: ObjectKind | None
+    ) -> tuple[str, str | None]:
         """Goal of a frame, if the command supports the preposition; for a person also the place."""
-        looks = frame.task in (Task.GRASP, Task.FIND)
-        if looks and location == HERE:
+        looks = frame.task in _LOOKS
+        if looks and place == HERE:
             raise RefusalError("I take and find objects on surfaces, and people in rooms: name a place", [HERE.name])
         act = "look" if looks else "go" if frame.item is None else "bring"
-        check_relation(act, _KINDS, location)
-        person = None if location == HERE or location.phrase is None else self._person(location.phrase)
-        goal = HERE.name if location == HERE else person or self.place(location)
-        goal_at = self.place(location.within) if person is not None and location.within is not None else None
-        if frame.object == CONTENTS and goal in self.knowledge.rooms:
+        check_relation(act, ("room", "surface", "person"), place)
+        goal, goal_at = self._goal(place)
+        room, surface = goal in self.knowledge.rooms, goal in self.knowledge.surfaces
+        if frame.object == CONTENTS and room:
             what = f"I cannot tell whether all of the {goal} is empty; ask whether anybody is in it, or what is in it"
-            raise RefusalError(what, [location.text])
-        if people and goal in self.knowledge.surfaces:
+            raise RefusalError(what, [place.text])
+        if target is not None and frame.task is Task.FIND and surface and self.knowledge.somebody(target.name):
             raise RefusalError(f"I look for people in rooms, and the {goal} is none", [goal])
-        surface = goal in (*self.knowledge.surfaces, *self.knowledge.poses)
-        kind = "room" if goal in self.knowledge.rooms else "surface" if surface else "person"
-        check_relation(act, [kind], location)
+        kind = "room" if room else "surface" if surface or goal in self.knowledge.poses else "person"
+        check_relation(act, [kind], place)
         return goal, goal_at
+
+    def _goal(self, location: Location) -> tuple[str, str | None]:
+        """Place that a location means, or a known person with the place where the person is."""
+        phrase, within = location.phrase, location.within
+        person = None if phrase is None else self.knowledge.person(phrase.text)
+        if location == HERE or person is not None:
+            return person or HERE.name, None if within is None else self.place(within)
+        if phrase is None or not phrase.person or self.knowledge.place(phrase.text) is not None:
+            return self.place(location), None
+        if self.knowledge.people and not phrase.named_person:
+            raise _asking(which_question(Slot.PERSON, phrase.text, tuple(self.knowledge.people)))
+        raise self._unknown(Slot.PERSON, (phrase.text,), self._known(self.knowledge.people))
 
     def object_kind(self, phrase: Phrase) -> ObjectKind:
         """Known class or category that a phrase names, with the adjectives before it."""
@@ -300,65 +308,59 @@ class _Grounder:
 
     def place(self, location: Location) -> str:
         """Known place that a location names. Among surfaces with the same noun ("table"), the room around decides."""
-        if location.phrase is None:
+        phrase = location.phrase
+        if phrase is None:
             raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
-        if location.phrase.said_count not in (None, 1) or location.every_room:
-            said = location.phrase.spoken
-            raise RefusalError(f"I go to one place at a time, not to {said!r}", [said])
+        if phrase.said_count not in (None, 1) or location.every_room:
+            raise RefusalError(f"I go to one place at a time, not to {phrase.spoken!r}", [phrase.spoken])
         known = self._known(self.knowledge.place_names())
-        room = self._room(location)
-        candidates = self._places(location.phrase, room, known)
-        fitting = (name for name in candidates if room in (None, name, self.knowledge.room(name)))
-        inside = [name for name in fitting if not self._left_over(location.phrase, name)]
-        exact = self.knowledge.place(location.phrase.text)
-        if not inside and exact is not None and room is not None:
+        room = self._room(phrase, location.within, known)
+        candidates = (name for name in self._places(phrase, room, known) if not self._left_over(phrase, name))
+        inside = [name for name in candidates if room in (None, name, self.knowledge.room(name))]
+        return self._only(inside or self._bins(phrase, room, known), Slot.PLACE, Phrase(phrase.tokens).text)
+
+    def _bins(self, phrase: Phrase, room: str | None, known: Mapping[str, str]) -> Sequence[str]:
+        """Bins in a room that "bin" can mean. Raises RefusalError for other words."""
+        exact = self.knowledge.place(phrase.text)
+        if exact is not None and room is not None:
             own = self.knowledge.room(exact)
             where = f"the {exact} is not {'in' if room in self.knowledge.places else 'on'} the {room}"
-            raise RefusalError(where if own == exact else f"{where}, but in the {own}", [location.phrase.text])
-        if not inside and location.phrase.singular in (_BIN, *synonyms_for(_BIN)):
-            inside = [name for name in self.knowledge.bins if room in (None, self.knowledge.room(name))]
-            if not inside:
-                raise RefusalError("there is no bin here that I know of", [location.phrase.text])
-        if not inside:
-            raise self._unknown(Slot.PLACE, (location.phrase.text, location.phrase.singular), known)
-        return self._only(inside, Slot.PLACE, Phrase(location.phrase.tokens).text)
+            raise RefusalError(where if own == exact else f"{where}, but in the {own}", [phrase.text])
+        if phrase.singular not in (_BIN, *synonyms_for(_BIN)):
+            raise self._unknown(Slot.PLACE, (phrase.text, phrase.singular), known)
+        if bins := [name for name in self.knowledge.bins if room in (None, self.knowledge.room(name))]:
+            return bins
+        raise RefusalError("there is no bin here that I know of", [phrase.text])
 
-    def _room(self, location: Location) -> str | None:
-        """Room that a location names besides the place ("in the kitchen", "of the kitchen", "bedroom table")."""
-        extra = () if location.phrase is None else location.phrase.extra
-        around = " ".join(extra[1:]) if extra[:1] == ("of",) else None
-        around = around if location.within is None else location.within.text
-        if around is not None:
-            known = self._known(self.knowledge.place_names())
-            found = self.knowledge.place(around) or next(iter(synonyms_of(around, known)), None)
-            if found is None:
-                raise self._unknown(Slot.PLACE, (around,), known)
-            return found
-        words = [] if location.phrase is None else [t.text for t in location.phrase.tokens[:-1]]
-        return next(filter(None, map(self.knowledge.place, words)), None)
+    def _room(self, phrase: Phrase, within: Location | None, known: Mapping[str, str]) -> str | None:
+        """Room that is named besides the place ("in the kitchen", "of the kitchen", "bedroom table")."""
+        of = " ".join(phrase.extra[1:]) if phrase.extra[:1] == ("of",) else None
+        around = of if within is None else within.text
+        if around is None:
+            return next(filter(None, (self.knowledge.place(token.text) for token in phrase.tokens[:-1])), None)
+        found = self.knowledge.place(around) or next(iter(synonyms_of(around, known)), None)
+        if found is None:
+            raise self._unknown(Slot.PLACE, (around,), known)
+        return found
 
     def _places(self, phrase: Phrase, room: str | None, known: Mapping[str, str]) -> Sequence[str]:
         """Places with exactly this name, or else with this noun; if a room is given, also places with a synonym."""
         groups = {"room": tuple(self.knowledge.rooms), "surface": tuple(self.knowledge.surfaces)}
-        named = len(phrase.content) > 1 or self.knowledge.place(phrase.text) is not None
-        if not named and groups.get(phrase.head.lemma):  # any place: "the room", "a surface"
-            return groups[phrase.head.lemma]
+        any_place = groups.get(phrase.head.lemma)  # "the room", "a surface"
+        if any_place and len(phrase.content) == 1 and self.knowledge.place(phrase.text) is None:
+            return any_place
         bare = Phrase(phrase.tokens)
         forms = (phrase.text, bare.text, bare.singular)
-        exact = next(filter(None, map(self.knowledge.place, forms)), None)
-        if exact is not None:
-            return [exact]
-        synonyms = [name for form in forms for name in synonyms_of(form, known)]
-        if synonyms:
-            self._note(bare.text, *dict.fromkeys(synonyms))
-            return list(dict.fromkeys(synonyms))
-        nouns = {*_forms(phrase.head)}
+        if exact := [*filter(None, map(self.knowledge.place, forms))]:
+            return exact[:1]
+        if synonyms := dict.fromkeys(chain(*(synonyms_of(form, known) for form in forms))):
+            self._note(bare.text, *synonyms)
+            return [*synonyms]
+        nouns = {phrase.head.word, phrase.head.lemma}
         own = [name for name in self.knowledge.place_names() if _last(name) in nouns]
         other = [name for spelling, name in known.items() if _last(spelling) in nouns]
-        if room is None:
-            return list(dict.fromkeys(own or other))
         called = (name for spelling, name in known.items() if nouns & {*map(_last, synonyms_for(spelling))})
-        return list(dict.fromkeys([*own, *other, *called]))
+        return [*dict.fromkeys((own or other) if room is None else [*own, *other, *called])]
 
     def _left_over(self, phrase: Phrase, name: str) -> bool:
         """Returns whether words remain that belong neither to the place's name nor to its room's ("kitchen 3")."""
@@ -367,16 +369,6 @@ class _Grounder:
         spellings = self.knowledge.spellings([name, self.knowledge.room(name)])
         known = (other for spelling in spellings for other in (spelling, *synonyms_for(spelling)))
         return not said <= {word.lower() for other in known for word in other.split()}
-
-    def _person(self, phrase: Phrase) -> str | None:
-        """Known person; None if the words name no known person."""
-        name = self.knowledge.person(phrase.text)
-        if name is not None or not phrase.person or self.knowledge.place(phrase.text) is not None:
-            return name
-        people = tuple(self.knowledge.people)
-        if people and not phrase.named_person:
-            raise _asking(which_question(Slot.PERSON, phrase.text, people))
-        raise self._unknown(Slot.PERSON, (phrase.text,), self._known(people))
 
     def _only(self, candidates: Sequence[str], slot: Slot, heard: str) -> str:
         """Single candidate. Raises RefusalError with a question if there are several."""
@@ -420,12 +412,8 @@ def _readings(phrase: Phrase) -> Iterator[tuple[tuple[str, ...], str]]:
     for first in range(len(words) + 1):
         attributes, name = words[:first], [t.text for t in words[first:]]
         if all(t.adjective for t in attributes):
-            for form in _forms(head):
+            for form in dict.fromkeys((head.word, head.lemma)):
                 yield tuple(t.word for t in attributes), " ".join([*name, form, *phrase.extra])
-
-
-def _forms(head: Token) -> tuple[str, ...]:
-    return tuple(dict.fromkeys((head.word, head.lemma)))
 
 
 def _last(name: str) -> str:
@@ -434,4 +422,4 @@ def _last(name: str) -> str:
 
 _BIN: Final = "bin"
 _HOME: Final = "home"
-_KINDS: Final = ("room", "surface", "person")
+_LOOKS: Final = (Task.GRASP, Task.FIND)

@@ -1,10 +1,9 @@
 """Represents a sentence as a row of items: verbs, noun phrases with their prepositions, and small words.
 
-Parsers err most in the attachment of prepositions; the row keeps the order of the words, and the verbs assign roles to
-the places later.
+Parsers err most in the attachment of prepositions; the row keeps the order, and verbs give places their roles later.
 """
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from typing import Final
@@ -41,6 +40,11 @@ class Chunk:
         """All words as spoken."""
         return f"{self.preposition} {self.phrase.spoken}".strip()
 
+    @property
+    def placed(self) -> bool:
+        """Returns whether the preposition makes the noun phrase a place."""
+        return self.role not in (None, PrepositionRole.FOR, PrepositionRole.PATH)
+
 
 @dataclass(frozen=True)
 class Adverb:
@@ -53,9 +57,8 @@ class Adverb:
 class Being:
     """Form of "to be"; `existential` with "there", `asked` before its subject.
 
-    `teller` is the person who left an object at its place ("Anna left her umbrella"). `narrated` marks any verb in a
-    narration ("somebody spilled milk on the floor"), and `topic` is what the narration is about ("the ball rolled under
-    the sofa").
+    `teller` is who left an object at its place ("Anna left her umbrella"), `narrated` marks any verb in a narration
+    ("somebody spilled milk on the floor"), `topic` is what a narration is about ("the ball rolled under the sofa").
     """
 
     text: str
@@ -108,26 +111,30 @@ Item = Verb | Chunk | Adverb | Being | Whether | Separator | Unknown | Outside |
 
 def spoken_words(items: Iterable[Item]) -> str:
     """Words of the items as spoken, without small words."""
-    words = (
-        item.spoken if isinstance(item, Chunk) else getattr(item, "word", getattr(item, "text", ""))
-        for item in items
-        if not isinstance(item, Separator)
-    )
+    kept = (item for item in items if not isinstance(item, Separator))
+    words = (one.spoken if isinstance(one, Chunk) else getattr(one, "word", getattr(one, "text", "")) for one in kept)
     return " ".join(filter(None, words))
 
 
 def without_objects(items: Sequence[Item]) -> tuple[Item, ...]:
     """Verb with its recipient and goal, to be used for another object; empty if there are several verbs."""
-    verbs = [item for item in items if isinstance(item, Verb | Being | Outside | Negation | Correction)]
-    if len(verbs) != 1 or not isinstance(verbs[0], Verb):
-        return ()
-    at = {VerbKind.PLACE, VerbKind.FIND} & verbs[0].kinds or verbs[0].text in word_list("at_is_goal")
-    roles = (PrepositionRole.GOAL, *((PrepositionRole.AT, PrepositionRole.BESIDE) if at else ()))
-    return tuple(
-        item
-        for item in items
-        if isinstance(item, Verb | Adverb) or (isinstance(item, Chunk) and (item.role in roles or item.phrase.receiver))
-    )
+    match [item for item in items if isinstance(item, Verb | Being | Outside | Negation | Correction)]:
+        case [Verb() as only]:
+            at = {VerbKind.PLACE, VerbKind.FIND} & only.kinds or only.text in word_list("at_is_goal")
+            roles = (PrepositionRole.GOAL, *((PrepositionRole.AT, PrepositionRole.BESIDE) if at else ()))
+            kept = [one for one in chunks(items) if one.role in roles or one.phrase.receiver]
+            return tuple(item for item in items if isinstance(item, Verb | Adverb) or item in kept)
+    return ()
+
+
+def chunks(items: Iterable[Item]) -> list[Chunk]:
+    """Noun phrases among the items."""
+    return [item for item in items if isinstance(item, Chunk)]
+
+
+def last_index(items: Sequence[Item], fits: Callable[[Item], bool]) -> int | None:
+    """Index of the last item that fits; None if none does."""
+    return next((n for n in range(len(items) - 1, -1, -1) if fits(items[n])), None)
 
 
 LONGEST: Final = 8
@@ -136,10 +143,7 @@ LONGEST: Final = 8
 
 @dataclass
 class Row:
-    """Words of a sentence, the noun phrases by their first word, and the reader's position.
-
-    The reader skips words in `silent`.
-    """
+    """Words of a sentence, the noun phrases by their first word, the reader's position, and words that it skips."""
 
     tokens: Sequence[Token]
     phrases: Mapping[int, Phrase]
@@ -180,10 +184,9 @@ def may_begin_command(items: Sequence[Item]) -> bool:
 
 @dataclass(frozen=True)
 class Predicate:
-    """Verb, or a form of "to be", with the items after it; the robot may not know the verb.
+    """Verb, or a form of "to be", with the items after it; `verb` is None for items before the first verb.
 
-    `verb` is None for items before the first verb; `subject` precedes a form of "to be"; `whether` is True if "if" or
-    "whether" precedes the subject.
+    `subject` precedes a form of "to be", and `whether` is True if "if" or "whether" precedes the subject.
     """
 
     verb: Verb | Being | Outside | None
@@ -207,36 +210,37 @@ def predicates(items: Iterable[Item]) -> tuple[Predicate, ...]:
             found.append(Predicate(item))
         else:
             found[-1] = replace(found[-1], items=(*found[-1].items, item))
-    whole = (clause for clause in found if clause.verb is not None or clause.content)
-    return tuple(part for clause in whole for part in _ungapped(clause))
+    return tuple(part for clause in found if clause.verb or clause.content for part in _ungapped(clause))
 
 
 def _ungapped(clause: Predicate) -> Iterator[Predicate]:
     """Repeats an omitted verb: "a beer to Robin and a coke to Charlie"."""
-    items = clause.items
-    pairs = [
-        (n, one, other)
-        for n, (joint, one, other) in enumerate(zip(items[1:], items[2:], items[3:], strict=False), 1)
-        if isinstance(joint, Separator) and isinstance(one, Chunk) and isinstance(other, Chunk) and one.role is None
-    ]
-    # me the book and Anna the pen
-    gifts = [n for n, who, what in pairs if what.role is None and who.phrase.receiver and not what.phrase.receiver]
-    cut, recipient = next((n for n in gifts if isinstance(items[n - 1], Chunk)), None), tuple[Item, ...]()
-    if cut is None and (cut := next((n for n, _, place in pairs if _gap(items[:n], place)), None)) is not None:
-        first = items[0]
-        recipient = (first,) if isinstance(first, Chunk) and first.role is None and first.phrase.speaker else ()
+    items, joints = clause.items, range(1, len(clause.items) - 2)
+    gift = next((at for at in joints if _is_gift(items[at - 1 : at + 3])), None)
+    cut = next((at for at in joints if _is_gap(items[:at], items[at : at + 3])), None) if gift is None else gift
     if cut is None or not isinstance(clause.verb, Verb):
         yield clause
         return
+    recipient = [one for one in chunks(items[:1]) if gift is None and one.role is None and one.phrase.speaker]
     yield replace(clause, items=items[:cut])
     yield from _ungapped(Predicate(clause.verb, (*recipient, *items[cut + 1 :])))
 
 
-def _gap(items: Sequence[Item], place: Chunk) -> bool:
-    """Returns whether the items have an object, and a place with the same role as another object's place."""
-    before = [item for item in items if isinstance(item, Chunk)]
-    bare = any(item.role is None and not item.phrase.speaker for item in before)
-    return bare and place.role is not None and place.role in [item.role for item in before]
+def _is_gift(items: Sequence[Item]) -> bool:
+    """Returns whether somebody else is given something else: "(me) the book and Anna the pen"."""
+    match items:
+        case [Chunk(), Separator(), Chunk(role=None, phrase=who), Chunk(role=None, phrase=what)]:
+            return who.receiver and not what.receiver
+    return False
+
+
+def _is_gap(before: Sequence[Item], items: Sequence[Item]) -> bool:
+    """Returns whether another object gets a place with the same role as the place of the object before."""
+    match items:
+        case [Separator(), Chunk(role=None), Chunk(role=PrepositionRole() as role)]:
+            roles = {one.role for one in chunks(before) if not (one.role is None and one.phrase.speaker)}
+            return {None, role} <= roles
+    return False
 
 
 def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
@@ -251,13 +255,12 @@ def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
 
 def drop_name(clauses: Sequence[Predicate]) -> tuple[Predicate, ...]:
     """Removes a name without a comma before the first verb, which calls somebody ("Michael go to the kitchen")."""
-    first, *rest = clauses or [Predicate(None)]
-    name = first.content[0] if len(first.content) == 1 else None
-    if first.verb is not None or not rest or not isinstance(name, Chunk) or name.role is not None:
-        return tuple(clauses)
-    words = [item.word if isinstance(item, Separator) else "" for item in first.items]
-    called = name.phrase.named_person or (words[-1] == "," and name.phrase.proper)
-    return tuple(rest if called and not {"and", "or"} & {*words} else clauses)
+    match clauses:
+        case [Predicate(verb=None, content=[Chunk(role=None, phrase=name)], items=items), _, *_]:
+            words = [item.word if isinstance(item, Separator) else "" for item in items]
+            called = name.named_person or (words[-1] == "," and name.proper)
+            return tuple(clauses[1:] if called and not {"and", "or"} & {*words} else clauses)
+    return tuple(clauses)
 
 
 def requested_predicates(predicates: Sequence[Predicate]) -> list[Predicate]:
@@ -267,67 +270,56 @@ def requested_predicates(predicates: Sequence[Predicate]) -> list[Predicate]:
 
 def _with_verb(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
     """Adds "take" to a sentence without a verb: "hammer to the kitchen, please"."""
-    items = [item for clause in clauses for item in clause.content]
-    chunks = [item for item in items if isinstance(item, Chunk)]
-    carried = [chunk.role for chunk in chunks] == [None, PrepositionRole.GOAL] and len(chunks) == len(items)
-    if len(clauses) != 1 or clauses[0].verb is not None or not carried or chunks[0].phrase.kind is not NounKind.THING:
-        return clauses
-    return (replace(clauses[0], verb=verb("take")),)
+    match clauses:
+        case [Predicate(verb=None, content=[Chunk(role=None, phrase=named), Chunk(role=PrepositionRole.GOAL)]) as only]:
+            return (replace(only, verb=verb("take")),) if named.kind is NounKind.THING else clauses
+    return clauses
 
 
 def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
     """Moves a place before the first verb after it: "from the kitchen bring me a spoon"."""
-    if len(clauses) < 2 or clauses[0].verb is not None or not isinstance(clauses[1].verb, Verb | Being):
-        return clauses
-    fronted = clauses[0].content
-    chunks = [item for item in fronted if isinstance(item, Chunk)]
-    if len(chunks) < len(fronted):
-        return clauses
-    if chunks and chunks[0].role is None:  # that vase on the shelf, bring it here
-        named = chunks[0].phrase
-        placed = all(chunk.role in PLACES for chunk in chunks[1:]) and not (named.pronoun or named.speaker)
-        meant = [item.phrase for item in clauses[1].items if isinstance(item, Chunk)]
-        if placed and any(phrase.pronoun or phrase.text == named.text for phrase in meant):
-            return (replace(clauses[0], verb=Being("", existential=True, asked=False)), *clauses[1:])
-    if not all(chunk.role in PLACES for chunk in chunks):
-        return clauses
-    return (replace(clauses[1], items=(*clauses[1].items, *fronted)), *clauses[2:])
+    match clauses:
+        case [Predicate(verb=None, content=fronted) as first, Predicate(verb=Verb() | Being()) as second, *rest]:
+            named = [one.phrase for one in chunks(fronted[:1]) if one.role is None]
+            if not all(isinstance(item, Chunk) and item.placed for item in fronted[len(named) :]):
+                return clauses
+            if not named:
+                return (replace(second, items=(*second.items, *fronted)), *rest)
+            meant = [one.phrase for one in chunks(second.items)]
+            again = any(phrase.pronoun or phrase.text == named[0].text for phrase in meant)
+            if again and not (named[0].pronoun or named[0].speaker):  # that vase on the shelf, bring it here
+                return (replace(first, verb=Being("", existential=True, asked=False)), second, *rest)
+    return clauses
 
 
 def _without_reasons(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
     """Removes the speaker's own plans before or after the request."""
+    match clauses:
+        case [*others, Predicate(verb=Verb(), items=items) as request, plan]:
+            at = last_index(items, lambda item: isinstance(item, Chunk))
+            if at and _is_own_affair(items[at:], plan.verb):
+                return (*others, replace(request, items=items[:at]))
+    match clauses:
+        case [Predicate(verb=None, items=items), plan, Predicate(verb=Verb()), *_] if _is_own_affair(items, plan.verb):
+            return clauses[2:]
+    return clauses
 
-    def own_affair(verb: Verb | Being | Outside | None, before: Sequence[Item]) -> bool:
-        """Returns whether the verb expresses a plan of the speaker and no request: "I am about to sing"."""
-        wants = [item.word for item in before if isinstance(item, Unknown)]
-        return isinstance(verb, Outside) and verb.word.lower() not in word_list("asks") and wants[-1:] == ["to"]
 
-    if len(clauses) > 1 and isinstance(clauses[-2].verb, Verb):
-        items = clauses[-2].items
-        at = next((n for n in range(len(items) - 1, -1, -1) if isinstance(items[n], Chunk)), 0)
-        last = items[at] if items else None
-        speaks = at > 0 and isinstance(last, Chunk) and last.phrase.speaker
-        if speaks and own_affair(clauses[-1].verb, items[at + 1 :]):
-            return (*clauses[:-2], replace(clauses[-2], items=items[:at]))
-    if len(clauses) < 3 or clauses[0].verb is not None or not isinstance(clauses[2].verb, Verb):
-        return clauses
-    first = clauses[0].items
-    speaker = bool(first) and isinstance(first[0], Chunk) and first[0].phrase.speaker
-    return clauses[2:] if speaker and own_affair(clauses[1].verb, first) else clauses
+def _is_own_affair(items: Sequence[Item], verb: Verb | Being | Outside | None) -> bool:
+    """Returns whether a verb expresses a plan of the speaker and no request: "I am about to sing"."""
+    wants = [item.word for item in items if isinstance(item, Unknown)]
+    asked = not isinstance(verb, Outside) or verb.word.lower() in word_list("asks")
+    return not asked and wants[-1:] == ["to"] and isinstance(items[0], Chunk) and items[0].phrase.speaker
 
 
 def _without_checks(clauses: Sequence[Predicate]) -> Iterator[Predicate]:
     """Removes "see" and "check" before "if there is": only the question remains."""
     asks = False
     for clause, after in zip_longest(clauses, clauses[1:]):
-        checks = isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
-        bare = checks and all(isinstance(item, Separator | Whether) for item in clause.items)
         if clause.whether and not asks:
             clause = replace(clause, verb=Outside("if"))
-        asks = bare and after is not None and after.whether
-        if not asks and not (bare and after is not None and isinstance(after.verb, Verb)):
+        checks = after is not None and isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
+        bare = checks and all(isinstance(item, Separator | Whether) for item in clause.items)
+        asks = bare and after.whether
+        if not asks and not (bare and isinstance(after.verb, Verb)):
             yield clause
-
-
-PLACES: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
-"""Roles of places after a preposition."""

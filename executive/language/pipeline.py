@@ -34,9 +34,7 @@ class Trace:
     """Result of each step for a sentence, in the order of the fields; steps after a refusal are empty.
 
     The first fields are inputs. `memory` has the referents from earlier sentences, and at the end those from this one.
-    `lead` are items before the words, `elliptic` allows an omitted "it", `recipient` receives objects if the sentence
-    names nobody.
-
+    `lead` are items before the words, `elliptic` allows an omitted "it", `recipient` receives objects if nobody else.
     `unwanted` are phrases after "not", `taken_back` are those and what the speaker has corrected, `meanings` are
     pronouns with their meanings, `notes` list names that were interpreted as others. `refused_at` is the step that
     refused the sentence. If it has conditions, loops or waits, `steps` is its mission and `parts` are its clauses.
@@ -74,10 +72,7 @@ class Pipeline:
     knowledge: Knowledge | None
 
     def run(self, trace: Trace, *, behind: str | None = None, upto: str | None = None) -> Trace:
-        """Runs all steps, or only the steps after one named step and up to another.
-
-        Never raises, whatever the text. The text must not contain the wake phrase.
-        """
+        """Runs all steps, or those after one step and up to another, on a text without wake phrase. Never raises."""
         names = tuple(_STEPS)
         last = len(names) if upto is None else names.index(upto) + 1
         for name in names[0 if behind is None else names.index(behind) + 1 : last]:
@@ -127,17 +122,11 @@ class Pipeline:
             raise not_understood([*unknown, *lost], self.knowledge)
         if trace.taken_back:
             notes.append(_NOT_MEANT.format(listing(map(repr, trace.taken_back))))
-        for choice, kind in ((choice, action.kind) for action in trace.actions for choice in action.choices):
-            any_will_do = all(one.tokens[0].word in ("a", "an", "any", "some") and not one.person for one in choice)
-            if kind is VerbKind.FIND or not any_will_do:
-                raise _choosing(choice, trace.tokens)
-            notes.append(f"of {listing((one.spoken for one in choice), last='or')} I take the first")
+        notes += [_chosen(each, action.kind, trace.tokens) for action in trace.actions for each in action.choices]
         if self.knowledge is not None:
             check_routes_and_speaker(trace.clauses, trace.actions)
         if not any(action.kind for action in trace.actions):
-            phrases = [phrase.text for action in trace.actions for phrase in action.objects]
-            of = f" of {listing(phrases)}" if phrases else ""
-            raise RefusalError(f"nothing to do was said{of}; {ABLE}", phrases, kind=RefusalKind.NOTHING_TO_DO)
+            raise _nothing_to_do(trace.actions)
         return replace(trace, notes=(*trace.notes, *notes))
 
     def _refer(self, trace: Trace) -> Trace:
@@ -162,15 +151,24 @@ _NOT_MEANT: Final = "I take {} not to be meant"
 """Note on what the speaker has corrected or denied, where the commands do not carry it."""
 
 
-def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError:
-    """Question that remains about phrases joined by "or" if only one of them is possible."""
+def _nothing_to_do(actions: Sequence[Action]) -> RefusalError:
+    names = [phrase.text for action in actions for phrase in action.objects]
+    of = f" of {listing(names)}" if names else ""
+    return RefusalError(f"nothing to do was said{of}; {ABLE}", names, kind=RefusalKind.NOTHING_TO_DO)
+
+
+def _chosen(choice: Sequence[Phrase], kind: VerbKind | None, tokens: Sequence[Token]) -> str:
+    """Note on which of some phrases joined by "or" is meant. Raises RefusalError with a question if not any will do."""
+    anything = all(one.tokens[0].word in ("a", "an", "any", "some") and not one.person for one in choice)
+    if anything and kind is not VerbKind.FIND:
+        return f"of {listing((one.spoken for one in choice), last='or')} I take the first"
     heard = " ".join(t.text for t in tokens[choice[0].content[0].index : choice[-1].head.index + 1]).replace(" ,", ",")
     place = all(phrase.kind is NounKind.PLACE for phrase in choice)
     slot = Slot.PLACE if place else Slot.PERSON if all(phrase.person for phrase in choice) else Slot.THING
     noun = choice[-1].head.text
     names = (f"{p.text} {noun}" if is_attribute(p.head.text) else p.text for p in choice)
     question = which_question(slot, slot.noun, tuple(dict.fromkeys(names)))
-    return RefusalError(question.text, (heard,), question=replace(question, heard=heard))
+    raise RefusalError(question.text, (heard,), question=replace(question, heard=heard))
 
 
 _STEPS: Final[dict[str, Callable[[Pipeline, Trace], Trace]]] = {

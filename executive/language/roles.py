@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Final
 
-from executive.language.items import PLACES, Adverb, Being, Chunk, Item, Outside, Separator, Unknown, Verb, Whether
+from executive.language.items import Adverb, Being, Chunk, Item, Outside, Separator, Unknown, Verb, Whether, chunks
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, read_table, word_list
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase, SpokenRelation
@@ -17,10 +17,9 @@ from skills.relations import ROWS, RelationKind
 
 @dataclass(frozen=True)
 class Location:
-    """Place or person as spoken.
+    """Place or person as spoken; `phrase` is None for HERE and THERE.
 
-    `preposition` precedes the location; `within` is a larger place around it ("the table in the kitchen"), or the place
-    where a person is. `phrase` is None for HERE and THERE.
+    `within` is a larger place around it ("the table in the kitchen"), or the place where a person is.
     """
 
     phrase: Phrase | None
@@ -65,9 +64,8 @@ class Location:
     @property
     def text(self) -> str:
         """Words for the place, with the larger place around it."""
-        if self.within is None:
-            return self.name
-        return " ".join(filter(None, (self.name, self.within.preposition, self.within.text)))
+        around = () if self.within is None else (self.within.preposition, self.within.text)
+        return " ".join(filter(None, (self.name, *around)))
 
 
 _JOINTS: Final = frozenset({",", ";", "and", "or", "then", "also", "plus", "second", "but"})
@@ -81,8 +79,8 @@ THERE: Final = Location(None, preposition="there")
 class Roles:
     """Items after a verb, sorted into noun phrases, places by their prepositions, and unknown words.
 
-    `first_at` is where the person is if the first phrase without a preposition is a person; `listed` marks phrases
-    joined by "and". `choices` are phrases joined by "or". `favour` marks a recipient after "for".
+    `first_at` is where the person is if the first phrase without a preposition is one. `listed` marks phrases joined by
+    "and", `choices` are those joined by "or", and `favour` marks a recipient after "for".
     """
 
     objects: list[Phrase] = field(default_factory=list)
@@ -101,42 +99,54 @@ class Roles:
 
     def add(self, one: _Placed) -> None:
         """Adds a phrase to the role that its preposition gives, with the larger place around it."""
-        phrase, role, location = one.chunk.phrase, one.chunk.role, one.location
-        joined = bool(one.joint and self.goals)
-        if role is None:
-            self._add_bare(one)
-        elif role is PrepositionRole.SOURCE:
-            self.sources.append(location)
-        elif role is PrepositionRole.GOAL:
-            (self.joined_goals if joined else self.goals).append(location)
-        elif role in _CLOSER:
-            (self.joined_goals if joined or (one.joint and self.ats) else self.ats).append(location)
-        elif role is PrepositionRole.PATH:
-            self.paths.append(location)
-        elif phrase.receiver:
-            self.recipient, self.favour = location, True
-        else:
-            self.searched = phrase
+        role, phrase = one.chunk.role, one.chunk.phrase
+        match role:
+            case None:
+                self._add_bare(one)
+            case PrepositionRole.FOR if phrase.receiver:
+                self.recipient, self.favour = one.location, True
+            case PrepositionRole.FOR:
+                self.searched = phrase
+            case PrepositionRole.SOURCE | PrepositionRole.PATH:
+                (self.paths if role is PrepositionRole.PATH else self.sources).append(one.location)
+            case _:
+                places = self.goals if role is PrepositionRole.GOAL else self.ats
+                (self.joined_goals if one.joint and (self.goals or places) else places).append(one.location)
 
     def _add_bare(self, one: _Placed) -> None:
-        phrase = one.chunk.phrase
-        self.listed = self.listed or (bool(one.joint) and bool(self.objects))
-        last = self.objects[-1] if self.objects else None
+        phrase, last = one.chunk.phrase, self.objects[-1:]
+        self.listed = self.listed or bool(one.joint and last)
         again = phrase.stands_for_one and one.joint in _LISTING and one.within is None
-        if again and last is not None and not last.receiver:
-            self.objects[-1] = phrase.replace_one(last)
+        if again and last and not last[0].receiver:
+            self.objects[-1] = phrase.replace_one(last[0])
             return
-        places = self.goals or self.ats
-        another = phrase.kind is NounKind.THING and bool(places and self.objects)  # the salt to the hall and the pepper
-        another = another and places[-1].kind is NounKind.PLACE
-        if one.joint and places and not self.sources and not another:
+        if one.joint and self._are_goals(phrase):
             self.joined_goals.append(one.location)
             return
-        if one.within is not None and phrase.somebody and not self.objects:
+        if one.within is not None and phrase.somebody and not last:
             self.first_at = one.within
         elif one.within is not None:
             self.ats.append(one.within)
         self.objects.append(phrase)
+
+    def _are_goals(self, phrase: Phrase) -> bool:
+        """Returns whether a phrase after "and" is a goal: not "the pepper" in "the salt to the hall and the pepper"."""
+        match self.goals or self.ats:
+            case [*_, Location(kind=NounKind.PLACE)] if phrase.kind is NounKind.THING and self.objects:
+                return False
+            case places:
+                return bool(places) and not self.sources
+
+    def hand_over(self) -> None:
+        """Takes the recipient from the objects: "give Robin a coke", "bring me a coke"."""
+        match self.objects:
+            case [first, *others] if first.speaker or (others and (first.person or self._are_them(first))):
+                self.objects, self.recipient = others, HERE if first.speaker else Location(first, within=self.first_at)
+            case _ if self.first_at is not None:
+                self.ats.append(self.first_at)
+
+    def _are_them(self, first: Phrase) -> bool:
+        return not self.listed and (first.stands_for_somebody or first.somebody or first.living)
 
 
 @dataclass(frozen=True)
@@ -150,16 +160,14 @@ class _Placed:
     @property
     def location(self) -> Location:
         """Noun phrase as a location."""
-        if self.chunk.phrase.speaker:
-            return HERE
-        return Location(self.chunk.phrase, self.chunk.preposition, self.within)
+        chunk = self.chunk
+        return HERE if chunk.phrase.speaker else Location(chunk.phrase, chunk.preposition, self.within)
 
 
 def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) -> Roles:
-    """Sorts the items after a verb into roles.
+    """Sorts the items after a verb into roles; with `describes`, "near" before further places identifies the object.
 
-    With `describes`, "near" or "on top of" before further places identifies the object. With `puts`, "on" after "from"
-    is the destination, as in "put the cup from the desk on the bed".
+    With `puts`, "on" after "from" is the destination, as in "put the cup from the desk on the bed".
     """
     roles = Roles()
     spoken = list(_spoken(items, roles))
@@ -169,18 +177,11 @@ def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) ->
             listed = _listed_before(row)
             roles.choices.append([*listed, one.chunk.phrase])
             roles.objects = [phrase for phrase in roles.objects if phrase not in listed[1:]]
-            continue
-        roles.add(one)
-        row.append(one)
+        else:
+            roles.add(one)
+            row.append(one)
     roles.goals += [HERE if item.here else THERE for item in items if isinstance(item, Adverb)]
-    first = roles.objects[0] if roles.objects else None
-    them = first is not None and (first.stands_for_somebody or first.somebody or first.living)
-    receives = first is not None and len(roles.objects) > 1 and (first.person or (them and not roles.listed))
-    if first is not None and (first.speaker or receives):
-        roles.objects.pop(0)  # give Robin a coke, bring me a coke
-        roles.recipient = HERE if first.speaker else Location(first, within=roles.first_at)
-    elif roles.first_at is not None:
-        roles.ats.append(roles.first_at)
+    roles.hand_over()
     return roles
 
 
@@ -194,15 +195,15 @@ def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Placed]:
             before = replace(item, role=PrepositionRole.SOURCE) if lies and item.role in _CLOSER else item
             yield _Placed(before, joint)
         elif isinstance(item, Unknown | Whether):
-            roles.unknown.append(item.word if isinstance(item, Unknown) else "if")
-        relates = isinstance(item, Separator) and item.word in word_list("relative")
-        relative = relates or (relative and isinstance(item, Separator) and item.word == "")
-        joint = "" if not isinstance(item, Separator) else item.word if item.word in _JOINTS else joint
+            roles.unknown.append(getattr(item, "word", "if"))
+        word = item.word if isinstance(item, Separator) else None
+        relative = word in word_list("relative") or (relative and word == "")
+        joint = "" if word is None else word if word in _JOINTS else joint
 
 
 def _described(spoken: list[_Placed]) -> list[_Placed]:
     """Splits "the object on top of the cup from the desk" into an object and a source."""
-    places = [n for n, one in enumerate(spoken) if one.chunk.role not in (None, PrepositionRole.FOR)]
+    places = [n for n, one in enumerate(spoken) if one.chunk.role not in _TO]
     if len(places) < 2 or places[0] == 0:
         return spoken
     first, second = places[:2]
@@ -219,18 +220,14 @@ def _nested(spoken: Sequence[_Placed], puts: bool) -> Iterator[_Placed]:
     """Joins a place to the previous place if it contains that place: no "and" between, and another preposition."""
     rest = list(spoken)
     while rest:
-        first = rest.pop(0)
-        chain = [first.chunk]
-        apart = puts and first.chunk.role is PrepositionRole.SOURCE
+        first, within = rest.pop(0), None
+        chain, apart = [first.chunk], puts and first.chunk.role is PrepositionRole.SOURCE
         while rest and not apart:
             before, chunk = chain[-1], rest[0].chunk
-            place = before.role in PLACES
-            place = place or (before.role in (None, PrepositionRole.FOR) and before.phrase.somebody)
-            closer = chunk.role in _CLOSER and not rest[0].joint and chunk.preposition != before.preposition
-            if not (place and closer):
+            place = before.placed or (before.role in _TO and before.phrase.somebody)
+            if not place or chunk.role not in _CLOSER or rest[0].joint or chunk.preposition == before.preposition:
                 break
             chain.append(rest.pop(0).chunk)
-        within: Location | None = None
         for chunk in reversed(chain[1:]):
             within = Location(chunk.phrase, chunk.preposition, within)
         yield replace(first, within=within)
@@ -253,6 +250,7 @@ _ONE: Final = Token(0, 0, "one", "one", "NOUN", "NN", 0, "obj")
 _THERE: Final = Phrase((Token(0, 0, "that", "that", "PRON", "DT", 0, "obl"),))
 _COMPARED: Final = (RelationKind.NEAREST_TO, RelationKind.SEEN_FROM)
 _GOES: Final = {VerbKind.GO, VerbKind.CHECK}
+_TO: Final = (None, PrepositionRole.FOR)
 _PLACED: Final = (PrepositionRole.AT, PrepositionRole.GOAL)
 
 
@@ -290,39 +288,38 @@ class _Row:
 
     def take(self, item: Item) -> None:
         """Takes the next item."""
-        if isinstance(item, Verb | Outside):
-            self.verb, self.named, self.place = item, None, None
-        elif isinstance(item, Being):
-            self.verb = item
-        elif isinstance(item, Chunk):
-            relation = self._relation(item)
-            if relation is not None and self._attach(item, relation):
+        match item:
+            case Verb() | Outside():
+                self.verb, self.named, self.place = item, None, None
+            case Being():
+                self.verb = item
+            case Chunk() if self._attach(item):
                 return
-            if item.role in (None, PrepositionRole.FOR) and not item.phrase.receiver:
-                self.named, item = len(self.found), replace(item, phrase=self._ordered(item.phrase))
-            elif _is_placed(item):
+            case Chunk(role=None | PrepositionRole.FOR, phrase=Phrase(receiver=False) as phrase):
+                self.named, item = len(self.found), replace(item, phrase=self._ordered(phrase))
+            case Chunk() if _is_placed(item):
                 self.place = len(self.found)
-            elif item.role in _PLACED:
+            case Chunk(role=PrepositionRole.AT | PrepositionRole.GOAL):
                 self.named = None
         self.found.append(item)
 
     def _ordered(self, phrase: Phrase) -> Phrase:
         """Phrase with its order in place of "second", "biggest" or "left"; takes "on the left" behind it."""
-        ordinals, behind = read_table("relations.yaml")["ordinals"], next(iter(self.rest), None)
-        chosen = isinstance(self.verb, Verb) and VerbKind.PLACE not in self.verb.kinds
-        numbers = [t for t in phrase.tokens if t.word in ordinals]
-        orders = [t for t in phrase.tokens[:-1] if t.word in _kinds("orders")]
-        side = behind.spoken if isinstance(behind, Chunk) and behind.spoken in _kinds("sides") else ""
-        side = side if numbers or chosen else ""
-        if len(numbers) > 1 or len(orders) + bool(side) != 1:
+        ordinals, kinds = read_table("relations.yaml")["ordinals"], {**_kinds("orders"), **_kinds("sides")}
+        words = ((phrase.tokens, ordinals), (phrase.tokens[:-1], _kinds("orders")))
+        numbers, orders = ([t for t in tokens if t.word in known] for tokens, known in words)
+        chosen = numbers or (isinstance(self.verb, Verb) and VerbKind.PLACE not in self.verb.kinds)
+        sides = [one.spoken for one in chunks(self.rest[:1]) if chosen and one.spoken in _kinds("sides")]
+        said = [*(t.word for t in orders), *sides]
+        if len(numbers) > 1 or len(said) != 1:
             return phrase
-        self.rest = self.rest[bool(side) :]
-        kind = _kinds("sides")[side] if side else _kinds("orders")[orders[0].word]
+        self.rest = self.rest[len(sides) :]
+        kind, before = kinds[said[0]], tuple(sorted((*numbers, *orders), key=phrase.tokens.index))
         nth = int(ordinals[numbers[0].word]) if numbers else 1
-        before = tuple(t for t in phrase.tokens if t in (*numbers, *orders))
-        one = (replace(_ONE, index=phrase.head.index),) if phrase.head in numbers else ()
-        relation = SpokenRelation(kind, side, () if kind in ROWS else (_YOU,), nth, before)
-        return replace(phrase, tokens=(*phrase.tokens[: -1 if one else None], *one)).with_relation(relation)
+        relation = SpokenRelation(kind, "".join(sides), () if kind in ROWS else (_YOU,), nth, before)
+        if phrase.head in numbers:
+            phrase = replace(phrase, tokens=(*phrase.tokens[:-1], replace(_ONE, index=phrase.head.index)))
+        return phrase.with_relation(relation)
 
     def _relation(self, item: Chunk) -> SpokenRelation | None:
         """Relation in a noun phrase with its preposition; takes the second landmark of "between"."""
@@ -342,41 +339,53 @@ class _Row:
         self.rest = self.rest[2:]
         return SpokenRelation(beside, f"{item.spoken} and {other.spoken}", (item.phrase, other.phrase))
 
-    def _attach(self, item: Chunk, relation: SpokenRelation) -> bool:
-        """Attaches a relation to the object, or to the surface; returns whether it belongs to one of them."""
-        verb, own = self.verb, not relation.landmarks and item.spoken.lower() not in _kinds("parts")
-        kinds = verb.kinds if isinstance(verb, Verb) else {VerbKind.FIND} if isinstance(verb, Being) else _GOES
-        if kinds <= _GOES:
+    def _attach(self, item: Chunk) -> bool:
+        """Attaches a relation to the object, or to the surface; returns whether there is one for them."""
+        relation = self._relation(item)
+        if relation is None:
             return False
-        surface, last, behind = replace(item, preposition="on", role=PrepositionRole.AT), self.found[-1], self.rest[:1]
-        apart = isinstance(last, Separator) and last.word in word_list("relative")
-        aims = [id(one) for one in (*self.found, *self.rest) if _is_aim(one)]
-        lacks = isinstance(verb, Verb) and verb.text in word_list("at_is_goal") and not (aims or apart)
-        if lacks and VerbKind.ROUND_TRIP in kinds:
-            return False  # it could say which one, or where to
-        aimed = self.place is not None and id(self.found[self.place]) in aims
-        is_spot = self.named is not None and (lacks or aimed or (VerbKind.PLACE in kinds and not apart))
-        if is_spot and (own or self.place is None):
-            placed = [one for one in behind if isinstance(one, Chunk) and _is_placed(one)]
-            named = surface if own or relation.landmarks else replace(surface, phrase=_THERE)
-            place = named if own or not placed else placed[0]
-            self.rest[: place is not named] = [replace(place, phrase=place.phrase.with_relation(relation))]
+        spot, own = self._is_spot(), not relation.landmarks and item.spoken.lower() not in _kinds("parts")
+        surface, at = replace(item, preposition="on", role=PrepositionRole.AT), self.place if spot else self.named
+        if spot and (own or at is None):
+            self._put(relation, surface, own)
             return True
-        at = self.place if is_spot else self.named
-        chunk = None if at is None else self.found[at]
-        if at is None or not isinstance(chunk, Chunk) or not (is_spot or own or relation.landmarks):
+        chunk = None if at is None or spot is None else self.found[at]
+        if at is None or not isinstance(chunk, Chunk) or not (spot or own or relation.landmarks):
             return False
         self.found[at] = replace(chunk, phrase=chunk.phrase.with_relation(relation))
-        self.found = self.found[: len(self.found) - apart]
+        self.found = self.found[: len(self.found) - _is_relative(self.found[-1])]
         self.rest[:0] = [surface] if own else []
         return True
+
+    def _put(self, relation: SpokenRelation, surface: Chunk, own: bool) -> None:
+        """Attaches a relation to its own surface, or else to the one that follows; otherwise to one to be found."""
+        placed = [one for one in chunks(self.rest[:1]) if _is_placed(one) and not own]
+        named = surface if own or relation.landmarks else replace(surface, phrase=_THERE)
+        place = next(iter(placed), named)
+        self.rest[: len(placed)] = [replace(place, phrase=place.phrase.with_relation(relation))]
+
+    def _is_spot(self) -> bool | None:
+        """Returns whether a relation says where to put the object, and not which one it is; None if it says neither."""
+        verb = self.verb
+        kinds = verb.kinds if isinstance(verb, Verb) else {VerbKind.FIND} if isinstance(verb, Being) else _GOES
+        if kinds <= _GOES:
+            return None
+        apart, aimed = _is_relative(self.found[-1]), self.place is not None and _is_aim(self.found[self.place])
+        aims = apart or any(map(_is_aim, (*self.found, *self.rest)))
+        lacks = isinstance(verb, Verb) and verb.text in word_list("at_is_goal") and not aims
+        if lacks and VerbKind.ROUND_TRIP in kinds:
+            return None  # it could say which one, or where to
+        return self.named is not None and (lacks or aimed or (VerbKind.PLACE in kinds and not apart))
+
+
+def _is_relative(item: Item) -> bool:
+    return isinstance(item, Separator) and item.word in word_list("relative")
 
 
 def _is_aim(item: Item) -> bool:
     """Returns whether a noun phrase says whereto, or to whom."""
-    if not isinstance(item, Chunk):
-        return False
-    return item.role is PrepositionRole.GOAL or (item.phrase.receiver and item.role in (None, PrepositionRole.FOR))
+    to = isinstance(item, Chunk) and item.phrase.receiver and item.role in _TO
+    return to or (isinstance(item, Chunk) and item.role is PrepositionRole.GOAL)
 
 
 def _is_placed(item: Chunk) -> bool:

@@ -9,7 +9,6 @@ from typing import Final
 
 from executive.language.amounts import parse_seconds, parse_time, parse_times
 from executive.language.clauses import (
-    ATTACHED,
     CHECKS,
     Clause,
     Cue,
@@ -18,7 +17,6 @@ from executive.language.clauses import (
     join_clauses,
     leading_cue,
     verb_positions,
-    without_whatever,
 )
 from executive.language.items import verb
 from executive.language.questions import RefusalError
@@ -81,14 +79,15 @@ class Builder:
             if isinstance(last, Repeat) and last.loop.is_endless:
                 raise RefusalError("nothing can follow an endless repetition; say how often", [clause.text])
             self.at += 1
-            if clause.anyway:
-                self._always(clause)
-            elif clause.kind is None:
-                self.act(self, clause)
-            elif clause.kind in ATTACHED:
-                self._attach(clause)
-            else:
-                self._lead(clause)
+            match clause.kind:
+                case None if clause.anyway:
+                    self._always(clause)
+                case None:
+                    self.act(self, clause)
+                case Cue.SO | Cue.NOT | Cue.OTHERWISE | Cue.FAILED:
+                    self._attach(clause)
+                case _:
+                    self._lead(clause)
         self.flush()
         return tuple(self.steps), self.state
 
@@ -160,7 +159,7 @@ class Builder:
         self.flush()
         if not self.steps:
             raise RefusalError("say what I am to do first, before what I am to do in any case", [clause.text])
-        ended = re.sub(r"[, ]+(?:at the end|in the end)$", "", without_whatever(clause.text), flags=re.IGNORECASE)
+        ended = re.sub(r"[, ]+(?:at the end|in the end)$", "", clause.without_whatever, flags=re.IGNORECASE)
         rest = [replace(clause, text=ended), *self.take("", len(self.clauses))]
         always, state = self.nest(rest, self.state.elsewhere)
         self.steps = [Group(steps=tuple(self.steps), always=always)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
@@ -37,6 +38,12 @@ def attempt(read: Callable[..., T], *inputs: Any) -> T | RefusalError:
         return read(*inputs)
     except RefusalError as refusal:
         return refusal
+
+
+def refuse(*rows: tuple[object, RefusalError]) -> None:
+    """Raises the refusal of the first row whose condition holds."""
+    if (refusal := next((refusal for holds, refusal in rows if holds), None)) is not None:
+        raise refusal
 
 
 @dataclass(frozen=True)
@@ -76,6 +83,10 @@ class State:
     def noting(self, notes: Iterable[str]) -> State:
         """State with more notes."""
         return replace(self, notes=tuple(dict.fromkeys((*self.notes, *notes))))
+
+    def recalling(self, **referents: Any) -> State:
+        """State with other referents."""
+        return replace(self, memory=replace(self.memory, **referents))
 
     @property
     def elsewhere(self) -> State:
@@ -181,14 +192,17 @@ class PlainReader:
 
     pipeline: Pipeline
     knowledge: Knowledge
+    _traces: dict[tuple[Trace, str | None, str | None], Trace] = field(default_factory=dict, compare=False, repr=False)
 
     def read(
         self, state: State, text: str = "", *, behind: str | None = None, upto: str | None = None, **inputs: Any
     ) -> PlainReading:
         """Understands a part as far as a step of the pipeline, from its text, or from `inputs` that a step gives."""
-        trace = self.pipeline.run(Trace(text, state.memory, **inputs), behind=behind, upto=upto)
-        if trace.refusal is not None:
-            raise trace.refusal
+        key = (Trace(text, state.memory, **inputs), behind, upto)
+        if key not in self._traces:  # clauses are attempted before they are built
+            self._traces[key] = self.pipeline.run(key[0], behind=behind, upto=upto)
+        if (trace := self._traces[key]).refusal is not None:
+            raise copy(trace.refusal)
         commands = trace.commands
         if commands and state.held is not None and (commands[0].task, commands[0].object) == (Task.GRASP, state.held):
             commands = commands[1:]
@@ -248,9 +262,13 @@ class PlainReader:
     def place(self, said: str, state: State, kind: str = "place") -> str:
         """World's name for a place that words name."""
         first, *more = self.go_to(said, state).commands
-        if more or first.item or first.task or first.goal is None or self.knowledge.place(first.goal) is None:
+        if more or first.item or first.task or first.goal is None or not self.is_place(first.goal):
             raise RefusalError(f"'{said}' is no {kind}", [said])
         return first.goal
+
+    def is_place(self, name: str | None) -> bool:
+        """Returns whether a goal is a place in the world."""
+        return name is not None and self.knowledge.place(name) is not None
 
     def room(self, place: str, state: State) -> str:
         """Room that contains a place."""
@@ -268,7 +286,7 @@ class PlainReader:
         """Condition that the looks in a reading succeed; `text` is the full text."""
         looks = tuple(Look.from_command(command) for command in reading.commands if command.task is Task.FIND)
         known = self._state_if_seen(reading, state).noting(reading.trace.notes)
-        fails = replace(known, memory=replace(known.memory, where=None, locations=before.memory.locations))
+        fails = known.recalling(where=None, locations=before.memory.locations)
         return SpokenCondition(looks[0] if len(looks) == 1 else AllOf(parts=looks), text, known, fails)
 
     def last_check(self, reading: PlainReading, before: State, said: str = "") -> SpokenCondition | None:
@@ -281,8 +299,7 @@ class PlainReader:
         if taken is None:
             return None
         found = Look.from_command(replace(taken, task=Task.FIND, verb="find"))
-        memory = replace(reading.state.memory, where=None, locations=before.memory.locations)
-        fails = replace(reading.state.elsewhere, memory=memory, held=None)
+        fails = replace(reading.state.elsewhere, held=None).recalling(where=None, locations=before.memory.locations)
         return SpokenCondition(found, "", reading.state, fails, steps=len(commands))
 
     def _state_if_seen(self, reading: PlainReading, state: State) -> State:
@@ -291,16 +308,16 @@ class PlainReader:
         target, where = action.target, action.source
         if target is None:
             return replace(state, memory=memory)
-        place = where or memory.place
-        locations = memory.locations if where is None else (*memory.locations, (target, where))
-        sought = reading.commands[-1].object
-        somebody = sought is not None and self.knowledge.somebody(sought.name) is not None
-        if not (somebody or target.person):
-            memory = replace(memory, objects=(target,), where=where, place=place, locations=locations)
-            return replace(state, memory=memory)
-        known = sought is not None and self.knowledge.person(sought.name) is not None
-        person = Location(target) if known else state.memory.person
-        met = replace(memory, objects=state.memory.objects, where=state.memory.where, person=person, place=place)
+        sought, place = reading.commands[-1].object, where or memory.place
+        name = "" if sought is None else sought.name
+        if self.knowledge.somebody(name) is None and not target.person:
+            locations = memory.locations if where is None else (*memory.locations, (target, where))
+            return replace(state, memory=memory).recalling(
+                objects=(target,), where=where, place=place, locations=locations
+            )
+        known = self.knowledge.person(name) is not None
+        person, before = Location(target) if known else state.memory.person, state.memory
+        met = replace(memory, objects=before.objects, where=before.where, person=person, place=place)
         return replace(state, memory=met, somebody=not known)
 
     def state_after(self, commands: Sequence[Command], memory: Memory, state: State) -> State:
@@ -312,13 +329,14 @@ class PlainReader:
             elif command.item is not None and command.goal is not None:
                 held = None
             goal = command.goal if command.goal is not None else goal
-        if not commands:
-            return replace(state, memory=memory)
-        place = commands[-1].goal_at or commands[-1].goal
-        if place == START:
-            at = State.initial(self.knowledge, state.memory).at
-        elif place in self.knowledge.people and commands[-1].goal_at is None:
-            at = self.knowledge.room(self.knowledge.people[place].at)
-        else:
-            at = None if place is None or self.knowledge.place(place) is None else self.knowledge.room(place)
+        at = self._room_after(commands[-1]) if commands else state.at
         return replace(state, memory=memory, held=held, goal=goal, at=at)
+
+    def _room_after(self, command: Command) -> str | None:
+        """Room of the robot after a command; None if it is unknown."""
+        place = command.goal_at or command.goal
+        if place == START:
+            return State.initial(self.knowledge, Memory()).at
+        if place in self.knowledge.people and command.goal_at is None:
+            return self.knowledge.room(self.knowledge.people[place].at)
+        return self.knowledge.room(place) if place is not None and self.is_place(place) else None

@@ -1,4 +1,4 @@
-"""Parses spoken conditions: "there is a beer in the kitchen", "the battery is low"."""
+"""Parses spoken conditions ("the battery is low"), and requests for doors, pictures, charging and waits."""
 
 import re
 from collections.abc import Callable
@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from executive.language.amounts import parse_seconds, parse_share, parse_time
-from executive.language.clauses import CHECKS, CLAUSES
+from executive.language.clauses import CHECKS, CLAUSES, trailing_cue
 from executive.language.indirect import CONTENTS, OBJECTS
 from executive.language.items import Chunk, verb
 from executive.language.questions import RefusalError, RefusalKind, Slot, which_question
@@ -14,9 +14,20 @@ from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
 from executive.language.structure.plain import PlainReader, SpokenCondition, State, attempt, with_preposition
 from executive.language.templates import Match, page
+from executive.words.command import Task
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
-from executive.words.leaf_steps import Awaited, DoorToOpen, OpenDoor, Wait, steps_of_commands
+from executive.words.leaf_steps import (
+    Awaited,
+    Charging,
+    Dock,
+    DoorToOpen,
+    OpenDoor,
+    Picture,
+    Subject,
+    Wait,
+    steps_of_commands,
+)
 from executive.words.steps import Steps
 from skills.inputs.errors import listing
 
@@ -26,10 +37,8 @@ _JOINED: Final = page("joined")
 _WAITING: Final = page("waiting")
 Done = tuple[Steps, State]
 """Steps, and the state after them."""
-RequestParser = Callable[[str, Callable[[], State], PlainReader], Done | None]
-"""Parses a clause; the state before it is only computed for a request that it understands."""
 _SUBJECTS: Final = {"him": "he", "her": "she"}
-FULL: Final = 0.99
+_FULL: Final = 0.99
 """Share at which a battery is full."""
 
 
@@ -68,7 +77,7 @@ def _measured(words: str, state: State, reader: PlainReader) -> SpokenCondition 
     if (match["span"] and seconds is None) or (match["time"] and time is None):
         return None
     facts, sign = reader.knowledge.battery, match["sign"] or ">="
-    values = {"low": facts.low, "charged": facts.charged, "full": FULL, "sign": sign, "share": share, "span": seconds}
+    values = {"low": facts.low, "charged": facts.charged, "full": _FULL, "sign": sign, "share": share, "span": seconds}
     text = match["value"].format(**values, time=None if time is None else time.text)
     known = state if time is None else state.noting(time.notes(match["time"]))
     found = SpokenCondition(ValueIs(text=text), words, known, known)
@@ -151,15 +160,20 @@ def _meeting(words: str, state: State, reader: PlainReader) -> SpokenCondition |
     nobody = _P["nobody"].fullmatch(who) is not None
     if not (nobody or reader.is_somebody(who, state)) or re.search(r"\b(?:or|and)\b", where):
         return None
-    place = where.lower() or ("there" if re.search(r"\bthere(?: any more)?$", words, re.IGNORECASE) else "here")
-    room = state.at
-    if place not in ("here", "there") or (place == "there" and state.memory.place != HERE):
-        room = reader.room(where or place, state)
-    if room is None:
-        raise RefusalError(f"in which room can I see whether '{words}'? Name it", [words])
+    room = _room_of_meeting(where, words, state, reader)
     subject = "anybody" if nobody or _P["anybody"].fullmatch(who) else _SUBJECTS.get(who.lower(), who)
     look = reader.check(f"{subject} is in the {room}", state, words)
     return look if nobody == (gone is not None) else replace(look, condition=Not(part=look.condition))
+
+
+def _room_of_meeting(where: str, words: str, state: State, reader: PlainReader) -> str:
+    """Room where people come or go; without a place, by "there" at the end of the words, or the robot's own."""
+    place = where.lower() or ("there" if re.search(r"\bthere(?: any more)?$", words, re.IGNORECASE) else "here")
+    here = place == "here" or (place == "there" and state.memory.place == HERE)
+    room = state.at if here else reader.room(where or place, state)
+    if room is None:
+        raise RefusalError(f"in which room can I see whether '{words}'? Name it", [words])
+    return room
 
 
 def _look(words: str, state: State, reader: PlainReader) -> SpokenCondition:
@@ -198,20 +212,24 @@ def _joined(words: str, state: State, reader: PlainReader) -> SpokenCondition | 
             if isinstance(halves, RefusalError):
                 left_open = left_open or (halves if halves.question is not None else None)
                 continue
-            first, second = halves
-            known = second.holds
-            if kind is AnyOf:  # the person of two conditions on one person, without the place
-                one, other = first.holds.memory.person, known.memory.person
-                same = one is not None and other is not None and one.name == other.name
-                person = replace(one, within=None) if one is not None and same else state.memory.person
-                memory = replace(state.memory, person=person)
-                known = replace(state.elsewhere, memory=memory).noting(known.notes)
-            both = (first.condition, second.condition)
-            parts = tuple(each for one in both for each in (one.parts if isinstance(one, kind) else (one,)))
-            if any(isinstance(each, Not) and each.part in parts for each in parts):
-                raise RefusalError(f"'{words}' says one thing and its opposite; say one of the two", [words])
-            return SpokenCondition(kind(parts=parts), words, known, state.noting(known.notes))
+            return _join(kind, *halves, words, state)
     return left_open
+
+
+def _join(
+    kind: type[AnyOf | AllOf], first: SpokenCondition, second: SpokenCondition, words: str, state: State
+) -> SpokenCondition:
+    """Joins two conditions; only after both of them hold ("and") is the state the one after the second."""
+    known, both = second.holds, (first.condition, second.condition)
+    if kind is AnyOf:  # the person of two conditions on one person, without the place
+        one, other = first.holds.memory.person, known.memory.person
+        same = one is not None and other is not None and one.name == other.name
+        person = replace(one, within=None) if one is not None and same else state.memory.person
+        known = state.elsewhere.recalling(person=person).noting(known.notes)
+    parts = tuple(each for one in both for each in (one.parts if isinstance(one, kind) else (one,)))
+    if any(isinstance(each, Not) and each.part in parts for each in parts):
+        raise RefusalError(f"'{words}' says one thing and its opposite; say one of the two", [words])
+    return SpokenCondition(kind(parts=parts), words, known, state.noting(known.notes))
 
 
 def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[SpokenCondition, SpokenCondition]:
@@ -241,27 +259,32 @@ def parse_wait(text: str, known: Callable[[], State], reader: PlainReader) -> Do
     if match is None or _WAITING["only_span"].fullmatch(match["what"]):
         return None
     (steps, there), how, what = _gone(match["where"], known(), reader), match["how"].lower(), match["what"]
+    at = _WAITING["person_at"].fullmatch(what) if how == "for" else None
+    if at is not None and reader.is_somebody(at["who"], there):
+        reading = reader.go_to(at["where"], there)
+        steps, there, what = (*steps, *steps_of_commands(reading.commands)), reading.state, at["who"]
+    awaited, after = _awaited(how, what, there, reader)
+    return (*steps, Wait(awaited=awaited)), after
+
+
+def _awaited(how: str, what: str, state: State, reader: PlainReader) -> tuple[Awaited, State]:
+    """What ends a wait, and the state after it."""
     if how in ("until", "till"):
         ends = _WAITING["ends"].fullmatch(what)
         if (seconds := parse_seconds("" if ends is None else ends["span"])) is not None:
-            return (*steps, Wait(awaited=Awaited(seconds=seconds))), there
+            return Awaited(seconds=seconds), state
         if (time := parse_time(what if ends is None else ends["time"])) is not None:
-            return (*steps, Wait(awaited=Awaited(until_clock=time.text))), there.noting(time.notes(what))
-        found = parse_condition(what, there, reader)
-    elif how != "for":
-        found = parse_condition(what, there, reader).negate(what)
+            return Awaited(until_clock=time.text), state.noting(time.notes(what))
+        found: SpokenCondition | None = parse_condition(what, state, reader)
+    elif how == "for":
+        somebody = reader.is_somebody(what, state)
+        event = f"{what} is here" if somebody else _WAITING["button"].reword(what, whole=True)
+        found = usual_condition(event, state, reader)
     else:
-        who, at = what, _WAITING["person_at"].fullmatch(what)
-        if at is not None and reader.is_somebody(at["who"], there):
-            reading = reader.go_to(at["where"], there)
-            steps, there, who = (*steps, *steps_of_commands(reading.commands)), reading.state, at["who"]
-        event = f"{who} is here" if reader.is_somebody(who, there) else _WAITING["button"].reword(what, whole=True)
-        usual = usual_condition(event, there, reader)
-        if usual is None:
-            raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
-        found = usual
-    after = replace(found.holds, goal=found.holds.goal or there.goal)
-    return (*steps, Wait(awaited=Awaited(condition=found.condition))), after
+        found = parse_condition(what, state, reader).negate(what)
+    if found is None:
+        raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
+    return Awaited(condition=found.condition), replace(found.holds, goal=found.holds.goal or state.goal)
 
 
 def _gone(where: str, state: State, reader: PlainReader) -> Done:
@@ -272,3 +295,59 @@ def _gone(where: str, state: State, reader: PlainReader) -> Done:
         return (), state
     reading = reader.go_to(match["place"] or "there", state)
     return steps_of_commands(reading.commands), reading.state
+
+
+def _parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
+    """Parses a request for pictures; None for other texts. Raises RefusalError for an unknown name."""
+    if (match := page("pictures")["picture"].fullmatch(text)) is None or trailing_cue(text) is not None:
+        return None
+    state = known()
+    stands = reader.go_to(match["at"], state).commands if match["at"] else ()
+    if len(stands) > 1:
+        raise RefusalError(f"I take a picture from one place at a time, not from {match['at']}", [match["at"]])
+    at = stands[0].goal if stands else None
+    subjects = _of_each(match["of"], reader.knowledge) or re.split(r",? and |,? then |, ", match["of"])
+    pictured = (Subject(of=_pictured(of, state, reader), at=at, camera=match["camera"] or None) for of in subjects)
+    return tuple(Picture(subject=subject) for subject in pictured), state.elsewhere
+
+
+def _pictured(what: str, state: State, reader: PlainReader) -> str:
+    """Place, or object of a kind, that a picture shows. Raises RefusalError for one of several, or at a place."""
+    place = reader.knowledge.place(re.sub(r"^(?:the|a|an|my|our|your) ", "", what, flags=re.IGNORECASE))
+    if place is not None:
+        return place
+    finds, *more = reader.read_commands(what, state, (verb("find"),)).commands
+    if more or finds.object is None or finds.object.relations or finds.object_count != 1:
+        raise RefusalError(f"I cannot tell in a picture which one is '{what}'", [what])
+    if finds.goal != reader.knowledge.default_place(Task.FIND, finds.object.name):
+        raise RefusalError(f"I take a picture of the first {finds.object} that I see, not of '{what}'", [what])
+    return str(finds.object)
+
+
+def _of_each(text: str, knowledge: Knowledge) -> list[str]:
+    """Rooms, or surfaces of a kind, that "every table except the desk" means; none for other texts."""
+    every, *others = re.split(r",? (?:except(?: for)?|but not|other than|apart from) ", text)
+    kind = re.fullmatch(r"(?:every|each|all(?: of)?(?: the)?) (?:single )?(\w+?)s?", every, re.IGNORECASE)
+    if kind is None:
+        return []
+    named = knowledge.rooms if kind[1].lower() == "room" else knowledge.surfaces
+    of_kind = [name for name in named if kind[1].lower() in ("room", "surface", name.split()[-1].lower())]
+    said = re.split(r",? (?:and|or) |, ", others[0]) if others else []
+    left_out = [knowledge.place(re.sub(r"^(?:the|my|our) ", "", one, flags=re.IGNORECASE)) for one in said]
+    if len(others) > 1 or None in left_out:
+        raise RefusalError(f"I do not know what to leave out of '{text}'; name places", [text])
+    return [name for name in of_kind if name not in left_out]
+
+
+def _parse_charging(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
+    """Parses charging up to a level; None if the text states no level."""
+    if (match := _WAITING["charge"].fullmatch(text)) is None:
+        return None
+    level = _FULL if match["full"] else parse_share(match["level"])
+    if level is None:
+        raise RefusalError(f"'{match['level']}' is no charge; say it in percent", [match["level"]])
+    return (Dock(charging=Charging(level=level)),), known().elsewhere
+
+
+REQUESTS: Final = (parse_opening, _parse_pictures, _parse_charging, parse_wait)
+"""Parsers of requests; each computes the state before a clause only if it understands the clause."""

@@ -1,13 +1,13 @@
 """Reads a sentence with conditions, loops, waits or speech, and builds the steps of its actions."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.amounts import parse_seconds, parse_share
+from executive.language.amounts import parse_seconds
 from executive.language.clauses import CHECKS, Clause, Cue, split, trailing_cue
 from executive.language.coverage import TOLD, note_adverbs
 from executive.language.items import verb, without_objects
@@ -17,48 +17,20 @@ from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.structure.builder import Builder
-from executive.language.structure.conditions import (
-    FULL,
-    Done,
-    RequestParser,
-    parse_condition,
-    parse_opening,
-    parse_wait,
-    statement_of_check,
-)
-from executive.language.structure.plain import (
-    PlainReader,
-    State,
-    attempt,
-    names_of_world,
-    person_named,
-    phrase_of_name,
-)
+from executive.language.structure.conditions import REQUESTS, Done, parse_condition, statement_of_check
+from executive.language.structure.plain import PlainReader, State, attempt, names_of_world, person_named, phrase_of_name
 from executive.language.structure.speaking import ROOMS, SPEECH, asks, is_clause, say_in_each_room, says
 from executive.language.templates import Match, page
 from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.condition import Look
 from executive.words.knowledge import ANYBODY, Knowledge
-from executive.words.leaf_steps import (
-    Awaited,
-    Charging,
-    Check,
-    Do,
-    Dock,
-    Picture,
-    Speak,
-    Subject,
-    Wait,
-    steps_of_commands,
-)
+from executive.words.leaf_steps import Awaited, Check, Do, Speak, Wait, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Repeat, Together, Try
 from skills.api import ObjectKind
 from skills.inputs.errors import listing
 from skills.inputs.schema import first_error
 
-_CHARGE: Final = page("waiting")["charge"]
-_PICTURE: Final = page("pictures")["picture"]
 _PEOPLE: Final = page("people")
 MOST_NESTED: Final = 2
 
@@ -92,60 +64,9 @@ def _skips(row: Builder, clause: Clause) -> bool:
     return idle or looked
 
 
-def _parse_charging(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
-    """Parses charging up to a level; None if the text states no level."""
-    if (match := _CHARGE.fullmatch(text)) is None:
-        return None
-    level = FULL if match["full"] else parse_share(match["level"])
-    if level is None:
-        raise RefusalError(f"'{match['level']}' is no charge; say it in percent", [match["level"]])
-    return (Dock(charging=Charging(level=level)),), known().elsewhere
-
-
-def _parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
-    """Parses a request for pictures; None for other texts. Raises RefusalError for an unknown name."""
-    if (match := _PICTURE.fullmatch(text)) is None or trailing_cue(text) is not None:
-        return None
-    state, steps = known(), list[Step]()
-    stands = reader.go_to(match["at"], state).commands if match["at"] else ()
-    if len(stands) > 1:
-        raise RefusalError(f"I take a picture from one place at a time, not from {match['at']}", [match["at"]])
-    at = stands[0].goal if stands else None
-    for what in _of_each(match["of"], reader.knowledge) or re.split(r",? and |,? then |, ", match["of"]):
-        of = reader.knowledge.place(re.sub(r"^(?:the|a|an|my|our|your) ", "", what, flags=re.IGNORECASE))
-        if of is None:
-            finds, *more = reader.read_commands(what, state, (verb("find"),)).commands
-            usual = finds.object and reader.knowledge.default_place(Task.FIND, finds.object.name)
-            if more or finds.object is None or finds.object.relations or finds.object_count != 1:
-                raise RefusalError(f"I cannot tell in a picture which one is '{what}'", [what])
-            if finds.goal != usual:
-                raise RefusalError(f"I take a picture of the first {finds.object} that I see, not of '{what}'", [what])
-            of = str(finds.object)
-        steps.append(Picture(subject=Subject(of=of, at=at, camera=match["camera"] or None)))
-    return tuple(steps), state.elsewhere
-
-
-def _of_each(text: str, knowledge: Knowledge) -> list[str]:
-    """Rooms, or surfaces of a kind, that "every table except the desk" means; none for other texts."""
-    every, *others = re.split(r",? (?:except(?: for)?|but not|other than|apart from) ", text)
-    kind = re.fullmatch(r"(?:every|each|all(?: of)?(?: the)?) (?:single )?(\w+?)s?", every, re.IGNORECASE)
-    if kind is None:
-        return []
-    named = knowledge.rooms if kind[1].lower() == "room" else knowledge.surfaces
-    of_kind = [name for name in named if kind[1].lower() in ("room", "surface", name.split()[-1].lower())]
-    said = re.split(r",? (?:and|or) |, ", others[0]) if others else []
-    left_out = [knowledge.place(re.sub(r"^(?:the|my|our) ", "", one, flags=re.IGNORECASE)) for one in said]
-    if len(others) > 1 or None in left_out:
-        raise RefusalError(f"I do not know what to leave out of '{text}'; name places", [text])
-    return [name for name in of_kind if name not in left_out]
-
-
-_REQUESTS: Final[tuple[RequestParser, ...]] = (parse_opening, _parse_pictures, _parse_charging, parse_wait)
-
-
 def _requests(row: Builder, clause: Clause) -> bool:
     """Adds the steps of a request for a door, pictures, charging or a wait."""
-    done = next(filter(None, (parse(clause.text, row.known, row.reader) for parse in _REQUESTS)), None)
+    done = next(filter(None, (parse(clause.text, row.known, row.reader) for parse in REQUESTS)), None)
     if done is not None:
         row.put(*done)
     return done is not None

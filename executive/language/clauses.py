@@ -11,7 +11,6 @@ from typing import Final
 from executive.language.addressees import AddressedText, Addressee, addressees
 from executive.language.items import Item
 from executive.language.lexicon import lexicon, word_list
-from executive.language.questions import RefusalError
 from executive.language.templates import Match, Words, page, words_of
 from executive.language.tokens import smooth
 
@@ -85,11 +84,6 @@ class Clause:
     def then(self) -> bool:
         """Returns whether "then" stands before the clause."""
         return re.search(r"\bthen\b", self.joint, re.IGNORECASE) is not None
-
-    def missing_action(self, text: str = "") -> RefusalError:
-        """Refusal of a condition to which no action belongs."""
-        said = f"{self.cue} {text}".strip()
-        return RefusalError(f"what am I to do {f'{self.cue.lower()} {text}'.strip()}?", [said])
 
 
 def split(text: str, robots: tuple[str, ...] = ()) -> tuple[Addressee | None, tuple[Clause, ...]]:

@@ -12,7 +12,7 @@ from executive.language.items import Chunk, verb
 from executive.language.questions import RefusalError, RefusalKind, Slot, which_question
 from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
-from executive.language.structure.plain import PlainReader, SpokenCondition, State, attempt, with_preposition
+from executive.language.structure.plain import PlainReader, SpokenCondition, State, attempt, require, with_preposition
 from executive.language.templates import Match, page
 from executive.words.command import Task
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
@@ -40,6 +40,7 @@ Done = tuple[Steps, State]
 _SUBJECTS: Final = {"him": "he", "her": "she"}
 _FULL: Final = 0.99
 """Share at which a battery is full."""
+_NO_CHARGE: Final = "'{}' is no charge; say it in percent"
 
 
 def parse_condition(text: str, state: State, reader: PlainReader) -> SpokenCondition:
@@ -72,8 +73,7 @@ def _measured(words: str, state: State, reader: PlainReader) -> SpokenCondition 
     if (match := _P["measured"].fullmatch(words)) is None:
         return None
     share, seconds, time = parse_share(match["share"]), parse_seconds(match["span"]), parse_time(match["time"])
-    if match["share"] and share is None:
-        raise RefusalError(f"'{match['share']}' is no charge; say it in percent", [match["share"]])
+    require(share or not match["share"], _NO_CHARGE.format(match["share"]), match["share"])
     if (match["span"] and seconds is None) or (match["time"] and time is None):
         return None
     facts, sign = reader.knowledge.battery, match["sign"] or ">="
@@ -89,9 +89,9 @@ def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | No
     match = _DOORS["stands"].fullmatch(words)
     if match is None or (match["it"] and state.door is None):
         return None
-    if (how := match["how"].lower()).endswith("locked"):
-        what = f"I cannot see whether a door is {how}; ask whether it is closed"
-        raise RefusalError(what, [how], kind=RefusalKind.UNSEEN)
+    how = match["how"].lower()
+    unseen = f"I cannot see whether a door is {how}; ask whether it is closed"
+    require(not how.endswith("locked"), unseen, how, kind=RefusalKind.UNSEEN)
     door = state.door if match["it"] and state.door is not None else DoorOpen(door=_between(match, reader.knowledge))
     known = replace(state.elsewhere, door=door)
     found = SpokenCondition(door, words, known, known)
@@ -121,16 +121,14 @@ def _between(match: Match, knowledge: Knowledge) -> tuple[str, str]:
     Raises RefusalError when there is no such door; with a question when there are several.
     """
     bare = re.sub(r"^(?:the|that|this|a) ", "", match["door"], flags=re.IGNORECASE)
-    if not knowledge.doors:
-        what = f"I know no door here, so I cannot look at '{match['door']}'"
-        raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
+    no_door = f"I know no door here, so I cannot look at '{match['door']}'"
+    require(knowledge.doors, no_door, bare, kind=RefusalKind.NO_SUCH_DOOR)
     named = filter(None, (match[name] for name in ("room", "one", "other", "from", "to", "of")))
     rooms = {_room(name, knowledge) for name in named}
     fitting = [door.between for door in knowledge.doors if rooms <= {*door.between}]
-    if not fitting:
-        known = listing(" and ".join(door.between) for door in knowledge.doors)
-        what = f"I know no such door as '{match['door']}'; there are doors between {known}"
-        raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
+    known = listing(" and ".join(door.between) for door in knowledge.doors)
+    unknown = f"I know no such door as '{match['door']}'; there are doors between {known}"
+    require(fitting, unknown, bare, kind=RefusalKind.NO_SUCH_DOOR)
     if len(fitting) > 1:
         question = which_question(Slot.PLACE, bare, tuple(f"door between {one} and {other}" for one, other in fitting))
         raise RefusalError(question.text, [bare], question=question)
@@ -141,10 +139,8 @@ def _room(name: str, knowledge: Knowledge) -> str:
     bare = re.sub(r"^(?:the|my|our|your) ", "", name, flags=re.IGNORECASE)
     known = {spelling.lower(): room for room in knowledge.rooms for spelling in knowledge.spellings([room])}
     found = knowledge.place(bare) or next(iter(synonyms_of(bare.lower(), known)), None)
-    if found is None:
-        what = f"I know no room '{bare}'; known are {listing(knowledge.rooms)}"
-        raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
-    return knowledge.room(found)
+    unknown = f"I know no room '{bare}'; known are {listing(knowledge.rooms)}"
+    return knowledge.room(require(found, unknown, bare, kind=RefusalKind.NO_SUCH_DOOR))
 
 
 def _meeting(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
@@ -171,9 +167,7 @@ def _room_of_meeting(where: str, words: str, state: State, reader: PlainReader) 
     place = where.lower() or ("there" if re.search(r"\bthere(?: any more)?$", words, re.IGNORECASE) else "here")
     here = place == "here" or (place == "there" and state.memory.place == HERE)
     room = state.at if here else reader.room(where or place, state)
-    if room is None:
-        raise RefusalError(f"in which room can I see whether '{words}'? Name it", [words])
-    return room
+    return require(room, f"in which room can I see whether '{words}'? Name it", words)
 
 
 def _look(words: str, state: State, reader: PlainReader) -> SpokenCondition:
@@ -227,8 +221,8 @@ def _join(
         person = replace(one, within=None) if one is not None and same else state.memory.person
         known = state.elsewhere.recalling(person=person).noting(known.notes)
     parts = tuple(each for one in both for each in (one.parts if isinstance(one, kind) else (one,)))
-    if any(isinstance(each, Not) and each.part in parts for each in parts):
-        raise RefusalError(f"'{words}' says one thing and its opposite; say one of the two", [words])
+    opposed = any(isinstance(each, Not) and each.part in parts for each in parts)
+    require(not opposed, f"'{words}' says one thing and its opposite; say one of the two", words)
     return SpokenCondition(kind(parts=parts), words, known, state.noting(known.notes))
 
 
@@ -282,15 +276,14 @@ def _awaited(how: str, what: str, state: State, reader: PlainReader) -> tuple[Aw
         found = usual_condition(event, state, reader)
     else:
         found = parse_condition(what, state, reader).negate(what)
-    if found is None:
-        raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
+    found = require(found, f"I do not understand what to wait for: '{what}'", what)
     return Awaited(condition=found.condition), replace(found.holds, goal=found.holds.goal or state.goal)
 
 
 def _gone(where: str, state: State, reader: PlainReader) -> Done:
     """Adds the drive to the place of a wait."""
-    if (match := _WAITING["place"].fullmatch(where or "here")) is None:
-        raise RefusalError(f"I do not understand where to wait: '{where}'", [where])
+    match = _WAITING["place"].fullmatch(where or "here")
+    match = require(match, f"I do not understand where to wait: '{where}'", where)
     if match["here"] or (match["there"] and state.goal is not None and state.at is not None):
         return (), state
     reading = reader.go_to(match["place"] or "there", state)
@@ -303,8 +296,8 @@ def _parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) 
         return None
     state = known()
     stands = reader.go_to(match["at"], state).commands if match["at"] else ()
-    if len(stands) > 1:
-        raise RefusalError(f"I take a picture from one place at a time, not from {match['at']}", [match["at"]])
+    several = f"I take a picture from one place at a time, not from {match['at']}"
+    require(len(stands) <= 1, several, match["at"])
     at = stands[0].goal if stands else None
     subjects = _of_each(match["of"], reader.knowledge) or re.split(r",? and |,? then |, ", match["of"])
     pictured = (Subject(of=_pictured(of, state, reader), at=at, camera=match["camera"] or None) for of in subjects)
@@ -319,8 +312,8 @@ def _pictured(what: str, state: State, reader: PlainReader) -> str:
     finds, *more = reader.read_commands(what, state, (verb("find"),)).commands
     if more or finds.object is None or finds.object.relations or finds.object_count != 1:
         raise RefusalError(f"I cannot tell in a picture which one is '{what}'", [what])
-    if finds.goal != reader.knowledge.default_place(Task.FIND, finds.object.name):
-        raise RefusalError(f"I take a picture of the first {finds.object} that I see, not of '{what}'", [what])
+    usual = finds.goal == reader.knowledge.default_place(Task.FIND, finds.object.name)
+    require(usual, f"I take a picture of the first {finds.object} that I see, not of '{what}'", what)
     return str(finds.object)
 
 
@@ -334,8 +327,8 @@ def _of_each(text: str, knowledge: Knowledge) -> list[str]:
     of_kind = [name for name in named if kind[1].lower() in ("room", "surface", name.split()[-1].lower())]
     said = re.split(r",? (?:and|or) |, ", others[0]) if others else []
     left_out = [knowledge.place(re.sub(r"^(?:the|my|our) ", "", one, flags=re.IGNORECASE)) for one in said]
-    if len(others) > 1 or None in left_out:
-        raise RefusalError(f"I do not know what to leave out of '{text}'; name places", [text])
+    known = len(others) <= 1 and None not in left_out
+    require(known, f"I do not know what to leave out of '{text}'; name places", text)
     return [name for name in of_kind if name not in left_out]
 
 
@@ -343,9 +336,9 @@ def _parse_charging(text: str, known: Callable[[], State], reader: PlainReader) 
     """Parses charging up to a level; None if the text states no level."""
     if (match := _WAITING["charge"].fullmatch(text)) is None:
         return None
-    level = _FULL if match["full"] else parse_share(match["level"])
-    if level is None:
-        raise RefusalError(f"'{match['level']}' is no charge; say it in percent", [match["level"]])
+    level = require(
+        _FULL if match["full"] else parse_share(match["level"]), _NO_CHARGE.format(match["level"]), match["level"]
+    )
     return (Dock(charging=Charging(level=level)),), known().elsewhere
 
 

@@ -40,10 +40,11 @@ def attempt(read: Callable[..., T], *inputs: Any) -> T | RefusalError:
         return refusal
 
 
-def refuse(*rows: tuple[object, RefusalError]) -> None:
-    """Raises the refusal of the first row whose condition holds."""
-    if (refusal := next((refusal for holds, refusal in rows if holds), None)) is not None:
-        raise refusal
+def require(given: T | None, reason: str, *unknown: str, **how: Any) -> T:
+    """Returns what must be given, or must hold. Raises RefusalError when it is nothing, or does not hold."""
+    if not given:
+        raise RefusalError(reason, unknown, **how)
+    return given
 
 
 @dataclass(frozen=True)
@@ -246,8 +247,8 @@ class PlainReader:
             raise unseen if reading.kind is RefusalKind.NOT_UNDERSTOOD else reading
         if {command.task for command in reading.commands} != {Task.FIND}:
             raise unseen
-        if any(action.choices for action in reading.trace.actions):
-            raise RefusalError(f"I cannot tell which one '{text}' means; name one", [text])
+        one = not any(action.choices for action in reading.trace.actions)
+        require(one, f"I cannot tell which one '{text}' means; name one", text)
         there = replace(state, goal=reading.state.goal, at=reading.state.at)
         return self._condition_of_looks(reading, there, state, text)
 

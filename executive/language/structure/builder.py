@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -11,16 +11,8 @@ from executive.language.amounts import parse_seconds, parse_time, parse_times
 from executive.language.clauses import CHECKS, Clause, Cue, cut, end_of_scope, join_clauses, leading_cue, verb_positions
 from executive.language.items import verb
 from executive.language.questions import RefusalError
-from executive.language.structure.conditions import parse_condition, parse_wait, statement_of_check
-from executive.language.structure.plain import (
-    PlainReader,
-    PlainReading,
-    SpokenCondition,
-    State,
-    attempt,
-    negate,
-    require,
-)
+from executive.language.structure.conditions import Done, parse_condition, parse_wait, statement_of_check
+from executive.language.structure.plain import PlainReader, PlainReading, SpokenCondition, State, attempt, require
 from executive.language.templates import Match, words_of
 from executive.words.command import Task
 from executive.words.leaf_steps import Awaited, Do, Speak, Wait, steps_of_commands
@@ -69,7 +61,7 @@ class Builder:
     begun: int = 0
     special: bool = False
 
-    def build(self) -> tuple[Steps, State]:
+    def build(self) -> Done:
         """Builds the steps of all clauses, in order."""
         while self.at < len(self.clauses):
             clause = self.clauses[self.at]
@@ -93,9 +85,7 @@ class Builder:
         clauses = [replace(one, joint="" if n == 0 else one.joint) for n, one in enumerate(clauses)]
         return Builder(self.reader, self.act, clauses, state, statement, self.given)
 
-    def nest(
-        self, clauses: Sequence[Clause], state: State, supposed: SpokenCondition | None = None
-    ) -> tuple[Steps, State]:
+    def nest(self, clauses: Sequence[Clause], state: State, supposed: SpokenCondition | None = None) -> Done:
         """Builds the steps of clauses inside others; in the branch of a condition, "tell Robin" refers to it."""
         inner = self._inner(clauses, state, self.statement if supposed is None else supposed.statement)
         inner.special = self.special and supposed is None
@@ -235,11 +225,11 @@ class Builder:
         """Builds a choice for "if" and "unless"; a look or fetch before it may belong to the choice."""
         asked = self.asked
         if asked is not None and asked.looked:
-            if supposed.condition in (asked.condition, negate(asked.condition)):
+            if supposed.condition in (asked.condition, asked.opposite.condition):
                 del self.steps[-asked.steps :]
         elif asked is not None and clause.kind is Cue.IF:
             there = supposed.at_source(tuple(self.steps[-asked.steps :]), clause.text).condition
-            if there == negate(asked.condition):  # get a coke; if there is no coke, get a beer
+            if there == asked.opposite.condition:  # get a coke; if there is no coke, get a beer
                 self._replace_missing(asked, supposed.said, body)
                 return
         self._choose(supposed.opposite if clause.kind is Cue.UNLESS else supposed, body)
@@ -249,11 +239,11 @@ class Builder:
         then, after = self.nest(body, supposed.holds, supposed)
         otherwise, other = self._second_branch(supposed, after, more)
         require(then or otherwise, "no action is said for either case; name one", supposed.said)
-        condition = supposed.condition if then else negate(supposed.condition)
+        condition = (supposed if then else supposed.opposite).condition
         block = Choose(condition=condition, then=then or otherwise, otherwise=otherwise if then else ())
         self.put((block,), after.common(other))
 
-    def _second_branch(self, supposed: SpokenCondition, after: State, more: tuple[Cue, ...]) -> tuple[Steps, State]:
+    def _second_branch(self, supposed: SpokenCondition, after: State, more: tuple[Cue, ...]) -> Done:
         """Builds the second branch of a choice; no steps unless the next clause begins it."""
         second, other = self.following, supposed.fails
         if second is None or second.kind not in (Cue.OTHERWISE, Cue.NOT, Cue.SO, *more):
@@ -305,10 +295,7 @@ class Builder:
         self.put((block,), self.state.common(state))
 
     def _replace_missing(self, asked: SpokenCondition, said: str, body: Sequence[Clause]) -> None:
-        """Builds a choice: the last steps if their object is found, otherwise the steps of the body.
-
-        Raises RefusalError when "there" could be the object's source or its destination.
-        """
+        """Builds a choice: the last steps if their object is found (at its source), otherwise the steps of the body."""
         done = tuple(self.steps[-asked.steps :])
         puts = any(command.task is Task.PLACE for step in done for command in step.commands)
         two_places = puts and re.search(r"\bthere$", said, re.IGNORECASE) is not None
@@ -424,8 +411,6 @@ def _under_way(cue: Clause) -> Match | None:
     return CHECKS["under_way"].match(cue.text) if cue.kind is Cue.WHILE else None
 
 
-def _places_to_cut(text: str, follows: Sequence[Clause]) -> Iterator[int]:
-    """Yields where an action may begin: behind the text if clauses follow, and at verbs in it."""
-    if follows:
-        yield len(text)
-    yield from verb_positions(text)
+def _places_to_cut(text: str, follows: Sequence[Clause]) -> list[int]:
+    """Positions where an action may begin: behind the text if clauses follow, and at verbs in it."""
+    return [*([len(text)] if follows else []), *verb_positions(text)]

@@ -100,10 +100,7 @@ def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | No
 
 
 def parse_opening(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
-    """Parses a request to have a door opened; None for other texts.
-
-    Raises RefusalError like `_between`, and if the robot would have to open a door that has no plug-in.
-    """
+    """Parses a request to have a door opened. Raises RefusalError for a door that the robot itself cannot open."""
     match = _DOORS["opening"].fullmatch(text)
     if match is None or ((state := known()).door is None and match["it"]):
         return None
@@ -116,10 +113,7 @@ def parse_opening(text: str, known: Callable[[], State], reader: PlainReader) ->
 
 
 def _between(match: Match, knowledge: Knowledge) -> tuple[str, str]:
-    """Rooms on the two sides of a door.
-
-    Raises RefusalError when there is no such door; with a question when there are several.
-    """
+    """Rooms on the two sides of a door. Raises RefusalError for no such door, and with a question for several."""
     bare = re.sub(r"^(?:the|that|this|a) ", "", match["door"], flags=re.IGNORECASE)
     no_door = f"I know no door here, so I cannot look at '{match['door']}'"
     require(knowledge.doors, no_door, bare, kind=RefusalKind.NO_SUCH_DOOR)
@@ -144,10 +138,7 @@ def _room(name: str, knowledge: Knowledge) -> str:
 
 
 def _meeting(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
-    """Condition that somebody, or nobody, is at the robot's place or in a room, arrives there, or leaves it.
-
-    "There" may be an earlier room. Raises RefusalError when the robot's room is unknown.
-    """
+    """Condition that somebody, or nobody, is at the robot's place or in a room, arrives there, or leaves it."""
     gone = _P["goes"].fullmatch(words)
     match = gone or _P["comes"].fullmatch(words)
     if match is None or CLAUSES["unreal"].search(words):
@@ -163,7 +154,7 @@ def _meeting(words: str, state: State, reader: PlainReader) -> SpokenCondition |
 
 
 def _room_of_meeting(where: str, words: str, state: State, reader: PlainReader) -> str:
-    """Room where people come or go; without a place, by "there" at the end of the words, or the robot's own."""
+    """Room where people come or go: named, an earlier one ("there"), or the robot's. Raises RefusalError if unknown."""
     place = where.lower() or ("there" if re.search(r"\bthere(?: any more)?$", words, re.IGNORECASE) else "here")
     here = place == "here" or (place == "there" and state.memory.place == HERE)
     room = state.at if here else reader.room(where or place, state)
@@ -203,10 +194,9 @@ def _joined(words: str, state: State, reader: PlainReader) -> SpokenCondition | 
         for joint in re.finditer(rf" {word} (?:if )?(?:that )?", words, re.IGNORECASE):
             before = re.sub(r"^(?:both |either )", "", words[: joint.start()]).strip(" ,")
             halves = attempt(_both, before, words[joint.end() :], state, reader)
-            if isinstance(halves, RefusalError):
-                left_open = left_open or (halves if halves.question is not None else None)
-                continue
-            return _join(kind, *halves, words, state)
+            if not isinstance(halves, RefusalError):
+                return _join(kind, *halves, words, state)
+            left_open = left_open or (halves if halves.question is not None else None)
     return left_open
 
 
@@ -244,11 +234,7 @@ def statement_of_check(text: str) -> str | None:
 
 
 def parse_wait(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
-    """Parses a wait in a place: until a condition holds, while it holds, or for a person ("for").
-
-    Returns None for other texts, and for a wait of a given duration. Raises RefusalError when the place or the
-    condition cannot be understood.
-    """
+    """Parses a wait in a place: until a condition holds, while it holds, or for a person; None for a mere duration."""
     match = _WAITING["wait"].fullmatch(text)
     if match is None or _WAITING["only_span"].fullmatch(match["what"]):
         return None

@@ -17,7 +17,7 @@ from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import HERE, Location
-from executive.language.templates import page
+from executive.language.templates import Page, page
 from executive.language.tokens import Token
 from executive.words.command import START, Command, Task
 from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
@@ -159,29 +159,18 @@ def negate(condition: Condition) -> Condition:
     return condition.part if isinstance(condition, Not) else Not(part=condition)
 
 
-def phrase_of_name(name: str, kind: NounKind) -> Phrase:
-    """Noun phrase that stands for a name in the world."""
-    entity = "PERSON" if kind is NounKind.PERSON else ""
-    pos, tag = ("PROPN", "NNP") if entity else ("NOUN", "NN")
-    return Phrase((Token(0, 0, name, name.lower(), pos, tag, 0, "obl", entity, kind, known=True),))
-
-
-def person_named(name: str, within: Location | None = None) -> Location:
-    """Person with a name in the world, as somebody to go to."""
-    return Location(phrase_of_name(name, NounKind.PERSON), "to", within)
-
-
-def names_of_world(knowledge: Knowledge) -> dict[str, tuple[str, ...]]:
-    """Names of people and places, which templates leave open; the longest first."""
-    names = {"names": knowledge.people, "around": knowledge.place_names()}
-    return {key: tuple(sorted(knowledge.spellings(each), key=len, reverse=True)) for key, each in names.items()}
+def named(name: str, kind: NounKind = NounKind.PERSON) -> Location:
+    """Person to go to, or place, with a name in the world."""
+    person = kind is NounKind.PERSON
+    entity, pos, tag = ("PERSON", "PROPN", "NNP") if person else ("", "NOUN", "NN")
+    token = Token(0, 0, name, name.lower(), pos, tag, 0, "obl", entity, kind, known=True)
+    return Location(Phrase((token,)), "to" if person else "in")
 
 
 def with_preposition(items: Sequence[Item], preposition: str) -> tuple[Item, ...]:
     """Adds a preposition to the first noun phrase of some items; "there" needs none."""
-    at = next((n for n, item in enumerate(items) if isinstance(item, Chunk | Adverb)), None)
-    first = None if at is None else items[at]
-    if at is None or not isinstance(first, Chunk) or first.role is not None:
+    at, first = next(((n, item) for n, item in enumerate(items) if isinstance(item, Chunk | Adverb)), (0, None))
+    if not isinstance(first, Chunk) or first.role is not None:
         return tuple(items)
     role = lexicon().prepositions[tuple(preposition.split())]
     return (*items[:at], replace(first, preposition=preposition, role=role), *items[at + 1 :])
@@ -194,6 +183,12 @@ class PlainReader:
     pipeline: Pipeline
     knowledge: Knowledge
     _traces: dict[tuple[Trace, str | None, str | None], Trace] = field(default_factory=dict, compare=False, repr=False)
+
+    def forms(self, name: str) -> Page:
+        """Templates of a page that leaves open the names of people and places; the longest names come first."""
+        names = {"names": self.knowledge.people, "around": self.knowledge.place_names()}
+        spelt = {key: self.knowledge.spellings(each) for key, each in names.items()}
+        return page(name, **{key: tuple(sorted(each, key=len, reverse=True)) for key, each in spelt.items()})
 
     def read(
         self, state: State, text: str = "", *, behind: str | None = None, upto: str | None = None, **inputs: Any
@@ -313,9 +308,8 @@ class PlainReader:
         name = "" if sought is None else sought.name
         if self.knowledge.somebody(name) is None and not target.person:
             locations = memory.locations if where is None else (*memory.locations, (target, where))
-            return replace(state, memory=memory).recalling(
-                objects=(target,), where=where, place=place, locations=locations
-            )
+            seen = replace(memory, objects=(target,), where=where, place=place, locations=locations)
+            return replace(state, memory=seen)
         known = self.knowledge.person(name) is not None
         person, before = Location(target) if known else state.memory.person, state.memory
         met = replace(memory, objects=before.objects, where=before.where, person=person, place=place)

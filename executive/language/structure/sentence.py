@@ -19,20 +19,12 @@ from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.structure.builder import Builder, is_paced
 from executive.language.structure.conditions import REQUESTS, Done, parse_condition, statement_of_check
-from executive.language.structure.plain import (
-    PlainReader,
-    State,
-    attempt,
-    names_of_world,
-    person_named,
-    phrase_of_name,
-    require,
-)
+from executive.language.structure.plain import PlainReader, State, attempt, named, require
 from executive.language.structure.speaking import ROOMS, SPEECH, asks, is_clause, say_in_each_room, says
 from executive.language.templates import Match, page
 from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.condition import Look
-from executive.words.knowledge import ANYBODY, Knowledge
+from executive.words.knowledge import ANYBODY
 from executive.words.leaf_steps import Awaited, Check, Do, Speak, Wait, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Repeat, Together, Try
@@ -78,11 +70,8 @@ def _requests(row: Builder, clause: Clause) -> bool:
     return done is not None
 
 
-def _brings_to_everyone(row: Builder, clause: Clause) -> bool:
-    """Goes on with a delivery to each person of a group.
-
-    Raises RefusalError like `_people_at`, and when there is only one such object.
-    """
+def _brings_to_all(row: Builder, clause: Clause) -> bool:
+    """Goes on with a delivery to each person of a group. Raises RefusalError when there is only one such object."""
     text, group = clause.text, ROOMS["everyone"].search(clause.text)
     if group is None or ROOMS["gives"].match(text) is None:
         return False
@@ -103,7 +92,7 @@ def _brings_to_everyone(row: Builder, clause: Clause) -> bool:
 def _people_at(group: Location, who: str, state: State, reader: PlainReader) -> list[str]:
     """People of a group in a room. Raises RefusalError when no room is named, or no known person is there."""
     no_room = f"I bring objects to one person at a time, not to {who}; name one, or a room"
-    place = require(group.within and group.within.phrase, no_room, who)
+    place = require(group.within.phrase if group.within else None, no_room, who)
     room, knowledge = reader.room(place.spoken, state), reader.knowledge
     people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
     return require(people, f"I know nobody in the {room} to bring anything to: {who}", who)
@@ -116,7 +105,7 @@ def _meets_people(row: Builder, clause: Clause) -> bool:
     if found is not None and found.kind in (Cue.WHILE, Cue.UNTIL):
         found = None  # how long the robot follows
     text = clause.text if timed is None or seconds is None else timed["clause"]
-    request = _parse_people(text if found is None else found.before, row.reader.knowledge)
+    request = _parse_people(text if found is None else found.before, row.reader)
     if request is None or not _asks_alone(request, row):
         return False
     if found is not None:
@@ -139,7 +128,7 @@ def _asks_alone(request: Match, row: Builder) -> bool:
         case "find":
             return refers or (row.special and _refers_to_person(request))
         case "stated":
-            return refers and _parse_people(row.ahead(), row.reader.knowledge) is not None
+            return refers and _parse_people(row.ahead(), row.reader) is not None
         case _:
             return True
 
@@ -154,25 +143,25 @@ def _flush_reasons(row: Builder) -> None:
         refusal.plain = False
         raise refusal
     row.plain, row.state = [], row.state.noting([TOLD.format(repr(reasons))])
-    named = [name for name in row.reader.knowledge.people if re.search(rf"\b{re.escape(name)}\b", reasons)]
-    if len(named) == 1:
-        row.state = row.state.recalling(person=person_named(named[0]))
+    people = [name for name in row.reader.knowledge.people if re.search(rf"\b{re.escape(name)}\b", reasons)]
+    if len(people) == 1:
+        row.state = row.state.recalling(person=named(people[0]))
 
 
-def _parse_people(text: str, knowledge: Knowledge) -> Match | None:
+def _parse_people(text: str, reader: PlainReader) -> Match | None:
     """Parses a clause about following, guiding, meeting or greeting people; None for other clauses.
 
     The match has the `task`, the person `who` (empty: the speaker), and the places `at` and `to`; its `form` is "find"
     or "stated" if it asks for nothing alone. Raises RefusalError when it is not clear whom the clause means.
     """
-    forms = page("people", **names_of_world(knowledge))
+    forms, knowledge = reader.forms("people"), reader.knowledge
     text = text if (around := forms["around"].fullmatch(text)) is None else around["clause"]
     match = forms["request"].fullmatch(text)
     if match is not None or forms["certain"].match(text) is None or forms["greets_known"].match(text) is not None:
         return match
     known = f"; known are {listing(knowledge.people)}" if knowledge.people else ""
     hint = f"name one person, or say 'the person in the kitchen'{known}"
-    if (cue := trailing_cue(text)) is not None and _parse_people(cue.before, knowledge) is not None:
+    if (cue := trailing_cue(text)) is not None and _parse_people(cue.before, reader) is not None:
         what, hint = f"I cannot do '{cue.before}' {cue.cue} {cue.text}", "I do it up to a place, or until you say stop"
     elif (unseen := forms["unseen"].search(text)) is not None:
         what = f"I cannot tell people apart by {unseen['by']}, such as '{unseen.text}'"
@@ -191,57 +180,52 @@ def _refers_to_person(match: Match) -> bool:
 def _steps_on_people(request: Match, state: State, reader: PlainReader) -> Done:
     """Builds the steps for a request, with the state after them. Raises RefusalError."""
     person, said, task = _person(request, state, reader), request.text, request["task"]
-    at = _place(_where(request, person, state), state, reader)
+    spoken_of = person == ANYBODY and _refers_to_person(request) and state.memory.person is None
+    at = _place(request["at"] or ("there" if spoken_of and state.memory.place else ""), state, reader)
     goal, state = _goal(request, person, state, reader)
-    here = at or (state.goal if reader.is_place(state.goal) else None)
+    if task in ("greet", "") and at is None and reader.is_place(state.goal):
+        at = state.goal
     greets_there = task == "greet" or (not task and person == ANYBODY)
-    require(here or not greets_there, f"{said}: in which room?", question=True)
+    require(at or not greets_there, f"{said}: in which room?", question=True)
     require(goal or task != "guide", f"{said}: where to?", question=True)
     require(person != SPEAKER or goal != START, f"{said}: you are here; name another place", said)
-    verb = said.split()[0].lower()
-    match task:
-        case "greet":
-            count = 0 if person == ANYBODY and not request["one"] else 1
-            greet = Command(goal=here, task=Task.GREET, object=ObjectKind(ANYBODY), object_count=count, verb=verb)
-            commands = [greet]
-        case "":
-            commands = _go_to(person, here, verb, state)
-        case _:
-            first = [] if at is None else _go_to(person, at, verb, state)
-            commands = [*first, Command(goal=goal, task=Task(task), object=ObjectKind(person), verb=verb)]
+    commands = _commands_on(request, person, at, goal, state)
     return steps_of_commands(commands), _state_behind(commands, person, state, reader)
 
 
-def _where(request: Match, person: str, state: State) -> str:
-    """Words for the place where a person is; "there" for a person who has only been spoken of with a place."""
-    memory, unknown = state.memory, person == ANYBODY and _refers_to_person(request)
-    return "there" if not request["at"] and unknown and memory.person is None and memory.place else request["at"]
+def _commands_on(request: Match, person: str, at: str | None, goal: str | None, state: State) -> list[Command]:
+    """Commands of a request about a person; for anybody the robot only goes to the place, unless it is there."""
+    verb, anybody = request.text.split()[0].lower(), person == ANYBODY
+    meets = Command(goal=at, verb=verb) if anybody else Command(goal=person, goal_at=at, verb=verb)
+    first = [] if anybody and at == state.goal else [meets]
+    match request["task"]:
+        case "":
+            return first
+        case "greet":
+            count = 0 if anybody and not request["one"] else 1
+            return [Command(None, at, None, Task.GREET, ObjectKind(ANYBODY), object_count=count, verb=verb)]
+        case task:
+            does = Command(goal=goal, task=Task(task), object=ObjectKind(person), verb=verb)
+            return [does] if at is None else [*first, does]
 
 
 def _goal(request: Match, person: str, state: State, reader: PlainReader) -> tuple[str | None, State]:
-    """Place to which a request leads, and the state with a note on what is somebody's home. Raises RefusalError."""
-    knowledge, goal = reader.knowledge, _place(request["to"], state, reader)
+    """Goal of a request, and the state with a note on whose home it is. Raises RefusalError for an unknown home."""
+    goal, knowledge = _place(request["to"], state, reader), reader.knowledge
     if request["to"].lower() != "home" or goal is not None:
         return goal, state
-    require(person in knowledge.people, f"{request.text}: which room is home?", "home", question=True)
-    home = knowledge.room(knowledge.people[person].at)
+    facts = require(knowledge.people.get(person), f"{request.text}: which room is home?", "home", question=True)
+    home = knowledge.room(facts.at)
     return home, state.noting([f"I take {person}'s home to be the {home}"])
 
 
 def _state_behind(commands: Sequence[Command], person: str, state: State, reader: PlainReader) -> State:
     """State after a request about a person, whom the robot may have followed anywhere."""
-    last, memory = commands[-1] if commands else Command(), replace(state.memory, person=person_named(person))
+    last, memory = commands[-1] if commands else Command(), replace(state.memory, person=named(person))
     if last.goal is not None and reader.is_place(last.goal):
-        memory = replace(memory, place=Location(phrase_of_name(last.goal, NounKind.PLACE), "in"))
+        memory = replace(memory, place=named(last.goal, NounKind.PLACE))
     after = reader.state_after(commands, memory, state)
     return after.elsewhere if last.task is Task.FOLLOW and last.goal is None else after
-
-
-def _go_to(person: str, at: str | None, verb: str, state: State) -> list[Command]:
-    """Goes to a known person at a place; for anybody only to the place, unless the robot is there already."""
-    if person != ANYBODY:
-        return [Command(goal=person, goal_at=at, verb=verb)]
-    return [] if at == state.goal else [Command(goal=at, verb=verb)]
 
 
 def _person(match: Match, state: State, reader: PlainReader) -> str:
@@ -285,10 +269,10 @@ def _checks(row: Builder, clause: Clause) -> bool:
 def _is_modified(row: Builder, clause: Clause) -> bool:
     """Adds an action that a cue behind it makes conditional or repeats."""
     found = trailing_cue(clause.text)
-    modified = found is not None and (found.kind is Cue.EVERY or not ROOMS["every_room"].search(clause.text))
-    if found is not None and modified:
-        row.modify(clause, found)
-    return modified
+    if found is None or (found.kind is not Cue.EVERY and ROOMS["every_room"].search(clause.text)):
+        return False
+    row.modify(clause, found)
+    return True
 
 
 def _searches_rooms(row: Builder, clause: Clause) -> bool:
@@ -315,17 +299,7 @@ def _searches_rooms(row: Builder, clause: Clause) -> bool:
     return True
 
 
-_ACTS: Final = (
-    _skips,
-    _meets_people,
-    _requests,
-    asks,
-    says,
-    _checks,
-    _is_modified,
-    _brings_to_everyone,
-    _searches_rooms,
-)
+_ACTS: Final = (_skips, _meets_people, _requests, asks, says, _checks, _is_modified, _brings_to_all, _searches_rooms)
 """Actions in the order of trying."""
 
 

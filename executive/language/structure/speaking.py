@@ -13,7 +13,7 @@ from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.structure.builder import Builder
 from executive.language.structure.conditions import parse_condition
-from executive.language.structure.plain import PlainReader, attempt, names_of_world, person_named, require
+from executive.language.structure.plain import PlainReader, attempt, named, require
 from executive.language.templates import Match, page, words_of
 from executive.words.command import PEOPLE_TASKS
 from executive.words.knowledge import Knowledge
@@ -100,7 +100,7 @@ def _parse_speech(text: str, reader: PlainReader) -> Match | None:
     `pronoun`, a `name` or everybody (`crowd`), and `where` they are; without these the robot speaks where it is. Raises
     RefusalError when the robot cannot say it in the speaker's place, or does not know the listener.
     """
-    forms = page("speech", **names_of_world(reader.knowledge))
+    forms = reader.forms("speech")
     clear = forms["say_within"].fullmatch(text) is None
     require(clear, f"I do not understand to whom to say '{text}'; name one person at the end", text)
     for intent in ("says_to", "greets_there", "says", "formula", "tells", "relays"):
@@ -132,11 +132,8 @@ def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
 
 
 def _words(match: Match, intent: str, parser: DependencyParser) -> str:
-    """Words to say; none of "let Robin know it".
-
-    Raises RefusalError when they only describe a text, or would have another meaning when the robot says them.
-    """
-    said, text = f"{match['polite']}{match['text']}", match.text
+    """Words to say; none of "let Robin know it". Raises RefusalError for words that mean something else when said."""
+    said = f"{match['polite']}{match['text']}"
     if intent == "formula" or not said:
         return said
     clause = intent != "tells" and is_clause(said, parser)
@@ -150,8 +147,8 @@ def _words(match: Match, intent: str, parser: DependencyParser) -> str:
         if intent == "relays":
             _refuse_unclear(match, said, clause and not nothing, parser)
         if (inner := CLAUSES["deictic"].search(said) or SPEECH["inner"].search(said)) is not None:
-            meant = "would mean somebody or something else"
-            raise RefusalError(f"I cannot say '{said}' for you: '{inner.text}' {meant}", [said])
+            other = f"'{inner.text}' would mean somebody or something else"
+            raise RefusalError(f"I cannot say '{said}' for you: {other}", [said])
     require(not nothing, f"what am I to say? '{said}' says nothing", said)
     return said.strip(" ,.'\"")
 
@@ -195,7 +192,7 @@ def asks(row: Builder, clause: Clause) -> bool:
     person, text = row.state.memory.person, clause.text
     if person is not None:
         text = re.sub(r"^(ask) (?:him|her)\b", rf"\1 {person.name}", text, flags=re.IGNORECASE)
-    if (asked := _parse_question(text, row.reader.knowledge)) is None:
+    if (asked := _parse_question(text, row.reader)) is None:
         return False
     row.flush()
     _goes_to_listener(row, asked.of)
@@ -207,8 +204,7 @@ def asks(row: Builder, clause: Clause) -> bool:
 def _agreed(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
     """Steps that follow the answers yes and no."""
     found: dict[str, Steps] = {"yes": (), "no": ()}
-    while row.at < len(row.clauses):
-        clause = row.clauses[row.at]
+    while (clause := row.following) is not None:
         match = CHECKS["answers"].match(clause.text) if clause.kind is Cue.IF else None
         answer, rest = _ANSWERS.get(clause.kind), clause.text
         if match is not None:
@@ -227,30 +223,25 @@ def _agreed(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
 
 def _chosen(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
     """Steps that follow each of the choices: the robot brings the chosen object if the sentence says so."""
-    body = row.take("", row.at + 1) if CHECKS["brings"].match(row.ahead()) else []
-    article = r"^(?:a|an|some|the|any|another) "
-    return {
-        re.sub(article, "", choice, flags=re.IGNORECASE): _steps_if_chosen(row, body, asked, choice) if body else ()
-        for choice in asked.choices
-    }
+    body = row.take("", row.at + 1) if begins_as(row.ahead(), "brings") else []
+    steps = {choice: _steps_if_chosen(row, body, asked, choice) if body else () for choice in asked.choices}
+    article = re.compile(r"^(?:a|an|some|the|any|another) ", re.IGNORECASE)
+    return {article.sub("", choice): each for choice, each in steps.items()}
 
 
 def _steps_if_chosen(row: Builder, body: Sequence[Clause], asked: QuestionRequest, choice: str) -> Steps:
     """Steps after an answer: "it" refers to the chosen object, and the asked person receives it."""
     objects = tuple(item.phrase for item in row.reader.read_items(choice) if isinstance(item, Chunk))
-    person = person_named(asked.of["name"])
+    person = named(asked.of["name"])
     memory = replace(row.state.memory, objects=objects, gathered=objects, where=None, person=person)
     steps, after = row.nest(body, replace(row.state, memory=memory, recipient=person))
     row.state = row.state.noting(after.notes)
     return steps
 
 
-def _parse_question(text: str, knowledge: Knowledge) -> QuestionRequest | None:
-    """Parses a clause that tells the robot to ask somebody a question; None for other clauses.
-
-    Raises RefusalError for a question that the robot cannot put.
-    """
-    forms = page("speech", **names_of_world(knowledge))
+def _parse_question(text: str, reader: PlainReader) -> QuestionRequest | None:
+    """Parses a request to ask somebody a question; None for others. Raises RefusalError for one it cannot put."""
+    forms, knowledge = reader.forms("speech"), reader.knowledge
     if not re.match(r"ask\b", text, re.IGNORECASE) or forms["tells"].fullmatch(text):
         return None
     match = forms["wants_one"].fullmatch(text) or forms["wants_what"].fullmatch(text)

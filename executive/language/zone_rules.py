@@ -114,10 +114,10 @@ def _starts(text: str) -> Iterator[tuple[int, int]]:
         if (joint := _PAGE["joint"].match(text, at)) is not None:
             at = joint.after
             yield at, first
-            continue
-        if first == at and _PAGE["begins"].match(text, at) is not None:
-            yield at, at
-        at = first = at + 1
+        else:
+            if first == at and _PAGE["begins"].match(text, at) is not None:
+                yield at, at
+            at = first = at + 1
 
 
 def _rest(text: str, rule: Match, start: int, first: int) -> str | None:

@@ -15,7 +15,7 @@ from executive.language.structure.conditions import Done, parse_condition, parse
 from executive.language.structure.plain import PlainReader, PlainReading, SpokenCondition, State, attempt, require
 from executive.language.templates import Match, words_of
 from executive.words.command import Task
-from executive.words.leaf_steps import Awaited, Do, Speak, Wait, steps_of_commands
+from executive.words.leaf_steps import Awaited, Do, Speak, Wait
 from executive.words.step import OnFailure, Step
 from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, Try
 
@@ -122,7 +122,7 @@ class Builder:
 
     def add(self, reading: PlainReading, said: str = "") -> None:
         """Adds the commands of a plain part of the sentence; `said` is the statement of its last look."""
-        self.steps += steps_of_commands(reading.commands)
+        self.steps += reading.steps
         self.asked = self.reader.last_check(reading, self.state, said)
         self.state = reading.state
 
@@ -339,7 +339,7 @@ class Builder:
         said, _ = self.nest(body, reading.state) if body else ((), None)
         speaks = [type(step) for step in said] == [Speak] and len(reading.commands) == 1
         require(speaks, "while I go somewhere I can only say something", join_clauses(body))
-        self.put((Together(steps=(Do.from_command(reading.commands[0]), *said)),), reading.state)
+        self.put((Together(steps=(*reading.steps, *said)),), reading.state)
 
     def modify(self, clause: Clause, cue: Clause) -> None:
         """Adds an action that a trailing condition or number of rounds modifies."""

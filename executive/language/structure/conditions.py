@@ -17,17 +17,7 @@ from executive.language.templates import Match, page
 from executive.words.command import Task
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
-from executive.words.leaf_steps import (
-    Awaited,
-    Charging,
-    Dock,
-    DoorToOpen,
-    OpenDoor,
-    Picture,
-    Subject,
-    Wait,
-    steps_of_commands,
-)
+from executive.words.leaf_steps import Awaited, Charging, Dock, DoorToOpen, OpenDoor, Picture, Subject, Wait
 from executive.words.steps import Steps
 from skills.inputs.errors import listing
 
@@ -169,7 +159,7 @@ def _look(words: str, state: State, reader: PlainReader) -> SpokenCondition:
         return reader.check(words, state)
     some = match["some"] != ""
     place = with_preposition(reader.read_items(match["place"]), "on" if some else "at")
-    found = reader.look_by_items((verb("find"), Chunk(OBJECTS if some else CONTENTS), *place), words, state)
+    found = reader.looks((verb("find"), Chunk(OBJECTS if some else CONTENTS), *place), words, state)
     empty = match["how"].lower() in ("empty", "free", "bare", "clear")
     return found.negate(words) if empty != bool(match["not"]) else found
 
@@ -178,7 +168,7 @@ def _seen(match: Match, words: str, state: State, reader: PlainReader) -> Spoken
     """Condition that the robot sees, or does not see, an object or a person."""
     what = match["what"]
     if re.fullmatch(r"it|one|him|her|them", what, re.IGNORECASE):
-        found = reader.look_by_items((verb("find"), *reader.read_items(what)), words, state)
+        found = reader.looks((verb("find"), *reader.read_items(what)), words, state)
     elif match["looks"] and state.at is not None and reader.is_somebody(what, state):
         found = reader.check(f"{_SUBJECTS.get(what.lower(), what)} is in the {state.at}", state, words)
     else:
@@ -242,7 +232,7 @@ def parse_wait(text: str, known: Callable[[], State], reader: PlainReader) -> Do
     at = _WAITING["person_at"].fullmatch(what) if how == "for" else None
     if at is not None and reader.is_somebody(at["who"], there):
         reading = reader.go_to(at["where"], there)
-        steps, there, what = (*steps, *steps_of_commands(reading.commands)), reading.state, at["who"]
+        steps, there, what = (*steps, *reading.steps), reading.state, at["who"]
     awaited, after = _awaited(how, what, there, reader)
     return (*steps, Wait(awaited=awaited)), after
 
@@ -268,12 +258,13 @@ def _awaited(how: str, what: str, state: State, reader: PlainReader) -> tuple[Aw
 
 def _gone(where: str, state: State, reader: PlainReader) -> Done:
     """Adds the drive to the place of a wait."""
-    match = _WAITING["place"].fullmatch(where or "here")
-    match = require(match, f"I do not understand where to wait: '{where}'", where)
+    match = require(
+        _WAITING["place"].fullmatch(where or "here"), f"I do not understand where to wait: '{where}'", where
+    )
     if match["here"] or (match["there"] and state.goal is not None and state.at is not None):
         return (), state
     reading = reader.go_to(match["place"] or "there", state)
-    return steps_of_commands(reading.commands), reading.state
+    return reading.steps, reading.state
 
 
 def _parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
@@ -282,8 +273,7 @@ def _parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) 
         return None
     state = known()
     stands = reader.go_to(match["at"], state).commands if match["at"] else ()
-    several = f"I take a picture from one place at a time, not from {match['at']}"
-    require(len(stands) <= 1, several, match["at"])
+    require(len(stands) <= 1, f"I take a picture from one place at a time, not from {match['at']}", match["at"])
     at = stands[0].goal if stands else None
     subjects = _of_each(match["of"], reader.knowledge) or re.split(r",? and |,? then |, ", match["of"])
     pictured = (Subject(of=_pictured(of, state, reader), at=at, camera=match["camera"] or None) for of in subjects)

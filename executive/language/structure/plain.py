@@ -22,6 +22,7 @@ from executive.language.tokens import Token
 from executive.words.command import START, Command, Task
 from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
 from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.outlines import inside
 from executive.words.steps import Steps
 from skills.api import ObjectKind
@@ -146,6 +147,11 @@ class PlainReading:
     trace: Trace
 
     @property
+    def steps(self) -> tuple[Do, ...]:
+        """Steps of the commands."""
+        return steps_of_commands(self.commands)
+
+    @property
     def one_errand(self) -> bool:
         """Returns whether all commands are about one object, or only go to a place and back."""
         objects = {str(thing) for command in self.commands for thing in (command.item, command.object) if thing}
@@ -229,12 +235,10 @@ class PlainReader:
         read = self.read(state, affirmed, lead=(verb("check"), Whether()), upto="reading").trace
         if (left_out := next((token.word for token in read.tokens if token.word in _LEFT_OUT), None)) is not None:
             raise RefusalError(f"I cannot see whether '{said}'; say it without '{left_out}'", [said])
-        found = self.look_by_items(read.items, said, state, read.tokens)
+        found = self.looks(read.items, said, state, read.tokens)
         return found if denied is None else found.negate(said)
 
-    def look_by_items(
-        self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()
-    ) -> SpokenCondition:
+    def looks(self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()) -> SpokenCondition:
         """Condition of the looks that given items ask for; `text` is the full text."""
         reading = attempt(self.commands_from_items, [self._by_name(item, state) for item in items], state, tokens)
         unseen = RefusalError(f"I cannot see whether '{text}'; {_SEES}", [text])

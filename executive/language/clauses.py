@@ -11,7 +11,6 @@ from typing import Final
 from executive.language.addressees import AddressedText, Addressee, addressees
 from executive.language.items import Item
 from executive.language.lexicon import lexicon, word_list
-from executive.language.questions import RefusalError
 from executive.language.templates import Match, Words, page, words_of
 from executive.language.tokens import smooth
 
@@ -67,18 +66,24 @@ class Clause:
     @property
     def anyway(self) -> bool:
         """Returns whether the clause runs at the end, whatever happens before."""
-        said = self.kind is None and self.text != without_whatever(self.text)
+        said = self.kind is None and self.text != self.without_whatever
         return said or CLAUSES["whatever"].search(self.joint) is not None
+
+    @property
+    def without_whatever(self) -> str:
+        """Text without "whatever happens" at its end."""
+        found = CLAUSES["whatever_last"].fullmatch(self.text)
+        return self.text if found is None else found["before"].rstrip(" ,")
+
+    @property
+    def refers(self) -> bool:
+        """Returns whether the cue, or a pronoun behind "if", refers to the last look or action."""
+        return self.kind in _ATTACHED or (self.kind is Cue.IF and begins_as(self.text, "pronoun"))
 
     @property
     def then(self) -> bool:
         """Returns whether "then" stands before the clause."""
         return re.search(r"\bthen\b", self.joint, re.IGNORECASE) is not None
-
-    def missing_action(self, text: str = "") -> RefusalError:
-        """Refusal of a condition to which no action belongs."""
-        said = f"{self.cue} {text}".strip()
-        return RefusalError(f"what am I to do {f'{self.cue.lower()} {text}'.strip()}?", [said])
 
 
 def split(text: str, robots: tuple[str, ...] = ()) -> tuple[Addressee | None, tuple[Clause, ...]]:
@@ -108,25 +113,24 @@ def _cuts(text: str) -> Iterator[tuple[int, int]]:
         behind = _behind_joint(words, at)
         start, begin = words.spans[at - 1][1] if at else 0, words.start(behind)
         joint, before = text[start:begin], words.word(at - 1)
-        bare = at > 0 and behind == at  # no words join, but "otherwise" may follow
-        cue = None if bare and not CLAUSES["otherwise"].match(text, at) else leading_cue(text[begin:])
-        alone = before.endswith(_SOME) if bare else before in _ONE_VERB and joint.strip().lower() in ("and", "please")
-        begins = cue is not None or (not bare and begins_action(text[begin:])) or re.search(r"[.!?;](?:\s|$)", joint)
-        if not at or (begins and not alone):
+        if at and behind == at:  # no words join, but "otherwise" may follow
+            cue = leading_cue(text[begin:]) if CLAUSES["otherwise"].match(text, at) else None
+            begins = cue is not None and not before.endswith(_SOME)
+        else:
+            cue, ends = leading_cue(text[begin:]), re.search(r"[.!?;](?:\s|$)", joint) is not None
+            one_verb = before in _ONE_VERB and joint.strip().lower() in ("and", "please")
+            begins = (cue is not None or ends or begins_action(text[begin:])) and not one_verb
+        if begins or not at:
             yield start, begin
         at = behind + (1 if cue is None else max(1, len(words_of(cue.cue).words)))
 
 
 def _behind_joint(words: Words, at: int) -> int:
     """Index of the word behind the joining words that begin at a word."""
-    while words.word(at):
-        joints = (CLAUSES["joint"], CLAUSES["outer"], CLAUSES["whatever"])
-        found = next((found.after for form in joints if (found := form.match(words.text, at)) is not None), at)
-        found += words.word(at) in _MARKS
-        if found == at:
-            break
-        at = found
-    return at
+    joints = (CLAUSES["joint"], CLAUSES["outer"], CLAUSES["whatever"])
+    behind = next((found.after for form in joints if (found := form.match(words.text, at)) is not None), at)
+    behind += words.word(at) in _MARKS
+    return at if behind == at else _behind_joint(words, behind)
 
 
 def leading_cue(text: str) -> Clause | None:
@@ -158,10 +162,9 @@ def _clause(kind: Cue, cue: Match, text: str) -> Clause:
     return Clause("", text, kind, cue.text, amount=cue["span"] or cue["times"])
 
 
-def without_whatever(text: str) -> str:
-    """Text without "whatever happens" at its end."""
-    found = CLAUSES["whatever_last"].fullmatch(text)
-    return text if found is None else found["before"].rstrip(" ,")
+def begins_as(text: str, *intents: str) -> bool:
+    """Returns whether a text begins with words of one of the intents of `CHECKS`."""
+    return any(CHECKS[intent].match(text) is not None for intent in intents)
 
 
 def begins_action(text: str) -> bool:
@@ -188,13 +191,12 @@ def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, ro
     """
     first = any(re.search(r"\bfirst\b", one.joint, re.IGNORECASE) for one in clauses[at : at + 1])
     for n, one in enumerate(clauses[at:], at):
-        after_all = n > at and ((one.outer and not first) or one.anyway)
-        then = n > at and branch and one.then
+        after_all = one.anyway or (one.outer and not first)
         if rounds:
-            goes_on = one.kind in ATTACHED or (one.kind is Cue.IF and CHECKS["pronoun"].match(one.text) is not None)
-            if after_all or (one.begins and n > at and not goes_on):
-                return n
-        elif one.kind in (*ATTACHED, Cue.IF, Cue.UNLESS, Cue.SOON) or one.begins or after_all or then:
+            ends = n > at and (after_all or (one.begins and not one.refers))
+        else:
+            ends = one.begins or one.kind in _DECIDES or (n > at and (after_all or (branch and one.then)))
+        if ends:
             return n
     return len(clauses)
 
@@ -204,8 +206,8 @@ def _verbs() -> frozenset[str]:
     return frozenset({first for first, *_ in lexicon().verbs} | set(CLAUSES.table["openers"]))
 
 
-ATTACHED: Final = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)
-"""Cues of clauses that refer to the last look or action."""
+_ATTACHED: Final = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)
+_DECIDES: Final = (*_ATTACHED, Cue.IF, Cue.UNLESS, Cue.SOON)
 _BEHIND: Final = (Cue.EVERY, Cue.TIMES, Cue.WHILE, Cue.UNTIL, Cue.UNLESS, Cue.IF)
 _WHOLE: Final = frozenset({Cue.FAILED, Cue.SO, Cue.NOT})
 _MARKS: Final = frozenset(",;.!?:")

@@ -122,16 +122,11 @@ def understand(
     memory: Memory | None = None,
     correct: bool = True,
 ) -> Understanding:
-    """Understands the commands in `sentence`.
+    """Understands the commands in `sentence`, spoken or typed.
 
-    Args:
-        sentence: the words, spoken or typed.
-        parser: the dependency parser.
-        knowledge: the world's names and defaults; None keeps all names as spoken.
-        require_wake: whether the sentence must begin with the wake phrase.
-        robot_name: the robot's name; by default the one in `knowledge`.
-        memory: referents of earlier sentences, for "it" and "there".
-        correct: whether to correct misspelled names when that is safe.
+    With `knowledge` None, all names stay as spoken. With `require_wake` the sentence must begin with the wake phrase,
+    which calls `robot_name` (by default the name in `knowledge`). `memory` has the referents of earlier sentences, for
+    "it" and "there". With `correct`, misspelled names are corrected when that is safe.
     """
     name = robot_name or (knowledge.robot.name if knowledge else "robot")
     called = strip_wake(clean(sentence), name, knowledge.robot.others if knowledge else ())
@@ -142,8 +137,7 @@ def understand(
     if require_wake and not addressed:
         reason = f'the robot\'s name was not said; begin with "Hey {name}"'
         return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
-    names = () if knowledge is None else (*knowledge.place_names(), *knowledge.object_names(), *knowledge.people)
-    if (blank := placeholder(sentence)) is not None and not any(blank in each for each in names):
+    if (blank := _blank(sentence, knowledge)) is not None:
         odd = RefusalError(f"{blank!r} is no word; say it in words", [blank])
         return replace(_of_trace(Trace(sentence, refusal=odd, refused_at="cleaning")), addressed=addressed)
     said = CorrectedText(called.text)
@@ -158,6 +152,13 @@ def understand(
     return replace(found, text=sentence, notes=(*said.notes, *found.notes), addressed=addressed)
 
 
+def _blank(sentence: str, knowledge: Knowledge | None) -> str | None:
+    """Placeholder in a sentence that is in no name of the world."""
+    names = () if knowledge is None else (*knowledge.place_names(), *knowledge.object_names(), *knowledge.people)
+    blank = placeholder(sentence)
+    return None if blank is None or any(blank in each for each in names) else blank
+
+
 def look_again(text: str, found: Understanding, knowledge: Knowledge | None) -> Understanding:
     """Refuses what a second look finds to lack a word that forbids, limits or shares."""
     if found.status is not Status.OK or knowledge is None:
@@ -169,10 +170,7 @@ def look_again(text: str, found: Understanding, knowledge: Knowledge | None) -> 
 
 
 def under_rules(rules: RoomRules, meant: Understanding) -> Understanding:
-    """Puts the steps, or the steps of each part, into a group that has the rules for rooms, if there are any.
-
-    Raises RefusalError for work in a forbidden room.
-    """
+    """Puts the steps, or those of each part, under the rules. Raises RefusalError for work in a forbidden room."""
     if meant.status is not Status.OK or not rules.zones:
         return meant
     if meant.parts:
@@ -197,12 +195,13 @@ def _of_trace(trace: Trace) -> Understanding:
     if refusal is None:
         return replace(found, commands=trace.commands, memory=trace.memory, steps=trace.steps)
     lost = " ".join((*refusal.unknown, (refusal.question and refusal.question.heard) or ""))
-    if (reason := unkept_reason(trace.text, lost)) is not None:
-        return replace(found, status=Status.REFUSED, reason=reason, unknown_words=refusal.unknown)
-    status = Status.QUESTION if refusal.question else Status.REFUSED
-    reason = foreign_reason(trace.text) or refusal.reason
-    reason = reason if refusal.question else requote(reason, trace.text)
-    return replace(found, status=status, reason=reason, unknown_words=refusal.unknown, question=refusal.question)
+    reason = unkept_reason(trace.text, lost)
+    question = refusal.question if reason is None else None
+    if reason is None:
+        reason = foreign_reason(trace.text) or refusal.reason
+        reason = reason if question else requote(reason, trace.text)
+    status = Status.QUESTION if question else Status.REFUSED
+    return replace(found, status=status, reason=reason, unknown_words=refusal.unknown, question=question)
 
 
 def ask_until_clear(sentence: str, meant: Callable[[str], Understanding], answer: Answerer) -> Understanding:
@@ -212,8 +211,7 @@ def ask_until_clear(sentence: str, meant: Callable[[str], Understanding], answer
     """
     found = meant(sentence)
     for _ in range(_MOST_QUESTIONS):
-        said = None if found.question is None else answer(found.question)
-        if found.question is None or said is None:
+        if found.question is None or (said := answer(found.question)) is None:
             break
         sentence = insert_answer(sentence, found.question, said)
         found = meant(sentence)

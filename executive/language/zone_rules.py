@@ -77,36 +77,33 @@ def _forbidden(zones: Zones) -> frozenset[str]:
 
 
 def take_rules(text: str, knowledge: Knowledge) -> tuple[str, Zones]:
-    """Removes the rules for rooms from a sentence; returns the rest of the sentence, and the zones by name.
-
-    Raises RefusalError for a speed limit that is not a separate clause, or that no robot can obey.
-    """
-    zones: dict[str, ZoneFacts] = {}
-    own = {
-        word.lower(): name
-        for name in knowledge.rooms
-        for spelling in knowledge.spellings([name])
-        for word in (*synonyms_for(spelling), spelling)
-        if knowledge.place(word) in (None, name)
-    }
+    """Takes the rules out of a sentence: its rest, and the zones by name. Raises RefusalError for an unclear rule."""
+    zones, own = dict[str, ZoneFacts](), _rooms_by_word(knowledge)
     forms = page("zones", room=tuple(sorted(own, key=len, reverse=True)))
     for kind in _KINDS:
         for start, first in [*_starts(text)][::-1]:
             match = forms[kind].match(text, start)
             rest = None if match is None else _rest(text, match, start, first)
-            if match is not None and rest is not None:
-                for said in re.findall(any_of(own), match["rooms"], re.IGNORECASE):
-                    name = own[said.lower()]
-                    facts = _facts(kind, match, name)
-                    zones[name if name not in zones else f"{name}, {facts.kind.replace('_', ' ')}"] = facts
-                text = rest
+            if match is None or rest is None:
+                continue
+            for name in (own[said.lower()] for said in re.findall(any_of(own), match["rooms"], re.IGNORECASE)):
+                facts = _facts(kind, match, name)
+                zones[name if name not in zones else f"{name}, {facts.kind.replace('_', ' ')}"] = facts
+            text = rest
     for intent in (*_KINDS, "other"):
         left = forms[intent].search(text)
         begin = "" if left is None else text[: left.start]
-        is_said, other = _PAGE["speaks"].search(begin) is not None, intent != ZoneKind.KEEP_OUT
-        if left is not None and (re.search(r"\bbut\W*$", begin, re.IGNORECASE) if is_said else other):
+        but, forbids = re.search(r"\bbut\W*$", begin, re.IGNORECASE) is not None, intent == ZoneKind.KEEP_OUT
+        if left is not None and (but if _PAGE["speaks"].search(begin) else not forbids):
             raise RefusalError(f"I do not understand '{left.text}' here; say it in a sentence of its own", [left.text])
     return text, zones
+
+
+def _rooms_by_word(knowledge: Knowledge) -> dict[str, str]:
+    """Rooms by the words that mean them, in lower case."""
+    spelt = ((room, spelling) for room in knowledge.rooms for spelling in knowledge.spellings([room]))
+    words = ((word, room) for room, spelling in spelt for word in (*synonyms_for(spelling), spelling))
+    return {word.lower(): room for word, room in words if knowledge.place(word) in (None, room)}
 
 
 def _starts(text: str) -> Iterator[tuple[int, int]]:
@@ -117,10 +114,10 @@ def _starts(text: str) -> Iterator[tuple[int, int]]:
         if (joint := _PAGE["joint"].match(text, at)) is not None:
             at = joint.after
             yield at, first
-            continue
-        if first == at and _PAGE["begins"].match(text, at) is not None:
-            yield at, at
-        at = first = at + 1
+        else:
+            if first == at and _PAGE["begins"].match(text, at) is not None:
+                yield at, at
+            at = first = at + 1
 
 
 def _rest(text: str, rule: Match, start: int, first: int) -> str | None:

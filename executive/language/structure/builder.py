@@ -3,42 +3,30 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.language.amounts import parse_seconds, parse_time, parse_times
-from executive.language.clauses import (
-    ATTACHED,
-    CHECKS,
-    Clause,
-    Cue,
-    cut,
-    end_of_scope,
-    join_clauses,
-    leading_cue,
-    verb_positions,
-    without_whatever,
-)
+from executive.language.clauses import CHECKS, Clause, Cue, cut, end_of_scope, join_clauses, leading_cue, verb_positions
 from executive.language.items import verb
 from executive.language.questions import RefusalError
-from executive.language.structure.conditions import parse_condition, parse_wait, statement_of_check
-from executive.language.structure.plain import (
-    PlainReader,
-    PlainReading,
-    SpokenCondition,
-    State,
-    attempt,
-    negate,
-)
+from executive.language.structure.conditions import Done, parse_condition, parse_wait, statement_of_check
+from executive.language.structure.plain import PlainReader, PlainReading, SpokenCondition, State, attempt, require
 from executive.language.templates import Match, words_of
 from executive.words.command import Task
-from executive.words.leaf_steps import Awaited, Do, Speak, Wait, steps_of_commands
+from executive.words.leaf_steps import Awaited, Do, Speak, Wait
 from executive.words.step import OnFailure, Step
 from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, Try
 
 _ROUNDS: Final = (Cue.EVERY, Cue.TIMES, Cue.WHILE, Cue.UNTIL)
 """Cues of repeated actions."""
+_HOW_OFTEN: Final = "I do not understand how often: '{} {}'"
+
+
+def is_paced(loop: Loop) -> bool:
+    """Returns whether rounds have a number or an interval."""
+    return loop.times is not None or loop.every_s is not None
 
 
 @dataclass(frozen=True)
@@ -73,22 +61,23 @@ class Builder:
     begun: int = 0
     special: bool = False
 
-    def build(self) -> tuple[Steps, State]:
+    def build(self) -> Done:
         """Builds the steps of all clauses, in order."""
         while self.at < len(self.clauses):
             clause = self.clauses[self.at]
             last = self.steps[-1] if self.steps and not self.plain else None
-            if isinstance(last, Repeat) and last.loop.is_endless:
-                raise RefusalError("nothing can follow an endless repetition; say how often", [clause.text])
+            endless = isinstance(last, Repeat) and last.loop.is_endless
+            require(not endless, "nothing can follow an endless repetition; say how often", clause.text)
             self.at += 1
-            if clause.anyway:
-                self._always(clause)
-            elif clause.kind is None:
-                self.act(self, clause)
-            elif clause.kind in ATTACHED:
-                self._attach(clause)
-            else:
-                self._lead(clause)
+            match clause.kind:
+                case None if clause.anyway:
+                    self._always(clause)
+                case None:
+                    self.act(self, clause)
+                case Cue.SO | Cue.NOT | Cue.OTHERWISE | Cue.FAILED:
+                    self._attach(clause)
+                case _:
+                    self._lead(clause)
         self.flush()
         return tuple(self.steps), self.state
 
@@ -96,9 +85,7 @@ class Builder:
         clauses = [replace(one, joint="" if n == 0 else one.joint) for n, one in enumerate(clauses)]
         return Builder(self.reader, self.act, clauses, state, statement, self.given)
 
-    def nest(
-        self, clauses: Sequence[Clause], state: State, supposed: SpokenCondition | None = None
-    ) -> tuple[Steps, State]:
+    def nest(self, clauses: Sequence[Clause], state: State, supposed: SpokenCondition | None = None) -> Done:
         """Builds the steps of clauses inside others; in the branch of a condition, "tell Robin" refers to it."""
         inner = self._inner(clauses, state, self.statement if supposed is None else supposed.statement)
         inner.special = self.special and supposed is None
@@ -123,11 +110,11 @@ class Builder:
     def _read_together(self, clauses: Sequence[Clause], state: State) -> PlainReading:
         """Understands several plain clauses together."""
         text = join_clauses([replace(clauses[0], joint=""), *clauses[1:]])
-        reading = attempt(self.reader.read_commands, text, state, clauses[0].lead)
-        if isinstance(reading, RefusalError):
-            reading.plain = not self.special
-            raise reading
-        return reading
+        try:
+            return self.reader.read_commands(text, state, clauses[0].lead)
+        except RefusalError as refusal:
+            refusal.plain = not self.special
+            raise
 
     def known(self) -> State:
         """State after the pending clauses."""
@@ -135,7 +122,7 @@ class Builder:
 
     def add(self, reading: PlainReading, said: str = "") -> None:
         """Adds the commands of a plain part of the sentence; `said` is the statement of its last look."""
-        self.steps += steps_of_commands(reading.commands)
+        self.steps += reading.steps
         self.asked = self.reader.last_check(reading, self.state, said)
         self.state = reading.state
 
@@ -150,17 +137,29 @@ class Builder:
         found, self.at = [*cut(text), *self.clauses[self.at : end]], end
         return found
 
+    def body(self, clause: Clause, text: str, end: int, said: str = "") -> list[Clause]:
+        """Takes the clauses that a cue decides about. Raises RefusalError when there are none."""
+        what = f"what am I to do {f'{clause.cue.lower()} {said}'.strip()}?"
+        return require(self.take(text, end), what, f"{clause.cue} {said}".strip())
+
+    def insert(self, clauses: Iterable[Clause]) -> None:
+        """Inserts clauses before the next one."""
+        self.clauses[self.at : self.at] = clauses
+
+    @property
+    def following(self) -> Clause | None:
+        """Next clause; None behind the last."""
+        return self.clauses[self.at] if self.at < len(self.clauses) else None
+
     def ahead(self) -> str:
         """Words of the next clause; empty if it begins with a cue."""
-        following = self.clauses[self.at] if self.at < len(self.clauses) else None
-        return following.text if following is not None and following.kind is None else ""
+        return self.following.text if self.following is not None and self.following.kind is None else ""
 
     def _always(self, clause: Clause) -> None:
         """Adds steps that run at the end, whatever happens."""
         self.flush()
-        if not self.steps:
-            raise RefusalError("say what I am to do first, before what I am to do in any case", [clause.text])
-        ended = re.sub(r"[, ]+(?:at the end|in the end)$", "", without_whatever(clause.text), flags=re.IGNORECASE)
+        require(self.steps, "say what I am to do first, before what I am to do in any case", clause.text)
+        ended = re.sub(r"[, ]+(?:at the end|in the end)$", "", clause.without_whatever, flags=re.IGNORECASE)
         rest = [replace(clause, text=ended), *self.take("", len(self.clauses))]
         always, state = self.nest(rest, self.state.elsewhere)
         self.steps = [Group(steps=tuple(self.steps), always=always)]
@@ -173,20 +172,18 @@ class Builder:
         if clause.kind in (Cue.IF, Cue.UNLESS) and self._stands_behind(clause, follows):
             return
         self.flush()
-        if (under_way := self._under_way(clause)) is not None:
+        if (under_way := _under_way(clause)) is not None:
             at = next((one for one in _places_to_cut(clause.text, follows) if one > under_way.end), len(clause.text))
             self._put_together(clause.text[under_way.end : at], self.take(clause.text[at:], end))
             return
         head, rest = self._split(clause, follows)
-        body = self.take(rest, end)
-        if not body:
-            raise clause.missing_action(clause.text)
+        body = self.body(clause, rest, end, clause.text)
         if isinstance(head, Rounds):
             said = clause.text[: len(clause.text) - len(rest)].strip(" ,")
             self._put_rounds(head, body, f"{body[0].text} {clause.cue} {said}")
         elif clause.kind is Cue.SOON:
             self.put((Wait(awaited=Awaited(condition=head.condition)),), head.holds)
-            self.clauses[self.at : self.at] = body
+            self.insert(body)
             self.begun = len(self.steps)
         else:
             self._decide(clause, head, body)
@@ -198,15 +195,10 @@ class Builder:
             return False
         if isinstance(attempt(parse_condition, clause.text, self.known(), self.reader), RefusalError):
             return False
-        if not self.plain:
-            raise RefusalError(f"what am I to do {clause.cue} {clause.text}? Say the condition first", [clause.text])
-        main = self.plain.pop()
+        what = f"what am I to do {clause.cue} {clause.text}? Say the condition first"
+        main = require(self.plain, what, clause.text).pop()
         self.modify(main, replace(clause, before=main.text))
         return True
-
-    def _under_way(self, cue: Clause) -> Match | None:
-        """Match of "while driving to the kitchen"."""
-        return CHECKS["under_way"].match(cue.text) if cue.kind is Cue.WHILE else None
 
     def _split(self, clause: Clause, follows: Sequence[Clause]) -> tuple[SpokenCondition | Rounds, str]:
         """Splits a condition or rounds from an action that follows without a comma."""
@@ -233,11 +225,11 @@ class Builder:
         """Builds a choice for "if" and "unless"; a look or fetch before it may belong to the choice."""
         asked = self.asked
         if asked is not None and asked.looked:
-            if supposed.condition in (asked.condition, negate(asked.condition)):
+            if supposed.condition in (asked.condition, asked.opposite.condition):
                 del self.steps[-asked.steps :]
         elif asked is not None and clause.kind is Cue.IF:
             there = supposed.at_source(tuple(self.steps[-asked.steps :]), clause.text).condition
-            if there == negate(asked.condition):  # get a coke; if there is no coke, get a beer
+            if there == asked.opposite.condition:  # get a coke; if there is no coke, get a beer
                 self._replace_missing(asked, supposed.said, body)
                 return
         self._choose(supposed.opposite if clause.kind is Cue.UNLESS else supposed, body)
@@ -245,58 +237,57 @@ class Builder:
     def _choose(self, supposed: SpokenCondition, body: Sequence[Clause], more: tuple[Cue, ...] = ()) -> None:
         """Adds a choice of two branches, of which the next clause may begin the second, also with one of the cues."""
         then, after = self.nest(body, supposed.holds, supposed)
-        otherwise: Steps = ()
-        other = supposed.fails
-        second = self.clauses[self.at] if self.at < len(self.clauses) else None
-        if second is not None and second.kind in (Cue.OTHERWISE, Cue.NOT, Cue.SO, *more):
-            if second.kind is Cue.SO and all(one.kind is not Cue.NOT for one in self.clauses[: self.at]):
-                raise RefusalError(f"I do not understand '{second.cue}' here", [second.cue])
-            self.at += 1
-            decides = [one.kind for one in cut(second.text)[:1]] == [Cue.IF]
-            rest = self.take(
-                second.text, len(self.clauses) if decides else end_of_scope(self.clauses, self.at, branch=True)
-            )
-            if not rest:
-                raise second.missing_action()
-            if other.memory.objects == () or other.memory.objects[-1].person:
-                other = replace(other, memory=replace(other.memory, objects=after.memory.objects))
-            otherwise, other = self.nest(rest, other, supposed.opposite)
-        if not (then or otherwise):
-            raise RefusalError("no action is said for either case; name one", [supposed.said])
-        condition = supposed.condition if then else negate(supposed.condition)
+        otherwise, other = self._second_branch(supposed, after, more)
+        require(then or otherwise, "no action is said for either case; name one", supposed.said)
+        condition = (supposed if then else supposed.opposite).condition
         block = Choose(condition=condition, then=then or otherwise, otherwise=otherwise if then else ())
         self.put((block,), after.common(other))
+
+    def _second_branch(self, supposed: SpokenCondition, after: State, more: tuple[Cue, ...]) -> Done:
+        """Builds the second branch of a choice; no steps unless the next clause begins it."""
+        second, other = self.following, supposed.fails
+        if second is None or second.kind not in (Cue.OTHERWISE, Cue.NOT, Cue.SO, *more):
+            return (), other
+        clear = second.kind is not Cue.SO or any(one.kind is Cue.NOT for one in self.clauses[: self.at])
+        require(clear, f"I do not understand '{second.cue}' here", second.cue)
+        self.at += 1
+        decides = [one.kind for one in cut(second.text)[:1]] == [Cue.IF]
+        end = len(self.clauses) if decides else end_of_scope(self.clauses, self.at, branch=True)
+        body = self.body(second, second.text, end)
+        if other.memory.objects == () or other.memory.objects[-1].person:
+            other = other.recalling(objects=after.memory.objects)
+        return self.nest(body, other, supposed.opposite)
 
     def _attach(self, clause: Clause) -> None:
         """Builds a branch for "if so", "otherwise" or "if that fails", which refers to the last look or action."""
         self.flush()
-        cue, words, asked = clause.kind, [clause.cue], self.asked
-        if cue in (Cue.SO, Cue.NOT) and asked is None and CHECKS["somebody"].search(clause.cue):
+        asked, nothing = self.asked, f"'{clause.cue}' refers to nothing that was said before"
+        if clause.kind in (Cue.SO, Cue.NOT) and asked is None and CHECKS["somebody"].search(clause.cue):
             said = re.sub(r"^if ", "", clause.cue, flags=re.IGNORECASE)
             self._lead(replace(clause, kind=Cue.IF, text=f"{said} {clause.text}".strip()))
             return
-        if not self.steps[self.begun :] and not (asked and self.steps):
-            raise RefusalError(f"'{clause.cue}' refers to nothing that was said before", words)
-        looked = asked is not None and asked.looked and cue is not Cue.FAILED
-        body = self.take(clause.text, end_of_scope(self.clauses, self.at, branch=not looked))
-        if not body:
-            raise clause.missing_action()
-        if asked is not None and looked:
-            del self.steps[-asked.steps :]
-            self._choose(asked if cue is Cue.SO else asked.opposite, body)
-            return
-        last = self.steps[-1] if self.steps else None
-        if cue is Cue.SO or (isinstance(last, Choose | Repeat) and cue is not Cue.FAILED):
-            raise RefusalError(f"I do not understand what '{clause.cue}' refers to; say the whole condition", words)
-        if cue is Cue.NOT and clause.cue.lower() not in ("if not", "if no"):
-            if asked is None:
-                raise RefusalError(f"'{clause.cue}' refers to no earlier look", words)
-            self._replace_missing(asked, clause.cue, body)
+        require(self.steps[self.begun :] or (asked and self.steps), nothing, clause.cue)
+        looked = asked if asked is not None and asked.looked and clause.kind is not Cue.FAILED else None
+        body = self.body(clause, clause.text, end_of_scope(self.clauses, self.at, branch=looked is None))
+        if looked is not None:
+            del self.steps[-looked.steps :]
+            self._choose(looked if clause.kind is Cue.SO else looked.opposite, body)
         else:
-            otherwise, state = self.nest(body, replace(self.state.elsewhere, held=None))
-            tried = tuple(self.steps[self.begun :])
-            skipped = Group(steps=tried, on_failure=OnFailure.SKIP)
-            self._wrap(len(tried), Try(steps=tried, otherwise=otherwise) if otherwise else skipped, state)
+            self._attach_to_action(clause, body)
+
+    def _attach_to_action(self, clause: Clause, body: Sequence[Clause]) -> None:
+        """Builds what is done when the last action fails, or its object is missing."""
+        block = isinstance(self.steps[-1], Choose | Repeat) and clause.kind is not Cue.FAILED
+        unclear = f"I do not understand what '{clause.cue}' refers to; say the whole condition"
+        require(clause.kind is not Cue.SO and not block, unclear, clause.cue)
+        if clause.kind is Cue.NOT and clause.cue.lower() not in ("if not", "if no"):
+            asked = require(self.asked, f"'{clause.cue}' refers to no earlier look", clause.cue)
+            self._replace_missing(asked, clause.cue, body)
+            return
+        otherwise, state = self.nest(body, replace(self.state.elsewhere, held=None))
+        tried = tuple(self.steps[self.begun :])
+        skipped = Group(steps=tried, on_failure=OnFailure.SKIP)
+        self._wrap(len(tried), Try(steps=tried, otherwise=otherwise) if otherwise else skipped, state)
 
     def _wrap(self, count: int, block: Step, state: State) -> None:
         """Replaces the last steps by a block that contains them; `state` is the state after its other branch."""
@@ -304,14 +295,11 @@ class Builder:
         self.put((block,), self.state.common(state))
 
     def _replace_missing(self, asked: SpokenCondition, said: str, body: Sequence[Clause]) -> None:
-        """Builds a choice: the last steps if their object is found, otherwise the steps of the body.
-
-        Raises RefusalError when "there" could be the object's source or its destination.
-        """
+        """Builds a choice: the last steps if their object is found (at its source), otherwise the steps of the body."""
         done = tuple(self.steps[-asked.steps :])
         puts = any(command.task is Task.PLACE for step in done for command in step.commands)
-        if puts and re.search(r"\bthere$", said, re.IGNORECASE):
-            raise RefusalError(f"'{said}' could mean two places; name the place", [said])
+        two_places = puts and re.search(r"\bthere$", said, re.IGNORECASE) is not None
+        require(not two_places, f"'{said}' could mean two places; name the place", said)
         otherwise, state = self.nest(body, asked.fails, asked.opposite)
         self._wrap(len(done), Choose(condition=asked.condition, then=done, otherwise=otherwise), state)
 
@@ -319,21 +307,14 @@ class Builder:
         """Condition, or rounds, of a cue and its words: "three times", "every hour for a day", "until it is open"."""
         if cue.kind not in _ROUNDS:
             return parse_condition(cue.text, state, self.reader)
-        every_s, times = parse_seconds(cue.amount), parse_times(cue.amount)
-        if cue.amount and every_s is None and times is None:
-            what = "number of times" if cue.kind is Cue.TIMES else "time"
-            raise RefusalError(f"'{cue.cue}' is no {what} that I understand", [cue.cue])
-        if cue.kind is Cue.EVERY and every_s:  # "for an hour" and "until three" may stand behind
-            times = parse_times(cue.text)
-            if (match := CHECKS["for_span"].fullmatch(cue.text)) is not None:
-                times = int((parse_seconds(match["span"]) or 0.0) // every_s)
-                if times < 1:
-                    raise RefusalError(f"'{cue.text}' is shorter than one round", [cue.text])
+        every_s = parse_seconds(cue.amount)
+        times, what = _times(cue, every_s), "number of times" if cue.kind is Cue.TIMES else "time"
+        require(not cue.amount or every_s or times, f"'{cue.cue}' is no {what} that I understand", cue.cue)
         if times is not None or (every_s is not None and not cue.text):
             return Rounds(Loop(times=times, every_s=every_s), state)
         ends = leading_cue(cue.text) if cue.kind is Cue.EVERY else cue
         if ends is None or ends.kind not in (Cue.UNTIL, Cue.WHILE):
-            raise RefusalError(f"I do not understand how often: '{cue.cue} {cue.text}'", [cue.cue])
+            raise RefusalError(_HOW_OFTEN.format(cue.cue, cue.text), [cue.cue])
         if ends.kind is Cue.UNTIL and (time := parse_time(ends.text)) is not None:
             return Rounds(Loop(until_clock=time.text, every_s=every_s), state.noting(time.notes(ends.text)))
         supposed = parse_condition(ends.text, state, self.reader)
@@ -343,47 +324,29 @@ class Builder:
 
     def _put_rounds(self, rounds: Rounds, body: Sequence[Clause], waits: str = "") -> None:
         """Adds rounds that repeat given clauses, or a wait if the text `waits` asks for one."""
-        ends = rounds.loop.times is None and rounds.loop.every_s is None
+        ends, what = not is_paced(rounds.loop), join_clauses(body)
         stays = ends and len(body) == 1 and CHECKS["stays"].fullmatch(body[0].text) is not None
         if stays and (done := parse_wait(waits, self.known, self.reader)) is not None:
             self.put(*done)
             return
-        loop, (steps, state) = rounds.loop, self.nest(body, rounds.holds.elsewhere)
-        commands = [command for step in steps for each in step.walk() for command in each.commands]
-        stays = len(commands) == 1 and commands[0].item is None and commands[0].task in (None, Task.CHARGE)
-        if ends and stays and all(isinstance(step, Do) for step in steps):  # only goes to one place, or charges
-            raise RefusalError("I see no action to repeat; say 'wait there until ...'", [join_clauses(body)])
-        if not steps:
-            what = join_clauses(body)
-            raise RefusalError(f"'{what}' is nothing to do; leave it out", [what])
-        behind: Steps = ()
-        if isinstance(inner := steps[0], Repeat):  # every hour .. until noon: one loop with both
-            ends_inside = inner.loop.times is None and inner.loop.every_s is None
-            if len(steps) == 1 and inner.loop.is_endless and not ends:
-                raise RefusalError("an endless repetition cannot be repeated again; say how often", [])
-            if len(steps) == 1 and inner.loop.is_endless:
-                loop, steps = loop.model_copy(update={"every_s": inner.loop.every_s}), inner.steps
-            elif loop.is_endless and ends_inside:
-                loop, behind = inner.loop.model_copy(update={"every_s": loop.every_s}), steps[1:]
-                steps = inner.steps
-        self.put((Repeat(loop=loop, steps=steps), *behind), state)
+        steps, state = self.nest(body, rounds.holds.elsewhere)
+        require(not (ends and _only_goes(steps)), "I see no action to repeat; say 'wait there until ...'", what)
+        self.put(_repeat(rounds.loop, require(steps, f"'{what}' is nothing to do; leave it out", what)), state)
 
     def _put_together(self, where: str, body: Sequence[Clause]) -> None:
         """Adds speech in parallel to a drive."""
         reading = self.reader.read_commands(where.strip(" ,"), self.state, (verb("go"),))
         said, _ = self.nest(body, reading.state) if body else ((), None)
-        if [type(step) for step in said] != [Speak] or len(reading.commands) != 1:
-            raise RefusalError("while I go somewhere I can only say something", [join_clauses(body)])
-        self.put((Together(steps=(Do.from_command(reading.commands[0]), *said)),), reading.state)
+        speaks = [type(step) for step in said] == [Speak] and len(reading.commands) == 1
+        require(speaks, "while I go somewhere I can only say something", join_clauses(body))
+        self.put((Together(steps=(*reading.steps, *said)),), reading.state)
 
     def modify(self, clause: Clause, cue: Clause) -> None:
         """Adds an action that a trailing condition or number of rounds modifies."""
-        if cue.kind is Cue.TIMES and cue.text:
-            raise RefusalError(f"I do not understand how often: '{cue.cue} {cue.text}'", [cue.cue])
-        if not cue.text and cue.kind not in (Cue.EVERY, Cue.TIMES):
-            raise RefusalError(f"{cue.cue.lower()} what?", [cue.cue])
+        require(cue.kind is not Cue.TIMES or not cue.text, _HOW_OFTEN.format(cue.cue, cue.text), cue.cue)
+        require(cue.kind in (Cue.EVERY, Cue.TIMES) or cue.text, f"{cue.cue.lower()} what?", cue.cue)
         scope, before = self._scope(clause, cue), self.state
-        if (under_way := self._under_way(cue)) is not None:
+        if (under_way := _under_way(cue)) is not None:
             self._put_together(cue.text[under_way.end :], scope)
             return
         steps, state = self._inner(scope, before, self.statement).build()  # "if there is one", "until there are none"
@@ -395,7 +358,7 @@ class Builder:
         supposed = head.at_source(steps, cue.text)
         begun = replace(noted, goal=supposed.holds.goal)
         if cue.kind is Cue.IF:
-            begun = replace(begun, memory=replace(begun.memory, locations=supposed.holds.memory.locations))
+            begun = begun.recalling(locations=supposed.holds.memory.locations)
         both = supposed.negate(supposed.said) if cue.kind is Cue.UNLESS else supposed
         self._choose(replace(both, holds=begun), scope, (Cue.FAILED,))
 
@@ -410,14 +373,44 @@ class Builder:
         self.flush()
         scope = [*earlier, replace(clause, text=cue.before)]
         scope[0] = replace(scope[0], joint="")
-        if unclear or (earlier and not self._read_together(scope, self.state).one_errand):
-            said = f"{cue.cue} {cue.text}".strip()
-            raise RefusalError(f"it is not clear which action '{said}' belongs to; say it first", [said])
+        clear = not unclear and (not earlier or self._read_together(scope, self.state).one_errand)
+        said = f"{cue.cue} {cue.text}".strip()
+        require(clear, f"it is not clear which action '{said}' belongs to; say it first", said)
         return scope
 
 
-def _places_to_cut(text: str, follows: Sequence[Clause]) -> Iterator[int]:
-    """Yields where an action may begin: behind the text if clauses follow, and at verbs in it."""
-    if follows:
-        yield len(text)
-    yield from verb_positions(text)
+def _times(cue: Clause, every_s: float | None) -> int | None:
+    """Number of rounds, which "for an hour" behind an interval also says."""
+    if cue.kind is not Cue.EVERY or every_s is None:
+        return parse_times(cue.amount)
+    if (match := CHECKS["for_span"].fullmatch(cue.text)) is None:
+        return parse_times(cue.text)
+    times = int((parse_seconds(match["span"]) or 0.0) // every_s)
+    return require(times, f"'{cue.text}' is shorter than one round", cue.text)
+
+
+def _only_goes(steps: Steps) -> bool:
+    """Returns whether steps only go to one place, or charge."""
+    commands = [command for step in steps for command in step.commands if isinstance(step, Do)]
+    return len(steps) == len(commands) == 1 and not commands[0].item and commands[0].task in (None, Task.CHARGE)
+
+
+def _repeat(loop: Loop, steps: Steps) -> Steps:
+    """Repeats steps; "every hour" and "until noon", one inside the other, become one loop."""
+    inner = steps[0]
+    if isinstance(inner, Repeat) and len(steps) == 1 and inner.loop.is_endless:
+        require(not is_paced(loop), "an endless repetition cannot be repeated again; say how often")
+        return (Repeat(loop=loop.model_copy(update={"every_s": inner.loop.every_s}), steps=inner.steps),)
+    if isinstance(inner, Repeat) and loop.is_endless and not is_paced(inner.loop):
+        return Repeat(loop=inner.loop.model_copy(update={"every_s": loop.every_s}), steps=inner.steps), *steps[1:]
+    return (Repeat(loop=loop, steps=steps),)
+
+
+def _under_way(cue: Clause) -> Match | None:
+    """Match of "while driving to the kitchen"."""
+    return CHECKS["under_way"].match(cue.text) if cue.kind is Cue.WHILE else None
+
+
+def _places_to_cut(text: str, follows: Sequence[Clause]) -> list[int]:
+    """Positions where an action may begin: behind the text if clauses follow, and at verbs in it."""
+    return [*([len(text)] if follows else []), *verb_positions(text)]

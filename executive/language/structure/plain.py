@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
@@ -16,11 +17,12 @@ from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import HERE, Location
-from executive.language.templates import page
+from executive.language.templates import Page, page
 from executive.language.tokens import Token
 from executive.words.command import START, Command, Task
 from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
 from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.outlines import inside
 from executive.words.steps import Steps
 from skills.api import ObjectKind
@@ -37,6 +39,13 @@ def attempt(read: Callable[..., T], *inputs: Any) -> T | RefusalError:
         return read(*inputs)
     except RefusalError as refusal:
         return refusal
+
+
+def require(given: T | None, reason: str, *unknown: str, **how: Any) -> T:
+    """Returns what must be given, or must hold. Raises RefusalError when it is nothing, or does not hold."""
+    if not given:
+        raise RefusalError(reason, unknown, **how)
+    return given
 
 
 @dataclass(frozen=True)
@@ -76,6 +85,10 @@ class State:
     def noting(self, notes: Iterable[str]) -> State:
         """State with more notes."""
         return replace(self, notes=tuple(dict.fromkeys((*self.notes, *notes))))
+
+    def recalling(self, **referents: Any) -> State:
+        """State with other referents."""
+        return replace(self, memory=replace(self.memory, **referents))
 
     @property
     def elsewhere(self) -> State:
@@ -134,6 +147,11 @@ class PlainReading:
     trace: Trace
 
     @property
+    def steps(self) -> tuple[Do, ...]:
+        """Steps of the commands."""
+        return steps_of_commands(self.commands)
+
+    @property
     def one_errand(self) -> bool:
         """Returns whether all commands are about one object, or only go to a place and back."""
         objects = {str(thing) for command in self.commands for thing in (command.item, command.object) if thing}
@@ -147,29 +165,18 @@ def negate(condition: Condition) -> Condition:
     return condition.part if isinstance(condition, Not) else Not(part=condition)
 
 
-def phrase_of_name(name: str, kind: NounKind) -> Phrase:
-    """Noun phrase that stands for a name in the world."""
-    entity = "PERSON" if kind is NounKind.PERSON else ""
-    pos, tag = ("PROPN", "NNP") if entity else ("NOUN", "NN")
-    return Phrase((Token(0, 0, name, name.lower(), pos, tag, 0, "obl", entity, kind, known=True),))
-
-
-def person_named(name: str, within: Location | None = None) -> Location:
-    """Person with a name in the world, as somebody to go to."""
-    return Location(phrase_of_name(name, NounKind.PERSON), "to", within)
-
-
-def names_of_world(knowledge: Knowledge) -> dict[str, tuple[str, ...]]:
-    """Names of people and places, which templates leave open; the longest first."""
-    names = {"names": knowledge.people, "around": knowledge.place_names()}
-    return {key: tuple(sorted(knowledge.spellings(each), key=len, reverse=True)) for key, each in names.items()}
+def named(name: str, kind: NounKind = NounKind.PERSON) -> Location:
+    """Person to go to, or place, with a name in the world."""
+    person = kind is NounKind.PERSON
+    entity, pos, tag = ("PERSON", "PROPN", "NNP") if person else ("", "NOUN", "NN")
+    token = Token(0, 0, name, name.lower(), pos, tag, 0, "obl", entity, kind, known=True)
+    return Location(Phrase((token,)), "to" if person else "in")
 
 
 def with_preposition(items: Sequence[Item], preposition: str) -> tuple[Item, ...]:
     """Adds a preposition to the first noun phrase of some items; "there" needs none."""
-    at = next((n for n, item in enumerate(items) if isinstance(item, Chunk | Adverb)), None)
-    first = None if at is None else items[at]
-    if at is None or not isinstance(first, Chunk) or first.role is not None:
+    at, first = next(((n, item) for n, item in enumerate(items) if isinstance(item, Chunk | Adverb)), (0, None))
+    if not isinstance(first, Chunk) or first.role is not None:
         return tuple(items)
     role = lexicon().prepositions[tuple(preposition.split())]
     return (*items[:at], replace(first, preposition=preposition, role=role), *items[at + 1 :])
@@ -181,14 +188,23 @@ class PlainReader:
 
     pipeline: Pipeline
     knowledge: Knowledge
+    _traces: dict[tuple[Trace, str | None, str | None], Trace] = field(default_factory=dict, compare=False, repr=False)
+
+    def forms(self, name: str) -> Page:
+        """Templates of a page that leaves open the names of people and places; the longest names come first."""
+        names = {"names": self.knowledge.people, "around": self.knowledge.place_names()}
+        spelt = {key: self.knowledge.spellings(each) for key, each in names.items()}
+        return page(name, **{key: tuple(sorted(each, key=len, reverse=True)) for key, each in spelt.items()})
 
     def read(
         self, state: State, text: str = "", *, behind: str | None = None, upto: str | None = None, **inputs: Any
     ) -> PlainReading:
         """Understands a part as far as a step of the pipeline, from its text, or from `inputs` that a step gives."""
-        trace = self.pipeline.run(Trace(text, state.memory, **inputs), behind=behind, upto=upto)
-        if trace.refusal is not None:
-            raise trace.refusal
+        key = (Trace(text, state.memory, **inputs), behind, upto)
+        if key not in self._traces:  # clauses are attempted before they are built
+            self._traces[key] = self.pipeline.run(key[0], behind=behind, upto=upto)
+        if (trace := self._traces[key]).refusal is not None:
+            raise copy(trace.refusal)
         commands = trace.commands
         if commands and state.held is not None and (commands[0].task, commands[0].object) == (Task.GRASP, state.held):
             commands = commands[1:]
@@ -219,12 +235,10 @@ class PlainReader:
         read = self.read(state, affirmed, lead=(verb("check"), Whether()), upto="reading").trace
         if (left_out := next((token.word for token in read.tokens if token.word in _LEFT_OUT), None)) is not None:
             raise RefusalError(f"I cannot see whether '{said}'; say it without '{left_out}'", [said])
-        found = self.look_by_items(read.items, said, state, read.tokens)
+        found = self.looks(read.items, said, state, read.tokens)
         return found if denied is None else found.negate(said)
 
-    def look_by_items(
-        self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()
-    ) -> SpokenCondition:
+    def looks(self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()) -> SpokenCondition:
         """Condition of the looks that given items ask for; `text` is the full text."""
         reading = attempt(self.commands_from_items, [self._by_name(item, state) for item in items], state, tokens)
         unseen = RefusalError(f"I cannot see whether '{text}'; {_SEES}", [text])
@@ -232,8 +246,8 @@ class PlainReader:
             raise unseen if reading.kind is RefusalKind.NOT_UNDERSTOOD else reading
         if {command.task for command in reading.commands} != {Task.FIND}:
             raise unseen
-        if any(action.choices for action in reading.trace.actions):
-            raise RefusalError(f"I cannot tell which one '{text}' means; name one", [text])
+        one = not any(action.choices for action in reading.trace.actions)
+        require(one, f"I cannot tell which one '{text}' means; name one", text)
         there = replace(state, goal=reading.state.goal, at=reading.state.at)
         return self._condition_of_looks(reading, there, state, text)
 
@@ -248,9 +262,13 @@ class PlainReader:
     def place(self, said: str, state: State, kind: str = "place") -> str:
         """World's name for a place that words name."""
         first, *more = self.go_to(said, state).commands
-        if more or first.item or first.task or first.goal is None or self.knowledge.place(first.goal) is None:
+        if more or first.item or first.task or first.goal is None or not self.is_place(first.goal):
             raise RefusalError(f"'{said}' is no {kind}", [said])
         return first.goal
+
+    def is_place(self, name: str | None) -> bool:
+        """Returns whether a goal is a place in the world."""
+        return name is not None and self.knowledge.place(name) is not None
 
     def room(self, place: str, state: State) -> str:
         """Room that contains a place."""
@@ -268,7 +286,7 @@ class PlainReader:
         """Condition that the looks in a reading succeed; `text` is the full text."""
         looks = tuple(Look.from_command(command) for command in reading.commands if command.task is Task.FIND)
         known = self._state_if_seen(reading, state).noting(reading.trace.notes)
-        fails = replace(known, memory=replace(known.memory, where=None, locations=before.memory.locations))
+        fails = known.recalling(where=None, locations=before.memory.locations)
         return SpokenCondition(looks[0] if len(looks) == 1 else AllOf(parts=looks), text, known, fails)
 
     def last_check(self, reading: PlainReading, before: State, said: str = "") -> SpokenCondition | None:
@@ -281,8 +299,7 @@ class PlainReader:
         if taken is None:
             return None
         found = Look.from_command(replace(taken, task=Task.FIND, verb="find"))
-        memory = replace(reading.state.memory, where=None, locations=before.memory.locations)
-        fails = replace(reading.state.elsewhere, memory=memory, held=None)
+        fails = replace(reading.state.elsewhere, held=None).recalling(where=None, locations=before.memory.locations)
         return SpokenCondition(found, "", reading.state, fails, steps=len(commands))
 
     def _state_if_seen(self, reading: PlainReading, state: State) -> State:
@@ -291,16 +308,15 @@ class PlainReader:
         target, where = action.target, action.source
         if target is None:
             return replace(state, memory=memory)
-        place = where or memory.place
-        locations = memory.locations if where is None else (*memory.locations, (target, where))
-        sought = reading.commands[-1].object
-        somebody = sought is not None and self.knowledge.somebody(sought.name) is not None
-        if not (somebody or target.person):
-            memory = replace(memory, objects=(target,), where=where, place=place, locations=locations)
-            return replace(state, memory=memory)
-        known = sought is not None and self.knowledge.person(sought.name) is not None
-        person = Location(target) if known else state.memory.person
-        met = replace(memory, objects=state.memory.objects, where=state.memory.where, person=person, place=place)
+        sought, place = reading.commands[-1].object, where or memory.place
+        name = "" if sought is None else sought.name
+        if self.knowledge.somebody(name) is None and not target.person:
+            locations = memory.locations if where is None else (*memory.locations, (target, where))
+            seen = replace(memory, objects=(target,), where=where, place=place, locations=locations)
+            return replace(state, memory=seen)
+        known = self.knowledge.person(name) is not None
+        person, before = Location(target) if known else state.memory.person, state.memory
+        met = replace(memory, objects=before.objects, where=before.where, person=person, place=place)
         return replace(state, memory=met, somebody=not known)
 
     def state_after(self, commands: Sequence[Command], memory: Memory, state: State) -> State:
@@ -312,13 +328,14 @@ class PlainReader:
             elif command.item is not None and command.goal is not None:
                 held = None
             goal = command.goal if command.goal is not None else goal
-        if not commands:
-            return replace(state, memory=memory)
-        place = commands[-1].goal_at or commands[-1].goal
-        if place == START:
-            at = State.initial(self.knowledge, state.memory).at
-        elif place in self.knowledge.people and commands[-1].goal_at is None:
-            at = self.knowledge.room(self.knowledge.people[place].at)
-        else:
-            at = None if place is None or self.knowledge.place(place) is None else self.knowledge.room(place)
+        at = self._room_after(commands[-1]) if commands else state.at
         return replace(state, memory=memory, held=held, goal=goal, at=at)
+
+    def _room_after(self, command: Command) -> str | None:
+        """Room of the robot after a command; None if it is unknown."""
+        place = command.goal_at or command.goal
+        if place == START:
+            return State.initial(self.knowledge, Memory()).at
+        if place in self.knowledge.people and command.goal_at is None:
+            return self.knowledge.room(self.knowledge.people[place].at)
+        return self.knowledge.room(place) if place is not None and self.is_place(place) else None

@@ -1,14 +1,15 @@
 """Reads a sentence with conditions, loops, waits or speech, and builds the steps of its actions."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import dropwhile
 from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.amounts import parse_seconds, parse_share
-from executive.language.clauses import CHECKS, Clause, Cue, split, trailing_cue
+from executive.language.amounts import parse_seconds
+from executive.language.clauses import CHECKS, Clause, Cue, begins_as, split, trailing_cue
 from executive.language.coverage import TOLD, note_adverbs
 from executive.language.items import verb, without_objects
 from executive.language.nouns import NounKind
@@ -16,67 +17,36 @@ from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.structure.builder import Builder
-from executive.language.structure.conditions import (
-    FULL,
-    Done,
-    RequestParser,
-    parse_condition,
-    parse_opening,
-    parse_wait,
-    statement_of_check,
-)
-from executive.language.structure.plain import (
-    PlainReader,
-    State,
-    attempt,
-    names_of_world,
-    person_named,
-    phrase_of_name,
-)
+from executive.language.structure.builder import Builder, is_paced
+from executive.language.structure.conditions import REQUESTS, Done, parse_condition, statement_of_check
+from executive.language.structure.plain import PlainReader, State, attempt, named, require
 from executive.language.structure.speaking import ROOMS, SPEECH, asks, is_clause, say_in_each_room, says
 from executive.language.templates import Match, page
 from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.condition import Look
-from executive.words.knowledge import ANYBODY, Knowledge
-from executive.words.leaf_steps import (
-    Awaited,
-    Charging,
-    Check,
-    Do,
-    Dock,
-    Picture,
-    Speak,
-    Subject,
-    Wait,
-    steps_of_commands,
-)
+from executive.words.knowledge import ANYBODY
+from executive.words.leaf_steps import Awaited, Check, Do, Speak, Wait, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Repeat, Together, Try
 from skills.api import ObjectKind
 from skills.inputs.errors import listing
 from skills.inputs.schema import first_error
 
-_CHARGE: Final = page("waiting")["charge"]
-_PICTURE: Final = page("pictures")["picture"]
 _PEOPLE: Final = page("people")
 MOST_NESTED: Final = 2
-
 MOST_CLAUSES: Final = 24
 
 
 def act(row: Builder, clause: Clause) -> None:
     """Adds the steps of a clause with an action, and of the clauses that belong to it; plain words stay pending."""
     text, given = clause.text, row.given
-    stated = bool(row.plain) and all(
-        CHECKS["told_first"].match(one.text) or CHECKS["pronoun"].match(one.text) for one in row.plain
-    )
+    stated = bool(row.plain) and all(begins_as(one.text, "told_first", "pronoun") for one in row.plain)
     if clause.begins and not stated:  # unless it goes on with "there is a hammer on the bench. bring it"
         row.flush()
         row.begun = len(row.steps)
     if given is not None and row.at == 1 and CHECKS["no_verb"].fullmatch(text):
         clause = replace(clause, lead=without_objects(row.reader.read_items(given)))
-    if CHECKS["brings"].match(text) is not None or CHECKS["giving"].match(text) is not None:
+    if begins_as(text, "brings", "giving"):
         row.given = text if (behind := trailing_cue(text)) is None else behind.before
     if not any(does(row, clause) for does in _ACTS):
         row.plain.append(clause)
@@ -92,121 +62,75 @@ def _skips(row: Builder, clause: Clause) -> bool:
     return idle or looked
 
 
-def _parse_charging(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
-    """Parses charging up to a level; None if the text states no level."""
-    if (match := _CHARGE.fullmatch(text)) is None:
-        return None
-    level = FULL if match["full"] else parse_share(match["level"])
-    if level is None:
-        raise RefusalError(f"'{match['level']}' is no charge; say it in percent", [match["level"]])
-    return (Dock(charging=Charging(level=level)),), known().elsewhere
-
-
-def _parse_pictures(text: str, known: Callable[[], State], reader: PlainReader) -> Done | None:
-    """Parses a request for pictures; None for other texts. Raises RefusalError for an unknown name."""
-    if (match := _PICTURE.fullmatch(text)) is None or trailing_cue(text) is not None:
-        return None
-    state, steps = known(), list[Step]()
-    stands = reader.go_to(match["at"], state).commands if match["at"] else ()
-    if len(stands) > 1:
-        raise RefusalError(f"I take a picture from one place at a time, not from {match['at']}", [match["at"]])
-    at = stands[0].goal if stands else None
-    for what in _of_each(match["of"], reader.knowledge) or re.split(r",? and |,? then |, ", match["of"]):
-        of = reader.knowledge.place(re.sub(r"^(?:the|a|an|my|our|your) ", "", what, flags=re.IGNORECASE))
-        if of is None:
-            finds, *more = reader.read_commands(what, state, (verb("find"),)).commands
-            usual = finds.object and reader.knowledge.default_place(Task.FIND, finds.object.name)
-            if more or finds.object is None or finds.object.relations or finds.object_count != 1:
-                raise RefusalError(f"I cannot tell in a picture which one is '{what}'", [what])
-            if finds.goal != usual:
-                raise RefusalError(f"I take a picture of the first {finds.object} that I see, not of '{what}'", [what])
-            of = str(finds.object)
-        steps.append(Picture(subject=Subject(of=of, at=at, camera=match["camera"] or None)))
-    return tuple(steps), state.elsewhere
-
-
-def _of_each(text: str, knowledge: Knowledge) -> list[str]:
-    """Rooms, or surfaces of a kind, that "every table except the desk" means; none for other texts."""
-    every, *others = re.split(r",? (?:except(?: for)?|but not|other than|apart from) ", text)
-    kind = re.fullmatch(r"(?:every|each|all(?: of)?(?: the)?) (?:single )?(\w+?)s?", every, re.IGNORECASE)
-    if kind is None:
-        return []
-    named = knowledge.rooms if kind[1].lower() == "room" else knowledge.surfaces
-    of_kind = [name for name in named if kind[1].lower() in ("room", "surface", name.split()[-1].lower())]
-    said = re.split(r",? (?:and|or) |, ", others[0]) if others else []
-    left_out = [knowledge.place(re.sub(r"^(?:the|my|our) ", "", one, flags=re.IGNORECASE)) for one in said]
-    if len(others) > 1 or None in left_out:
-        raise RefusalError(f"I do not know what to leave out of '{text}'; name places", [text])
-    return [name for name in of_kind if name not in left_out]
-
-
-_REQUESTS: Final[tuple[RequestParser, ...]] = (parse_opening, _parse_pictures, _parse_charging, parse_wait)
-
-
 def _requests(row: Builder, clause: Clause) -> bool:
     """Adds the steps of a request for a door, pictures, charging or a wait."""
-    done = next(filter(None, (parse(clause.text, row.known, row.reader) for parse in _REQUESTS)), None)
+    done = next(filter(None, (parse(clause.text, row.known, row.reader) for parse in REQUESTS)), None)
     if done is not None:
         row.put(*done)
     return done is not None
 
 
-def _brings_to_everyone(row: Builder, clause: Clause) -> bool:
-    """Goes on with a delivery to each person of a group.
-
-    Raises RefusalError when no room is named, no known person is there, or there is only one such object.
-    """
+def _brings_to_all(row: Builder, clause: Clause) -> bool:
+    """Goes on with a delivery to each person of a group. Raises RefusalError when there is only one such object."""
     text, group = clause.text, ROOMS["everyone"].search(clause.text)
     if group is None or ROOMS["gives"].match(text) is None:
         return False
-    state, knowledge = row.known(), row.reader.knowledge
+    state = row.known()
     actions = row.reader.read(state, text, upto="understanding", elliptic=True).trace.actions
     goals = ((one.goal, one.goal.phrase.spoken) for one in actions if one.goal and one.goal.phrase)
-    to, who = next(((goal, said) for goal, said in goals if ROOMS["everyone"].fullmatch(said)), (None, ""))
-    if to is None:
+    found = next(((goal, said) for goal, said in goals if ROOMS["everyone"].fullmatch(said)), None)
+    if found is None:
         return False
-    if (place := to.within) is None or place.phrase is None:
-        raise RefusalError(f"I bring objects to one person at a time, not to {who}; name one, or a room", [who])
-    room = row.reader.room(place.phrase.spoken, state)
-    people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
-    if not people:
-        raise RefusalError(f"I know nobody in the {room} to bring anything to: {who}", [who])
-    if any(not phrase.indefinite for action in actions for phrase in action.objects):
-        raise RefusalError(f"there is only one of it, and I cannot bring it to {who}; name one person", [who])
-    each = [f"{text[: group.start]}{name}{text[group.end :]}" for name in people]
-    row.clauses[row.at : row.at] = [Clause(". ", said) for said in each]
+    people, (_, who) = _people_at(*found, state, row.reader), found
+    several = all(phrase.indefinite for action in actions for phrase in action.objects)
+    require(several, f"there is only one of it, and I cannot bring it to {who}; name one person", who)
+    row.insert(Clause(". ", f"{text[: group.start]}{name}{text[group.end :]}") for name in people)
     row.special = True
     return True
 
 
+def _people_at(group: Location, who: str, state: State, reader: PlainReader) -> list[str]:
+    """People of a group in a room. Raises RefusalError when no room is named, or no known person is there."""
+    no_room = f"I bring objects to one person at a time, not to {who}; name one, or a room"
+    place = require(group.within.phrase if group.within else None, no_room, who)
+    room, knowledge = reader.room(place.spoken, state), reader.knowledge
+    people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
+    return require(people, f"I know nobody in the {room} to bring anything to: {who}", who)
+
+
 def _meets_people(row: Builder, clause: Clause) -> bool:
-    """Adds a request about people; finding somebody counts only before another request about the same person."""
-    knowledge, found, then = row.reader.knowledge, trailing_cue(clause.text), row.ahead()
-    timed = _PEOPLE["timed"].fullmatch(clause.text)
+    """Adds a request about people, perhaps for some time."""
+    found, timed = trailing_cue(clause.text), _PEOPLE["timed"].fullmatch(clause.text)
     seconds = None if timed is None else parse_seconds(timed["span"])
     if found is not None and found.kind in (Cue.WHILE, Cue.UNTIL):
         found = None  # how long the robot follows
     text = clause.text if timed is None or seconds is None else timed["clause"]
-    request = _parse_people(text if found is None else found.before, knowledge)
-    if request is None:
-        return False
-    refers = _PEOPLE["refers"].search(then) is not None
-    if request["form"] == "find" and not (refers or (row.special and _refers_to_person(request))):
-        return False
-    if request["form"] == "stated" and not (refers and _parse_people(then, knowledge)):
+    request = _parse_people(text if found is None else found.before, row.reader)
+    if request is None or not _asks_alone(request, row):
         return False
     if found is not None:
         row.modify(clause, found)
-    else:
-        _flush_reasons(row)
-        steps, state = _steps_on_people(request, row.state, row.reader)
-        if seconds is not None and request["task"] == Task.FOLLOW.value:
-            wait = Wait(awaited=Awaited(seconds=seconds))
-            steps = (*steps[:-1], Together(steps=(steps[-1], wait), done_when="any"))
-        elif seconds is not None:
-            raise RefusalError(f"I do not do '{clause.text}' for a time", [clause.text])
-        row.put(steps, state)
+        return True
+    _flush_reasons(row)
+    steps, state = _steps_on_people(request, row.state, row.reader)
+    if seconds is not None:
+        require(request["task"] == Task.FOLLOW.value, f"I do not do '{clause.text}' for a time", clause.text)
+        wait = Wait(awaited=Awaited(seconds=seconds))
+        steps = (*steps[:-1], Together(steps=(steps[-1], wait), done_when="any"))
+    row.put(steps, state)
     return True
+
+
+def _asks_alone(request: Match, row: Builder) -> bool:
+    """Returns whether a form is a request; finding somebody is one only before another about the same person."""
+    refers = _PEOPLE["refers"].search(row.ahead()) is not None
+    match request["form"]:
+        case "find":
+            return refers or (row.special and _refers_to_person(request))
+        case "stated":
+            return refers and _parse_people(row.ahead(), row.reader) is not None
+        case _:
+            return True
 
 
 def _flush_reasons(row: Builder) -> None:
@@ -219,25 +143,25 @@ def _flush_reasons(row: Builder) -> None:
         refusal.plain = False
         raise refusal
     row.plain, row.state = [], row.state.noting([TOLD.format(repr(reasons))])
-    named = [name for name in row.reader.knowledge.people if re.search(rf"\b{re.escape(name)}\b", reasons)]
-    if len(named) == 1:
-        row.state = replace(row.state, memory=replace(row.state.memory, person=person_named(named[0])))
+    people = [name for name in row.reader.knowledge.people if re.search(rf"\b{re.escape(name)}\b", reasons)]
+    if len(people) == 1:
+        row.state = row.state.recalling(person=named(people[0]))
 
 
-def _parse_people(text: str, knowledge: Knowledge) -> Match | None:
+def _parse_people(text: str, reader: PlainReader) -> Match | None:
     """Parses a clause about following, guiding, meeting or greeting people; None for other clauses.
 
     The match has the `task`, the person `who` (empty: the speaker), and the places `at` and `to`; its `form` is "find"
     or "stated" if it asks for nothing alone. Raises RefusalError when it is not clear whom the clause means.
     """
-    forms = page("people", **names_of_world(knowledge))
+    forms, knowledge = reader.forms("people"), reader.knowledge
     text = text if (around := forms["around"].fullmatch(text)) is None else around["clause"]
     match = forms["request"].fullmatch(text)
     if match is not None or forms["certain"].match(text) is None or forms["greets_known"].match(text) is not None:
         return match
     known = f"; known are {listing(knowledge.people)}" if knowledge.people else ""
     hint = f"name one person, or say 'the person in the kitchen'{known}"
-    if (cue := trailing_cue(text)) is not None and _parse_people(cue.before, knowledge) is not None:
+    if (cue := trailing_cue(text)) is not None and _parse_people(cue.before, reader) is not None:
         what, hint = f"I cannot do '{cue.before}' {cue.cue} {cue.text}", "I do it up to a place, or until you say stop"
     elif (unseen := forms["unseen"].search(text)) is not None:
         what = f"I cannot tell people apart by {unseen['by']}, such as '{unseen.text}'"
@@ -253,67 +177,72 @@ def _refers_to_person(match: Match) -> bool:
     return bool(match["him"] or match["that_person"])
 
 
-def _steps_on_people(match: Match, state: State, reader: PlainReader) -> Done:
+def _steps_on_people(request: Match, state: State, reader: PlainReader) -> Done:
     """Builds the steps for a request, with the state after them. Raises RefusalError."""
-    person, knowledge, refers = _person(match, state, reader), reader.knowledge, _refers_to_person(match)
-    said, task, to, where = match.text, Task(match["task"]) if match["task"] else None, match["to"], match["at"]
-    if not where and person == ANYBODY and refers and state.memory.person is None and state.memory.place:
-        where = "there"
-    at, goal = (_place(text, state, reader) if text else None for text in (where, to))
-    if to.lower() == "home" and goal is None:
-        if person not in knowledge.people:
-            raise RefusalError(f"{said}: which room is home?", ["home"], question=True)
-        goal = knowledge.room(knowledge.people[person].at)
-        state = state.noting([f"I take {person}'s home to be the {goal}"])
-    here = state.goal if state.goal is not None and knowledge.place(state.goal) is not None else None
-    verb = said.split()[0].lower()
-    if (at or here) is None and (task is Task.GREET or (task is None and person == ANYBODY)):
-        raise RefusalError(f"{said}: in which room?", question=True)
-    if task is Task.GUIDE and goal is None:
-        raise RefusalError(f"{said}: where to?", question=True)
-    if person == SPEAKER and goal == START:
-        raise RefusalError(f"{said}: you are here; name another place", [said])
-    if task is Task.GREET:
-        count = 0 if person == ANYBODY and not match["one"] else 1
-        commands = [Command(goal=at or here, task=task, object=ObjectKind(ANYBODY), object_count=count, verb=verb)]
-    elif task is None:
-        commands = _go_to(person, at or here, verb, state)
-    else:
-        first = [] if at is None else _go_to(person, at, verb, state)
-        commands = [*first, Command(goal=goal, task=task, object=ObjectKind(person), verb=verb)]
-    memory = replace(state.memory, person=person_named(person))
-    last = commands[-1] if commands else Command()
-    if last.goal is not None and knowledge.place(last.goal) is not None:
-        memory = replace(memory, place=Location(phrase_of_name(last.goal, NounKind.PLACE), "in"))
+    person, said, task = _person(request, state, reader), request.text, request["task"]
+    spoken_of = person == ANYBODY and _refers_to_person(request) and state.memory.person is None
+    at = _place(request["at"] or ("there" if spoken_of and state.memory.place else ""), state, reader)
+    goal, state = _goal(request, person, state, reader)
+    if task in ("greet", "") and at is None and reader.is_place(state.goal):
+        at = state.goal
+    greets_there = task == "greet" or (not task and person == ANYBODY)
+    require(at or not greets_there, f"{said}: in which room?", question=True)
+    require(goal or task != "guide", f"{said}: where to?", question=True)
+    require(person != SPEAKER or goal != START, f"{said}: you are here; name another place", said)
+    commands = _commands_on(request, person, at, goal, state)
+    return steps_of_commands(commands), _state_behind(commands, person, state, reader)
+
+
+def _commands_on(request: Match, person: str, at: str | None, goal: str | None, state: State) -> list[Command]:
+    """Commands of a request about a person; for anybody the robot only goes to the place, unless it is there."""
+    verb, anybody = request.text.split()[0].lower(), person == ANYBODY
+    meets = Command(goal=at, verb=verb) if anybody else Command(goal=person, goal_at=at, verb=verb)
+    first = [] if anybody and at == state.goal else [meets]
+    match request["task"]:
+        case "":
+            return first
+        case "greet":
+            count = 0 if anybody and not request["one"] else 1
+            return [Command(None, at, None, Task.GREET, ObjectKind(ANYBODY), object_count=count, verb=verb)]
+        case task:
+            does = Command(goal=goal, task=Task(task), object=ObjectKind(person), verb=verb)
+            return [does] if at is None else [*first, does]
+
+
+def _goal(request: Match, person: str, state: State, reader: PlainReader) -> tuple[str | None, State]:
+    """Goal of a request, and the state with a note on whose home it is. Raises RefusalError for an unknown home."""
+    goal, knowledge = _place(request["to"], state, reader), reader.knowledge
+    if request["to"].lower() != "home" or goal is not None:
+        return goal, state
+    facts = require(knowledge.people.get(person), f"{request.text}: which room is home?", "home", question=True)
+    home = knowledge.room(facts.at)
+    return home, state.noting([f"I take {person}'s home to be the {home}"])
+
+
+def _state_behind(commands: Sequence[Command], person: str, state: State, reader: PlainReader) -> State:
+    """State after a request about a person, whom the robot may have followed anywhere."""
+    last, memory = commands[-1] if commands else Command(), replace(state.memory, person=named(person))
+    if last.goal is not None and reader.is_place(last.goal):
+        memory = replace(memory, place=named(last.goal, NounKind.PLACE))
     after = reader.state_after(commands, memory, state)
-    gone = last.task is Task.FOLLOW and last.goal is None
-    return steps_of_commands(commands), after.elsewhere if gone else after
-
-
-def _go_to(person: str, at: str | None, verb: str, state: State) -> list[Command]:
-    """Goes to a known person at a place; for anybody only to the place, unless the robot is there already."""
-    if person != ANYBODY:
-        return [Command(goal=person, goal_at=at, verb=verb)]
-    return [] if at == state.goal else [Command(goal=at, verb=verb)]
+    return after.elsewhere if last.task is Task.FOLLOW and last.goal is None else after
 
 
 def _person(match: Match, state: State, reader: PlainReader) -> str:
     """Person that a request is about: known, the speaker or anybody. Raises RefusalError for an unclear pronoun."""
-    before = state.memory.person
-    if not match["who"]:
-        if match["at"]:
-            raise RefusalError(f"you are not there: '{match.text}'; say only where to", [match["at"]])
+    before, who, said = state.memory.person, match["who"], match.text
+    if not who:
+        require(not match["at"], f"you are not there: '{said}'; say only where to", match["at"])
         return SPEAKER
     if _refers_to_person(match) and before is not None and match["task"] != "greet":
         return reader.knowledge.person(before.name) or before.name
-    if match["him"] and not state.somebody:
-        raise RefusalError(f"who is meant by '{match['who']}' in '{match.text}'?", [match["who"]], question=True)
-    return reader.knowledge.person(match["who"]) or ANYBODY
+    require(not match["him"] or state.somebody, f"who is meant by '{who}' in '{said}'?", who, question=True)
+    return reader.knowledge.person(who) or ANYBODY
 
 
 def _place(text: str, state: State, reader: PlainReader) -> str | None:
-    """World's name for a place in words; None for "home" where no place is called so. Raises RefusalError."""
-    if text.lower() == "home":
+    """World's name for a place in words; None without words, and for "home" where no place is called so."""
+    if text.lower() in ("", "home"):
         return reader.knowledge.place(text)
     return START if text.lower() in ("here", "back") else reader.place(text, state)
 
@@ -340,10 +269,10 @@ def _checks(row: Builder, clause: Clause) -> bool:
 def _is_modified(row: Builder, clause: Clause) -> bool:
     """Adds an action that a cue behind it makes conditional or repeats."""
     found = trailing_cue(clause.text)
-    modified = found is not None and (found.kind is Cue.EVERY or not ROOMS["every_room"].search(clause.text))
-    if found is not None and modified:
-        row.modify(clause, found)
-    return modified
+    if found is None or (found.kind is not Cue.EVERY and ROOMS["every_room"].search(clause.text)):
+        return False
+    row.modify(clause, found)
+    return True
 
 
 def _searches_rooms(row: Builder, clause: Clause) -> bool:
@@ -360,8 +289,9 @@ def _searches_rooms(row: Builder, clause: Clause) -> bool:
         return False
     what = looks["what"]
     reading = row.reader.read_commands(what, row.known(), (verb("find"),))
-    if any(one.task is not Task.FIND for one in reading.commands) or re.search(r"\b(?:in|on|at|near)\b", what):
-        raise RefusalError(f"I cannot look for {listing([what])} in every room", [what])
+    looks_only = all(one.task is Task.FIND for one in reading.commands)
+    nowhere = re.search(r"\b(?:in|on|at|near)\b", what) is None
+    require(looks_only and nowhere, f"I cannot look for {listing([what])} in every room", what)
     commands = tuple(replace(command, goal=None, goal_at=None) for command in reading.commands)
     row.flush()
     row.add(replace(reading, commands=commands, state=reading.state.elsewhere))
@@ -369,17 +299,7 @@ def _searches_rooms(row: Builder, clause: Clause) -> bool:
     return True
 
 
-_ACTS: Final = (
-    _skips,
-    _meets_people,
-    _requests,
-    asks,
-    says,
-    _checks,
-    _is_modified,
-    _brings_to_everyone,
-    _searches_rooms,
-)
+_ACTS: Final = (_skips, _meets_people, _requests, asks, says, _checks, _is_modified, _brings_to_all, _searches_rooms)
 """Actions in the order of trying."""
 
 
@@ -405,34 +325,37 @@ def read_structure(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pip
 
 def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, memory: Memory) -> Trace:
     """Reads the structured sentence. Raises RefusalError with the words if any part is uncertain."""
-    if len(clauses) > MOST_CLAUSES:
-        raise RefusalError(f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most")
+    too_many = f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most"
+    require(len(clauses) <= MOST_CLAUSES, too_many)
     assert pipeline.knowledge is not None
     reader, begin = PlainReader(pipeline, pipeline.knowledge), State.initial(pipeline.knowledge, memory)
     builder = Builder(reader, act, [*clauses], begin)
     steps, state = builder.build()
     if all(isinstance(step, Do) for step in steps) and not builder.special:
         return plain
-    if max(map(_depth, steps), default=0) > MOST_NESTED:
-        raise RefusalError("three conditions or repetitions within each other are too many; say it in two sentences")
-    parts = tuple(" | ".join(filter(None, (each.joint.strip(" ,;."), each.cue, each.text))) for each in clauses)
     walked = [each for step in steps for each in step.walk()]
-    for each in (each for each in walked if isinstance(each, Repeat)):
-        paced = each.loop.times is not None or each.loop.every_s is not None
-        if not paced and all(isinstance(step, Speak) for step in each.steps):
-            raise RefusalError("how often am I to say it? Say 'every minute', for example", question=True)
+    deep = "three conditions or repetitions within each other are too many; say it in two sentences"
+    require(max(map(_depth, steps), default=0) <= MOST_NESTED, deep)
+    how_often = "how often am I to say it? Say 'every minute', for example"
+    require(not any(map(_says_without_end, walked)), how_often, question=True)
+    parts = tuple(" | ".join(filter(None, (each.joint.strip(" ,;."), each.cue, each.text))) for each in clauses)
     commands = tuple(command for step in walked for command in step.commands)
-    moved = next((n for n, one in enumerate(commands) if str(one.object) == SPEAKER), len(commands))
-    back = any(one.item is not None and one.goal == START for one in commands[moved:])
+    behind = dropwhile(lambda one: str(one.object) != SPEAKER, commands)
+    back = [_BACK] if any(one.item is not None and one.goal == START for one in behind) else []
     spoken = [step.speak for step in walked if isinstance(step, Speak)]
     adverbs = note_adverbs(plain.text, [*spoken, *re.findall("'([^']+)'", " ".join(state.notes))])
-    notes = state.noting([*filter(None, [adverbs]), *([_BACK] if back else [])]).notes
+    notes = state.noting([*filter(None, [adverbs]), *back]).notes
     found = Trace(plain.text, state.memory, opened=plain.opened, tokens=plain.tokens, commands=commands)
     return replace(found, notes=notes, parts=parts, steps=steps)
 
 
 _BACK: Final = "I bring it to the place where you have spoken to me, not to where you are then"
 """Note when the robot brings an object to the speaker after going elsewhere with the speaker."""
+
+
+def _says_without_end(step: Step) -> bool:
+    """Returns whether a step only speaks again and again, without a pause or number."""
+    return isinstance(step, Repeat) and not is_paced(step.loop) and all(isinstance(one, Speak) for one in step.steps)
 
 
 def _depth(step: Step) -> int:

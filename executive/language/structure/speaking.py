@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from executive.language.clauses import CHECKS, CLAUSES, Clause, Cue, end_of_scope, trailing_cue
+from executive.language.clauses import CHECKS, CLAUSES, Clause, Cue, begins_as, end_of_scope, trailing_cue
 from executive.language.items import Chunk, predicates
 from executive.language.lexicon import lexicon, read_table
 from executive.language.limits import refuse_harm
@@ -13,7 +13,7 @@ from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.structure.builder import Builder
 from executive.language.structure.conditions import parse_condition
-from executive.language.structure.plain import PlainReader, attempt, names_of_world, person_named
+from executive.language.structure.plain import PlainReader, attempt, named, require
 from executive.language.templates import Match, page, words_of
 from executive.words.command import PEOPLE_TASKS
 from executive.words.knowledge import Knowledge
@@ -32,10 +32,8 @@ def says(row: Builder, clause: Clause) -> bool:
     if (match := SPEECH["tells_when"].fullmatch(text)) is not None:
         row.flush()
         statement = parse_condition(match["what"], row.state, row.reader).statement
-        if statement is None:
-            raise RefusalError(f"what am I to say in '{text}'?", [text])
-        told = Clause("", f"tell {match['who']} that {statement}")
-        row.clauses[row.at : row.at] = [Clause("", match["what"], Cue.SOON, "when"), told]
+        told = require(statement, f"what am I to say in '{text}'?", text)
+        row.insert([Clause("", match["what"], Cue.SOON, "when"), Clause("", f"tell {match['who']} that {told}")])
         return True
     if not SPEECH["speaks"].match(text) or SPEECH["asks_back"].match(text):
         return False
@@ -43,34 +41,42 @@ def says(row: Builder, clause: Clause) -> bool:
         left_out = [row.reader.room(each, row.state) for each in re.split(r",? and |, ", everywhere["except"]) if each]
         say_in_each_room(row, everywhere["said"], left_out)
         return True
-    found = trailing_cue(text)
-    if found is not None and found.kind is not Cue.IF and re.search(r" that ", found.before):
-        cue = f"{found.cue} {found.text}".strip()
-        raise RefusalError(f"it is not clear whether '{cue}' is a part of what I am to say; say it first", [cue])
-    counts = found is not None and found.kind in (Cue.TIMES, Cue.EVERY) and found.text
-    if found is not None and (not counts or re.match(r"for|until|every", found.text)):
-        row.modify(clause, found)  # unless it is a part of what is said
+    if (found := _cue_behind_speech(text)) is not None:
+        row.modify(clause, found)
         return True
-    if (said := _parse_speech(text, row.reader)) is None:
-        return False
-    places = re.split(r",? and (?:in |at )?|, ", said["where"])
+    if (said := _parse_speech(text, row.reader)) is not None:
+        _speaks(row, said)
+    return said is not None
+
+
+def _cue_behind_speech(text: str) -> Clause | None:
+    """Cue that is no part of what is said. Raises RefusalError when that is not clear."""
+    if (found := trailing_cue(text)) is None:
+        return None
+    clear, cue = found.kind is Cue.IF or " that " not in found.before, f"{found.cue} {found.text}".strip()
+    require(clear, f"it is not clear whether '{cue}' is a part of what I am to say; say it first", cue)
+    said = found.kind in (Cue.TIMES, Cue.EVERY) and found.text and not re.match(r"for|until|every", found.text)
+    return None if said else found
+
+
+def _speaks(row: Builder, said: Match) -> None:
+    """Adds speech to a listener, or goes on with speech in each of several places."""
+    places, text = re.split(r",? and (?:in |at )?|, ", said["where"]), said.text
     if len(places) > 1:
-        row.clauses[row.at : row.at] = [Clause("", f"announce in {place} that {said['text']}") for place in places]
-        return True
-    if said["text"] and SPEECH["instructs"].fullmatch(said["text"]) and not re.match(r"\w+ that ", text):
-        raise RefusalError(f"I cannot tell the words to say from where or when in '{text}'; begin 'say that'", [text])
-    if not (words := said["text"] or row.statement):
-        raise RefusalError(f"what am I to say in '{text}'?", [text])
+        row.insert(Clause("", f"announce in {place} that {said['text']}") for place in places)
+        return
+    clear = not SPEECH["instructs"].fullmatch(said["text"]) or re.match(r"\w+ that ", text)
+    require(clear, f"I cannot tell the words to say from where or when in '{text}'; begin 'say that'", text)
+    words = require(said["text"] or row.statement, f"what am I to say in '{text}'?", text)
     row.flush()
     _goes_to_listener(row, said)
     row.put((Speak(speak=_escape_braces(words)),), row.state)
-    return True
 
 
 def say_in_each_room(row: Builder, said: str, left_out: Sequence[str] = ()) -> None:
     """Goes on with speech in every room but some."""
     goes = (f"go to the {room}" for room in row.reader.knowledge.rooms if room not in left_out)
-    row.clauses[row.at : row.at] = [Clause("", text) for go in goes for text in (go, said)]
+    row.insert(Clause("", text) for go in goes for text in (go, said))
 
 
 def _goes_to_listener(row: Builder, to: Match) -> None:
@@ -94,9 +100,9 @@ def _parse_speech(text: str, reader: PlainReader) -> Match | None:
     `pronoun`, a `name` or everybody (`crowd`), and `where` they are; without these the robot speaks where it is. Raises
     RefusalError when the robot cannot say it in the speaker's place, or does not know the listener.
     """
-    forms = page("speech", **names_of_world(reader.knowledge))
-    if forms["say_within"].fullmatch(text) is not None:
-        raise RefusalError(f"I do not understand to whom to say '{text}'; name one person at the end", [text])
+    forms = reader.forms("speech")
+    clear = forms["say_within"].fullmatch(text) is None
+    require(clear, f"I do not understand to whom to say '{text}'; name one person at the end", text)
     for intent in ("says_to", "greets_there", "says", "formula", "tells", "relays"):
         if (match := forms[intent].fullmatch(text)) is not None:
             if match["polite"]:
@@ -109,8 +115,7 @@ def _parse_speech(text: str, reader: PlainReader) -> Match | None:
 def _refuse_harm(told: str, reader: PlainReader) -> None:
     """Raises RefusalError for a request to somebody that could hurt somebody or break something."""
     words, table = {*words_of(told).words}, read_table("harm.yaml")
-    if words & {*table["swallows"]} and words & {*table["poisons"]}:
-        raise RefusalError(f"{told!r} could hurt somebody", [told])
+    require(not all(words & {*table[kind]} for kind in ("swallows", "poisons")), f"{told!r} could hurt somebody", told)
     items = attempt(reader.read_items, told)
     if not isinstance(items, RefusalError):
         refuse_harm(predicates(items))
@@ -127,11 +132,8 @@ def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
 
 
 def _words(match: Match, intent: str, parser: DependencyParser) -> str:
-    """Words to say; none of "let Robin know it".
-
-    Raises RefusalError when they only describe a text, or would have another meaning when the robot says them.
-    """
-    said, text = f"{match['polite']}{match['text']}", match.text
+    """Words to say; none of "let Robin know it". Raises RefusalError for words that mean something else when said."""
+    said = f"{match['polite']}{match['text']}"
     if intent == "formula" or not said:
         return said
     clause = intent != "tells" and is_clause(said, parser)
@@ -140,23 +142,26 @@ def _words(match: Match, intent: str, parser: DependencyParser) -> str:
         whom = SPEECH["whom"].fullmatch(said)
         if whom is not None and (not clause or whom["human"]):
             raise RefusalError(f"I do not know to whom to say it: '{whom['whom']}'", [whom["whom"]])
-        if SPEECH["named"].match(said) and not clause:
-            raise RefusalError(f"what are the words of '{said}'?", [said])
-    elif intent == "relays":
-        if SPEECH["another"].match(said) is not None:
-            raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
-        when = SPEECH["adverbial"].fullmatch(said)
-        if when is not None and is_clause(when["told"], parser):
-            raise RefusalError(f"I tell it as soon as I am there, not {when['when']!r}", [when["when"]])
-        if SPEECH["greetings"].fullmatch(said) is None and (match["speaker"] or nothing or not clause):
-            raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
-    inner = None if intent in ("says_to", "says") else CLAUSES["deictic"].search(said) or SPEECH["inner"].search(said)
-    if inner is not None:
-        meant = "would mean somebody or something else"
-        raise RefusalError(f"I cannot say '{said}' for you: '{inner.text}' {meant}", [said])
-    if nothing:
-        raise RefusalError(f"what am I to say? '{said}' says nothing", [said])
+        require(clause or not SPEECH["named"].match(said), f"what are the words of '{said}'?", said)
+    else:
+        if intent == "relays":
+            _refuse_unclear(match, said, clause and not nothing, parser)
+        if (inner := CLAUSES["deictic"].search(said) or SPEECH["inner"].search(said)) is not None:
+            other = f"'{inner.text}' would mean somebody or something else"
+            raise RefusalError(f"I cannot say '{said}' for you: {other}", [said])
+    require(not nothing, f"what am I to say? '{said}' says nothing", said)
     return said.strip(" ,.'\"")
+
+
+def _refuse_unclear(match: Match, said: str, is_statement: bool, parser: DependencyParser) -> None:
+    """Raises RefusalError for words to tell that are no statement or greeting, or also say when or whom to tell."""
+    text = match.text
+    require(not SPEECH["another"].match(said), f"I tell it to one person at a time, not '{text}'", text)
+    when = SPEECH["adverbial"].fullmatch(said)
+    if when is not None and is_clause(when["told"], parser):
+        raise RefusalError(f"I tell it as soon as I am there, not {when['when']!r}", [when["when"]])
+    words = SPEECH["greetings"].fullmatch(said) or (is_statement and not match["speaker"])
+    require(words, f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", text)
 
 
 def is_clause(text: str, parser: DependencyParser) -> bool:
@@ -187,7 +192,7 @@ def asks(row: Builder, clause: Clause) -> bool:
     person, text = row.state.memory.person, clause.text
     if person is not None:
         text = re.sub(r"^(ask) (?:him|her)\b", rf"\1 {person.name}", text, flags=re.IGNORECASE)
-    if (asked := _parse_question(text, row.reader.knowledge)) is None:
+    if (asked := _parse_question(text, row.reader)) is None:
         return False
     row.flush()
     _goes_to_listener(row, asked.of)
@@ -199,8 +204,7 @@ def asks(row: Builder, clause: Clause) -> bool:
 def _agreed(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
     """Steps that follow the answers yes and no."""
     found: dict[str, Steps] = {"yes": (), "no": ()}
-    while row.at < len(row.clauses):
-        clause = row.clauses[row.at]
+    while (clause := row.following) is not None:
         match = CHECKS["answers"].match(clause.text) if clause.kind is Cue.IF else None
         answer, rest = _ANSWERS.get(clause.kind), clause.text
         if match is not None:
@@ -210,41 +214,34 @@ def _agreed(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
         if answer is None or found[answer]:
             break
         row.at += 1
-        body = row.take(rest, end_of_scope(row.clauses, row.at, branch=True))
-        if not body:
-            raise clause.missing_action(clause.text)
+        body = row.body(clause, rest, end_of_scope(row.clauses, row.at, branch=True), clause.text)
         found[answer] = _steps_if_chosen(row, body, asked, asked.choices[0])
-    if not found["yes"] and CHECKS["brings"].match(row.ahead()):
-        raise RefusalError("say 'if yes' before the action for that answer", [row.ahead()])
+    clear, ahead = found["yes"] or not begins_as(row.ahead(), "brings"), row.ahead()
+    require(clear, "say 'if yes' before the action for that answer", ahead)
     return found
 
 
 def _chosen(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
     """Steps that follow each of the choices: the robot brings the chosen object if the sentence says so."""
-    body = row.take("", row.at + 1) if CHECKS["brings"].match(row.ahead()) else []
-    article = r"^(?:a|an|some|the|any|another) "
-    return {
-        re.sub(article, "", choice, flags=re.IGNORECASE): _steps_if_chosen(row, body, asked, choice) if body else ()
-        for choice in asked.choices
-    }
+    body = row.take("", row.at + 1) if begins_as(row.ahead(), "brings") else []
+    steps = {choice: _steps_if_chosen(row, body, asked, choice) if body else () for choice in asked.choices}
+    article = re.compile(r"^(?:a|an|some|the|any|another) ", re.IGNORECASE)
+    return {article.sub("", choice): each for choice, each in steps.items()}
 
 
 def _steps_if_chosen(row: Builder, body: Sequence[Clause], asked: QuestionRequest, choice: str) -> Steps:
     """Steps after an answer: "it" refers to the chosen object, and the asked person receives it."""
     objects = tuple(item.phrase for item in row.reader.read_items(choice) if isinstance(item, Chunk))
-    person = person_named(asked.of["name"])
+    person = named(asked.of["name"])
     memory = replace(row.state.memory, objects=objects, gathered=objects, where=None, person=person)
     steps, after = row.nest(body, replace(row.state, memory=memory, recipient=person))
     row.state = row.state.noting(after.notes)
     return steps
 
 
-def _parse_question(text: str, knowledge: Knowledge) -> QuestionRequest | None:
-    """Parses a clause that tells the robot to ask somebody a question; None for other clauses.
-
-    Raises RefusalError for a question that the robot cannot put.
-    """
-    forms = page("speech", **names_of_world(knowledge))
+def _parse_question(text: str, reader: PlainReader) -> QuestionRequest | None:
+    """Parses a request to ask somebody a question; None for others. Raises RefusalError for one it cannot put."""
+    forms, knowledge = reader.forms("speech"), reader.knowledge
     if not re.match(r"ask\b", text, re.IGNORECASE) or forms["tells"].fullmatch(text):
         return None
     match = forms["wants_one"].fullmatch(text) or forms["wants_what"].fullmatch(text)
@@ -255,8 +252,7 @@ def _parse_question(text: str, knowledge: Knowledge) -> QuestionRequest | None:
     if not match["what"]:  # what he wants to drink: a choice among all known objects of that kind
         kind = (match["kind"] or match["drink"]).lower()
         names = knowledge.classes(kind.removesuffix("s")) if kind else ()
-        if not names:
-            raise RefusalError(f"I do not know what there is to choose from in '{text}'; name it", [text])
+        require(names, f"I do not know what there is to choose from in '{text}'; name it", text)
         spoken = f"Which {kind} do you want?" if match["kind"] else "What do you want to drink?"
         return QuestionRequest(spoken, match, tuple(map(with_article, names)))
     if (word := CLAUSES["deictic"].search(match["what"])) is not None:

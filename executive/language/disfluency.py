@@ -83,10 +83,9 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
         case [Verb() as act, *words]:
             clause = [*takewhile(lambda item: not isinstance(item, Verb | Being | Correction), words)]
             instead = [*dropwhile(lambda item: item != Separator("but"), clause)][1:]  # not to the hall but to the desk
-            negated, rest = (
-                [act, *clause],
-                [Separator(","), *([act, *instead] if instead else []), *words[len(clause) :]],
-            )
+            unknown = [item for item in clause if isinstance(item, Unknown)]
+            after = [*([act, *instead] if instead else []), *words[len(clause) :]]
+            negated, rest = [act, *clause], [Separator(","), *unknown, *after]
             fits, named = _done_instead(act, done, rest), _first_object(words)
             if named is not None and not (named.phrase.pronoun or named.phrase.speaker):
                 rest = _with_meaning(rest, _first_object(rest), named.phrase, _PRONOUNS)

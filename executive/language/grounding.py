@@ -23,7 +23,7 @@ from executive.words.command import Command, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge, except_for, split_exceptions
 from skills.api import ObjectKind
 from skills.inputs.errors import known_names, listing
-from skills.perception.class_forms import known_attributes
+from skills.perception.class_forms import NON, known_attributes
 from skills.relations import DOOR, ORDERS, ROBOT, Landmark, Relation, RelationKind
 
 
@@ -85,8 +85,16 @@ def _without(world: Knowledge, unwanted: Phrase, names: Sequence[str], kind: Obj
         return kind
     kept, *others = split_exceptions(kind.name)
     rest = except_for(kept, *dict.fromkeys((*others, names[0])))
-    told = any(attributes for attributes, _ in _readings(unwanted)) or unwanted.relations
-    if told or kept in (ANYTHING, EVERYTHING) or not world.classes(rest):
+    told = max((attributes for attributes, _ in _readings(unwanted)), key=len, default=())
+    non = tuple(f"{NON}{colour}" for colour in told)
+    if (
+        len(told) == 1
+        and {*non} <= known_attributes()
+        and kept not in (ANYTHING, EVERYTHING)
+        and not unwanted.relations
+    ):
+        return replace(kind, attributes=non)
+    if told or unwanted.relations or kept in (ANYTHING, EVERYTHING) or not world.classes(rest):
         raise RefusalError(f"I cannot follow the exclusion of '{unwanted.spoken}'; name a kind", [unwanted.spoken])
     return replace(kind, name=rest)
 

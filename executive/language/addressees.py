@@ -28,6 +28,11 @@ Addressee = tuple[str, ...] | RobotChoice
 """Robots by their names, or all of them, or any."""
 
 
+def named_robots(who: Addressee | None) -> tuple[str, ...]:
+    """Names of the robots; empty for all or any."""
+    return who if isinstance(who, tuple) else ()
+
+
 @dataclass(frozen=True)
 class AddressedText:
     """Text for one addressee: `who` is None if the text names nobody; `joint` are the joining words before the text.

@@ -86,6 +86,11 @@ class Phrase:
         return self.head.tag in ("NNS", "NNPS")
 
     @property
+    def plural_head(self) -> Token:
+        """Noun of the phrase in the plural."""
+        return self.head if self.plural else replace(self.head, text=plural(self.head.text), tag="NNS")
+
+    @property
     def count(self) -> int:
         """Number that was said; without a number, 1 for a singular and 0 for a plural."""
         said = self.said_count
@@ -216,8 +221,7 @@ class Phrase:
         noun = len(self.tokens) > 1 and self.head.word not in word_list("pronouns") and not (self.person or self.plural)
         if each.word not in ("each", "every") or counted or not (objects and noun):
             return self
-        head = replace(self.head, text=plural(self.head.text), tag="NNS")
-        return replace(self, tokens=(replace(each, text=_ALL, lemma=_ALL), *between, head))
+        return replace(self, tokens=(replace(each, text=_ALL, lemma=_ALL), *between, self.plural_head))
 
     def with_extra(self, *words: str) -> Phrase:
         """Returns the phrase with additional words after the noun."""

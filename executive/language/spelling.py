@@ -250,7 +250,7 @@ def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -
     own = [*knowledge.object_names(), *knowledge.place_names(), *knowledge.people]
     known = _known(knowledge.spellings(own))
     words = list(_WORD.finditer(text))[:_MOST_WORDS]
-    pieces, notes, end, at = [], [], 0, 0
+    pieces, notes, end, at = list[str](), list[str](), 0, 0
     while at < len(words):
         count, name = _corrected_at([word.group() for word in words[at : at + _LONGEST_NAME]], known, facts)
         if name is not None:

@@ -87,10 +87,7 @@ class Addressees:
         return self.forms.table["lists"][name]
 
     def find_robots(self, said: str, but: Sequence[str] = ()) -> Addressee:
-        """Finds the robots that `said` names; "the other robot" is the robot that is not in `but`.
-
-        Raises RefusalError when `said` states a wrong number of robots.
-        """
+        """Finds the robots that `said` names, "the other robot" without those in `but`. Raises RefusalError."""
         if self.forms["other"].fullmatch(said):
             others = tuple(name for name in self.names if name not in but)
             if len(others) != 1:
@@ -110,10 +107,7 @@ class Addressees:
         return None if match is None else (self.find_robots(match["who"]), match.rest)
 
     def parts(self, text: str) -> tuple[Addressee | None, tuple[AddressedText, ...]]:
-        """Splits a sentence into its addressee and its parts; joins adjacent parts that are for the same robots.
-
-        Raises RefusalError when the sentence names robots unclearly, or forbids an action.
-        """
+        """Splits a sentence into its addressee and parts, one for adjacent parts of a robot. Raises RefusalError."""
         parting = _Parting(self, *self.listener(text))
         found: list[AddressedText] = []
         for part in parting.parts():
@@ -210,10 +204,7 @@ class _Parting:
         return tuple(self._sentences())
 
     def _begins(self, n: int, start: int, at: int) -> Match | None:
-        """Beginning of a part for another robot at a word, with the verb that it implies; None if there is none.
-
-        Raises RefusalError if it forbids an action.
-        """
+        """Beginning of a part for another robot at a word, with the verb that it implies. Raises RefusalError."""
         current = self.found[-1]
         for match in self.calls.forms["begins"].matches(self.text, n):
             if match["who"].lower() in self.calls.words("yourself") and (current.who is None or not n):

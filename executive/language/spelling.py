@@ -90,8 +90,6 @@ class SoundAlikes:
     def similarities(self, words: str) -> tuple[Alike, ...]:
         """Returns all phrases that have a sound, in order, with their similarity to `words`."""
         heard = sounds_of(words)
-        if not self._phrases:
-            return ()
         costs = self._costs(heard)
         longest = np.maximum(self._lengths, len(heard))
         distances = np.minimum(costs / longest, 1.0) if heard else np.ones(len(costs))
@@ -124,17 +122,12 @@ class SoundAlikes:
         return costs
 
 
-@lru_cache(maxsize=64)
-def _alikes(names: tuple[str, ...]) -> SoundAlikes:
-    return SoundAlikes(names)
+_alikes = lru_cache(maxsize=64)(SoundAlikes)
 
 
 @lru_cache(maxsize=4096)
 def sound_distance(first: str, second: str) -> float:
-    """Distance in sound between two words or groups of words, from 0 to 1; blanks are silent.
-
-    A distance of up to about 0.2 is a likely mishearing.
-    """
+    """Distance in sound between two texts, from 0 to 1, without their blanks; up to 0.2 is a likely mishearing."""
     return next((one.distance for one in SoundAlikes((second,)).similarities(first)), 1.0)
 
 
@@ -209,10 +202,8 @@ def synonyms_of(word: str, known: Mapping[str, str]) -> tuple[str, ...]:
     """Known names that an unknown word may stand for; `known` maps each spelling to a name."""
     members = _synonyms()[1].get(word.lower(), ())
     of_kind = (other for member in members for other in (member, *_same(member)))
-    same, kind = (
-        dict.fromkeys(known[one] for one in words if one in known) for words in (_same(word.lower()), of_kind)
-    )
-    return tuple(same or kind)
+    rings = (dict.fromkeys(known[one] for one in ring if one in known) for ring in (_same(word.lower()), of_kind))
+    return tuple(next(filter(None, rings), ()))
 
 
 def _same(word: str) -> Iterator[str]:
@@ -229,10 +220,8 @@ def look_alikes(word: str, known: Mapping[str, str], facts: DependencyParser) ->
     scores: list[tuple[float, str]] = []  # the lower, the likelier
     for spelling, name in known.items():
         slips, sound = _slips(wanted, spelling), sounds.get(spelling, 1.0)
-        if len(wanted) >= _FEWEST_LETTERS - 1 and slips <= _slips_allowed(spelling) // 2 + (len(spelling) > 3):
-            scores.append((slips / len(spelling), name))
-        elif sound <= ALIKE_SOUND:
-            scores.append((sound, name))
+        typed = len(wanted) >= _FEWEST_LETTERS - 1 and slips <= _slips_allowed(spelling) // 2 + (len(spelling) > 3)
+        scores += [(slips / len(spelling), name)] if typed else [(sound, name)] if sound <= ALIKE_SOUND else []
     near = [name for score, name in sorted(scores) if score < 1.0]
     if not near:
         head = wanted.split()[-1] if wanted else ""
@@ -297,8 +286,8 @@ def _only_near(spoken: str, known: _Known, facts: DependencyParser) -> str | Non
         return None
     names = (name for name in known.names if name.count(" ") == spoken.count(" "))
     forms = [form for name in names for form in (name, f"{name}s")]
-    near = {form: slips for form in forms if (slips := _slips(spoken, form)) <= _slips_allowed(form)}
-    nearest = [known.spelled.get(form, form) for form, slips in near.items() if slips == min(near.values())]
+    near = [(slips, form) for form in forms if (slips := _slips(spoken, form)) <= _slips_allowed(form)]
+    nearest = [known.spelled.get(form, form) for slips, form in near if slips == min(near)[0]]
     return nearest[0] if len(nearest) == 1 else None
 
 
@@ -329,6 +318,5 @@ def _despaced(name: str) -> str:
 def _synonyms() -> tuple[tuple[tuple[str, ...], ...], Mapping[str, tuple[str, ...]]]:
     data = read_table("synonyms.yaml")
     others = [ring for _, more in class_tables("synonyms.yaml") for ring in more["same"]]
-    return tuple(map(tuple, [*data["same"], *others])), {
-        kind: tuple(members) for kind, members in data["kinds"].items()
-    }
+    kinds = {kind: tuple(members) for kind, members in data["kinds"].items()}
+    return tuple(map(tuple, [*data["same"], *others])), kinds

@@ -37,10 +37,7 @@ SAME_NAME_ALONE: Final = 0.05
 
 
 def clean(text: str) -> str:
-    """Removes control characters, brackets and emoji, and reduces repeated blanks to one.
-
-    Quotes become plain, and short forms are joined ("i 'm" becomes "i'm").
-    """
+    """Removes control characters, brackets, emoji, repeated blanks; makes quotes plain, and joins "i 'm" to "i'm"."""
     plain = unicodedata.normalize("NFKC", _PERCENT.sub(" percent", _AND.sub("and", text)))
     plain = plain.replace("\u2019", "'").replace("\u2018", "'").replace("...", ",")
     printable = "".join(" " if unicodedata.category(c).startswith(("C", "S", "Z")) else c for c in plain)
@@ -134,22 +131,29 @@ def called_stranger(text: str) -> str | None:
 def _calls(text: str, name: str) -> Iterator[tuple[int, int]]:
     """Yields spans of text that call a robot: by a greeting, or by the name at the beginning or the end."""
     forms = page("wake", own=(name,))
-    for match in forms["greets"].finditer(text):
-        before = text[: match.start]
-        paused = re.search(r"^[ ,.!?;:'\"-]*$|[,.!?;:]\s*$", before) or not match.rest.strip(" .!?,")
-        quoted = forms["says_before"].fullmatch(before) or _tells_of(match.rest)
-        if not quoted and (paused or forms["politely"].fullmatch(before)):
-            yield match.start, match.end
+    yield from ((one.start, one.end) for one in forms["greets"].finditer(text) if _greets(text[: one.start], one.rest))
     if (first := forms["begins"].match(text)) is not None:
         aside = forms["apposition"].match(first.rest)
         told = _tells_of(first.rest) or forms["relates"].match(first.rest)
         if not told and not (aside and forms["told"].match(aside.rest)):
             yield first.end - len(first["name"]), first.end
-    last = next((match for match in forms["ends"].finditer(text) if not re.search(r"\w", match.rest)), None)
-    if last is not None and not forms["tells_of"].match(before := text[: last.start]):
-        noun = re.sub(r"\W+$", "", before).rpartition(" ")[2].lower()
-        if noun not in word_list("people") and not re.search(r",\s*[A-Z]\w*\s*$", before):
-            yield last.start, last.end
+    last = next((one for one in forms["ends"].finditer(text) if not re.search(r"\w", one.rest)), None)
+    if last is not None and not _told_before(text[: last.start]):
+        yield last.start, last.end
+
+
+def _greets(before: str, after: str) -> bool:
+    """Returns whether a greeting and a name call between these words: after a pause or polite words, or at the end."""
+    paused = re.search(r"^[ ,.!?;:'\"-]*$|[,.!?;:]\s*$", before) or _PAGE["politely"].fullmatch(before)
+    calls = paused is not None or not after.strip(" .!?,")
+    return calls and _PAGE["says_before"].fullmatch(before) is None and not _tells_of(after)
+
+
+def _told_before(before: str) -> bool:
+    """Returns whether the words before a name tell of it ("this is my sister"), or list other names."""
+    noun = re.sub(r"\W+$", "", before).rpartition(" ")[2].lower()
+    listed = re.search(r",\s*[A-Z]\w*\s*$", before) is not None
+    return listed or noun in word_list("people") or _PAGE["tells_of"].match(before) is not None
 
 
 def _tells_of(after: str) -> bool:

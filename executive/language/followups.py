@@ -1,7 +1,4 @@
-"""Parses follow-ups to an earlier request: remarks about the run, corrections, additions, repetitions.
-
-Follow-ups amend the commands of the earlier request, once their names are grounded.
-"""
+"""Parses follow-ups to a request: remarks about the run, and corrections, additions, repetitions, which amend it."""
 
 import enum
 import re
@@ -79,11 +76,7 @@ def amend(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> t
 
 
 def skip_fetching(commands: Sequence[Command], held: ObjectKind | None, knowledge: Knowledge) -> tuple[Command, ...]:
-    """Removes the commands that are unnecessary because the gripper holds an object.
-
-    The robot does not fetch the held object again; if it holds another object, it first returns that object to its
-    usual place.
-    """
+    """Removes the fetching of the held object; another held object goes to its usual place before a command."""
     if held is None or not commands:
         return tuple(commands)
     first = commands[0]

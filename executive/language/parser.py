@@ -1,7 +1,4 @@
-"""Parses dependencies by spaCy's English model, which is loaded quickly.
-
-It loads spaCy without the modules that commands never use; these take most of the loading time.
-"""
+"""Parses dependencies by spaCy's English model, which is loaded quickly, without what commands never use."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Questions to the speaker, their answers, and refusals.
-
-The robot inserts the answer into the sentence, and understands it again by the same steps.
-"""
+"""Questions to the speaker, answers, which are inserted into the sentence to understand it again, and refusals."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -86,12 +83,6 @@ def perhaps_question(slot: Slot, heard: str, candidates: tuple[str, ...]) -> Cla
     return ClarifyingQuestion(text, slot, candidates, candidates[0], heard)
 
 
-def open_question(reason: str, heard: str | None) -> ClarifyingQuestion:
-    """Question about missing words: the destination, or what "it" or "there" means."""
-    slot = Slot.GOAL if heard is None else Slot.PLACE if heard == _THERE else Slot.THING
-    return ClarifyingQuestion(f"{reason[:1].upper()}{reason[1:]}", slot, heard=heard)
-
-
 def chosen_candidate(question: ClarifyingQuestion, answer: str) -> str | None:
     """Candidate that an answer means: by number, name, a word of the name, or a similar name; None if unclear."""
     words = _FILLERS.sub("", answer.lower()).strip(" ,.!?")
@@ -173,6 +164,8 @@ class RefusalError(Exception):
         self.reason = _LONG_WORD.sub(r"\1…", reason)
         super().__init__(self.reason)
         self.unknown = tuple(dict.fromkeys(_LONG_WORD.sub(r"\1…", word) for word in unknown))
-        self.question = (
-            open_question(self.reason, next(iter(self.unknown), None)) if question is True else question or None
-        )
+        if question is True:
+            heard = next(iter(self.unknown), None)
+            slot = Slot.GOAL if heard is None else Slot.PLACE if heard == _THERE else Slot.THING
+            question = ClarifyingQuestion(f"{self.reason[:1].upper()}{self.reason[1:]}", slot, heard=heard)
+        self.question = question or None

@@ -126,11 +126,10 @@ class _Reader:
         """Understands a part, and finds the parts that it waits for. Raises RefusalError."""
         other = before[-1].meaning if before and before[-1].part.who != part.who else None
         known = memory or Memory()
-        if other is not None:  # objects are where they were put, or looked for
+        if other is not None:
             if part.otherwise:
                 raise RefusalError("what one robot finds cannot decide what another does; say it as two requests")
-            known, place = other.memory or Memory(), _where(other)
-            known = known if place is None else replace(known, where=place, place=place)
+            known = _left_by(other)
             if re.search(_IT, part.text):
                 part = replace(part, text=re.sub(_FROM_THERE, "", part.text))
                 clauses = [replace(clause, text=re.sub(_FROM_THERE, "", clause.text)) for clause in clauses]
@@ -169,16 +168,15 @@ class _Reader:
     def _check_in_hand(self, before: Understanding, meant: Understanding, who: Addressee | None) -> None:
         """Refuses to take an object that another robot holds or has handed over. Raises RefusalError."""
         again = any(one.again for one in _actions(meant)) or re.search(_IT, meant.text, re.IGNORECASE)
-        carried = [one for one in before.commands if one.item is not None or one.object is not None]
+        carried = [one for one in before.commands if one.item or one.object]
         if meant.status is not Status.OK or not again or not carried:
             return
         last = carried[-1]
         put_down = last.goal is not None and self.knowledge.place(last.goal) is not None
-        if put_down if last.item is not None else last.task not in (None, Task.GRASP):
+        if put_down if last.item else last.task not in (None, Task.GRASP):
             return
-        item = last.item or last.object
-        what = f"{self._named(who)} cannot take the {item} then; say on which table the other robot puts it"
-        raise RefusalError(what, [str(item)])
+        what = f"{self._named(who)} cannot take the {last.item or last.object} then"
+        raise RefusalError(f"{what}; say on which table the other robot puts it", [str(last.item or last.object)])
 
     def _check_one_thing(self, part: AddressedText, meant: Understanding) -> None:
         """Refuses to send several robots for one single object. Raises RefusalError."""
@@ -242,6 +240,12 @@ def _moved(before: Understanding, meant: Understanding) -> Location | None:
     named = before.memory is not None and any(item.text in texts for item in before.memory.objects)
     puts = any(command.item is not None for command in before.commands)
     return _where(before) if named and puts and meant.status is Status.OK else None
+
+
+def _left_by(meant: Understanding) -> Memory:
+    """Memory after a text, in which objects are where they were put, or looked for."""
+    memory, place = meant.memory or Memory(), _where(meant)
+    return memory if place is None else replace(memory, where=place, place=place)
 
 
 def _where(meant: Understanding) -> Location | None:

@@ -252,10 +252,7 @@ def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -
 
 
 class _Known:
-    """Known spellings in lower case: those of a world with their aliases, and the general synonyms of both.
-
-    `words` are the words of the `names`, `joined` the names without blanks, `spelled` the original forms.
-    """
+    """Known spellings in lower case, and synonyms: names, their words, names without blanks, and the original forms."""
 
     def __init__(self, spelled: tuple[str, ...]) -> None:
         self.spelled = {name.lower(): name for name in spelled}

@@ -27,6 +27,13 @@ class RobotChoice(enum.Enum):
 Addressee = tuple[str, ...] | RobotChoice
 """Robots by their names, or all of them, or any."""
 
+_JOINTS: Final = re.compile(r"^(?:(?:and|but|so|then|while|meanwhile|first|also)\b[\s,]*)*", re.IGNORECASE)
+
+
+def named_robots(who: Addressee | None) -> tuple[str, ...]:
+    """Names of the robots; empty for all or any."""
+    return who if isinstance(who, tuple) else ()
+
 
 @dataclass(frozen=True)
 class AddressedText:
@@ -80,10 +87,7 @@ class Addressees:
         return self.forms.table["lists"][name]
 
     def find_robots(self, said: str, but: Sequence[str] = ()) -> Addressee:
-        """Finds the robots that `said` names; "the other robot" is the robot that is not in `but`.
-
-        Raises RefusalError when `said` states a wrong number of robots.
-        """
+        """Finds the robots that `said` names, "the other robot" without those in `but`. Raises RefusalError."""
         if self.forms["other"].fullmatch(said):
             others = tuple(name for name in self.names if name not in but)
             if len(others) != 1:
@@ -103,20 +107,17 @@ class Addressees:
         return None if match is None else (self.find_robots(match["who"]), match.rest)
 
     def parts(self, text: str) -> tuple[Addressee | None, tuple[AddressedText, ...]]:
-        """Splits a sentence into its addressee and its parts; joins adjacent parts that are for the same robots.
-
-        Raises RefusalError when the sentence names robots unclearly, or forbids an action.
-        """
+        """Splits a sentence into its addressee and parts, one for adjacent parts of a robot. Raises RefusalError."""
         parting = _Parting(self, *self.listener(text))
         found: list[AddressedText] = []
         for part in parting.parts():
             last = found[-1] if found else None
-            waits = part.behind is not None and part.behind != part.who
-            if last is not None and last.who == part.who and not waits and not (last.past or part.past):
+            waits = part.behind not in (None, part.who)
+            if last is None or last.who != part.who or waits or last.past or part.past:
+                found.append(part)
+            else:
                 joint = part.joint if re.search(r"\w", part.joint) else " and "
                 found[-1] = replace(last, text=f"{last.text}{joint}{part.text}")
-            else:
-                found.append(part)
         return parting.listener, tuple(found)
 
     def listener(self, text: str) -> tuple[Addressee | None, str]:
@@ -168,9 +169,6 @@ def _tidy(text: str) -> str:
     return _JOINTS.sub("", text.strip(" ,;:-")).strip(" ,;:-")
 
 
-_JOINTS: Final = re.compile(r"^(?:(?:and|but|so|then|while|meanwhile|first|also)\b[\s,]*)*", re.IGNORECASE)
-
-
 @dataclass
 class _Parting:
     """Splits one sentence into parts by robot."""
@@ -188,7 +186,7 @@ class _Parting:
         boundary, opening = self.calls.words("boundary"), self.calls.words("opening")
         for n, word in enumerate(words.words):
             start = words.start(n)
-            if start < at or not (not n or words.words[n - 1] in boundary or word in opening):
+            if start < at or (n and words.words[n - 1] not in boundary and word not in opening):
                 continue
             if (begun := self._begins(n, start, at)) is not None:
                 if self.listener is None and begun["kind"] == "call":
@@ -200,16 +198,13 @@ class _Parting:
                 self.found.append(AddressedText(self.address, "", then=True))
                 at = start
         self._add(text[at:])
-        if len(self.found) > 1 and not _says(self.found[-1]) and self.found[-1].behind is not None:
-            behind = self.found.pop().behind
-            self.found[-1] = replace(self.found[-1], behind=behind)
+        *before, last = self.found
+        if before and last.behind is not None and not re.search(r"\w", last.text):
+            self.found = [*before[:-1], replace(before[-1], behind=last.behind)]
         return tuple(self._sentences())
 
     def _begins(self, n: int, start: int, at: int) -> Match | None:
-        """Beginning of a part for another robot at a word, with the verb that it implies; None if there is none.
-
-        Raises RefusalError if it forbids an action.
-        """
+        """Beginning of a part for another robot at a word, with the verb that it implies. Raises RefusalError."""
         current = self.found[-1]
         for match in self.calls.forms["begins"].matches(self.text, n):
             if match["who"].lower() in self.calls.words("yourself") and (current.who is None or not n):
@@ -231,31 +226,28 @@ class _Parting:
         if kind in ("after", "wait"):
             self._add(said)
             who = self.found[-1].who if kind == "wait" or self.address is None else self.address
-            named = begun["who"].lower() not in self.calls.words("him")
-            behind = self.calls.find_robots(begun["who"]) if named else None
-            behind = behind or next((one.who for one in reversed(self.found) if one.who is not None), None)
-            if behind is None:
-                raise RefusalError(f"who is '{begun['who']}'? say the robot's name", [begun["who"]])
-            self.found.append(AddressedText(who, "", joint, behind=behind))
+            self.found.append(AddressedText(who, "", joint, behind=self._awaited(begun["who"])))
             return
-        who = self._who(begun["who"])
-        bare = said.strip(" ,")
+        who, bare = self._who(begun["who"]), said.strip(" ,")
         opener = len(bare) if kind == "past" else self.calls.opener(bare)
         if opener < len(bare):  # it belongs to the next part: "if there is a coke,"
             said, lead = bare[:opener], f"{bare[opener:]}, {lead}"
         self._add(said)
-        last, joins = self.found[-1], {*words_of(joint).words}
-        part = AddressedText(
-            who,
-            lead,
-            joint,
-            then=last.past or bool(joins & {*self.calls.words("follows")}) or (last.then and not last.text),
-            behind=None if last.text else last.behind,
-            otherwise=bool(joins & {*self.calls.words("otherwise")}),
-            past=kind == "past",
-        )
-        self.found.append(part)
+        last = self.found[-1]
+        joins = {*words_of(joint).words}
+        follows, otherwise = (not joins.isdisjoint(self.calls.words(name)) for name in ("follows", "otherwise"))
+        then = last.past or follows or (last.then and not last.text)
+        behind = None if last.text else last.behind
+        self.found.append(AddressedText(who, lead, joint, then, behind, otherwise, past=kind == "past"))
         self.address = who if kind == "call" else self.address
+
+    def _awaited(self, said: str) -> Addressee:
+        """Robots that must be done first, by their names or by "he": the latest ones. Raises RefusalError."""
+        named = () if said.lower() in self.calls.words("him") else self.calls.find_robots(said)
+        behind = named or next((one.who for one in reversed(self.found) if one.who is not None), None)
+        if behind is None:
+            raise RefusalError(f"who is '{said}'? say the robot's name", [said])
+        return behind
 
     def _add(self, more: str) -> None:
         """Adds to the text of the last part, if the text is not empty."""
@@ -264,22 +256,17 @@ class _Parting:
 
     def _who(self, said: str) -> Addressee:
         """Robots that a name, "you" or "the other robot" stands for."""
-        named = [name for one in self.found if isinstance(one.who, tuple) for name in one.who]
+        named = [name for one in self.found for name in named_robots(one.who)]
         if said.lower() in self.calls.words("yourself"):
             return self.calls.find_robots("the other robot", named) if self.address is None else self.address
-        return self.calls.find_robots(said, self.address if isinstance(self.address, tuple) else named[-1:])
+        return self.calls.find_robots(said, named_robots(self.address) or named[-1:])
 
     def _sentences(self) -> Iterator[AddressedText]:
         """Yields the parts with text; a new sentence inside another robot's part is for the addressee again."""
-        imperative = self.calls.imperative
         for one in self.found:
-            split = self.address is not None and self.address != one.who
+            split = self.address not in (None, one.who)
             first, *rest = re.split(r"(?<=[.!?])\s+", one.text) if split else [one.text]
-            if _says(replace(one, text=first)):
-                yield replace(one, text=_tidy(first) if one.past else imperative(_tidy(first)))
+            if re.search(r"\w", first):
+                yield replace(one, text=_tidy(first) if one.past else self.calls.imperative(_tidy(first)))
             if rest:
-                yield AddressedText(self.address, imperative(_tidy(" ".join(rest))))
-
-
-def _says(saying: AddressedText) -> bool:
-    return re.search(r"\w", saying.text) is not None
+                yield AddressedText(self.address, self.calls.imperative(_tidy(" ".join(rest))))

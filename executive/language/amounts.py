@@ -84,18 +84,14 @@ def parse_time(text: str) -> TimeOfDay | None:
     if match is None:
         return None
     said, _, minutes = match["hour"].replace(".", ":").partition(":")
-    hour, minute = parse_number(said), parse_number(match["minute"] or minutes or "0")
-    if hour is None or minute is None or not (0 <= hour <= 24 and minute < 60 and hour == int(hour)):
+    hour, minute, half = parse_number(said), parse_number(match["minute"] or minutes or "0"), match["daytime"]
+    if hour is None or minute is None or minute >= 60 or hour not in (range(1, 13) if half else range(25)):
         return None
-    half = match["daytime"]
-    if half and not 1 <= hour <= 12:
-        return None
-    sure = bool(half or match["sure"]) or hour > 12 or hour == 0 or said.startswith("0")
-    if half == "pm" or (half == "night" and hour >= 6 and hour != 12):
-        hour = hour % 12 + 12
-    elif half:
-        hour %= 12
-    elif not sure and hour <= 6:
-        hour += 12
-    minute *= -1 if match["side"] else 1
-    return TimeOfDay((3600.0 * hour + 60.0 * minute) % 86400.0, taken=not sure and hour != 12)
+    taken = not (half or match["sure"] or said.startswith("0")) and hour in range(1, 12)
+    after_noon = hour in _AFTER_NOON["open" if taken else half]
+    minutes_past = 60.0 * (hour % 12 + 12 * after_noon) + float(f"{match['side']}{minute}")
+    return TimeOfDay(60.0 * minutes_past % 86400.0, taken)
+
+
+_AFTER_NOON: Final = {"am": range(0), "pm": range(1, 13), "night": range(6, 12), "": range(12, 24), "open": range(1, 7)}
+"""Hours after noon, by the half of the day that is said."""

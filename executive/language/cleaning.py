@@ -24,13 +24,20 @@ _PLACEHOLDER: Final = re.compile(
     rf"\$?(?:(?<!\{{)\{{++[^{{}}]*+\}}+|<[^<>]*+>|\[[^\[\]]*+\])|(?<!\S)[^\s{_SIGNS}]*+[{_SIGNS}]\S*"
     r"|(?<!\S)-\d\S*(?= times)"
 )  # possessive, so that the time grows with the length of a sentence and not with its square
+_SHARE: Final = 0.4
+_FEWEST: Final = 2
+_MOST_LETTERS: Final = 2000
+_HEARD_WORDS: Final = 6
+_LATEST_GREETING: Final = 3
+_PAGE: Final = page("wake")
+SAME_NAME: Final = 0.13
+"""Largest distance in sound (see `sound_distance`) of a misheard name after a greeting."""
+SAME_NAME_ALONE: Final = 0.05
+"""Largest distance in sound of a misheard name without a greeting."""
 
 
 def clean(text: str) -> str:
-    """Removes control characters, brackets and emoji, and reduces repeated blanks to one.
-
-    Quotes become plain, and short forms are joined ("i 'm" becomes "i'm").
-    """
+    """Removes control characters, brackets, emoji, repeated blanks; makes quotes plain, and joins "i 'm" to "i'm"."""
     plain = unicodedata.normalize("NFKC", _PERCENT.sub(" percent", _AND.sub("and", text)))
     plain = plain.replace("\u2019", "'").replace("\u2018", "'").replace("...", ",")
     printable = "".join(" " if unicodedata.category(c).startswith(("C", "S", "Z")) else c for c in plain)
@@ -42,11 +49,6 @@ def placeholder(text: str) -> str | None:
     """Finds a placeholder ("${room}", "[object]", "ROOM_NAME") or another piece that is no word; None without one."""
     found = _PLACEHOLDER.search(_PERCENT.sub(" percent", _AND.sub("and", text)))
     return None if found is None else found[0]
-
-
-_SHARE: Final = 0.4
-_FEWEST: Final = 2
-_MOST_LETTERS: Final = 2000
 
 
 def foreign_reason(text: str) -> str | None:
@@ -76,13 +78,6 @@ def unkept_reason(text: str, lost: str) -> str | None:
     return None
 
 
-_PAGE: Final = page("wake")
-SAME_NAME: Final = 0.13
-"""Largest distance in sound (see `sound_distance`) of a misheard name after a greeting."""
-SAME_NAME_ALONE: Final = 0.05
-"""Largest distance in sound of a misheard name without a greeting."""
-
-
 @dataclass(frozen=True)
 class Address:
     """Robot that a sentence calls (None: no robot), and the text without the wake phrase."""
@@ -94,9 +89,9 @@ class Address:
 def find_address(text: str, names: Collection[str]) -> Address:
     """Finds the robot among `names` that a sentence calls, by the first wake phrase."""
     calls = [(start, -end, name) for name in names for start, end in _calls(text.replace("’", "'"), name)]
-    if not calls:
+    start, end, name = min(calls, key=lambda call: call[:2], default=(0, 0, None))
+    if name is None:
         return Address(None, text)
-    start, end, name = min(calls, key=lambda call: call[:2])
     behind = re.sub(r"^[\s,.!:;-]+", "", text[-end:] if end else "")
     return Address(name, " ".join(f"{text[:start].rstrip()} {behind}".split()).strip(" ,"))
 
@@ -136,28 +131,35 @@ def called_stranger(text: str) -> str | None:
 def _calls(text: str, name: str) -> Iterator[tuple[int, int]]:
     """Yields spans of text that call a robot: by a greeting, or by the name at the beginning or the end."""
     forms = page("wake", own=(name,))
-    for match in forms["greets"].finditer(text):
-        before, after = text[: match.start], match.rest
-        narrated = forms["says_before"].fullmatch(before) or forms["told"].match(after) or _is_listed(after)
-        ended = not before.strip(" ,.!?;:-'\"") or before.rstrip().endswith((",", ".", "!", "?", ";", ":"))
-        if not narrated and (ended or forms["politely"].fullmatch(before) or not after.strip(" .!?,")):
-            yield match.start, match.end
+    yield from ((one.start, one.end) for one in forms["greets"].finditer(text) if _greets(text[: one.start], one.rest))
     if (first := forms["begins"].match(text)) is not None:
         aside = forms["apposition"].match(first.rest)
-        told = forms["told"].match(first.rest) or (aside and forms["told"].match(aside.rest))
-        if not told and not forms["relates"].match(first.rest) and not _is_listed(first.rest):
+        told = _tells_of(first.rest) or forms["relates"].match(first.rest)
+        if not told and not (aside and forms["told"].match(aside.rest)):
             yield first.end - len(first["name"]), first.end
-    last = next((match for match in forms["ends"].finditer(text) if not re.search(r"\w", match.rest)), None)
-    if last is not None and not forms["tells_of"].match(before := text[: last.start]):
-        noun = re.sub(r"\W+$", "", before).rpartition(" ")[2].lower()
-        if noun not in word_list("people") and not re.search(r",\s*[A-Z]\w*\s*$", before):
-            yield last.start, last.end
+    last = next((one for one in forms["ends"].finditer(text) if not re.search(r"\w", one.rest)), None)
+    if last is not None and not _told_before(text[: last.start]):
+        yield last.start, last.end
 
 
-def _is_listed(after: str) -> bool:
-    """Returns whether another name follows a name: ", Bob and", "and Bob"."""
-    match = _PAGE["listed"].match(after)
-    return match is not None and match["next"][0].isupper()
+def _greets(before: str, after: str) -> bool:
+    """Returns whether a greeting and a name call between these words: after a pause or polite words, or at the end."""
+    paused = re.search(r"^[ ,.!?;:'\"-]*$|[,.!?;:]\s*$", before) or _PAGE["politely"].fullmatch(before)
+    calls = paused is not None or not after.strip(" .!?,")
+    return calls and _PAGE["says_before"].fullmatch(before) is None and not _tells_of(after)
+
+
+def _told_before(before: str) -> bool:
+    """Returns whether the words before a name tell of it ("this is my sister"), or list other names."""
+    noun = re.sub(r"\W+$", "", before).rpartition(" ")[2].lower()
+    listed = re.search(r",\s*[A-Z]\w*\s*$", before) is not None
+    return listed or noun in word_list("people") or _PAGE["tells_of"].match(before) is not None
+
+
+def _tells_of(after: str) -> bool:
+    """Returns whether the words behind a name tell of it, or name others with it (", Bob and", "and Bob")."""
+    listed = _PAGE["listed"].match(after)
+    return _PAGE["told"].match(after) is not None or (listed is not None and listed["next"][0].isupper())
 
 
 def _corrected(transcript: str, name: str, others: Collection[str]) -> Iterator[str]:
@@ -169,16 +171,11 @@ def _corrected(transcript: str, name: str, others: Collection[str]) -> Iterator[
 
     words = list(re.finditer(r"[^\W\d_][\w'’-]*", transcript))[:_HEARD_WORDS]
     for at, word in enumerate(words[:_LATEST_GREETING]):
-        for count in (1, 2):
-            behind = words[at + 1 : at + 1 + count]
-            greets = word.group().lower() in word_list("heard_greetings") and len(behind) == count
-            if greets and alike(transcript[behind[0].start() : behind[-1].end()], SAME_NAME):
-                yield f"{transcript[: word.start()]}Hey {name}{transcript[behind[-1].end() :]}"
+        greets = word.group().lower() in word_list("heard_greetings")
+        for last in words[at + 1 : at + 3] if greets else ():
+            if alike(transcript[words[at + 1].start() : last.end()], SAME_NAME):
+                yield f"{transcript[: word.start()]}Hey {name}{transcript[last.end() :]}"
         if sound_distance(word.group(), f"hey{name}") <= SAME_NAME and len(word.group()) > len(name):
             yield f"{transcript[: word.start()]}Hey {name}{transcript[word.end() :]}"
     if words and alike(words[0].group(), SAME_NAME_ALONE):
         yield f"{name}{transcript[words[0].end() :]}"
-
-
-_HEARD_WORDS: Final = 6
-_LATEST_GREETING: Final = 3

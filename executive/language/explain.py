@@ -2,7 +2,7 @@
 
 import enum
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from executive.language.actions import Action
@@ -12,6 +12,8 @@ from executive.language.lexicon import any_of, lexicon, word_list
 from executive.language.pipeline import Trace
 from executive.language.tokens import Token
 from executive.words.steps import steps_to_yaml
+
+_WORD: Final = re.compile(r"[\w'-]*\w")
 
 
 class Use(enum.Enum):
@@ -33,9 +35,6 @@ def word_uses(trace: Trace) -> tuple[tuple[str, Use], ...]:
     found = re.compile("|".join(groups), re.IGNORECASE)
     uses = {n: Use[match.lastgroup or ""] for match in found.finditer(trace.text) for n in range(*match.span())}
     return tuple((word[0], uses.get(word.start(), Use.MEANING)) for word in _WORD.finditer(trace.text))
-
-
-_WORD: Final = re.compile(r"[\w'-]*\w")
 
 
 def explain(trace: Trace) -> dict[str, Any]:
@@ -76,74 +75,69 @@ def _token_values(token: Token) -> dict[str, Any]:
 
 
 def _action_values(action: Action) -> dict[str, Any]:
-    source, goal = (
-        None if place is None else f"{place.preposition} {place.text}".strip() for place in (action.source, action.goal)
-    )
+    places = {"source": action.source, "goal": action.goal}
+    said = {name: place and f"{place.preposition} {place.text}".strip() for name, place in places.items()}
     to_somebody = action.goal is not None and (action.goal.person or action.goal.phrase is None)
     return {
         "verb": action.verb,
         "asks_for": None if action.kind is None else action.kind.value,
         "objects": [{"name": phrase.text, "count": phrase.count} for phrase in action.objects],
-        "source": source,
-        "goal": None if to_somebody else goal,
-        "recipient": goal if to_somebody else None,
+        "source": said["source"],
+        "goal": None if to_somebody else said["goal"],
+        "recipient": said["goal"] if to_somebody else None,
         "not_understood": [*action.unknown],
     }
 
 
 def _part(clause: Predicate) -> str:
     """Words of a clause, with its verb first."""
-    parts = (one for one in (clause.verb, clause.subject, *clause.items) if one is not None)
-    return " | ".join(filter(None, (spoken_words([part]) for part in parts)))
+    parts = (spoken_words([one]) for one in (clause.verb, clause.subject, *clause.items) if one is not None)
+    return " | ".join(filter(None, parts))
 
 
 def explanation_lines(trace: Trace) -> Iterator[str]:
     """Explains each step of understanding a sentence in lines with headings; omits empty steps."""
-    values = explain(trace)
-    sections: dict[str, Sequence[str]] = {
+    values, uses = explain(trace), word_uses(trace)
+    its = {use.value: ", ".join(word for word, where in uses if where is use) for use in Use}
+    sections: dict[str, Iterable[str]] = {
         "heard": [trace.text],
-        "in plain words": [trace.opened] if trace.opened else [],
-        "words": _table(trace.tokens),
-        "dependencies": list(tree_lines(trace.tokens)),
-        "subject": [values["subject"]] if values["subject"] else [],
+        "in plain words": filter(None, [trace.opened]),
+        "words": _table(values["tokens"]),
+        "dependencies": tree_lines(trace.tokens),
+        "subject": filter(None, [values["subject"]]),
         "parts": values["parts"],
-        "actions": [line for action in values["actions"] for line in _action_lines(action)],
-        "stands for": [f"{word} = {meant}" for word, meant in trace.meanings],
+        "actions": (line for action in values["actions"] for line in _action_lines(action)),
+        "stands for": (f"{word} = {meant}" for word, meant in trace.meanings),
         "command frames": values["frames"],
         "notes": trace.notes,
-        "where each word went": [
-            f"{use.value}: {', '.join(words)}"
-            for use in Use
-            if (words := [word for word, its in word_uses(trace) if its is use])
-        ],
+        "where each word went": (f"{use}: {words}" for use, words in its.items() if words),
         "commands": values["commands"],
         "mission": values["mission"],
-        f"refused at {trace.refused_at!r}": [] if trace.refused_at is None else [values["reason"] or ""],
+        f"refused at {trace.refused_at!r}": [] if trace.refusal is None else [trace.refusal.reason],
     }
     for title, lines in sections.items():
-        yield from (f"{title}:", *(f"  {line}" for line in lines)) if lines else ()
+        shown = [f"  {line}" for line in lines]
+        yield from (f"{title}:", *shown) if shown else ()
 
 
 def _action_lines(action: Mapping[str, Any]) -> Iterator[str]:
     yield f"{action['verb'] or '(no verb)'}: {action['asks_for'] or 'tells only'}"
-    found = {
-        "objects": ", ".join(f"{each['name']} x {each['count'] or 'some'}" for each in action["objects"]),
-        **{name: action[name] for name in ("source", "goal", "recipient")},
-        "not understood": ", ".join(action["not_understood"]),
-    }
-    yield from (f"  {name}: {value}" for name, value in found.items() if value)
+    objects = (f"{each['name']} x {each['count'] or 'some'}" for each in action["objects"])
+    found = {**action, "objects": ", ".join(objects), "not understood": ", ".join(action["not_understood"])}
+    shown = ("objects", "source", "goal", "recipient", "not understood")
+    yield from (f"  {name}: {found[name]}" for name in shown if found[name])
 
 
-def _table(tokens: Sequence[Token]) -> list[str]:
+def _table(words: Sequence[Mapping[str, Any]]) -> list[str]:
     """Formats words in columns."""
-    rows = []
-    for token in map(_token_values, tokens):
-        head = next((other.text for other in tokens if other.index == token["head"]), "")
-        arc = f"{token['relation']} <- {head}" if head else token["relation"]
-        shown = (token["index"], *(token[name] for name in ("text", "lemma", "pos", "tag")), arc, token["kind"] or "")
-        rows.append(tuple(map(str, shown)))
+    texts = {word["index"]: word["text"] for word in words}
+    arcs = (f"{word['relation']} <- {texts.get(word['head'], '')}".removesuffix(" <- ") for word in words)
+    names = ("index", "text", "lemma", "pos", "tag")
+    rows = [
+        [*(str(word[name]) for name in names), arc, word["kind"] or ""] for word, arc in zip(words, arcs, strict=True)
+    ]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
 
 
 def tree_lines(tokens: Sequence[Token], head: Token | None = None, indent: str = "") -> Iterator[str]:
@@ -155,9 +149,9 @@ def tree_lines(tokens: Sequence[Token], head: Token | None = None, indent: str =
         return
     below = [token for token in tokens if token.head == head.index != token.index]
     for token in below:
-        last = token is below[-1]
-        yield f"{indent}{'└─' if last else '├─'} {token.relation}: {token.text} ({token.pos})"
-        yield from tree_lines(tokens, token, indent + ("   " if last else "│  "))
+        mark, more = ("└─", "   ") if token is below[-1] else ("├─", "│  ")
+        yield f"{indent}{mark} {token.relation}: {token.text} ({token.pos})"
+        yield from tree_lines(tokens, token, indent + more)
 
 
 def arcs_svg(tokens: Sequence[Token]) -> str:

@@ -1,18 +1,18 @@
-"""Parses follow-ups to an earlier request: remarks about the run, corrections, additions, repetitions.
-
-Follow-ups amend the commands of the earlier request, once their names are grounded.
-"""
+"""Parses follow-ups to a request: remarks about the run, and corrections, additions, repetitions, which amend it."""
 
 import enum
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 from executive.language.templates import page
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectKind
+
+_PAGE: Final = page("followups")
+_MOST_LETTERS: Final = 200
 
 
 class FollowUpKind(enum.Enum):
@@ -56,10 +56,9 @@ class Amendment:
 def parse_follow_up(text: str) -> FollowUp | None:
     """Parses a follow-up; None for a sentence that is complete without the earlier request."""
     plain = " ".join(text.replace("’", "'").split()).strip(" .!,")
-    for kind in FollowUpKind:
-        if (match := _PAGE[kind.value].fullmatch(plain)) is not None:
-            return FollowUp(kind, match["said"], match["preposition"].lower(), match["old"])
-    return None
+    found = ((kind, _PAGE[kind.value].fullmatch(plain)) for kind in FollowUpKind)
+    follow_ups = (FollowUp(kind, one["said"], one["preposition"].lower(), one["old"]) for kind, one in found if one)
+    return next(follow_ups, None)
 
 
 def amend(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> tuple[Command, ...]:
@@ -69,69 +68,48 @@ def amend(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> t
     one's usual place. A place without a preposition becomes the destination if the request has one, otherwise the
     source.
     """
-    if by.kind is not None:
-        return tuple(_with_thing(command, by, knowledge) for command in commands)
     if by.goal is None:
-        return tuple(_counted(command, by.count) for command in commands)
-    at = _place_of(commands, by)
-    return (*commands[:at], replace(commands[at], goal=by.goal, goal_at=by.goal_at), *commands[at + 1 :])
+        return tuple(_with_thing(command, by, knowledge) for command in commands)
+    changed = _place_of(commands, by)
+    named = replace(commands[changed], goal=by.goal, goal_at=by.goal_at)
+    return (*commands[:changed], named, *commands[changed + 1 :])
 
 
 def skip_fetching(commands: Sequence[Command], held: ObjectKind | None, knowledge: Knowledge) -> tuple[Command, ...]:
-    """Removes the commands that are unnecessary because the gripper holds an object.
-
-    The robot does not fetch the held object again; if it holds another object, it first returns that object to its
-    usual place.
-    """
+    """Removes the fetching of the held object; another held object goes to its usual place before a command."""
     if held is None or not commands:
         return tuple(commands)
     first = commands[0]
     if first.task is Task.GRASP and first.object == held and len(commands) > 1:
         return tuple(commands[1:])
-    if all(command.item is None and command.task is not Task.GRASP for command in commands):
-        return tuple(commands)
-    usual = next(iter(knowledge.usual_surfaces(held.name)), None)
+    takes = any(command.item is not None or command.task is Task.GRASP for command in commands)
+    usual = next(iter(knowledge.usual_surfaces(held.name)), None) if takes else None
     back = Command(item=held, goal=usual, task=Task.PLACE, object=held, verb="put back")
-    return (back, *commands) if usual is not None else tuple(commands)
+    return tuple(commands) if usual is None else (back, *commands)
 
 
 def _with_thing(command: Command, by: Amendment, knowledge: Knowledge) -> Command:
-    assert by.kind is not None
+    """Names another object in a command, or only another number of objects."""
+    said = [role for role in ("item", "object") if getattr(command, role) is not None]
+    changed: dict[str, Any] = {f"{role}_count": by.count for role in said if by.count is not None}
     old = command.object or command.item
-    if old is None or (by.old is not None and old.name != by.old and by.old not in knowledge.classes(old.name)):
+    if by.kind is None or old is None:
+        return replace(command, **changed)
+    if by.old is not None and by.old not in (old.name, *knowledge.classes(old.name)):
         return command
     usual = command.task in (Task.GRASP, Task.FIND) and command.goal == knowledge.default_place(command.task, old.name)
-    named = replace(
-        command,
-        item=None if command.item is None else by.kind,
-        object=None if command.object is None else by.kind,
-        goal=knowledge.default_place(command.task, by.kind.name) if usual else command.goal,
-    )
-    return _counted(named, by.count)
-
-
-def _counted(command: Command, count: int | None) -> Command:
-    """Sets the number of objects in a command, if a number was said."""
-    item_count, object_count = (command.item_count, command.object_count) if count is None else (count, count)
-    return replace(
-        command,
-        item_count=1 if command.item is None else item_count,
-        object_count=1 if command.object is None else object_count,
-    )
+    goal = knowledge.default_place(command.task, by.kind.name) if usual else command.goal
+    return replace(command, **{**changed, "goal": goal, **dict.fromkeys(said, by.kind)})
 
 
 def _place_of(commands: Sequence[Command], by: Amendment) -> int:
     """Index of the command whose goal a new place changes."""
     named = [n for n, command in enumerate(commands) if by.old is not None and command.goal == by.old]
     sources = [n for n, command in enumerate(commands) if command.item is None and command.task is not None]
-    goals = [n for n, command in enumerate(commands) if n not in sources]
-    if by.source:
-        return [*named, *sources, *goals][0]
+    goals = [n for n in range(len(commands)) if n not in sources]
     said = [n for n in goals if commands[n].goal != START]
-    return [*named, *said[-1:], *goals[-1:], *sources][0]
-
-
-_PAGE: Final = page("followups")
+    likeliest = (*sources, *goals) if by.source else (*said[-1:], *goals[-1:], *sources)
+    return (*named, *likeliest)[0]
 
 
 class Remark(enum.Enum):
@@ -155,6 +133,3 @@ def parse_remark(text: str) -> Remark | None:
     """Parses a whole sentence as a remark; None for any other sentence, such as a request."""
     words = re.sub(r"[^\w\s']", " ", text[:_MOST_LETTERS].replace("’", "'"))
     return next((remark for remark in Remark if page("remarks")[remark.value].fullmatch(words)), None)
-
-
-_MOST_LETTERS: Final = 200

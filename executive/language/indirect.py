@@ -10,7 +10,6 @@ from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, word_
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.tokens import Token
-from skills.detect.descriptions import plural
 
 OBJECTS: Final = Phrase((Token(0, 0, "objects", "object", "NOUN", "NNS", 0, "obj", kind=NounKind.THING),))
 
@@ -24,12 +23,16 @@ def _looks(items: Sequence[Item]) -> bool:
     return isinstance(last, Verb) and bool(last.kinds & {VerbKind.FIND, VerbKind.CHECK})
 
 
+def _is_be(token: Token) -> bool:
+    """Returns whether a word is a form of "to be"."""
+    return token.lemma == "be" or token.word == "'s"
+
+
 def where_is(row: Row, items: list[Item]) -> Item | None:
     """Reads "where is the hammer", "check where the hammer is" as a request to find an object or a person."""
     asks, inverted = _looks(items), _is_be(row.token(1))
-    if row.word() != "where" or not (asks or may_begin_command(items)):
-        return None
-    phrase = row.phrase_at(row.at + 1 + inverted)
+    begins = row.word() == "where" and (asks or may_begin_command(items))
+    phrase = row.phrase_at(row.at + 1 + inverted) if begins else None
     if phrase is None or phrase.speaker or phrase.kind not in (NounKind.THING, NounKind.PERSON, None):
         return None
     if (phrase.indefinite or phrase.pronoun) and not (phrase.named_person or phrase.known):  # a good restaurant
@@ -39,38 +42,29 @@ def where_is(row: Row, items: list[Item]) -> Item | None:
         return None
     row.silent |= set() if inverted else {row.at + end}
     row.at += 1 + inverted
-    if asks:
-        items.pop()
+    del items[len(items) - asks :]
     return verb("find")
-
-
-def _is_be(token: Token) -> bool:
-    """Returns whether a word is a form of "to be"."""
-    return token.lemma == "be" or token.word == "'s"
 
 
 def how_many(row: Row, items: list[Item]) -> Item | None:
     """Reads "how many chairs are in the hall" as a request to look for chairs there."""
     phrase = row.phrases.get(row.at)
-    if row.word() != "how" or phrase is None or len(phrase.tokens) < 3 or not may_begin_command(items):
+    asks = (row.word(), row.word(1)) == ("how", "many") and may_begin_command(items)
+    if not asks or phrase is None or len(phrase.tokens) < 3:
         return None
-    end = len(phrase.tokens)
-    inner = row.phrase_at(row.at + end + 1) if row.word(end) == "of" else None
-    end += 0 if inner is None else 1 + len(inner.tokens)
-    be = row.token(end)
-    if row.word(1) != "many" or be.lemma != "be":
-        return None
-    if phrase.person and (len(phrase.tokens) > 3 or phrase.head.word not in word_list("any_person")):
-        return None
-    if any(t.tag == "IN" and b.word in ("a", "an") for t, b in pairwise(row.tokens[row.at + end :])):
+    counted, end = Phrase((*phrase.tokens[2:-1], phrase.plural_head)), len(phrase.tokens)
+    if row.word(end) == "of" and (inner := row.phrase_at(row.at + end + 1)) is not None:
+        counted, end = counted.with_contents(inner), end + 1 + len(inner.tokens)
+    be, behind = row.token(end), row.tokens[row.at + end :]
+    anybody = " ".join(token.word for token in phrase.tokens[2:]) in word_list("any_person")
+    one_place = any(one.tag == "IN" and other.word in ("a", "an") for one, other in pairwise(behind))
+    if be.lemma != "be" or one_place or (phrase.person and not anybody):
         return None
     row.at += end + 1
     while row.word() in ("there", "left"):
         row.at += 1
     items += [Separator(""), Being(be.text, existential=True, asked=True)]
-    head = phrase.head if phrase.plural else replace(phrase.head, text=plural(phrase.head.text), tag="NNS")
-    counted = Phrase((*phrase.tokens[2:-1], head))
-    return Chunk(counted if inner is None else counted.with_contents(inner))
+    return Chunk(counted)
 
 
 def do_we_have(row: Row, items: list[Item]) -> Item | None:
@@ -89,54 +83,47 @@ def what_is(row: Row, items: list[Item]) -> Item | None:
     asks = _looks(items)
     if not (asks or may_begin_command(items)):
         return None
-    for contents, read in ((OBJECTS, _whatever), (CONTENTS, _fullness)):
-        if (place := read(row)) is not None:
+    for contents, ahead, preposition in ((OBJECTS, *_whatever(row)), (CONTENTS, 1, _is_be(row.token()) * "at")):
+        phrase = row.phrase_at(row.at + ahead) if preposition else None
+        if phrase is None or not (phrase.known or phrase.kind is NounKind.PLACE):
+            continue
+        behind, of_fullness = ahead + len(phrase.tokens), contents is CONTENTS
+        if not of_fullness or (row.word(behind) in word_list("fullness") and not phrase.person):
+            row.at += behind + of_fullness
             items[len(items) - asks :] = [verb("find"), Chunk(contents)]
-            return place
+            return Chunk(phrase, preposition, PrepositionRole.AT)
     return None
 
 
-def _whatever(row: Row) -> Chunk | None:
-    """Place, with its preposition, after "what is" or "is there anything"."""
+def _whatever(row: Row) -> tuple[int, str]:
+    """Number of words in "what is on" or "is there anything in", and the preposition; without one, they do not ask."""
     ahead, asked = 0, False
     while (word := row.word(ahead)) in word_list("asked_with") or (word in word_list("whatever") and not asked):
         asked = asked or word in word_list("whatever")
         ahead += 1
     preposition = row.match(lexicon().prepositions, ahead) if asked else ()
-    ahead += len(preposition)
-    phrase = row.phrase_at(row.at + ahead) if preposition else None
-    if phrase is None or not (phrase.known or phrase.kind is NounKind.PLACE):
-        return None
-    row.at += ahead + len(phrase.tokens)
-    return Chunk(phrase, " ".join(preposition), PrepositionRole.AT)
+    return ahead + len(preposition), " ".join(preposition)
 
 
-def _fullness(row: Row) -> Chunk | None:
-    """Place that "is the bench empty" asks about."""
-    phrase = row.phrase_at(row.at + 1) if _is_be(row.token()) else None
-    if phrase is None or row.token(1 + len(phrase.tokens)).word not in word_list("fullness"):
-        return None
-    if not (phrase.known or phrase.kind is NounKind.PLACE) or phrase.person:
-        return None
-    row.at += 2 + len(phrase.tokens)
-    return Chunk(phrase, "at", PrepositionRole.AT)
+def _bare(items: Sequence[Item]) -> Chunk | None:
+    """Last item, if it is a phrase without a preposition."""
+    last = items[-1] if items else None
+    return last if isinstance(last, Chunk) and last.role is None else None
 
 
 def reported_speech(row: Row, items: list[Item]) -> Item | None:
     """Reads "I left it in the hall" as a statement on the place; after a noun it only identifies the object."""
-    subject = items[-1] if items else None
-    if not isinstance(subject, Chunk) or subject.role is not None or row.word() not in word_list("placing"):
+    subject = _bare(items)
+    if subject is None or row.word() not in word_list("placing"):
         return None
     phrase = subject.phrase
     if phrase.head.word not in word_list("subjects") and not phrase.person:
         return None
     items.pop()
-    text = row.take(1)
     if items and isinstance(items[-1], Unknown) and items[-1].word.lower() in ("that", "which", "what"):
         items.pop()
-    if items and isinstance(items[-1], Chunk):
-        return Separator("")
-    return Being(text, existential=True, asked=False, teller=phrase if phrase.person else None)
+    being = Being(row.take(1), existential=True, asked=False, teller=phrase if phrase.person else None)
+    return Separator("") if items and isinstance(items[-1], Chunk) else being
 
 
 def _subject(items: Sequence[Item]) -> tuple[int, Chunk | None]:
@@ -144,8 +131,7 @@ def _subject(items: Sequence[Item]) -> tuple[int, Chunk | None]:
     at = len(items) - 1
     while at > 0 and isinstance(item := items[at], Chunk) and item.role is not None:
         at -= 1
-    subject = items[at] if at >= 0 and may_begin_command(items[:at]) else None
-    return at, subject if isinstance(subject, Chunk) and subject.role is None else None
+    return at, _bare(items[: at + 1]) if may_begin_command(items[:at]) else None
 
 
 def stated_need(row: Row, items: list[Item]) -> Item | None:
@@ -168,39 +154,38 @@ def belonging(row: Row, items: list[Item]) -> Item | None:
     if not belongs or item is None or item.phrase.speaker or item.phrase.living:
         return None
     row.at += 1
-    items[at + 1 :] = [
-        replace(item, role=PrepositionRole.SOURCE) if isinstance(item, Chunk) else item for item in items[at + 1 :]
-    ]
-    items.insert(at, verb("put"))
+    sources = [replace(place, role=PrepositionRole.SOURCE) for place in items[at + 1 :] if isinstance(place, Chunk)]
+    items[at:] = [verb("put"), item, *sources]
     return Separator("")
 
 
-def ongoing_event(row: Row, items: list[Item]) -> Item | None:
+def event(row: Row, items: list[Item]) -> Item | None:
     """Reads "my back hurts" as an event, which asks for nothing."""
-    token, subject = row.token(), items[-1] if items else None
+    token, subject = row.token(), _bare(items)
     if token.tag != "VBZ" or token.pos != "VERB" or token.lemma in word_list("wants") | word_list("asks"):
         return None
-    if not isinstance(subject, Chunk) or subject.role is not None or not may_begin_command(items[:-1]):
-        return None
-    if any(word.tag.startswith("W") for word in subject.phrase.tokens):
+    if subject is None or not may_begin_command(items[:-1]) or _asks(subject.phrase):
         return None
     items.pop()
     return Being(row.take(1), existential=True, asked=False, narrated=True, topic=subject.phrase)
+
+
+def _asks(phrase: Phrase) -> bool:
+    """Returns whether a phrase has a word such as "what" or "whose"."""
+    return any(token.tag.startswith("W") for token in phrase.tokens)
 
 
 def narration(row: Row, items: list[Item]) -> Item | None:
     """Reads "somebody spilled milk", "I can't reach the jar" as a reason for a request."""
     last = items[-1] if len(items) > 1 else None
     at = len(items) - 1 - (isinstance(last, Separator) and last.word.isalpha() and last.word != "and")
-    subject = items[at] if at >= 0 else None
-    if not isinstance(subject, Chunk) or subject.role is not None or not may_begin_command(items[:at]):
+    subject, length = _bare(items[: at + 1]), _told_verb(row)
+    if subject is None or not length or not may_begin_command(items[:at]) or _asks(subject.phrase):
         return None
-    length, phrase = _told_verb(row), subject.phrase
-    asked = any(token.tag.startswith("W") for token in phrase.tokens)
-    if not length or asked or row.tokens[row.at + length - 1].lemma in word_list("asks"):
+    if row.token(length - 1).lemma in word_list("asks"):
         return None
     del items[at:]
-    living = phrase.living or phrase.speaker
+    phrase, living = subject.phrase, subject.phrase.living or subject.phrase.speaker
     teller, topic = (phrase if living and not phrase.speaker else None), None if living else phrase
     return Being(row.take(length), existential=True, asked=False, teller=teller, narrated=True, topic=topic)
 
@@ -208,26 +193,15 @@ def narration(row: Row, items: list[Item]) -> Item | None:
 def _told_verb(row: Row) -> int:
     """Number of words in a narrating verb that begins here; 0 if none does."""
     first, second, third, fourth = map(row.token, range(4))
-    if first.tag == "VBD" and first.pos == "VERB":
-        return 1
-    if first.tag == "MD" and second.word in ("not", "n't", "nt") and third.tag == "VB":
-        return 3
     progressive = first.lemma == "be" and second.tag == "VBG" and second.word not in word_list("relative")
-    perfect = first.lemma == "have" and first.pos == "AUX" and second.tag == "VBN"
-    if progressive and (second.word, third.word, fourth.tag) == ("going", "to", "VB"):
-        return 4
-    return 2 if progressive or perfect else 0
+    forms = (
+        (1, first.tag == "VBD" and first.pos == "VERB"),  # spilled
+        (3, first.tag == "MD" and second.word in ("not", "n't", "nt") and third.tag == "VB"),  # can't reach
+        (4, progressive and (second.word, third.word, fourth.tag) == ("going", "to", "VB")),
+        (2, progressive or (first.lemma == "have" and first.pos == "AUX" and second.tag == "VBN")),  # has fallen
+    )
+    return next((length for length, fits in forms if fits), 0)
 
 
-INDIRECT: Final = (
-    where_is,
-    how_many,
-    what_is,
-    do_we_have,
-    reported_speech,
-    narration,
-    stated_need,
-    belonging,
-    ongoing_event,
-)
+INDIRECT: Final = (where_is, how_many, what_is, do_we_have, reported_speech, narration, stated_need, belonging, event)
 """Readers of indirect requests, in the order of trying."""

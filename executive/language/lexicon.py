@@ -73,15 +73,13 @@ class Lexicon:
 
     def __init__(self) -> None:
         verbs, words = read_table("verbs.yaml"), read_table("words.yaml")
-        kinds: dict[Phrase, set[VerbKind]] = {}
-        for kind in VerbKind:
-            for text in verbs[kind.value]:
-                kinds.setdefault(tuple(text.split()), set()).add(kind)
-        self.verbs = {phrase: frozenset(each) for phrase, each in kinds.items()}
-        self.fillers, self.noted, self.needs, self.negations = (
-            {tuple(text.split()): None for text in words[name]}.keys()
-            for name in ("fillers", "noted", "needs", "negations")
-        )
+        self.verbs: dict[Phrase, frozenset[VerbKind]] = {}
+        kinds = ((kind, tuple(text.split())) for kind in VerbKind for text in verbs[kind.value])
+        for one, phrase in kinds:
+            self.verbs[phrase] = self.verbs.get(phrase, frozenset()) | {one}
+        names = ("fillers", "noted", "needs", "negations")
+        lists = ({tuple(text.split()): None for text in words[name]}.keys() for name in names)
+        self.fillers, self.noted, self.needs, self.negations = lists
         roles, softness = words["prepositions"].items(), words["corrections"].items()
         self.prepositions = {tuple(one.split()): PrepositionRole(role) for role, each in roles for one in each}
         self.corrections = {tuple(one.split()): name == "soft" for name, each in softness for one in each}

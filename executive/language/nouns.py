@@ -66,15 +66,12 @@ class NounKinds:
             return cls(noun_examples(), vector_of, stored["weights"])
 
     def kind(self, words: Sequence[str], *, lemma: str) -> NounKind | None:
-        """Kind of a noun, the last of `words`, with the words before it; None for an unknown noun.
-
-        `lemma` is the noun's dictionary form. If the scores are not decisive, the noun gets a kind within reach.
-        """
+        """Kind of a noun, the last of `words`, whose dictionary form is `lemma`; in doubt one within reach."""
         *before, noun = words
         pairs = [f"{before[-1]} {form}" for form in (noun, lemma)] if before else []
-        for known in (*pairs, noun, lemma):
-            if known in self.examples:
-                return self.examples[known]
+        known = next((form for form in (*pairs, noun, lemma) if form in self.examples), None)
+        if known is not None:
+            return self.examples[known]
         scores = self.scores(words)
         return None if scores is None else list(NounKind)[int(np.argmax(scores))]
 

@@ -1,7 +1,4 @@
-"""Parses dependencies by spaCy's English model, which is loaded quickly.
-
-It loads spaCy without the modules that commands never use; these take most of the loading time.
-"""
+"""Parses dependencies by spaCy's English model, which is loaded quickly, without what commands never use."""
 
 from __future__ import annotations
 
@@ -34,14 +31,22 @@ _OPEN_CLASS: Final = frozenset({"NOUN", "PROPN", "ADJ", "VERB", "ADV", "X", "INT
 _MODIFIERS: Final = frozenset({"compound", "amod", "nmod"})
 _KEPT_KINDS: Final = 5000
 _KEPT_TEXTS: Final = 32
+_UNUSED_PIPES: Final = ("senter", "ner")
+_FRAMEWORKS: Final = ("torch", "cupy")  # spaCy imports them where they are installed; the model needs neither
+_YAML_OF_SPACY: Final = ("read_yaml", "write_yaml", "yaml_dumps", "yaml_loads", "is_yaml_serializable")
+FREQUENT_WORDS: Final = 50_000
+"""Number of words of the model, by decreasing frequency, that count as English words."""
+_SEARCHES: Final = 40  # searches of the file for rare words before it is read as a whole
+_MOST_BYTES_OF_ENTRY: Final = 14
+_LARGEST_IN_A_BYTE: Final = 0x7F  # msgpack writes these as they are; else a byte gives the length: 0xcc, 0xcd, 0xce
+_KEY_OF_64_BITS: Final = b"\xcf"
+_MAP_OF_32_BITS: Final = b"\xdf"
+_HEADER_BYTES: Final = 5
 _RELATIONS: Final = {"dobj": "obj", "dative": "iobj", "pobj": "obl", "ROOT": "root"}
 
 
 class DependencyParser:
-    """Dependency parser of sentences, by spaCy with the English model that comes as a package.
-
-    The model's word vectors also serve to classify nouns.
-    """
+    """Dependency parser of sentences, and meanings of words, by spaCy with the English model that is a package."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -67,35 +72,22 @@ class DependencyParser:
 
     def parse(self, text: str) -> tuple[Token, ...]:
         """Parses `text` into words, in order; never raises, whatever the text. The latest texts are cached."""
-        from executive.language.tokens import Token, repair_parse
+        from executive.language.tokens import repair_parse
 
         if text not in self._parsed:
             if len(self._parsed) > _KEPT_TEXTS:
                 self._parsed.clear()
-            words = (
-                Token(
-                    index=token.i,
-                    start=token.idx,
-                    text=token.text,
-                    lemma=token.lemma_.lower(),
-                    pos=token.pos_,
-                    tag=token.tag_,
-                    head=token.head.i,
-                    relation=_RELATIONS.get(token.dep_, token.dep_),
-                    kind=self._kind(token),
-                )
-                for token in self._pipeline(text)
-                if not token.is_space
-            )
-            self._parsed[text] = repair_parse(words)
+            self._parsed[text] = repair_parse(self._token(word) for word in self._pipeline(text) if not word.is_space)
         return self._parsed[text]
 
-    def _kind(self, token: SpacyToken) -> NounKind | None:
-        """Kind of a word as a noun, with the words before it."""
-        if token.pos_ not in _OPEN_CLASS:
-            return None
-        before = (t.lower_ for t in token.lefts if t.dep_ in _MODIFIERS)
-        return self._kind_of_words(*before, token.lower_, token.lemma_.lower())
+    def _token(self, word: SpacyToken) -> Token:
+        """Word of a parsed sentence, with its kind as a noun, which the words before it may tell."""
+        from executive.language.tokens import Token
+
+        lemma, relation = word.lemma_.lower(), _RELATIONS.get(word.dep_, word.dep_)
+        before = (t.lower_ for t in word.lefts if t.dep_ in _MODIFIERS)
+        kind = self._kind_of_words(*before, word.lower_, lemma) if word.pos_ in _OPEN_CLASS else None
+        return Token(word.i, word.idx, word.text, lemma, word.pos_, word.tag_, word.head.i, relation, kind=kind)
 
     def vector(self, word: str) -> FloatArray | None:
         """Unit vector of a word's meaning; None if the word has no vector."""
@@ -117,20 +109,12 @@ class DependencyParser:
 
 @cache
 def load_parser() -> DependencyParser:
-    """Returns the parser of this process; its model is loaded at first use.
-
-    Raises InputError when the model's package is not installed.
-    """
+    """Returns the parser of this process; its model is loaded at first use. Raises InputError without its package."""
     spec = importlib.util.find_spec(_MODEL_PACKAGE)
     folders = [] if spec is None or spec.origin is None else sorted(Path(spec.origin).parent.glob("en_core_web_*"))
     if not folders:
         raise InputError(f"the language model {_MODEL_PACKAGE!r} is missing", hint="install it with 'make env'")
     return DependencyParser(folders[-1])
-
-
-_UNUSED_PIPES: Final = ("senter", "ner")
-_FRAMEWORKS: Final = ("torch", "cupy")  # spaCy imports them where they are installed; the model needs neither
-_YAML_OF_SPACY: Final = ("read_yaml", "write_yaml", "yaml_dumps", "yaml_loads", "is_yaml_serializable")
 
 
 def load_english(folder: Path) -> Language:
@@ -195,10 +179,7 @@ class RuleTokenizer:
 
 @contextmanager
 def _small_spacy() -> Iterator[None]:
-    """Replaces slow modules that spaCy's pipelines never use while spaCy is imported.
-
-    These are its command line, its YAML, and bridges to other frameworks. It also skips spaCy's search for plug-ins.
-    """
+    """Keeps spaCy, while it is imported, from slow modules that no pipeline uses, and from searching for plug-ins."""
     if "spacy" in sys.modules:
         yield
         return
@@ -216,16 +197,6 @@ def _small_spacy() -> Iterator[None]:
     finally:
         for name in stand_ins:
             sys.modules.pop(name, None)
-
-
-FREQUENT_WORDS: Final = 50_000
-"""Number of words of the model, by decreasing frequency, that count as English words."""
-_SEARCHES: Final = 40  # searches of the file for rare words before it is read as a whole
-_MOST_BYTES_OF_ENTRY: Final = 14
-_LARGEST_IN_A_BYTE: Final = 0x7F  # msgpack writes these as they are; else a byte gives the length: 0xcc, 0xcd, 0xce
-_KEY_OF_64_BITS: Final = b"\xcf"
-_MAP_OF_32_BITS: Final = b"\xdf"
-_HEADER_BYTES: Final = 5
 
 
 class WordRows(Mapping[int, int]):
@@ -259,11 +230,8 @@ class WordRows(Mapping[int, int]):
         return rows
 
     def __getitem__(self, key: int) -> int:
-        if "_all" in self.__dict__:
-            return self._all[key]
         row = self.frequent.get(key)
-        if row is None:
-            row = self._rare(key)
+        row = self._rare(key) if row is None else row
         if row is None:
             raise KeyError(key)
         return row
@@ -271,7 +239,8 @@ class WordRows(Mapping[int, int]):
     def _rare(self, key: int) -> int | None:
         """Row of a word that is not frequent; None if the word has no row."""
         if key not in self._searched:
-            if len(self._searched) >= _SEARCHES or key.bit_length() <= 32:  # short keys could be part of a longer one
+            short = key.bit_length() <= 32  # it could be part of a longer one
+            if short or "_all" in self.__dict__ or len(self._searched) >= _SEARCHES:
                 return self._all.get(key)
             at = self._data.find(_KEY_OF_64_BITS + key.to_bytes(8, "big"))
             first = self._data[at + 9]

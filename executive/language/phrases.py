@@ -21,6 +21,9 @@ _LEFT: Final = frozenset(
 )
 _NOMINAL: Final = frozenset({"NOUN", "PROPN", "PRON", "NUM", "X"})
 _DEEPEST: Final = 6
+_ALL: Final = "all"
+_ONE: Final = frozenset({"one", "ones"})
+_DIGITS: Final = re.compile(r"-?\d+(?:[.,]\d+)?")
 _HEADLIKE: Final = frozenset({"obj", "iobj", "obl", "nsubj", "attr", "conj", "root"})
 
 
@@ -75,15 +78,18 @@ class Phrase:
     def object_kind(self) -> ObjectKind:
         """Kind of object that the phrase names; its leading adjectives become attributes."""
         words = self.content
-        leads = (n for n, t in enumerate(words[:-1]) if not t.adjective)
-        first = next(leads, len(words) - 1)
-        name = _joined_text((*words[first:], *self.extra))
-        return ObjectKind(name, tuple(t.text for t in words[:first]))
+        leads = next((n for n, t in enumerate(words[:-1]) if not t.adjective), len(words) - 1)
+        return ObjectKind(_joined_text((*words[leads:], *self.extra)), tuple(t.text for t in words[:leads]))
 
     @property
     def plural(self) -> bool:
         """Returns whether the noun is plural."""
         return self.head.tag in ("NNS", "NNPS")
+
+    @property
+    def plural_head(self) -> Token:
+        """Noun of the phrase in the plural."""
+        return self.head if self.plural else replace(self.head, text=plural(self.head.text), tag="NNS")
 
     @property
     def count(self) -> int:
@@ -95,18 +101,17 @@ class Phrase:
     def said_count(self) -> int | None:
         """Number that was said, or None; "one" and "two" without a noun count too."""
         said = next(map(number_of_words, self._numerals()), None)
-        if said is None and self.plural and self.tokens[0].word == "both":
-            said = 2
-        return said if self.numbered is None else self.numbered
+        both = said is None and self.plural and self.tokens[0].word == "both"
+        return self.numbered if self.numbered is not None else 2 if both else said
 
     @property
     def odd_number(self) -> str | None:
         """Words of a number that cannot count objects: "one two three", "zero", "infinity", "2.5", "at least two"."""
-        odd = next((numeral for numeral in self._numerals() if not number_of_words(numeral)), None)
         left = self.tokens[:-1]
-        words = odd or [t.text for t in left if t.word in word_list("no_numbers")]
-        loose = any(t.word in word_list("loose_numbers") for t in left) and any(self._numerals())
-        return " ".join(t.text for t in left) if loose else " ".join(words) or None
+        if any(t.word in word_list("loose_numbers") for t in left) and any(self._numerals()):
+            return " ".join(t.text for t in left)
+        odd = next((numeral for numeral in self._numerals() if not number_of_words(numeral)), None)
+        return " ".join(odd or (t.text for t in left if t.word in word_list("no_numbers"))) or None
 
     @property
     def pronoun(self) -> bool:
@@ -211,13 +216,12 @@ class Phrase:
     def distributed(self) -> Phrase:
         """Phrase "all cubes" for "each cube"; the phrase itself for other words, such as "every second cube"."""
         each, *between = self.tokens[:-1] or self.tokens
+        one_of_many = len(self.tokens) > 1 and each.word in ("each", "every") and not (self.plural or self.person)
         counted = any(t.tag == "CD" or t.word in word_list("some_of_them") for t in between)
-        objects = self.kind is None or (self.kind.within_reach and self.head.lemma not in word_list("fixtures"))
-        noun = len(self.tokens) > 1 and self.head.word not in word_list("pronouns") and not (self.person or self.plural)
-        if each.word not in ("each", "every") or counted or not (objects and noun):
+        fixed = self.kind is not None and (not self.kind.within_reach or self.head.lemma in word_list("fixtures"))
+        if not one_of_many or counted or fixed or self.head.word in word_list("pronouns"):
             return self
-        head = replace(self.head, text=plural(self.head.text), tag="NNS")
-        return replace(self, tokens=(replace(each, text=_ALL, lemma=_ALL), *between, head))
+        return replace(self, tokens=(replace(each, text=_ALL, lemma=_ALL), *between, self.plural_head))
 
     def with_extra(self, *words: str) -> Phrase:
         """Returns the phrase with additional words after the noun."""
@@ -253,11 +257,8 @@ class Phrase:
 
     def _numerals(self) -> Iterator[tuple[str, ...]]:
         """Yields each number that counts objects, without numbers in measures ("ten inch nails")."""
-        left = tuple(t for n, t in enumerate(self.tokens[:-1]) if not self._measures(n))
-        for numeral, run in groupby(
-            self.tokens if self.counts else left,
-            key=lambda t: number_of_word(t.word) is not None or t.tag == "CD" or _DIGITS.fullmatch(t.text) is not None,
-        ):
+        left = [t for n, t in enumerate(self.tokens[:-1]) if not self._measures(n)]
+        for numeral, run in groupby(self.tokens if self.counts else left, key=_is_numeral):
             if numeral:
                 yield tuple(t.word for t in run)
 
@@ -267,18 +268,15 @@ class Phrase:
         return unit and number_of_word(self.tokens[at].word) is not None
 
 
-_ALL: Final = "all"
-_ONE: Final = frozenset({"one", "ones"})
-_DIGITS: Final = re.compile(r"-?\d+(?:[.,]\d+)?")
-
-
 def _joined_text(words: Sequence[Token | str]) -> str:
     """Joins words by blanks, except before the "'s" of a possessive."""
-    text = ""
-    for word in words:
-        owner = isinstance(word, Token) and word.tag == "POS"
-        text += ("" if owner or not text else " ") + (word.text if isinstance(word, Token) else word)
-    return text
+    said = ((word.text, word.tag == "POS") if isinstance(word, Token) else (word, False) for word in words)
+    return "".join(text if owner else f" {text}" for text, owner in said).lstrip()
+
+
+def _is_numeral(token: Token) -> bool:
+    digits = token.tag == "CD" or _DIGITS.fullmatch(token.text) is not None
+    return digits or number_of_word(token.word) is not None
 
 
 def _is_determiner(token: Token) -> bool:
@@ -289,23 +287,21 @@ def _is_determiner(token: Token) -> bool:
 
 def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:
     """Finds all noun phrases, which do not overlap; returns them by the index of the first word."""
-    phrases: dict[int, Phrase] = {}
-    end = len(tokens)
+    phrases: list[Phrase] = []
+    start = len(tokens)
     for head in reversed(tokens):
-        if head.index < end and _is_head(head, tokens):
-            start = head.index
-            while start > 0 and _belongs(tokens[start - 1], head, tokens):
-                start -= 1
-            phrases[start] = Phrase(tuple(tokens[start : head.index + 1]))
-            end = start
-    joined: dict[int, Phrase] = {}
-    for start, phrase in sorted(phrases.items()):
-        before = joined.get(last := max(joined, default=-1))
-        if before is not None and last + len(before.tokens) == start and _compound(before, phrase):
-            joined[last] = Phrase((*before.tokens, *phrase.tokens))
+        if head.index < start and _is_head(head, tokens):
+            begins = (n for n in range(head.index, 0, -1) if not _belongs(tokens[n - 1], head, tokens))
+            start = next(begins, 0)
+            phrases.append(Phrase(tuple(tokens[start : head.index + 1])))
+    joined: list[Phrase] = []
+    for phrase in reversed(phrases):
+        before = joined[-1] if joined else None
+        if before is not None and before.head.index + 1 == phrase.tokens[0].index and _compound(before, phrase):
+            joined[-1] = Phrase((*before.tokens, *phrase.tokens))
         else:
-            joined[start] = phrase
-    return joined
+            joined.append(phrase)
+    return {phrase.tokens[0].index: phrase for phrase in joined}
 
 
 def _compound(before: Phrase, phrase: Phrase) -> bool:

@@ -1,7 +1,4 @@
-"""Questions to the speaker, their answers, and refusals.
-
-The robot inserts the answer into the sentence, and understands it again by the same steps.
-"""
+"""Questions to the speaker, answers, which are inserted into the sentence to understand it again, and refusals."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -16,6 +13,15 @@ from skills.inputs.errors import listing
 ABLE: Final = "I can fetch, take, put and find objects, go to places, follow and guide people, wait and charge"
 ALIKE_SOUND: Final = 0.2
 _LONG_WORD: Final = re.compile(r"(\S{40})\S{20,}")
+_PREPOSITION: Final = r"(?:to|into|onto|in|on|at|from|near|next to|beside|under|behind|here|there)"
+_FILLERS: Final = re.compile(
+    r"^\W*(?:(?:um|uh|er|well|oh|please|yes|yeah|i mean|i meant|i said|i want|i think|make it|take|it is|it's)"
+    r"\b[\s,]*)+(?=\w)|[\s,]+please\W*$",
+    re.IGNORECASE,
+)
+_LEADING: Final = re.compile(rf"^(?:{_PREPOSITION}\s+)?(?:(?:the|a|an|my)\s+)?(?=\w)", re.IGNORECASE)
+_THERE: Final = "there"
+_ORDINALS: Final = ("first", "second", "third", "fourth", "fifth")
 
 
 class Slot(Enum):
@@ -77,29 +83,21 @@ def perhaps_question(slot: Slot, heard: str, candidates: tuple[str, ...]) -> Cla
     return ClarifyingQuestion(text, slot, candidates, candidates[0], heard)
 
 
-def open_question(reason: str, heard: str | None) -> ClarifyingQuestion:
-    """Question about missing words: the destination, or what "it" or "there" means."""
-    slot = Slot.GOAL if heard is None else Slot.PLACE if heard == _THERE else Slot.THING
-    return ClarifyingQuestion(f"{reason[:1].upper()}{reason[1:]}", slot, heard=heard)
-
-
 def chosen_candidate(question: ClarifyingQuestion, answer: str) -> str | None:
     """Candidate that an answer means: by number, name, a word of the name, or a similar name; None if unclear."""
     words = _FILLERS.sub("", answer.lower()).strip(" ,.!?")
     said = re.sub(r"\s+(?:one|please)$", "", _LEADING.sub("", words)).strip(" ,.!?")
-    for number, candidate in enumerate(question.candidates, 1):
-        if said in (str(number), *_ORDINALS[number - 1 : number]):
-            return candidate
-    agreed = set(re.findall(r"\w+", answer.lower()))
-    if len(question.candidates) == 1 and agreed & word_list("yes") and agreed <= word_list("yes") | {"please"}:
-        return question.candidates[0]
-    exact = [c for c in question.candidates if c.lower() == said]
-    parts = [c for c in question.candidates if said and set(said.split()) <= set(c.lower().split())]
-    inside = [c for c in question.candidates if re.search(rf"\b{re.escape(c.lower())}\b", said)]
-    for found in (exact, parts, inside, _nearly(question, said)):
-        if len(found) == 1:
-            return found[0]
-    return None
+    agreed, named = {*re.findall(r"\w+", answer.lower())} - {"please"}, {*said.split()}
+    names = question.candidates
+    ways = (
+        [name for n, name in enumerate(names, 1) if said in (str(n), *_ORDINALS[n - 1 : n])],
+        names if agreed and agreed <= word_list("yes") else (),
+        [name for name in names if name.lower() == said],
+        [name for name in names if named and named <= {*name.lower().split()}],
+        [name for name in names if re.search(rf"\b{re.escape(name.lower())}\b", said)],
+        _nearly(question, said),
+    )
+    return next((found[0] for found in ways if len(found) == 1), None)
 
 
 def insert_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> str:
@@ -108,10 +106,9 @@ def insert_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> s
     if question.heard is None:
         return f"{sentence.rstrip(' .,!?')} {_whereto(value)}"
     heard, pronouns = question.heard.lower(), word_list("pronouns") | word_list("somebody")
-    full = _definite(value) if heard in pronouns else _LEADING.sub("", value)
-    full = _whereto(value) if heard == _THERE else full
-    longer = tuple(c.lower() for c in question.candidates if len(c) > len(question.heard))
-    for match in re.finditer(rf"\b{re.escape(question.heard)}\b", sentence, re.IGNORECASE):
+    full = _whereto(value) if heard == _THERE else _definite(value) if heard in pronouns else _LEADING.sub("", value)
+    longer = tuple(c.lower() for c in question.candidates if len(c) > len(heard))
+    for match in re.finditer(rf"\b{re.escape(heard)}\b", sentence, re.IGNORECASE):
         if not sentence[: match.end()].lower().endswith(longer):  # it is no part of a candidate's whole name
             return f"{sentence[: match.start()]}{full}{sentence[match.end() :]}"
     return sentence
@@ -134,17 +131,6 @@ def _definite(value: str) -> str:
 
 def _whereto(value: str) -> str:
     return value if re.match(rf"(?:{_PREPOSITION})\b", value, re.IGNORECASE) else f"to {_definite(value)}"
-
-
-_PREPOSITION: Final = r"(?:to|into|onto|in|on|at|from|near|next to|beside|under|behind|here|there)"
-_FILLERS: Final = re.compile(
-    r"^\W*(?:(?:um|uh|er|well|oh|please|yes|yeah|i mean|i meant|i said|i want|i think|make it|take|it is|it's)"
-    r"\b[\s,]*)+(?=\w)|[\s,]+please\W*$",
-    re.IGNORECASE,
-)
-_LEADING: Final = re.compile(rf"^(?:{_PREPOSITION}\s+)?(?:(?:the|a|an|my)\s+)?(?=\w)", re.IGNORECASE)
-_THERE: Final = "there"
-_ORDINALS: Final = ("first", "second", "third", "fourth", "fifth")
 
 
 class RefusalKind(Enum):
@@ -178,6 +164,8 @@ class RefusalError(Exception):
         self.reason = _LONG_WORD.sub(r"\1…", reason)
         super().__init__(self.reason)
         self.unknown = tuple(dict.fromkeys(_LONG_WORD.sub(r"\1…", word) for word in unknown))
-        self.question = (
-            open_question(self.reason, next(iter(self.unknown), None)) if question is True else question or None
-        )
+        if question is True:
+            heard = next(iter(self.unknown), None)
+            slot = Slot.GOAL if heard is None else Slot.PLACE if heard == _THERE else Slot.THING
+            question = ClarifyingQuestion(f"{self.reason[:1].upper()}{self.reason[1:]}", slot, heard=heard)
+        self.question = question or None

@@ -3,13 +3,16 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import groupby
 from typing import Final
 
-from executive.language.addressees import AddressedText, Addressee, RobotChoice, addressees
+from executive.language.actions import Action
+from executive.language.addressees import AddressedText, Addressee, RobotChoice, addressees, named_robots
 from executive.language.clauses import Clause, split
 from executive.language.cleaning import called_stranger, clean
 from executive.language.parser import DependencyParser
+from executive.language.phrases import Phrase
 from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
@@ -45,15 +48,8 @@ def understand_for_robots(
     text = clean(sentence)
     names = tuple(map(display_name, robots))
     if len(robots) == 1:
-        alone = understand(
-            sentence,
-            parser=parser,
-            knowledge=knowledge,
-            require_wake=require_wake,
-            robot_name=names[0],
-            memory=memory,
-            correct=correct,
-        )
+        understood = partial(understand, sentence, parser=parser, knowledge=knowledge)
+        alone = understood(require_wake=require_wake, robot_name=names[0], memory=memory, correct=correct)
         part = Part(robots[0], alone, speaker_by=robots[0])
         return replace(alone, parts=(part,)) if alone.status is Status.OK else alone
     assert knowledge is not None
@@ -65,8 +61,8 @@ def understand_for_robots(
         listener, clauses = split(rules.rest, names)
         addressed = listener is not None
         found = Understanding(sentence, Status.NOT_ADDRESSED)
-        stranger = called_stranger(text)
-        if not addressed and stranger is not None and not addressees(names).find_robots(stranger):
+        stranger = None if addressed else called_stranger(text)
+        if stranger is not None and not addressees(names).find_robots(stranger):
             what = f"there is no robot called {stranger}; there are {listing(names)}"
             found = replace(found, reason=what, unknown_words=(stranger,))
         elif require_wake and not addressed:
@@ -128,95 +124,88 @@ class _Reader:
         self, part: AddressedText, clauses: Sequence[Clause], before: Sequence[_Read], memory: Memory | None
     ) -> _Read:
         """Understands a part, and finds the parts that it waits for. Raises RefusalError."""
-        changes_hands = bool(before) and before[-1].part.who != part.who
-        if part.otherwise and changes_hands:
-            raise RefusalError("what one robot finds cannot decide what another does; say it as two requests")
-        if changes_hands:  # objects are where they were put, or looked for
-            memory, place = before[-1].meaning.memory, _where(before[-1].meaning)
-            memory = memory if memory is None or place is None else replace(memory, where=place, place=place)
-        if changes_hands and re.search(_IT, part.text):
-            part = replace(part, text=re.sub(_FROM_THERE, "", part.text))
-            clauses = [replace(clause, text=re.sub(_FROM_THERE, "", clause.text)) for clause in clauses]
-        meant = meaning(Trace(part.text, memory or Memory()), self.pipeline, clauses)
+        other = before[-1].meaning if before and before[-1].part.who != part.who else None
+        known = memory or Memory()
+        if other is not None:
+            if part.otherwise:
+                raise RefusalError("what one robot finds cannot decide what another does; say it as two requests")
+            known = _left_by(other)
+            if re.search(_IT, part.text):
+                part = replace(part, text=re.sub(_FROM_THERE, "", part.text))
+                clauses = [replace(clause, text=re.sub(_FROM_THERE, "", clause.text)) for clause in clauses]
+        meant = meaning(Trace(part.text, known), self.pipeline, clauses)
         after = set(self._said_before(part, before))
-        for number, other in enumerate(before):
-            if other.part.who == part.who:
+        for number, earlier in enumerate(before):
+            if earlier.part.who == part.who:
                 continue
-            if (place := _moved(other.meaning, meant)) is not None and memory is not None:
-                known = replace(memory, locations=(*memory.locations, *((item, place) for item in memory.objects)))
-                meant = meaning(Trace(part.text, known), self.pipeline, clauses)
-            put = {(str(command.item), command.goal) for command in other.meaning.commands if command.item is not None}
-            if any((str(one.object), one.goal) in put for one in meant.commands if one.task is Task.GRASP):
+            if (place := _moved(earlier.meaning, meant)) is not None:
+                moved = replace(known, locations=(*known.locations, *((item, place) for item in known.objects)))
+                meant = meaning(Trace(part.text, moved), self.pipeline, clauses)
+            if _takes_put(earlier.meaning, meant):
                 after.add(number)
-        if changes_hands:
-            self._check_in_hand(before[-1].meaning, meant, part.who)
+        if other is not None:
+            self._check_in_hand(other, meant, part.who)
         self._check_one_thing(part, meant)
         return _Read(part, meant, frozenset(after))
 
     def _said_before(self, part: AddressedText, before: Sequence[_Read]) -> Iterator[int]:
         """Yields the parts that must be done before this part, as the sentence says."""
-        for number in range(len(before) - 1, -1, -1) if part.then else ():
-            if before[number].part.who != part.who:
+        for number, one in reversed([*enumerate(before)] if part.then else []):
+            if one.part.who != part.who:
                 yield number
-            if before[number].after or before[number].part.then:
+            if one.after or one.part.then:
                 break
-        if part.behind is None or part.behind == part.who:
+        if part.behind in (None, part.who):
             return
-        behind = part.behind if isinstance(part.behind, tuple) else None
-        whose = ((n, one.part.who) for n, one in enumerate(before) if one.part.who is not None)
-        found = [n for n, who in whose if behind is None or not isinstance(who, tuple) or {*who} & {*behind}]
+        behind = {*named_robots(part.behind)}
+        whose = ((n, {*named_robots(one.part.who)}) for n, one in enumerate(before) if one.part.who is not None)
+        found = [n for n, who in whose if not behind or not who or who & behind]
         if not found:
-            who = self._named(part.behind if isinstance(part.behind, tuple) else self.robots)
-            raise RefusalError(f"no earlier task of {who} is in the sentence", [who])
+            named = self._named(part.behind)
+            raise RefusalError(f"no earlier task of {named} is in the sentence", [named])
         yield found[-1]
 
     def _check_in_hand(self, before: Understanding, meant: Understanding, who: Addressee | None) -> None:
         """Refuses to take an object that another robot holds or has handed over. Raises RefusalError."""
-        again = meant.trace is not None and any(one.again for one in meant.trace.resolved)
-        again = again or re.search(_IT, meant.text, re.IGNORECASE) is not None
-        carried = [command for command in before.commands if command.item is not None or command.object is not None]
+        again = any(one.again for one in _actions(meant)) or re.search(_IT, meant.text, re.IGNORECASE)
+        carried = [one for one in before.commands if one.item or one.object]
         if meant.status is not Status.OK or not again or not carried:
             return
         last = carried[-1]
-        if last.task not in (None, Task.GRASP) and last.item is None:
+        put_down = last.goal is not None and self.knowledge.place(last.goal) is not None
+        if put_down if last.item else last.task not in (None, Task.GRASP):
             return
-        if last.item is None or last.goal is None or self.knowledge.place(last.goal) is None:
-            item = last.item or last.object
-            what = f"{self._named(who)} cannot take the {item} then; say on which table the other robot puts it"
-            raise RefusalError(what, [str(item)])
+        what = f"{self._named(who)} cannot take the {last.item or last.object} then"
+        raise RefusalError(f"{what}; say on which table the other robot puts it", [str(last.item or last.object)])
 
     def _check_one_thing(self, part: AddressedText, meant: Understanding) -> None:
         """Refuses to send several robots for one single object. Raises RefusalError."""
-        several = part.who is RobotChoice.ALL or (isinstance(part.who, tuple) and len(part.who) > 1)
-        if not several or meant.trace is None or all(command.task is not Task.GRASP for command in meant.commands):
-            return
-        targets = (one.target for one in meant.trace.resolved)
-        definite = [target for target in targets if target is not None and not target.indefinite and not target.plural]
-        if definite:
-            what = f"{self._named(part.who)} cannot all take the one {definite[0].text}; say which of them"
-            raise RefusalError(what, [definite[0].text])
+        several = part.who is RobotChoice.ALL or len(named_robots(part.who)) > 1
+        takes = any(command.task is Task.GRASP for command in meant.commands)
+        single = [target.text for _, target in _definite(meant) if not target.plural]
+        if several and takes and single:
+            what = f"{self._named(part.who)} cannot all take the one {single[0]}; say which of them"
+            raise RefusalError(what, single[:1])
 
     def _refuse_as_person(self, text: str) -> None:
         """Raises RefusalError when a part treats a robot as a person, except within quotes and descriptions."""
-        named = [name for name in self.robots if re.search(rf"\b{re.escape(name)}\b", text, re.IGNORECASE)]
-        named = [name for name in named if self.knowledge.person(name) is None]
+        said = (name for name in self.robots if re.search(rf"\b{re.escape(name)}\b", text, re.IGNORECASE))
+        named = [display_name(name) for name in said if self.knowledge.person(name) is None]
         quotes = re.match(r"(?:say|announce|shout)\b(?!.* to \w+\W*$)", text, re.IGNORECASE)
         calls = addressees(self.robots)
         if named and not quotes and calls.name.search(calls.without_descriptions(text)):
-            name = display_name(named[0])
             reason = (
-                f"{name} is a robot, and not somebody to go to or to hand objects to; "
-                f"say what {name} is to do, or put objects on a table and let {name} bring them from there"
+                f"{named[0]} is a robot, and not somebody to go to or to hand objects to; "
+                f"say what {named[0]} is to do, or put objects on a table and let {named[0]} bring them from there"
             )
-            raise RefusalError(reason, [name])
+            raise RefusalError(reason, named[:1])
 
     def _parts(self, read: Sequence[_Read], listener: Addressee | None) -> Iterator[Part]:
         """Yields a part for each robot that each part of the text addresses."""
-        by = find_robot(listener[0], self.robots) if isinstance(listener, tuple) else None
+        by = next((find_robot(name, self.robots) for name in named_robots(listener)), None)
         numbers: list[range] = []
         for one in read:
-            named = one.part.who if isinstance(one.part.who, tuple) else ()
-            robots = [find_robot(name, self.robots) or name for name in named]
+            robots = [find_robot(name, self.robots) or name for name in named_robots(one.part.who)]
             who: list[str | RobotChoice] = [*robots] or [RobotChoice(one.part.who or RobotChoice.ANY)]
             after = tuple(sorted({at for number in one.after for at in numbers[number]}))
             begin = numbers[-1].stop if numbers else 0
@@ -224,27 +213,44 @@ class _Reader:
             yield from (Part(robot, one.meaning, after, by) for robot in who)
 
     def _named(self, who: Addressee | None) -> str:
-        names = who if isinstance(who, tuple) else self.robots
+        names = named_robots(who) or self.robots
         return listing(map(display_name, names), last="and" if who is not None else "or")
+
+
+def _actions(meant: Understanding) -> Sequence[Action]:
+    """Actions of a text, in which each pronoun is replaced by what it means."""
+    return () if meant.trace is None else meant.trace.resolved
+
+
+def _definite(meant: Understanding) -> list[tuple[Action, Phrase]]:
+    """Actions on a certain object ("the beer"), and the object."""
+    targets = ((one, one.target) for one in _actions(meant))
+    return [(one, target) for one, target in targets if target is not None and not target.indefinite]
+
+
+def _takes_put(before: Understanding, meant: Understanding) -> bool:
+    """Returns whether `meant` takes an object from where it was put before."""
+    put = {(str(one.item), one.goal) for one in before.commands if one.item is not None}
+    return any((str(one.object), one.goal) in put for one in meant.commands if one.task is Task.GRASP)
 
 
 def _moved(before: Understanding, meant: Understanding) -> Location | None:
     """Last destination of an object that `meant` names again without a place ("the beer")."""
-    if meant.trace is None or before.trace is None or meant.status is not Status.OK or before.memory is None:
-        return None
-    named = (one.target for one in meant.trace.resolved if one.source is None and not one.again)
-    texts = {target.text for target in named if target is not None and not target.indefinite}
-    same = any(item.text in texts for item in before.memory.objects)
+    texts = {target.text for one, target in _definite(meant) if one.source is None and not one.again}
+    named = before.memory is not None and any(item.text in texts for item in before.memory.objects)
     puts = any(command.item is not None for command in before.commands)
-    return _where(before) if same and puts else None
+    return _where(before) if named and puts and meant.status is Status.OK else None
+
+
+def _left_by(meant: Understanding) -> Memory:
+    """Memory after a text, in which objects are where they were put, or looked for."""
+    memory, place = meant.memory or Memory(), _where(meant)
+    return memory if place is None else replace(memory, where=place, place=place)
 
 
 def _where(meant: Understanding) -> Location | None:
     """Last known place of the objects; None if the place is unknown or a person has them."""
-    memory = meant.memory
-    if memory is None or meant.trace is None:
-        return None
-    actions = meant.trace.resolved
-    found = next((one for one in reversed(actions) if one.target in memory.objects), None)
-    place = found.goal or found.source if found is not None else memory.place if not actions else None
+    memory, actions = meant.memory or Memory(), _actions(meant)
+    places = [one.goal or one.source for one in actions if one.target in memory.objects]
+    place = places[-1] if places else None if actions else memory.place
     return None if place is None or place.phrase is None or place.living else place

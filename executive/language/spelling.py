@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Final
@@ -43,6 +43,13 @@ _MOST_LETTERS: Final = 30
 _LONG_NAME: Final = 7
 _MOST_WORDS: Final = 60
 _MOST_CANDIDATES: Final = 4
+_PART_CHANGED: Final = 0.4
+_ALWAYS_CHANGED: Final = 0.6
+_MOST_COST: Final = 3.5
+_MOST_ALIKES: Final = 8
+_MOST_LETTERS_HEARD: Final = 200
+_VOWEL_DROP: Final = 0.5
+_CONSONANT_DROP: Final = 0.8
 
 
 @dataclass(frozen=True)
@@ -68,11 +75,11 @@ class SoundAlikes:
         self._words = frozenset(word for phrase, _ in self._phrases for word in phrase.lower().split())
         sounds = [sounds_of(phrase) for phrase, _ in self._phrases]
         self._letters = sorted(set("".join(sounds)))
-        code = {letter: number for number, letter in enumerate(self._letters)}
-        self._lengths = np.array([len(s) for s in sounds], int)
-        self._sounds = np.zeros((len(sounds), max(map(len, sounds), default=0)), int)
-        for row, its in enumerate(sounds):
-            self._sounds[row, : len(its)] = [code[letter] for letter in its]
+        self._lengths = np.array(list(map(len, sounds)), int)
+        code = {" ": 0, **{letter: number for number, letter in enumerate(self._letters)}}
+        longest = max(map(len, sounds), default=0)
+        rows = [[code[letter] for letter in its.ljust(longest)] for its in sounds]
+        self._sounds = np.array(rows, int).reshape(len(sounds), longest)
         self._drops = np.array([_drop_cost(letter) for letter in self._letters])
         self.nearest = lru_cache(maxsize=4096)(self._nearest)
 
@@ -83,8 +90,6 @@ class SoundAlikes:
     def similarities(self, words: str) -> tuple[Alike, ...]:
         """Returns all phrases that have a sound, in order, with their similarity to `words`."""
         heard = sounds_of(words)
-        if not self._phrases:
-            return ()
         costs = self._costs(heard)
         longest = np.maximum(self._lengths, len(heard))
         distances = np.minimum(costs / longest, 1.0) if heard else np.ones(len(costs))
@@ -117,30 +122,19 @@ class SoundAlikes:
         return costs
 
 
-_PART_CHANGED: Final = 0.4
-_ALWAYS_CHANGED: Final = 0.6
-_MOST_COST: Final = 3.5
-_MOST_ALIKES: Final = 8
-
-
-@lru_cache(maxsize=64)
-def _alikes(names: tuple[str, ...]) -> SoundAlikes:
-    return SoundAlikes(names)
+_alikes = lru_cache(maxsize=64)(SoundAlikes)
 
 
 @lru_cache(maxsize=4096)
 def sound_distance(first: str, second: str) -> float:
-    """Distance in sound between two words or groups of words, from 0 to 1; blanks are silent.
-
-    A distance of up to about 0.2 is a likely mishearing.
-    """
+    """Distance in sound between two texts, from 0 to 1, without their blanks; up to 0.2 is a likely mishearing."""
     return next((one.distance for one in SoundAlikes((second,)).similarities(first)), 1.0)
 
 
 @lru_cache(maxsize=4096)
 def sounds_of(words: str) -> str:
     """Sounds of one or more words, one character for each sound; only Latin letters have sounds."""
-    letters = unicodedata.normalize("NFKD", words[:_MAX_LETTERS].lower())  # accents are taken off
+    letters = unicodedata.normalize("NFKD", words[:_MOST_LETTERS_HEARD].lower())  # accents are taken off
     plain = re.sub(r"[^a-z ]", "", re.sub(r"[-_\s]", " ", letters))
     return "".join(map(_word_sounds, plain.split()))
 
@@ -183,11 +177,6 @@ def _change_cost(a: str, b: str) -> float:
     return next((float(cost) for cost, pairs in alike for pair in pairs if {*pair} == {a, b}), 1.0)
 
 
-_MAX_LETTERS: Final = 200
-_VOWEL_DROP: Final = 0.5
-_CONSONANT_DROP: Final = 0.8
-
-
 @cache
 def _vowels() -> Mapping[str, tuple[float, float]]:
     """Backness and height of each vowel, from 0 to 1."""
@@ -204,21 +193,22 @@ class CorrectedText:
 
 def synonyms_for(name: str) -> tuple[str, ...]:
     """Synonyms of `name`, and words for its kind."""
-    rings, kinds = _synonyms()
     wanted = name.lower()
-    same = [word for ring in rings if wanted in ring for word in ring if word != wanted]
-    return tuple(dict.fromkeys([*same, *(kind for kind, members in kinds.items() if wanted in members)]))
+    kinds = (kind for kind, members in _synonyms()[1].items() if wanted in members)
+    return tuple(dict.fromkeys([*(word for word in _same(wanted) if word != wanted), *kinds]))
 
 
 def synonyms_of(word: str, known: Mapping[str, str]) -> tuple[str, ...]:
     """Known names that an unknown word may stand for; `known` maps each spelling to a name."""
-    wanted = word.lower()
-    rings, kinds = _synonyms()
-    ring = (known[other] for ring in rings if wanted in ring for other in ring if other in known)
-    members = kinds.get(wanted, ())
-    with_rings = ((member, *(other for ring in rings if member in ring for other in ring)) for member in members)
-    kind = (known[other] for each in with_rings for other in each if other in known)
-    return tuple(dict.fromkeys(ring)) or tuple(dict.fromkeys(kind))
+    members = _synonyms()[1].get(word.lower(), ())
+    of_kind = (other for member in members for other in (member, *_same(member)))
+    rings = (dict.fromkeys(known[one] for one in ring if one in known) for ring in (_same(word.lower()), of_kind))
+    return tuple(next(filter(None, rings), ()))
+
+
+def _same(word: str) -> Iterator[str]:
+    """Yields the words of each ring of synonyms that has a word, itself included."""
+    return (other for ring in _synonyms()[0] if word in ring for other in ring)
 
 
 def look_alikes(word: str, known: Mapping[str, str], facts: DependencyParser) -> tuple[str, ...]:
@@ -230,10 +220,8 @@ def look_alikes(word: str, known: Mapping[str, str], facts: DependencyParser) ->
     scores: list[tuple[float, str]] = []  # the lower, the likelier
     for spelling, name in known.items():
         slips, sound = _slips(wanted, spelling), sounds.get(spelling, 1.0)
-        if len(wanted) >= _FEWEST_LETTERS - 1 and slips <= _slips_allowed(spelling) // 2 + (len(spelling) > 3):
-            scores.append((slips / len(spelling), name))
-        elif sound <= ALIKE_SOUND:
-            scores.append((sound, name))
+        typed = len(wanted) >= _FEWEST_LETTERS - 1 and slips <= _slips_allowed(spelling) // 2 + (len(spelling) > 3)
+        scores += [(slips / len(spelling), name)] if typed else [(sound, name)] if sound <= ALIKE_SOUND else []
     near = [name for score, name in sorted(scores) if score < 1.0]
     if not near:
         head = wanted.split()[-1] if wanted else ""
@@ -251,61 +239,59 @@ def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -
     own = [*knowledge.object_names(), *knowledge.place_names(), *knowledge.people]
     known = _known(knowledge.spellings(own))
     words = list(_WORD.finditer(text))[:_MOST_WORDS]
-    pieces, notes, end, at = [], [], 0, 0
+    pieces, notes, end, at = list[str](), list[str](), 0, 0
     while at < len(words):
-        count, name = _corrected_at(words, at, known, facts)
+        count, name = _corrected_at([word.group() for word in words[at : at + _LONGEST_NAME]], known, facts)
         if name is not None:
-            spoken = text[words[at].start() : words[at + count - 1].end()]
-            pieces += [text[end : words[at].start()], name]
+            start, behind = words[at].start(), words[at + count - 1].end()
+            pieces, spoken, end = [*pieces, text[end:start], name], text[start:behind], behind
             same = _despaced(spoken) in (_despaced(name), _despaced(f"{name}s"))
             notes += [] if same else [f"I take '{spoken}' to be {name}"]
-            end = words[at + count - 1].end()
         at += count
     return CorrectedText("".join([*pieces, text[end:]]), tuple(notes))
 
 
-@dataclass(frozen=True)
 class _Known:
-    """Known spellings in lower case: names, their words, names without blanks, and the original form of each name."""
+    """Known spellings in lower case, and synonyms: names, their words, names without blanks, and the original forms."""
 
-    names: frozenset[str]
-    words: frozenset[str]
-    joined: Mapping[str, str]
-    spelled: Mapping[str, str]
+    def __init__(self, spelled: tuple[str, ...]) -> None:
+        self.spelled = {name.lower(): name for name in spelled}
+        names = dict.fromkeys([*self.spelled, *(word for name in self.spelled for word in synonyms_for(name))])
+        self.names = names.keys()
+        self.words = {word for name in names for word in name.split()}
+        self.joined = {_despaced(name): name for name in reversed(names)}
 
 
-def _corrected_at(
-    words: Sequence[re.Match[str]], at: int, known: _Known, facts: DependencyParser
-) -> tuple[int, str | None]:
-    """Number of words from here that form a name, and the name if its spelling must change."""
-    rows = [[word.group().lower() for word in words[at : at + count]] for count in range(_LONGEST_NAME, 0, -1)]
-    fitting = [row for row in rows if at + len(row) <= len(words)]
-    for row in fitting:
-        spoken = " ".join(row)
+_known = lru_cache(maxsize=16)(_Known)
+
+
+def _corrected_at(words: Sequence[str], known: _Known, facts: DependencyParser) -> tuple[int, str | None]:
+    """Number of words that form a name at the beginning, and the name if its spelling must change."""
+    beginnings = [" ".join(words[:count]).lower() for count in range(len(words), 0, -1)]
+    for spoken in beginnings:
         if spoken in known.names or _singular(spoken) in known.names:
-            return len(row), None
+            return len(spoken.split()), None
         if _despaced(spoken) in known.joined:
-            return len(row), known.joined[_despaced(spoken)]
-    for row in fitting:
-        name = _only_near(row, known, facts)
-        if name is not None:
-            return len(row), name
-    return 1, None
+            return len(spoken.split()), known.joined[_despaced(spoken)]
+    near = ((spoken, _only_near(spoken, known, facts)) for spoken in beginnings)
+    return next(((len(spoken.split()), name) for spoken, name in near if name is not None), (1, None))
 
 
-def _only_near(row: Sequence[str], known: _Known, facts: DependencyParser) -> str | None:
+def _only_near(spoken: str, known: _Known, facts: DependencyParser) -> str | None:
     """Only known name that misspelled words can mean; None if they are English or ambiguous."""
-    strange = [word for word in row if word not in known.words]
-    if not strange or any(not _FEWEST_LETTERS <= len(word) <= _MOST_LETTERS for word in strange):
+    if not _is_misspelled([word for word in spoken.split() if word not in known.words], facts):
         return None
-    if any(facts.is_word(word) or facts.is_word(_singular(word)) for word in strange):
-        return None
-    spoken = " ".join(row)
-    names = (name for name in known.names if name.count(" ") == len(row) - 1)
+    names = (name for name in known.names if name.count(" ") == spoken.count(" "))
     forms = [form for name in names for form in (name, f"{name}s")]
-    near = sorted((distance, form) for form in forms if (distance := _slips(spoken, form)) <= _slips_allowed(form))
-    unsure = len(near) > 1 and near[1][0] == near[0][0]
-    return None if unsure or not near else known.spelled.get(near[0][1], near[0][1])
+    near = [(slips, form) for form in forms if (slips := _slips(spoken, form)) <= _slips_allowed(form)]
+    nearest = [known.spelled.get(form, form) for slips, form in near if slips == min(near)[0]]
+    return nearest[0] if len(nearest) == 1 else None
+
+
+def _is_misspelled(strange: Sequence[str], facts: DependencyParser) -> bool:
+    """Returns whether there are words that occur in no name, and all can be misspelled names: they are not English."""
+    typed = bool(strange) and all(_FEWEST_LETTERS <= len(word) <= _MOST_LETTERS for word in strange)
+    return typed and not any(facts.is_word(form) for word in strange for form in (word, _singular(word)))
 
 
 def _slips(word: str, name: str) -> int:
@@ -315,15 +301,6 @@ def _slips(word: str, name: str) -> int:
 
 def _slips_allowed(name: str) -> int:
     return 1 if len(name) < _LONG_NAME else 2
-
-
-@lru_cache(maxsize=16)
-def _known(spelled: tuple[str, ...]) -> _Known:
-    """Names in a world with their aliases, and the general synonyms of both."""
-    written = {name.lower(): name for name in spelled}
-    names = tuple(dict.fromkeys([*written, *(word for name in written for word in synonyms_for(name))]))
-    words = frozenset(word for name in names for word in name.split())
-    return _Known(frozenset(names), words, {_despaced(name): name for name in reversed(names)}, written)
 
 
 def _singular(word: str) -> str:
@@ -338,6 +315,5 @@ def _despaced(name: str) -> str:
 def _synonyms() -> tuple[tuple[tuple[str, ...], ...], Mapping[str, tuple[str, ...]]]:
     data = read_table("synonyms.yaml")
     others = [ring for _, more in class_tables("synonyms.yaml") for ring in more["same"]]
-    return tuple(map(tuple, [*data["same"], *others])), {
-        kind: tuple(members) for kind, members in data["kinds"].items()
-    }
+    kinds = {kind: tuple(members) for kind, members in data["kinds"].items()}
+    return tuple(map(tuple, [*data["same"], *others])), kinds

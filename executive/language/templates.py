@@ -13,7 +13,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import product
 from typing import Any, Final, NamedTuple
 
@@ -24,12 +24,10 @@ class Words:
     """Words of a text in lower case, and their positions there; "n't" is "not"."""
 
     def __init__(self, text: str) -> None:
-        self.text, self.words, self.spans = text, list[str](), list[tuple[int, int]]()
-        for match in _WORD.finditer(text):
-            for n, piece in enumerate(match.groups(), 1):
-                if piece is not None:
-                    self.words.append(_FULL.get(piece.lower(), piece.lower()))
-                    self.spans.append(match.span(n))
+        spans = (match.span(n) for match in _WORD.finditer(text) for n in range(1, _WORD.groups + 1))
+        self.text, self.spans = text, [span for span in spans if span[0] >= 0]
+        said = (text[start:end].lower() for start, end in self.spans)
+        self.words = [_FULL.get(word, word) for word in said]
 
     def word(self, at: int) -> str:
         """Word at an index; empty outside the text."""
@@ -41,8 +39,6 @@ class Words:
 
 
 words_of = lru_cache(maxsize=4096)(Words)
-
-
 _WORD: Final = re.compile(
     r"(\d+(?:[.:]\d+)+%?)|(can)(not|'t)\b|(\w+)(n't|'re|'ve|'ll|'m|'d)\b|(there|it|that|he|she|what|where|who|here|how|"
     r"door|battery)('s)\b|(\w+(?:['-]\w+)*%?)|([^\w\s])",
@@ -80,23 +76,15 @@ class Page:
 
     @cached_property
     def table(self) -> Mapping[str, Any]:
-        """Contents of the page."""
-        found: Mapping[str, Any] = read_table(f"intents/{self._name}.yaml")
-        return found
+        """Contents of the page, with the common rules and lists, and the words that are given."""
+        own, common = read_table(f"intents/{self._name}.yaml"), read_table("intents/common.yaml")
+        lists = {**common["lists"], **own.get("lists", {}), **self._given}
+        return {**own, "rules": {**common["rules"], **own.get("rules", {})}, "lists": lists}
 
     def __getitem__(self, intent: str) -> Template:
         if intent not in self._templates:
             self._templates[intent] = Template(self, self.table["intents"][intent])
         return self._templates[intent]
-
-    def entry(self, kind: str, name: str) -> Any:
-        """Rule or list of the page, or else the common one; an unknown list takes any words."""
-        tables = (self.table, read_table("intents/common.yaml"))
-        return next((table[kind][name] for table in tables if name in table.get(kind, ())), {})
-
-    def words(self, name: str) -> _Part | None:
-        """Part for the words of an open slot; None for a list of the page."""
-        return _choice([_phrase(words) for words in self._given[name]]) if name in self._given else None
 
     def part(self, values: str | Iterable[str]) -> _Part:
         """Part for a template, or for one of several; each is parsed once."""
@@ -155,9 +143,9 @@ class Template:
     def _match(self, row: Mapping[str, Any], words: Words, at: int, whole: bool) -> Match | None:
         ends, size = self._page.part(row["template"]).ends_at(words, at), len(words.words)
         end, slots = next(((end, slots) for end, slots in ends if (end == size if whole else end > at)), (-1, ()))
-        if end < 0 or not self._begins(row.get("before"), words, end, missing=True):
+        if end < 0 or ("before" in row and not self._begins(row["before"], words, end)):
             return None
-        if self._begins(row.get("not_before"), words, end, missing=False):
+        if self._begins(row.get("not_before", ()), words, end):
             return None
         if whole and any(self._page[one].fullmatch(words.text) for one in row.get("unless", ())):
             return None
@@ -166,10 +154,10 @@ class Template:
         instead = " ".join(row.get("instead", "").format_map(defaultdict(str, filled)).split())
         return Match(words.text[start:stop], start, stop, end, filled, instead, words.text[words.start(end) :])
 
-    def _begins(self, templates: Sequence[str] | None, words: Words, at: int, *, missing: bool) -> bool:
-        """Returns whether one of the templates, or the end of the text, is at a word; `missing` without templates."""
-        if templates is None or at == len(words.words):
-            return missing if templates is None else "" in templates
+    def _begins(self, templates: Sequence[str], words: Words, at: int) -> bool:
+        """Returns whether one of the templates, or the end of the text (""), is at a word."""
+        if at == len(words.words):
+            return "" in templates
         named = [template for template in templates if template]
         return bool(named) and next(self._page.part(named).ends_at(words, at), None) is not None
 
@@ -203,8 +191,7 @@ def _word(spellings: Iterable[str]) -> _Part:
 
 def _phrase(text: str) -> _Part:
     """Words of a text."""
-    words = [_word([word]) for word in words_of(text).words]
-    return words[0] if len(words) == 1 else _sequence(words)
+    return _sequence([_word([word]) for word in words_of(text).words])
 
 
 def _sequence(parts: Sequence[_Part]) -> _Part:
@@ -216,6 +203,8 @@ def _sequence(parts: Sequence[_Part]) -> _Part:
             for end, more in ends(words, middle, n + 1):
                 yield end, (*slots, *more)
 
+    if len(parts) == 1:
+        return parts[0]
     begin = next((n for n, part in enumerate(parts) if not part.empty), len(parts))
     return _Part(ends, _firsts(parts[: begin + 1]), begin == len(parts))
 
@@ -225,6 +214,8 @@ def _choice(parts: Sequence[_Part]) -> _Part:
         for part in parts:
             yield from part.ends_at(words, at)
 
+    if len(parts) == 1:
+        return parts[0]
     if all(part.ends is _next_word for part in parts):
         return _word(_firsts(parts) or ())
     return _Part(ends, _firsts(parts), any(part.empty for part in parts))
@@ -235,13 +226,13 @@ def _firsts(parts: Sequence[_Part]) -> frozenset[str] | None:
     return None if None in firsts else frozenset(word for first in firsts for word in first or ())
 
 
-def _slot(name: str, part: _Part, instead: Mapping[str, str]) -> _Part:
-    """Part whose text is kept, or another text for it."""
+def _kept(name: str, part: _Part, instead: Mapping[str, str] | None = None) -> _Part:
+    """Part whose text is kept in a slot, or another text for it."""
 
     def ends(words: Words, at: int) -> _Ends:
         for end, slots in part.ends_at(words, at):
             text = words.text[words.start(at) : words.spans[end - 1][1]]
-            yield end, ((name, instead.get(text.lower(), text)), *slots)
+            yield end, ((name, (instead or {}).get(text.lower(), text)), *slots)
 
     return part._replace(ends=ends)
 
@@ -269,22 +260,16 @@ def _number(words: Words, at: int) -> _Ends:
 
 def _alternatives(parts: list[str], page: Page) -> _Part:
     """Alternatives up to the closing bracket, which it removes from the reversed parts."""
-    choices, pieces, joined = list[_Part](), list[_Part](), False
-    while True:
-        part = parts.pop() if parts else ""
-        if part in ("|", ")", "]", ""):
-            choices.append(pieces[0] if len(pieces) == 1 else _sequence(pieces))
-            pieces, joined = [], False
-            if part != "|":
-                break
-            continue
+    choices, joined = [list[_Part]()], False
+    while (part := parts.pop() if parts else ")") not in (")", "]"):
         mark = part.isspace() or part in _MARKS or (part == "[" and parts[-1] in _MARKS)
-        glued = joined and not mark
-        if not part.isspace():
+        if part == "|":
+            choices.append([])
+        elif not part.isspace():
             found = _part(part, parts, page)
-            pieces[len(pieces) - glued :] = [_glued(pieces[-1], found) if glued else found]
+            choices[-1].append(_glued(choices[-1].pop(), found) if joined and not mark else found)
         joined = not mark
-    return choices[0] if len(choices) == 1 else _choice(choices)
+    return _choice([*map(_sequence, choices)])
 
 
 def _glued(one: _Part, other: _Part) -> _Part:
@@ -293,22 +278,34 @@ def _glued(one: _Part, other: _Part) -> _Part:
 
 
 def _part(part: str, parts: list[str], page: Page) -> _Part:
-    if part in "([":
-        found = _alternatives(parts, page)
-        return found if part == "(" else _choice([found, _sequence(())])
-    if part[0] == "<":
-        return page.part(page.entry("rules", part[1:-1]) or page.table["rules"][part[1:-1]])
-    if part[0] != "{":
-        return _phrase(part)
-    name, _, slot = part[1:-1].partition(":")
-    if (words := page.words(name)) is not None:
-        return _slot(slot or name, words, {})
-    values: Any = {} if name == "number" else page.entry("lists", name)
-    if isinstance(values, Mapping) and values.keys() <= {"most", "without"}:
-        return _slot(slot or name, _Part(_number) if name == "number" else _any(values), {})
-    inner = page.part(values) if values else _word(())
-    return _slot(slot or name, inner, values if isinstance(values, Mapping) else {})
+    match part[0]:
+        case "(":
+            return _alternatives(parts, page)
+        case "[":
+            return _choice([_alternatives(parts, page), _sequence(())])
+        case "<":
+            return page.part(page.table["rules"][part[1:-1]])
+        case "{":
+            return _slot(part[1:-1], page)
+    return _phrase(part)
+
+
+def _slot(said: str, page: Page) -> _Part:
+    """Slot `said`, or `list:slot`; a list without values takes any words."""
+    name, _, slot = said.partition(":")
+    kept = partial(_kept, slot or name)
+    match page.table["lists"].get(name, {}):
+        case _ if name == "number":
+            return kept(_Part(_number))
+        case tuple() as given:
+            return kept(_choice([*map(_phrase, given)]))
+        case dict() as facts if facts.keys() <= {"most", "without"}:
+            return kept(_any(facts))
+        case dict() as instead:
+            return kept(page.part(instead), instead)
+        case values:
+            return kept(page.part(values) if values else _word(()))
 
 
 _PARTS: Final = re.compile(r"\s+|[()\[\]|]|<[^>]*>|\{[^}]*\}|[,;:.!?]|[^\s()\[\]|<>{},;:.!?]+")
-_MARKS: Final = tuple(",;:.!?")
+_MARKS: Final = tuple("|,;:.!?")

@@ -54,6 +54,9 @@ class Token:
         return is_attribute(self.text) or (self.pos in ("ADJ", "ADV") and may_be_attribute(self.text))
 
 
+THING: Final = "cup"
+PLACE: Final = "kitchen"
+PERSON: Final = "John"
 NO_TOKEN: Final = Token(-1, -1, "", "", "", "", -1, "")
 """Stands for the words before and after a sentence."""
 
@@ -84,12 +87,11 @@ class _Repair:
     only: str = ".*"
 
     def fits(self, tokens: Sequence[Token], at: int) -> bool:
-        for place, facts in self.where.items():
-            for name, text in facts.items():
-                found = re.fullmatch(text.removeprefix("not "), _fact(tokens, at + place, name))
-                if (found is None) != text.startswith("not "):
-                    return False
-        return True
+        facts = (
+            (text, _fact(tokens, at + place, name)) for place, its in self.where.items() for name, text in its.items()
+        )
+        matches = ((text, re.fullmatch(text.removeprefix("not "), fact)) for text, fact in facts)
+        return all((found is None) == text.startswith("not ") for text, found in matches)
 
     def apply(self, tokens: list[Token], at: int) -> None:
         for place, become in self.then.items():
@@ -97,9 +99,9 @@ class _Repair:
             tokens[at + place] = replace(tokens[at + place], **{**become, **head})
         if self.joins:
             before, now = (at + place for place in self.joins)
-            for n in range(at - 1):
-                if tokens[n].head == before and re.fullmatch(self.only, tokens[n].relation):
-                    tokens[n] = replace(tokens[n], head=now)
+            for n, token in enumerate(tokens[: at - 1]):
+                if token.head == before and re.fullmatch(self.only, token.relation):
+                    tokens[n] = replace(token, head=now)
 
 
 @cache
@@ -132,12 +134,6 @@ _IS: Final[Mapping[str, Callable[[Sequence[Token], int], bool]]] = {
     "command": _begins_command,
 }
 
-
-THING: Final = "cup"
-PLACE: Final = "kitchen"
-PERSON: Final = "John"
-
-
 NameTable = tuple[re.Pattern[str], Mapping[str, str]]
 """Pattern of all known names, and the parser's replacement word for each name in lower case."""
 
@@ -161,19 +157,16 @@ def parse_with_names(
         return parse(text)
     pattern, stand_ins = table
     names: dict[int, re.Match[str]] = {}
-    pieces: list[str] = []
-    end = 0
+    said, end = "", 0
     for match in pattern.finditer(text):
-        pieces.append(text[end : match.start()])
-        names[sum(map(len, pieces))] = match
-        stand_in = stand_ins[match[1].lower()]
-        pieces.append(f"{stand_in}s" if match[2] and stand_in != PERSON else stand_in)
-        end = match.end()
-    tokens = list(parse("".join([*pieces, text[end:]])))
+        said += text[end : match.start()]
+        names[len(said)] = match
+        stand_in, end = stand_ins[match[1].lower()], match.end()
+        said += f"{stand_in}s" if match[2] and stand_in != PERSON else stand_in
+    tokens = list(parse(said + text[end:]))
     for n, token in enumerate(tokens):
         if (found := names.get(token.start)) is not None:
-            entity = "PERSON" if token.text == PERSON else ""
-            known = not is_attribute(found[1])
+            entity, known = "PERSON" if token.text == PERSON else "", not is_attribute(found[1])
             tokens[n] = replace(token, text=found[0], lemma=found[1].lower(), entity=entity, known=known)
     return tuple(tokens)
 
@@ -211,11 +204,9 @@ def _rewritten(text: str, families: tuple[str, ...] | None) -> str:
 def _rules(families: tuple[str, ...] | None) -> tuple[_Rule, ...]:
     table = read_table("rephrasing.yaml")
     rules = ((rule, name in _OF_WORK) for name in families or [*table][1:] for rule in table[name])
-    pairs = (((expression(rule), rule["instead"]) if isinstance(rule, dict) else rule, of) for rule, of in rules)
-    return tuple(
-        (re.compile(_filled(pattern), re.IGNORECASE), _FUNCTIONS.get(instead, instead), of)
-        for (pattern, instead), of in pairs
-    )
+    pairs = ((*((expression(rule), rule["instead"]) if isinstance(rule, dict) else rule), of) for rule, of in rules)
+    found = ((_filled(pattern), _FUNCTIONS.get(instead, instead), of) for pattern, instead, of in pairs)
+    return tuple((re.compile(pattern, re.IGNORECASE), instead, of) for pattern, instead, of in found)
 
 
 def _filled(pattern: str) -> str:

@@ -58,6 +58,11 @@ class Action:
         return self.objects[0] if self.objects else None
 
     @property
+    def for_somebody(self) -> bool:
+        """Returns whether the speaker, another person or an animal gets the object."""
+        return self.goal is not None and (self.goal == HERE or self.goal.living)
+
+    @property
     def phrases(self) -> tuple[Phrase, ...]:
         """Noun phrases of the action in any role."""
         places = (place for each in (self.source, self.goal, *self.passes) if each is not None for place in each.around)

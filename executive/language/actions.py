@@ -1,22 +1,11 @@
 """Reads actions: the work that each clause asks of the robot."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, takewhile
+from itertools import chain, takewhile, zip_longest
 from typing import Final
 
-from executive.language.items import (
-    Adverb,
-    Being,
-    Chunk,
-    Outside,
-    Predicate,
-    Separator,
-    Unknown,
-    Verb,
-    requested_predicates,
-    spoken_words,
-)
+from executive.language.items import Adverb, Being, Chunk, Predicate, Unknown, Verb, requested_predicates, spoken_words
 from executive.language.lexicon import PrepositionRole, VerbKind, word_list
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
@@ -58,16 +47,31 @@ class Action:
         return self.objects[0] if self.objects else None
 
     @property
+    def bare(self) -> bool:
+        """Returns whether only the verb is not understood: it lacks its object or place."""
+        return self.unknown == (self.verb,)
+
+    @property
+    def for_somebody(self) -> bool:
+        """Returns whether the speaker, another person or an animal gets the object."""
+        return self.goal is not None and (self.goal == HERE or self.goal.living)
+
+    @property
     def phrases(self) -> tuple[Phrase, ...]:
         """Noun phrases of the action in any role."""
         places = (place for each in (self.source, self.goal, *self.passes) if each is not None for place in each.around)
-        others = (self.teller, self.time, *(place.phrase for place in places))
+        others = (self.teller, self.time, *_phrases(places))
         return (*self.objects, *chain(*self.choices), *(phrase for phrase in others if phrase is not None))
+
+
+def _phrases(places: Iterable[Location | None]) -> tuple[Phrase, ...]:
+    return tuple(place.phrase for place in places if place is not None and place.phrase is not None)
 
 
 _IT: Final = Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),))
 _BIN: Final = Location(Phrase((Token(0, 0, "bin", "bin", "NOUN", "NN", 0, "obl", kind=NounKind.PLACE),)), "to")
 _AIMS: Final = (PrepositionRole.GOAL, PrepositionRole.FOR)
+_ALONG: Final = (" down", " up", " along")
 _ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})
 _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
@@ -82,82 +86,97 @@ def read_actions(
     found: list[Action] = []
     follows = False
     for clause in requested_predicates(clauses):
-        before = [each for each in (clause.subject, clause.verb) if each is not None]
-        chunks = [item for item in clause.items if isinstance(item, Chunk)]
-        named = any(one.role in _AIMS or (one.role is None and one.phrase.receiver) for one in chunks)
-        named = named or any(isinstance(item, Adverb) for item in clause.items)
+        receiver = None if any(map(_names_aim, clause.items)) else recipient
         for action in _actions(clause):
-            gives = recipient is not None and not named and action.verb.partition(" ")[0] in word_list("to_recipient")
-            goal = recipient if gives else action.goal
-            action = replace(action, said=spoken_words([*before, *clause.items]), follows=follows, goal=goal)
-            lacks = action.unknown == (action.verb,) and not action.objects and action.kind in _ELIDING
+            gives = action.verb.partition(" ")[0] in word_list("to_recipient")
+            goal = (receiver if gives else None) or action.goal
+            action = replace(action, said=_said(clause), follows=follows, goal=goal)
+            lacks = action.bare and not action.objects and action.kind in _ELIDING
             if elliptic and lacks and (goal is not None or action.kind is VerbKind.FIND):
                 action = replace(action, unknown=(), objects=(_IT,))  # take the phone and carry to me
             elliptic = elliptic or any(not phrase.speaker for phrase in action.objects)
             found.append(action)
-        end = takewhile(lambda item: isinstance(item, Separator), reversed(clause.items))
-        follows = any(isinstance(item, Separator) and item.word in word_list("follows") for item in end)
-    found = _without_idle_waits(found)
-    last = [replace(action, unknown=(action.said,)) if action.departs else action for action in found[-1:]]
-    # The "go" of "go and find" is left out.
-    bare = [one for one in found[:-1] if one.kind is VerbKind.GO and one.goal is None and one.unknown == (one.verb,)]
-    return (*(action for action in found[:-1] if action not in bare), *last)
+        follows = _leads_on(clause)
+    return tuple(_without_idle_drives(_without_idle_waits(found)))
 
 
-def _without_idle_waits(actions: list[Action]) -> list[Action]:
+def _leads_on(clause: Predicate) -> bool:
+    end = takewhile(lambda item: item not in clause.content, reversed(clause.items))
+    return any(getattr(item, "word", "") in word_list("follows") for item in end)
+
+
+def _names_aim(item: object) -> bool:
+    aims = isinstance(item, Chunk) and (item.role in _AIMS or (item.role is None and item.phrase.receiver))
+    return aims or isinstance(item, Adverb)
+
+
+def _said(clause: Predicate) -> str:
+    return spoken_words(item for item in (clause.subject, clause.verb, *clause.items) if item is not None)
+
+
+def _without_idle_waits(actions: Sequence[Action]) -> Sequence[Action]:
     """Removes a wait without a time after the last drive: the robot stays there. Raises RefusalError for others."""
     waits = [action for action in actions if action.verb in word_list("wait") and action.time is None]
-    idle = [action for action in waits if action.kind is VerbKind.WAIT and action.unknown == (action.verb,)]
-    if idle and idle[-1] is actions[-1] and len(actions) > 1 and actions[-2].kind is VerbKind.GO:
-        return _without_idle_waits(actions[:-1])
+    idle = [action for action in waits if action.kind is VerbKind.WAIT and action.bare]
+    match actions:
+        case [*before, Action(kind=VerbKind.GO) as drive, last] if last in idle:
+            return _without_idle_waits([*before, drive])
     if idle or any(action.kind is VerbKind.GO for action in waits if action is not actions[-1]):
         said = (idle or waits)[0].said
         raise RefusalError(f"say for how long I am to wait in '{said}', or until what", [said])
     return actions
 
 
+def _without_idle_drives(actions: Sequence[Action]) -> Iterator[Action]:
+    """Leaves out the "go" of "go and find"; the last action is not understood if it only leaves a place."""
+    for action, after in zip_longest(actions, actions[1:]):
+        if after is None and action.departs:
+            yield replace(action, unknown=(action.said,))
+        elif after is None or action.kind is not VerbKind.GO or action.goal is not None or not action.bare:
+            yield action
+
+
 def _actions(clause: Predicate) -> Iterator[Action]:
-    verb = clause.verb
-    if verb is None or isinstance(verb, Outside):
-        yield Action(None, "", unknown=(spoken_words([*([] if verb is None else [verb]), *clause.items]),))
-    elif isinstance(verb, Being):
-        yield _being(clause, verb)
-    else:
-        yield from _acting(clause, verb)
+    match clause.verb:
+        case Being() as being:
+            yield _being(clause, being)
+        case Verb() as verb:
+            yield from _acting(clause, verb)
+        case _:
+            yield Action(None, "", unknown=(_said(replace(clause, subject=None)),))
 
 
 def _being(clause: Predicate, being: Being) -> Action:
     """Reads a status check ("is there a hammer on the desk") or a statement ("there is a hammer on the desk")."""
-    subject = None if clause.subject is None else clause.subject.phrase
-    if being.narrated:
-        return _narrated(clause, being)
-    if _is_state(clause, being):
-        named = subject is not None and not (subject.speaker or subject.pronoun)
-        return Action(None, being.text, (subject,) if named and subject is not None else ())
-    roles = read_roles(clause.items, describes=False)
-    if subject is not None and subject.speaker and not being.asked:  # we are out of napkins, I am in the hall
-        lacked = tuple(place.phrase for place in roles.sources if place.phrase is not None)
-        unknown = (*roles.unknown, *(phrase.spoken for phrase in roles.objects))
-        return Action(None, being.text, lacked, next(iter(roles.ats), None), unknown=unknown)
-    objects = [*([subject] if subject is not None else []), *roles.objects]
-    if subject and not being.asked and roles.recipient is not None and len(objects) == 1 and not roles.unknown:
-        return Action(None, being.text, tuple(objects), teller=roles.recipient.phrase)
-    there = [place for place in roles.goals if place == THERE]
+    roles, told = read_roles(clause.items, describes=False), Action(None, being.text)
+    match clause.subject, roles:
+        case _ if being.narrated:
+            return _narrated(being, roles)
+        case Chunk(phrase=subject), _ if _is_state(clause, being):
+            return replace(told, objects=() if subject.speaker or subject.pronoun else (subject,))
+        case Chunk(phrase=Phrase(speaker=True)), _ if not being.asked:  # we are out of napkins, I am in the hall
+            unknown = (*roles.unknown, *(phrase.spoken for phrase in roles.objects))
+            return replace(told, objects=_phrases(roles.sources), source=next(iter(roles.ats), None), unknown=unknown)
+        case Chunk(phrase=subject), Roles(recipient=Location(phrase=teller), objects=[], unknown=[]) if not being.asked:
+            return replace(told, objects=(subject,), teller=teller)
+        case Chunk(phrase=subject), _:
+            return _located(clause, being, roles, [subject, *roles.objects])
+    return _located(clause, being, roles, roles.objects)
+
+
+def _located(clause: Predicate, being: Being, roles: Roles, objects: Sequence[Phrase]) -> Action:
+    there = [THERE] * roles.goals.count(THERE)
     places = [*roles.ats, *roles.sources, *there]
-    place = next(iter(places), None)
-    known = len(roles.goals) == len(there) and not (roles.unknown or roles.joined_goals)
     kind = VerbKind.FIND if being.asked or clause.whether else None
-    located = place or being.existential or (kind is not None and objects and objects[0].relations)
-    fits = len(objects) == 1 and len(places) <= 1 and known and located
-    before = [clause.subject] if clause.subject else []
-    unknown = () if fits and not any(map(_is_question, objects)) else (spoken_words([*before, being, *clause.items]),)
-    choices = tuple(map(tuple, roles.choices))
-    return Action(kind, "be", tuple(objects[:1]), place, unknown=unknown, choices=choices, teller=being.teller)
+    located = places or being.existential or (kind is not None and any(phrase.relations for phrase in objects))
+    surplus = places[1:] or objects[1:] or roles.goals != there or roles.unknown or roles.joined_goals
+    fits = objects and located and not (surplus or any(map(_is_question, objects)))
+    found = Action(kind, "be", tuple(objects[:1]), next(iter(places), None), teller=being.teller)
+    return replace(found, unknown=() if fits else (_said(clause),), choices=tuple(map(tuple, roles.choices)))
 
 
-def _narrated(clause: Predicate, being: Being) -> Action:
+def _narrated(being: Being, roles: Roles) -> Action:
     """Reads a narrated event with its object; an event is no request."""
-    roles = read_roles(clause.items, describes=False)
     lacked = [place.phrase for place in roles.sources if place.preposition == "out of"]
     topics = [phrase for phrase in (*roles.objects, roles.searched, *lacked) if phrase is not None]
     topics = topics or [phrase for phrase in (being.topic,) if phrase is not None]
@@ -181,69 +200,82 @@ def _is_question(phrase: Phrase) -> bool:
 
 def _acting(clause: Predicate, verb: Verb) -> Iterator[Action]:
     roles = read_roles(clause.items, describes=verb.kinds != {VerbKind.GO}, puts=VerbKind.PLACE in verb.kinds)
-    if verb.text in word_list("gives") and len(roles.objects) > 1 and not roles.recipient and not roles.listed:
-        roles.unknown.append(roles.objects[0].spoken)
+    match roles:
+        case Roles(objects=[first, _, *_], recipient=None, listed=False) if verb.text in word_list("gives"):
+            roles.unknown.append(first.spoken)
     if _departs(verb, roles):
         yield Action(None, verb.text, departs=True)
         return
-    going = VerbKind.GO in verb.kinds and (len(verb.kinds) == 1 or not (roles.objects or roles.recipient))
-    others = (kind for kind in VerbKind if kind in verb.kinds and kind is not VerbKind.GO)
-    kind = VerbKind.GO if going else next(others)
+    moved = bool(roles.objects or roles.recipient)  # "get the cup" takes, "get to the hall" goes
+    kinds = [kind for kind in VerbKind if kind in verb.kinds]
+    kind = min(kinds, key=lambda kind: moved is (kind is VerbKind.GO))
     blank = Action(kind, verb.text, unknown=tuple(roles.unknown), choices=tuple(map(tuple, roles.choices)))
-    if kind is VerbKind.GO:
-        yield from _going(blank, roles)
-    elif kind is VerbKind.FIND or (kind is VerbKind.CHECK and roles.searched is not None):
-        yield from _finding(replace(blank, kind=VerbKind.FIND), roles)
-    elif kind is VerbKind.WAIT:
-        yield _waiting(blank, roles)
-    elif kind is VerbKind.CHARGE:  # the robot charges only itself, at its dock
-        places = (place for place in (*roles.ats, *roles.goals) if place.phrase is not None)
-        yield replace(blank, passes=tuple(place for place in places if place.name in word_list("docks")))
-    elif kind is VerbKind.CHECK:
-        unknown = (spoken_words([verb, *clause.items]),)
-        yield replace(blank, kind=kind if clause.content else VerbKind.FIND, unknown=unknown)
-    else:
-        yield from _carrying(blank, roles)
+    match kind, roles:
+        case VerbKind.GO, _:
+            yield from _going(blank, roles)
+        case (VerbKind.FIND, _) | (VerbKind.CHECK, Roles(searched=Phrase())):
+            yield from _finding(replace(blank, kind=VerbKind.FIND), roles)
+        case VerbKind.WAIT, _:
+            yield _waiting(blank, roles)
+        case VerbKind.CHARGE, _:  # the robot charges only itself, at its dock
+            docks = (place for place in (*roles.ats, *roles.goals) if place.name in word_list("docks"))
+            yield replace(blank, passes=tuple(docks))
+        case VerbKind.CHECK, _:
+            yield replace(blank, kind=kind if clause.content else VerbKind.FIND, unknown=(_said(clause),))
+        case _:
+            yield from _carrying(blank, roles)
 
 
 def _departs(verb: Verb, roles: Roles) -> bool:
     """Returns whether a place is only left on the way elsewhere, as in "leave the kitchen and go to the hall"."""
     left = roles.objects if verb.text in word_list("leaves") else []
     if verb.text not in word_list("leaves") and VerbKind.GO in verb.kinds and not roles.objects:
-        left = [place.phrase for place in roles.sources if place.phrase is not None]
+        left = [*_phrases(roles.sources)]
     places = bool(left) and all(phrase.kind is NounKind.PLACE for phrase in left)
     return places and not (roles.goals or roles.ats or roles.recipient or roles.unknown or roles.searched)
 
 
 def _going(blank: Action, roles: Roles) -> Iterator[Action]:
     """Yields one action for each place to go to."""
-    bare = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
+    bare = not (roles.sources or roles.objects)
+    match roles.searched, roles.goals:
+        case Phrase(kind=NounKind.THING, pronoun=False) as sought, [Location(phrase=Phrase()) as place] if bare:
+            # run to the cellar for some wine
+            yield replace(blank, kind=VerbKind.ROUND_TRIP, objects=(sought,), source=place, goal=HERE)
+            return
+    places, passed = _route(blank.verb, roles)
+    passes = (*passed, *roles.paths) if places else ()
+    places = places or roles.paths or ([HERE] if blank.verb in word_list("goes_back") else [])
+    unfit = (
+        (not _names_places(blank.verb, roles.objects), [phrase.spoken for phrase in roles.objects]),
+        (roles.recipient == HERE and not roles.favour, ["me"]),
+        (not places, [blank.verb]),
+    )
+    unknown = (*blank.unknown, *chain(*(words for when, words in unfit if when)))
+    blank = replace(blank, unknown=unknown, passes=passes)
+    yield from (replace(blank, goal=place) for place in places) if places else (blank,)
+
+
+def _route(verb: str, roles: Roles) -> tuple[list[Location], list[Location]]:
+    """Places to go to, and places on the way to them."""
+    named = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
     passed = [place for place in roles.ats if roles.goals and place.preposition in ("around", "by")]
     ats = [place for place in roles.ats if place not in passed]
-    if len(bare) == 1 and bare[0] is not HERE and len(ats) == 1 and not roles.goals:
-        bare = [replace(bare[0], within=ats.pop())]
-    objects = any(phrase.kind is NounKind.THING and not phrase.known for phrase in roles.objects)
-    if bare and blank.verb.endswith((" down", " up", " along")):
-        passed += [replace(place, preposition=blank.verb.split()[-1]) for place in bare if roles.goals]
-        bare = [] if roles.goals else bare
-    elif bare and (blank.verb not in word_list("bare_goal") or (blank.verb in word_list("enters") and objects)):
-        blank = replace(blank, unknown=(*blank.unknown, *(phrase.spoken for phrase in roles.objects)))
-    sought = roles.searched
-    fetched = sought is not None and sought.kind is NounKind.THING and not sought.pronoun
-    elsewhere = len(roles.goals) == 1 and roles.goals[0].phrase is not None and not (roles.sources or roles.objects)
-    if sought is not None and fetched and elsewhere:  # run to the cellar for some wine
-        yield replace(blank, kind=VerbKind.ROUND_TRIP, objects=(sought,), source=roles.goals[0], goal=HERE)
-        return
-    headed = sought if sought is not None and sought.kind is NounKind.PLACE else None
-    places = [*roles.goals, *ats, *bare, *([] if headed is None else [Location(headed)]), *roles.joined_goals]
-    passed += roles.paths if places else []
-    places = places or roles.paths
-    if not places and blank.verb in word_list("goes_back"):
-        places = [HERE]
-    me = ["me"] if roles.recipient is HERE and not roles.favour else []
-    unknown = (*blank.unknown, *me, *([] if places else [blank.verb]))
-    blank = replace(blank, unknown=unknown, passes=tuple(passed))
-    yield from (replace(blank, goal=place) for place in places) if places else (blank,)
+    if roles.goals and verb.endswith(_ALONG):
+        passed, named = [*passed, *(replace(place, preposition=verb.split()[-1]) for place in named)], []
+    elif not roles.goals and len(named) == len(ats) == 1 and named != [HERE]:
+        named, ats = [replace(named[0], within=ats[0])], []
+    match roles.searched:
+        case Phrase(kind=NounKind.PLACE) as headed:
+            named.append(Location(headed))
+    return [*roles.goals, *ats, *named, *roles.joined_goals], passed
+
+
+def _names_places(verb: str, objects: Sequence[Phrase]) -> bool:
+    """Returns whether phrases without a preposition are places to go to, or to go along."""
+    things = any(phrase.kind is NounKind.THING and not phrase.known for phrase in objects)
+    enters = verb in word_list("bare_goal") and not (things and verb in word_list("enters"))
+    return enters or verb.endswith(_ALONG)
 
 
 def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
@@ -277,38 +309,44 @@ def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
 
     "A beer to Robin and Charlie" gives one action for each recipient or place.
     """
-    goals, sources, ats = list(roles.goals), list(roles.sources), list(roles.ats)
-    if roles.recipient is not None and not (roles.favour and ats and blank.kind is VerbKind.PLACE):
-        to_place = bool(goals) and not goals[0].person
-        rest = [] if to_place and roles.favour else [roles.recipient]
-        goals = [*goals, *rest] if to_place else [roles.recipient, *goals]
-    bins = [n for n, each in enumerate(ats) if each.phrase and each.phrase.singular in ("bin", *synonyms_for("bin"))]
-    if bins and not goals and blank.kind is VerbKind.PLACE:
-        bin_at, around = ats.pop(bins[-1]), ats[bins[-1] :]
-        ats, goals = ats[: bins[-1]], [replace(bin_at, within=next(iter(around), bin_at.within))]
-    discards, hurls = blank.verb in word_list("discards"), blank.verb in word_list("hurls")
-    lies_there = discards or (hurls and bool(ats) and ats[-1].preposition not in ("in", "inside"))
-    puts = blank.kind is VerbKind.PLACE and not lies_there
-    at_is_goal = puts or blank.verb in word_list("at_is_goal") or len(ats) > 1
-    lies = any(place.role is not PrepositionRole.SOURCE for place in sources)  # the cup that is on the desk
-    if ats and not goals and (at_is_goal or lies):
-        goals.append(ats.pop())
-    sources += ats
-    bare = _BIN if discards else HERE if blank.verb in word_list("hands") and not sources else None
-    goal = next(iter(goals), bare)
-    if goal is None and hurls:
-        blank = replace(blank, unknown=(*blank.unknown, blank.verb))
-    each = len(roles.objects) == 1 and roles.objects[0].indefinite and not roles.objects[0].pronoun
-    shared = roles.joined_goals if goal is not None and each else []
-    candidates = [place.phrase for place in ([] if shared else [goal, *roles.joined_goals]) if place and place.phrase]
-    if len(candidates) > 1:
-        blank = replace(blank, choices=(*blank.choices, tuple(candidates)))
-    source = next(iter(sources), None)
-    found = replace(blank, objects=tuple(roles.objects), source=source, goal=goal, passes=tuple(roles.paths))
-    beside = [word for word, place in (("here", HERE), ("there", THERE)) if place in roles.goals and goal != place]
-    carried = _with_object(found, beside)
-    yield carried
-    yield from (replace(carried, goal=place) for place in shared)
+    goal, ats = _aim(blank, roles)
+    sources, shared = [*roles.sources, *ats], list[Location]()
+    if goal is None and blank.verb in word_list("discards"):
+        goal = _BIN
+    elif goal is None and blank.verb in word_list("hands") and not sources:
+        goal = HERE
+    match roles.objects:
+        case [Phrase(indefinite=True, pronoun=False)] if goal is not None:
+            shared = roles.joined_goals
+    choice = _phrases([] if shared else [goal, *roles.joined_goals])
+    lost = [word for word, place in (("here", HERE), ("there", THERE)) if place in roles.goals and goal != place]
+    if goal is None and blank.verb in word_list("hurls"):
+        lost = [blank.verb, *lost]
+    found = replace(blank, objects=tuple(roles.objects), source=next(iter(sources), None), passes=tuple(roles.paths))
+    found = replace(_with_object(found, lost), choices=(*blank.choices, choice) if choice[1:] else blank.choices)
+    yield from (replace(found, goal=place) for place in (goal, *shared))
+
+
+def _aim(blank: Action, roles: Roles) -> tuple[Location | None, Sequence[Location]]:
+    """Goal or recipient of an object, and the places after "in" and "on" where it lies."""
+    goal, ats, puts = next(iter(roles.goals), None), roles.ats, blank.kind is VerbKind.PLACE
+    if (goal is None or goal.person) and not (roles.favour and ats and puts):
+        goal = roles.recipient or goal
+    if goal is not None or not ats:
+        return goal, ats
+    bins = [n for n, at in enumerate(ats) if at.phrase and at.phrase.singular in ("bin", *synonyms_for("bin"))]
+    if bins and puts:
+        thrown, *around = ats[bins[-1] :]
+        return replace(thrown, within=next(iter(around), thrown.within)), ats[: bins[-1]]
+    return (ats[-1], ats[:-1]) if _goes_there(blank, roles) else (None, ats)
+
+
+def _goes_there(blank: Action, roles: Roles) -> bool:
+    """Returns whether the last place after "in" or "on" says where an object goes, and not where it lies."""
+    hurled = blank.verb in word_list("hurls") and roles.ats[-1].preposition not in ("in", "inside")
+    puts = blank.kind is VerbKind.PLACE and not (hurled or blank.verb in word_list("discards"))
+    described = any(place.role is not PrepositionRole.SOURCE for place in roles.sources)  # the cup that is on the desk
+    return puts or described or len(roles.ats) > 1 or blank.verb in word_list("at_is_goal")
 
 
 def _with_object(action: Action, unknown: Sequence[str] = ()) -> Action:

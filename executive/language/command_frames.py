@@ -1,8 +1,7 @@
 """Builds command frames: resolved actions as commands with spoken names, one to take an object and one to carry it."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 from typing import Final
 
 from executive.language.actions import Action
@@ -14,11 +13,7 @@ from executive.words.command import Command, Task
 
 _GOES_FOR: Final = frozenset({VerbKind.FIND, VerbKind.PICK, VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP})
 _TAKES: Final = {*_GOES_FOR, VerbKind.PLACE}
-_ALONE: Final[Mapping[VerbKind | None, Task | None]] = {
-    VerbKind.GO: None,
-    VerbKind.WAIT: Task.WAIT,
-    VerbKind.CHARGE: Task.CHARGE,
-}
+_ALONE: Final = {VerbKind.WAIT: Task.WAIT, VerbKind.CHARGE: Task.CHARGE}
 
 
 @dataclass(frozen=True)
@@ -41,44 +36,40 @@ def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
     """
     frames: list[CommandFrame] = []
     held: Phrase | None = None
-    # A wish is left out where the next words say how to meet it: "I would like a tea, can you get me one".
-    followed = zip_longest(actions, actions[1:])
-    asked = tuple(action for action, after in followed if after is None or not _meets(after, action))
-    joined = _set_down(_one_by_one(_join_going(asked)))
-    for index, action in enumerate(joined):
-        verb, target, puts = action.verb, action.target, action.kind is VerbKind.PLACE
-        after = joined[index + 1] if index + 1 < len(joined) else None
-        later = any(other.again and other.target == target for other in joined[index + 1 :])
-        goal = action.goal or (HERE if action.kind is VerbKind.ROUND_TRIP and not later else None)
-        name = "it" if target is None else f"the {target.text}"
-        if goal is None and verb in word_list("goal_wanted") and not later:
-            raise RefusalError(f"{verb} {name}: where to?", question=True)
-        if verb in word_list("source_wanted") and action.source is None and action.goal is None:
-            raise RefusalError(f"{verb} {name}: from where?", [verb])
-        taking = [CommandFrame(verb, goal=action.source, task=Task.GRASP, object=target)] if held != target else []
-        if after is not None and _puts_down(after, action) and after.goal not in (None, HERE):
-            same = action.goal is not None and after.goal is not None and action.goal.name == after.goal.name
-            frames += [*taking, *([] if same else [CommandFrame(verb, goal=action.goal)])]
-            held = target
-        elif action.kind in _ALONE:
-            frames.append(CommandFrame(verb, goal=action.goal, task=_ALONE[action.kind], object=action.time))
-        elif action.kind is VerbKind.FIND and not later:
-            frames.append(CommandFrame(verb, goal=action.source, task=Task.FIND, object=target))
-        else:
-            frames += [] if puts and goal is None else taking
-            if puts:
-                frames.append(CommandFrame(verb, item=target, goal=goal, task=Task.PLACE, object=target))
-            elif goal is not None:
-                frames.append(CommandFrame(verb, item=target, goal=goal))
-            held = None if puts or goal is not None else target
+    joined = _merge(_one_by_one(_merge(_merge(actions, _meet), _join)), _set_down)
+    for index, action in enumerate(joined, 1):
+        verb, target = action.verb, action.target
+        later = any(other.again and other.target == target for other in joined[index:])
+        put_at = next((after.goal for after in joined[index : index + 1] if _puts_down(action, after)), None)
+        goal = _goal(action, later)
+        taking = [] if held == target else [CommandFrame(verb, goal=action.source, task=Task.GRASP, object=target)]
+        match action:
+            case Action(goal=Location(name=name)) if put_at is not None:
+                going = [] if name == put_at.name else [CommandFrame(verb, goal=goal)]
+                frames, held = [*frames, *taking, *going], target
+            case Action(kind=VerbKind.GO | VerbKind.WAIT | VerbKind.CHARGE as kind):
+                frames.append(CommandFrame(verb, goal=goal, task=_ALONE.get(kind), object=action.time))
+            case Action(kind=VerbKind.FIND) if not later:
+                frames.append(CommandFrame(verb, goal=action.source, task=Task.FIND, object=target))
+            case Action(kind=VerbKind.PLACE):
+                putting = CommandFrame(verb, item=target, goal=goal, task=Task.PLACE, object=target)
+                frames, held = [*frames, *(taking if goal is not None else []), putting], None
+            case _ if goal is None:
+                frames, held = [*frames, *taking], target
+            case _:
+                frames, held = [*frames, *taking, CommandFrame(verb, item=target, goal=goal)], None
     return tuple(_one_in_hand(frames))
 
 
-def _puts_down(action: Action, before: Action) -> bool:
-    """Returns whether an action puts down the object that was carried: "take it to the desk and set it down"."""
-    goal = before.goal if before.kind in _GOES_FOR else None
-    carried = goal is not None and goal is not HERE and not goal.person
-    return carried and action.kind is VerbKind.PLACE and action.again and action.target == before.target
+def _goal(action: Action, later: bool) -> Location | None:
+    """Where an action brings its object, unless a later action says so; raises RefusalError if a place is missing."""
+    verb, name = action.verb, "it" if action.target is None else f"the {action.target.text}"
+    goal = action.goal or (HERE if action.kind is VerbKind.ROUND_TRIP and not later else None)
+    if goal is None and verb in word_list("goal_wanted") and not later:
+        raise RefusalError(f"{verb} {name}: where to?", question=True)
+    if verb in word_list("source_wanted") and action.source is None and action.goal is None:
+        raise RefusalError(f"{verb} {name}: from where?", [verb])
+    return goal
 
 
 def _one_in_hand(frames: Sequence[CommandFrame]) -> Iterator[CommandFrame]:
@@ -95,48 +86,60 @@ def _one_in_hand(frames: Sequence[CommandFrame]) -> Iterator[CommandFrame]:
         yield CommandFrame(held.verb, item=held.object, goal=HERE)
 
 
-def _set_down(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Merges carrying an object and putting it down: "take it to the desk and set it down"."""
-    found: list[Action] = []
+def _merge(actions: Sequence[Action], join: Callable[[Action, Action], Action | None]) -> tuple[Action, ...]:
+    """Joins actions that follow each other, where `join` makes one of two."""
+    merged: list[Action] = []
     for action in actions:
-        if found and action.goal is None and _puts_down(action, found[-1]):
-            found[-1] = replace(found[-1], kind=VerbKind.PLACE)
-        else:
-            found.append(action)
-    return tuple(found)
+        one = join(merged[-1], action) if merged else None
+        merged = [*merged, action] if one is None else [*merged[:-1], one]
+    return tuple(merged)
 
 
-def _join_going(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Merges a bare "go" with the next action if that action names no place; "then fetch" stays separate."""
-    joined: list[Action] = []
-    for action in actions:
-        before = joined[-1] if joined and joined[-1].kind is VerbKind.GO else None
-        own = action.follows and action.kind is VerbKind.ROUND_TRIP
-        takes_source = before and action.kind in _GOES_FOR and action.source is None and not (action.again or own)
-        takes_goal = before and action.kind is VerbKind.PLACE and action.goal is None
-        there = before and action.kind in _GOES_FOR and action.source is not None and action.source.within is None
-        same = before and there and before.goal and action.source and before.goal.name == action.source.name
-        back = before and before.goal is HERE and action.kind is VerbKind.ROUND_TRIP
-        to_them = before and before.goal and before.goal.living and action.goal and action.goal.name == before.goal.name
-        goal = before.goal.phrase if before and before.goal else None
-        docks = action.kind is VerbKind.CHARGE and goal is not None and goal.head.lemma in word_list("docks")
-        if same or back or to_them or docks:
-            joined.pop()
-            takes_source = takes_source and not (back or to_them)
-        if before and (takes_source or takes_goal):
-            joined = joined if back or to_them else joined[:-1]
-            action = replace(action, source=before.goal) if takes_source else replace(action, goal=before.goal)
-        joined.append(action)
-    return tuple(joined)
+def _meet(wish: Action, action: Action) -> Action | None:
+    """Leaves out a wish that the next words say how to meet: "I would like a tea, can you get me one"."""
+    if wish.target is None or action.target is None or action.target.tokens != wish.target.tokens or not action.again:
+        return None
+    match wish, action.kind:
+        case Action(kind=VerbKind.PLACE), VerbKind.PLACE if action.goal == wish.goal:
+            return action
+        case Action(kind=VerbKind.ROUND_TRIP, source=None, again=False), VerbKind.ROUND_TRIP | VerbKind.PICK:
+            return action if wish.for_somebody else None
+    return None
 
 
-def _meets(action: Action, wish: Action) -> bool:
-    """Returns whether an action already fetches the object that a wish asks for."""
-    same = action.target is not None and wish.target is not None and action.target.tokens == wish.target.tokens
-    somebody = wish.goal is not None and (wish.goal is HERE or wish.goal.living)
-    wished = wish.kind is VerbKind.ROUND_TRIP and somebody and wish.source is None and not wish.again
-    put = wish.kind is VerbKind.PLACE and action.kind is VerbKind.PLACE and action.goal == wish.goal
-    return same and action.again and (put or (wished and action.kind in (VerbKind.ROUND_TRIP, VerbKind.PICK)))
+def _join(going: Action, action: Action) -> Action | None:
+    """Joins a "go" and the next action if that names no place, or leads there itself; "then fetch" stays separate."""
+    place, there = going.goal, None if going.goal is None else going.goal.name
+    match action:
+        case _ if going.kind is not VerbKind.GO:
+            return None
+        case Action(kind=VerbKind.ROUND_TRIP) if place == HERE:
+            return action
+        case Action(goal=Location(name=name)) if name == there and place is not None and place.living:
+            return action
+        case Action(kind=VerbKind.CHARGE) if place is not None and place.phrase is not None:
+            return action if place.phrase.head.lemma in word_list("docks") else None
+        case Action(kind=VerbKind.PLACE, goal=None):
+            return replace(action, goal=place)
+        case Action(source=Location(within=None, name=name)) if name == there:
+            return action if action.kind in _GOES_FOR else None
+        case Action(kind=VerbKind.ROUND_TRIP, follows=True) | Action(again=True):
+            return None
+        case Action(source=None) if action.kind in _GOES_FOR:
+            return replace(action, source=place)
+    return None
+
+
+def _set_down(before: Action, action: Action) -> Action | None:
+    """Joins carrying an object and putting it down: "take it to the desk and set it down"."""
+    return replace(before, kind=VerbKind.PLACE) if action.goal is None and _puts_down(before, action) else None
+
+
+def _puts_down(before: Action, action: Action) -> bool:
+    """Returns whether an action puts down the object that was carried, and not for the speaker."""
+    goal = before.goal if before.kind in _GOES_FOR else None
+    carried = goal is not None and HERE not in (goal, action.goal) and not goal.person
+    return carried and action.kind is VerbKind.PLACE and action.again and action.target == before.target
 
 
 def _one_by_one(actions: Sequence[Action]) -> tuple[Action, ...]:

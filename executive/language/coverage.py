@@ -5,13 +5,15 @@ for nothing. The fillers of words.yaml alone get no note.
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from typing import Final
 
 from executive.language.actions import Action
 from executive.language.items import Aside, Being, Chunk, Item, Predicate, Unknown, Verb, spoken_words
 from executive.language.lexicon import PrepositionRole, any_of, lexicon, word_list
 from executive.language.limits import is_door
+from executive.language.phrases import Phrase
 from skills.inputs.errors import listing
 
 
@@ -22,31 +24,58 @@ def cover(
 
     Returns notes on the words that change nothing, and the words that are lost, each with its clause.
     """
-    phrases = [phrase for action in actions for phrase in action.phrases]
+    phrases = [*chain.from_iterable(action.phrases for action in actions)]
+    asides, told, lost = [*_asides(items, actions, phrases)], list[str](), list[tuple[str, str]]()
+    for clause in clauses:
+        unused, words = _unused(clause, phrases), _spoken(clause)
+        if _asks(clause, actions):
+            favours = [one for one in unused if one.role is PrepositionRole.FOR and one.phrase.person]
+            asides += [one.spoken for one in favours]
+            lost += [(one.spoken, words) for one in unused if one not in favours]
+            lost += [(said, words) for said in _unrelated(clause, phrases)]
+        elif unused or _describes(clause, words):
+            told.append(words)
+    notes = {_LEFT_OUT: asides, TOLD: told, "I cannot tell whose it is: {}": [*_owned(actions)]}
+    return [form.format(listing(map(repr, words))) for form, words in notes.items() if words], lost
+
+
+def _asides(items: Sequence[Item], actions: Sequence[Action], phrases: Sequence[Phrase]) -> Iterator[str]:
+    """Yields the words that do not change what the robot does, and the places that it only passes."""
+    yield from (item.word for item in items if isinstance(item, Aside))
+    yield from (token.text for one in phrases for token in one.tokens[:-1] if (token.word,) in lexicon().noted)
+    yield from (f"{one.preposition} {one.text}" for action in actions for one in action.passes if not is_door(one))
+
+
+def _owned(actions: Sequence[Action]) -> Iterator[str]:
+    """Yields the objects and landmarks that are somebody's."""
+    relations = dict.fromkeys(each for action in actions for phrase in action.phrases for each in phrase.relations)
+    targets = [one.target for one in actions if one.target is not None]
+    for phrase in (*targets, *(one for each in relations for one in each.landmarks)):
+        if any(token.word in word_list("owners") for token in phrase.tokens[:-1]):
+            yield phrase.spoken
+
+
+def _unused(clause: Predicate, phrases: Sequence[Phrase]) -> list[Chunk]:
+    """Noun phrases of a clause that are not among the phrases of the actions, nor described by them."""
     used = {token.index for phrase in phrases for token in phrase.tokens}
     described = {text for phrase in phrases for text in phrase.extra}
-    related = dict.fromkeys(each for phrase in phrases for each in phrase.relations)
-    asides = [item.word for item in items if isinstance(item, Aside)]
-    asides += [token.text for phrase in phrases for token in phrase.tokens[:-1] if (token.word,) in lexicon().noted]
-    asides += [f"{one.preposition} {one.text}" for action in actions for one in action.passes if not is_door(one)]
-    told, lost = list[str](), list[tuple[str, str]]()
-    for clause in clauses:
-        chunks = [one for one in (clause.subject, *clause.items) if isinstance(one, Chunk)]
-        named = (one for one in chunks if not (one.phrase.speaker or (one.phrase.addressed and one.role is None)))
-        unused = [one for one in named if not used & _indices(one) and one.phrase.text not in described]
-        words, states = _spoken(clause), any(isinstance(item, Unknown) for item in clause.items)
-        if _asks(clause, actions):
-            favours = [chunk for chunk in unused if chunk.role is PrepositionRole.FOR and chunk.phrase.person]
-            asides += [chunk.spoken for chunk in favours]
-            lost += [(chunk.spoken, words) for chunk in unused if chunk not in favours]
-            lost += [(each.said, words) for one in chunks for each in one.phrase.relations if each not in related]
-        elif unused or (" " in words and isinstance(verb := clause.verb, Being) and (verb.narrated or states)):
-            told.append(words)
-    targets = [one.target for one in actions if one.target is not None]
-    targets += [one for each in related for one in each.landmarks]
-    owned = [one.spoken for one in targets if any(token.word in word_list("owners") for token in one.tokens[:-1])]
-    notes = {_LEFT_OUT: asides, TOLD: told, "I cannot tell whose it is: {}": owned}
-    return [form.format(listing(map(repr, words))) for form, words in notes.items() if words], lost
+    chunks = [item for item in (clause.subject, *clause.items) if isinstance(item, Chunk)]
+    named = (one for one in chunks if not (one.phrase.speaker or (one.phrase.addressed and one.role is None)))
+    return [one for one in named if not used & _indices(one) and one.phrase.text not in described]
+
+
+def _unrelated(clause: Predicate, phrases: Sequence[Phrase]) -> Iterator[str]:
+    """Yields the relations in a clause that no action has."""
+    related = {each for phrase in phrases for each in phrase.relations}
+    chunks = (item for item in (clause.subject, *clause.items) if isinstance(item, Chunk))
+    return (each.said for one in chunks for each in one.phrase.relations if each not in related)
+
+
+def _describes(clause: Predicate, words: str) -> bool:
+    """Returns whether a clause of several words tells an event or a state."""
+    verb = clause.verb
+    states = any(isinstance(item, Unknown) for item in clause.items)
+    return " " in words and isinstance(verb, Being) and (verb.narrated or states)
 
 
 def _indices(chunk: Chunk) -> set[int]:

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Final
 
 from executive.language.indirect import INDIRECT
@@ -41,21 +40,13 @@ class Reader(Row):
 
     def read(self, lead: Sequence[Item] = ()) -> tuple[Item, ...]:
         """Reads the words as items after `lead`: each word becomes an item, except the silent ones."""
-        steps: tuple[Callable[[list[Item]], Item | None], ...] = (
-            self._mark,
-            *(partial(step, self) for step in INDIRECT),
-            self._verb,
-            self._being,
-            self._chunk,
-            self._small,
-            self._outside,
-        )
+        steps = (Reader._mark, *INDIRECT, Reader._verb, Reader._being, Reader._chunk, Reader._small, Reader._outside)
         items = list(lead)
         while self.at < len(self.tokens):
             if self.at in self.silent:
                 self.at += 1
             else:
-                found = next((item for step in steps if (item := step(items)) is not None), None)
+                found = next((item for step in steps if (item := step(self, items)) is not None), None)
                 items.append(found or Unknown(self.take(1)))
         return tuple(items)
 
@@ -81,20 +72,16 @@ class Reader(Row):
 
     def _takes_preposition(self, verb: tuple[str, ...]) -> bool:
         """Returns whether a verb's last word begins a longer preposition instead ("go | in front of")."""
-        if verb[:-1] not in lexicon().verbs:
-            return False
         place = self.phrase_at(self.at + len(verb))
-        if verb[-1] in ("in", "on") and place is not None and place.kind is NounKind.PLACE:
-            return True
-        return len(self.match(lexicon().prepositions, len(verb) - 1)) > 1
+        inside = verb[-1] in ("in", "on") and place is not None and place.kind is NounKind.PLACE
+        longer = len(self.match(lexicon().prepositions, len(verb) - 1)) > 1
+        return verb[:-1] in lexicon().verbs and (inside or longer)
 
     def _gerund(self, items: list[Item]) -> tuple[str, ...]:
         """Verb in a form such as "bringing" or "brought" where a command begins, as after "would you mind"."""
-        first = self.token()
-        if not ((first.tag in ("VBD", "VBN") and not items) or (first.tag == "VBG" and may_begin_command(items))):
-            return ()
-        rest = self.tokens[self.at + 1 : self.at + LONGEST]
-        return longest_of(lexicon().verbs, [first.lemma, *(t.word for t in rest)])
+        first, rest = self.token(), self.tokens[self.at + 1 : self.at + LONGEST]
+        begins = not items if first.tag in ("VBD", "VBN") else first.tag == "VBG" and may_begin_command(items)
+        return longest_of(lexicon().verbs, [first.lemma, *(t.word for t in rest)]) if begins else ()
 
     def _being(self, items: list[Item]) -> Item | None:
         token, after = self.token(), self.token(1)
@@ -131,18 +118,16 @@ class Reader(Row):
         before = behind.word != "for" and (behind.pos == "ADP" or behind.tag in ("TO", "IN"))
         if before or (items and isinstance(items[-1], Chunk) and items[-1].role is not None):
             return Aside(token.text)
-        verb = next((item for item in reversed(items) if isinstance(item, Verb | Being)), None)
-        looks = not isinstance(verb, Verb) or VerbKind.FIND in verb.kinds
-        return _place(token, PrepositionRole.AT if looks else PrepositionRole.GOAL)
+        kinds = _last_kinds(items, Being)
+        return _place(token, PrepositionRole.GOAL if kinds and VerbKind.FIND not in kinds else PrepositionRole.AT)
 
     def _shown_at(self, start: int) -> Phrase | None:
         """Noun phrase after a "that" that the parser did not take as its article ("hand me that cup")."""
         that, phrase = self.token(start - self.at), self.phrase_at(start + 1)
-        if that.word not in word_list("pointing") or phrase is None:
+        if phrase is None or phrase.named_person or phrase.head.word in word_list("subjects"):
             return None
-        if phrase.named_person or phrase.head.word in word_list("subjects"):
-            return None
-        return Phrase((replace(that, tag="DT", pos="DET"), *phrase.tokens))
+        shown = Phrase((replace(that, tag="DT", pos="DET"), *phrase.tokens))
+        return shown if that.word in word_list("pointing") else None
 
     def _of(self, phrase: Phrase) -> Phrase:
         """Joins "of wine" to "a bottle", and "of cups" to "two" or "a couple"."""
@@ -165,26 +150,24 @@ class Reader(Row):
         who_is = self.word() in ("who", "that", "which") and self.word(1) in ("is", "'s", "are", "'re")
         if phrase.person and who_is and self.token(2).tag in ("VBG", "IN"):
             self.at += 2
-        token, inner = self.token(), self.phrase_at(self.at + 1)
-        if phrase.person and token.tag == "VBG":
+        if phrase.person and self.token().tag == "VBG":
             return self._doing_end()
-        end = self.at + 1 + (0 if inner is None else len(inner.tokens))
-        apart = PrepositionRole.BESIDE in self.prepositions.values()  # in a world, it says which one
-        if inner is not None and token.word == "on" and inner.head.word in ("left", "right") and not apart:
-            return end if end == len(self.tokens) or self.tokens[end].word != "of" else self.at
-        worn = inner is not None and inner.head.lemma in word_list("worn")
-        joins = token.word in ("with", "containing", "holding")
-        joins = joins or (phrase.person and token.word in ("in", "wearing") and worn)
-        if inner is None or not joins or inner.person or inner.speaker or inner.pronoun:
-            return self.at
-        return end
+        inner = self.phrase_at(self.at + 1)
+        return self.at if inner is None or not self._describes(phrase, inner) else self.at + 1 + len(inner.tokens)
+
+    def _describes(self, phrase: Phrase, inner: Phrase) -> bool:
+        """Returns whether the next word joins a description to a noun: "with", "on" the left, or "in" clothes."""
+        word = self.word()
+        if word == "on" and inner.head.word in ("left", "right"):  # in a world, it says which one
+            apart = PrepositionRole.BESIDE in self.prepositions.values()
+            return not apart and self.word(1 + len(inner.tokens)) != "of"
+        worn = phrase.person and word in ("in", "wearing") and inner.head.lemma in word_list("worn")
+        return (worn or word in ("with", "containing", "holding")) and not (inner.receiver or inner.pronoun)
 
     def _doing_end(self) -> int:
         """End of a description such as "raising their left arm" or "wearing a blue shirt"."""
-        end = self.at + 1
-        inner = self.phrase_at(end)
-        if inner is not None and not inner.person:
-            end += len(inner.tokens)
+        inner = self.phrase_at(self.at + 1)
+        end = self.at + 1 + (0 if inner is None or inner.person else len(inner.tokens))
         while end < len(self.tokens) and (more := self._directional(end)):
             end += more
         return end
@@ -200,26 +183,12 @@ class Reader(Row):
         return preposition + len(phrase.tokens)
 
     def _small(self, items: list[Item]) -> Item | None:
-        token = self.token()
-        before = token.pos in ("ADP", "ADV") and token.word not in ("of", "from")
-        if self._idle(items) or (before and self.word(1) in ("here", "there")):
+        token, then = self.token(), next((then for when, then in _SINGLE if when(self, items)), None)
+        if then is not None:
             self.at += 1
-            return Separator("")
-        chunks = [item for item in items if isinstance(item, Chunk)]
-        named = bool(chunks) and not chunks[-1].phrase.pronoun and all(chunk.role is None for chunk in chunks)
-        if token.word == "inside" and named and not any(isinstance(item, Being) for item in items):  # the house itself
-            self.at += 1
-            return _place(token, PrepositionRole.GOAL)
-        if token.word in word_list("here") or token.word in word_list("there"):
-            self.at += 1
-            return Adverb(here=token.word in word_list("here"))
-        if token.word in ("if", "whether"):
-            self.at += 1
-            return Whether()
+            return then(token)
         if token.word == "but" and self.at > 0 and self._excepts(items):
             return None
-        if token.word in word_list("postures") and any(item.phrase.somebody for item in chunks[-1:]):
-            return Unknown(self.take(1))
         filler, noted = self._particle(items) or self.match(lexicon().fillers), self.match(lexicon().noted)
         if len(noted) > len(filler):
             return Aside(self.take(len(noted)))
@@ -234,33 +203,43 @@ class Reader(Row):
 
     def _idle(self, items: Sequence[Item]) -> bool:
         """Returns whether the next word adds nothing, as in "that clamp over there" or "I need like a towel"."""
-        token, behind = self.token(), self.token(1)
-        if token.word in word_list("there") and self._points(items):
-            return True
+        token, word, behind = self.token(), self.word(), self.token(1)
         wants = bool(items) and (isinstance(items[-1], Verb) or self.word(-1) in ("me", "us"))
-        if token.word == "like" and wants and self.phrase_at(self.at + 1):
-            return True
-        last = next((item for item in reversed(items) if isinstance(item, Verb | Being | Outside)), None)
         purpose = behind.tag == "VB" and any(verb[0] == behind.word for verb in lexicon().verbs)
-        if purpose and token.tag == "TO" and isinstance(last, Verb) and VerbKind.GO in last.kinds:
-            return True  # go to take the broom
-        return not items and token.word in ("after", "upon", "by") and behind.tag == "VBG"
+        rows = (
+            word in word_list("there") and self._points(items),
+            word == "like" and wants and self.phrase_at(self.at + 1) is not None,
+            token.tag == "TO" and purpose and VerbKind.GO in _last_kinds(items, Being, Outside),  # go to take
+            word in ("after", "upon", "by") and not items and behind.tag == "VBG",
+            token.pos in ("ADP", "ADV") and word not in ("of", "from") and behind.word in ("here", "there"),
+        )
+        return any(rows)
+
+    def _enters(self, items: Sequence[Item]) -> bool:
+        """Returns whether "inside" means the house itself: behind a verb and its object."""
+        chunks = [item for item in items if isinstance(item, Chunk)]
+        named = bool(chunks) and not chunks[-1].phrase.pronoun and all(chunk.role is None for chunk in chunks)
+        return named and self.word() == "inside" and not any(isinstance(item, Being) for item in items)
+
+    def _describes_state(self, items: Sequence[Item]) -> bool:
+        """Returns whether a posture says how somebody is ("the man lying there")."""
+        chunk = next((item for item in reversed(items) if isinstance(item, Chunk)), None)
+        return self.word() in word_list("postures") and chunk is not None and chunk.phrase.somebody
 
     def _points(self, items: Sequence[Item]) -> bool:
         """Returns whether "over there" only accompanies "that", as in "that clamp over there"."""
-        named = next((item for item in reversed(items) if not isinstance(item, Separator)), None)
-        beyond = self.word(-1) == "over" or self.token(1).tag == "IN"
-        if not isinstance(named, Chunk) or named.role is not None or not beyond:
-            return False
-        return named.phrase.tokens[0].word in word_list("pointing") and not named.phrase.pronoun
+        match next((item for item in reversed(items) if not isinstance(item, Separator)), None):
+            case Chunk(role=None, phrase=Phrase(pronoun=False, tokens=(first, *_))):
+                beyond = self.word(-1) == "over" or self.token(1).tag == "IN"
+                return beyond and first.word in word_list("pointing")
+        return False
 
     def _particle(self, items: list[Item]) -> tuple[str, ...]:
         """Joins a particle to its verb: "put the cup down"."""
         particle = self.word()
         at, last = next(((n, item) for n, item in [*enumerate(items)][::-1] if isinstance(item, Verb)), (0, None))
-        if last is None or (*last.text.split(), particle) not in lexicon().verbs:
-            return ()
-        if self.word(1) in word_list("here") | word_list("there"):
+        placed = self.word(1) in word_list("here") | word_list("there")
+        if last is None or placed or (*last.text.split(), particle) not in lexicon().verbs:
             return ()
         items[at] = verb(f"{last.text} {particle}")
         return (particle,)
@@ -268,19 +247,34 @@ class Reader(Row):
     def _outside(self, items: list[Item]) -> Item | None:
         """Unknown verb at a position where a clause may begin."""
         token = self.token()
-        if token.pos != "VERB" or token.tag not in _VERB_TAGS or not (may_begin_command(items) or token.tag == "VB"):
-            return None
-        return Outside(self.take(1))
+        begins = token.tag == "VB" or (token.tag in _VERB_TAGS and may_begin_command(items))
+        return Outside(self.take(1)) if token.pos == "VERB" and begins else None
 
 
 def _handles(items: Sequence[Item], phrase: Phrase) -> bool:
     """Returns whether the last verb carries or finds objects like the phrase; "is every beer there" does not."""
-    last = next((item for item in reversed(items) if isinstance(item, Verb | Being | Outside | Whether)), None)
-    kinds = last.kinds if isinstance(last, Verb) else frozenset()
+    kinds = _last_kinds(items, Being, Outside, Whether)
     carries = kinds & {VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PICK, VerbKind.PLACE}
     return bool(carries) or (VerbKind.FIND in kinds and phrase.kind in (NounKind.THING, None))
+
+
+def _last_kinds(items: Sequence[Item], *others: type[Item]) -> frozenset[VerbKind]:
+    """Kinds of the last verb; empty if one of the other items follows it."""
+    last = next((item for item in reversed(items) if isinstance(item, (Verb, *others))), None)
+    return last.kinds if isinstance(last, Verb) else frozenset()
 
 
 def _place(token: Token, role: PrepositionRole) -> Chunk:
     """Makes a place out of a word."""
     return Chunk(Phrase((replace(token, pos="NOUN", tag="NN", kind=NounKind.PLACE),)), "", role)
+
+
+_SINGLE: Final[Sequence[tuple[Callable[[Reader, Sequence[Item]], bool], Callable[[Token], Item]]]] = (
+    (Reader._idle, lambda _: Separator("")),
+    (Reader._enters, lambda token: _place(token, PrepositionRole.GOAL)),
+    (lambda reader, _: reader.word() in word_list("here"), lambda _: Adverb(here=True)),
+    (lambda reader, _: reader.word() in word_list("there"), lambda _: Adverb(here=False)),
+    (lambda reader, _: reader.word() in ("if", "whether"), lambda _: Whether()),
+    (Reader._describes_state, lambda token: Unknown(token.text)),
+)
+"""When a word stands alone, and as which item."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from executive.language.actions import Action
 from executive.language.lexicon import VerbKind
 from executive.language.nouns import NounKind
-from executive.language.phrases import Phrase
+from executive.language.phrases import Phrase, SpokenRelation
 from executive.language.questions import RefusalError
-from executive.language.roles import HERE, THERE, Location
+from executive.language.roles import THERE, Location
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,11 @@ class Memory:
     person: Location | None = None
     locations: tuple[tuple[Phrase, Location], ...] = ()
 
-    def where_is(self, item: Phrase) -> Location | None:
-        """Location that a statement has given for an object with that name."""
-        return next((place for phrase, place in reversed(self.locations) if phrase.head.lemma == item.head.lemma), None)
+    def source(self, action: Action) -> Location | None:
+        """Source of an action, or the location that a statement has given for an object with that name."""
+        lemma = None if action.target is None or action.kind is VerbKind.GO else action.target.head.lemma
+        told = (place for phrase, place in reversed(self.locations) if phrase.head.lemma == lemma)
+        return action.source or next(told, None)
 
 
 @dataclass(frozen=True)
@@ -51,56 +53,47 @@ def resolve(actions: Sequence[Action], memory: Memory) -> Resolution:
 
 
 def _done(action: Action, before: Resolution) -> Resolution:
-    memory = before.memory
-    again = any(phrase.pronoun for phrase in action.objects)
-    meant = _all_meant(action.objects, memory)
-    meant = tuple(_as_before(item, before.actions, memory) for item in meant)
-    objects = tuple(_named_before(item, action, before.actions) or item for item in meant)
+    memory, again = before.memory, any(phrase.pronoun for phrase in action.objects)
+    meant = [_as_before(item, before.actions, memory) for item in _all_meant(action.objects, memory)]
+    objects = tuple(_named_before(item, action, before.actions) for item in meant)
     goal, source = (_place(place, memory) for place in (action.goal, action.source))
-    to = None if action.goal is None else action.goal.phrase
-    taken = before.actions[-1].source if before.actions else None
-    if again and to is not None and to.pronoun and goal is not None and goal == taken:  # put it next to it
-        raise RefusalError(f"which place is {to.text!r}?", [to.text], question=True)
-    refers = again or any(phrase.stands_for_one for phrase in action.objects)
-    source = source or (memory.where if refers else None)
-    person = next((place for place in (goal, source) if place is not None and place.living), memory.person)
-    after = Memory(
+    match action.goal, before.actions:
+        case Location(phrase=Phrase(pronoun=True, text=text)), (*_, Action(source=taken)) if again and goal == taken:
+            raise RefusalError(f"which place is {text!r}?", [text], question=True)  # put it next to it
+    if again or any(phrase.stands_for_one for phrase in action.objects):
+        source = source or memory.where
+    whole = replace(action, objects=objects, source=source, goal=goal, again=again)
+    each = [replace(whole, objects=(item,), again=again or item not in meant) for item in objects] or [whole]
+    actions = (*before.actions, *(replace(one, source=memory.source(one)) for one in each))
+    return Resolution(actions, _after(whole, memory), (*before.meanings, *_meanings(action, memory)))
+
+
+def _after(action: Action, memory: Memory) -> Memory:
+    """Memory after an action with all its objects."""
+    goal, source, objects = action.goal, action.source, action.objects
+    return replace(
+        memory,
         objects=objects or memory.objects,
         gathered=() if goal is not None else tuple(dict.fromkeys((*memory.gathered, *objects))),
-        where=source if again or not objects else None,
+        where=source if action.again or not objects else None,
         place=goal or source or memory.place,
-        person=person,
-        locations=memory.locations,
-    )
-    bare = replace(action, objects=(), source=source, goal=goal, again=again)
-    each = tuple(
-        replace(
-            bare,
-            objects=(item,),
-            source=source or (memory.where_is(item) if action.kind is not VerbKind.GO else None),
-            again=again or item not in meant,
-        )
-        for item in objects
-    )
-    return Resolution(
-        (*before.actions, *(each if objects else (bare,))), after, (*before.meanings, *_meanings(action, memory))
+        person=next((place for place in (goal, source) if place is not None and place.living), memory.person),
     )
 
 
-def _named_before(item: Phrase, action: Action, actions: Sequence[Action]) -> Phrase | None:
-    """Earlier object with the same name: "get the bread, go to the hall and put the bread there"."""
+def _named_before(item: Phrase, action: Action, actions: Sequence[Action]) -> Phrase:
+    """Earlier object with the same name, if any: "get the bread, go to the hall and put the bread there"."""
     if item.indefinite or action.source is not None or action.kind not in (VerbKind.PLACE, VerbKind.SINGLE_TRIP):
-        return None
+        return item
     taken = (one.target for one in reversed(actions) if one.target is not None and one.kind is not VerbKind.PLACE)
-    return next((target for target in taken if target.text.lower() == item.text.lower()), None)
+    return next((target for target in taken if target.text.lower() == item.text.lower()), item)
 
 
 def _as_before(item: Phrase, actions: Sequence[Action], memory: Memory) -> Phrase:
     """Object with the relations that it had before, or without "other" if a person got one: the robot finds others."""
     plain = replace(item, tokens=tuple(t for t in item.tokens if t.word != "other"))
-    given = (one for one in actions if one.goal == HERE or (one.goal and one.goal.living))
-    back = (one for one in actions if one.kind is VerbKind.ROUND_TRIP and one.goal is None)
-    if any(one.target is not None and one.target.text.lower() == plain.text.lower() for one in (*given, *back)):
+    given = (one for one in actions if one.for_somebody or (one.kind is VerbKind.ROUND_TRIP and one.goal is None))
+    if any(one.target is not None and one.target.text.lower() == plain.text.lower() for one in given):
         return plain
     same = (one for one in memory.objects if one.relations and one.text.lower() == item.text.lower())
     return item if item.indefinite or item.relations else next(same, item)
@@ -120,23 +113,26 @@ def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
 
 def _stated(action: Action, before: Resolution) -> Resolution:
     """Remembers a statement; "it is in the drawer" gives the place of an object in an earlier action."""
-    memory = before.memory
-    where = _place(action.source, memory)
+    memory, where = before.memory, _place(action.source, before.memory)
     somebody = any(phrase.stands_for_somebody for phrase in action.objects)
-    if where is not None and somebody and memory.person:  # bring it to Robin, he is in the hall
-        met = replace(memory.person, within=where)
-        actions = tuple(replace(one, goal=met) if one.goal == memory.person else one for one in before.actions)
-        return replace(before, actions=actions, memory=replace(memory, person=met, place=where))
+    match memory.person, where:
+        case Location() as person, Location() if somebody:
+            return _met(replace(person, within=where), before)
     teller = None if action.teller is None else Location(action.teller, within=None if action.objects else where)
-    memory = replace(memory, where=where, place=where or memory.place, person=teller or memory.person)
-    animal = somebody and any(item.kind is NounKind.PERSON for item in memory.objects)
+    told = replace(memory, where=where, place=where or memory.place, person=teller or memory.person)
+    animal = somebody and NounKind.PERSON in [item.kind for item in memory.objects]
     if not animal and not any(phrase.pronoun for phrase in action.objects):
-        return replace(before, memory=_remember(action, where, memory))
-    placed = tuple(
-        replace(one, source=where) if one.target in memory.objects and one.source is None else one
-        for one in before.actions
-    )
-    return replace(before, actions=placed, memory=memory)
+        return replace(before, memory=_remember(action, where, told))
+    meant = memory.objects
+    actions = [replace(one, source=one.source or where) if one.target in meant else one for one in before.actions]
+    return replace(before, actions=tuple(actions), memory=told)
+
+
+def _met(person: Location, before: Resolution) -> Resolution:
+    """Goes to a person where a statement says that they are: "bring it to Robin, he is in the hall"."""
+    actions = [replace(one, goal=person) if one.goal == before.memory.person else one for one in before.actions]
+    memory = replace(before.memory, person=person, place=person.within)
+    return replace(before, actions=tuple(actions), memory=memory)
 
 
 def _remember(action: Action, where: Location | None, memory: Memory) -> Memory:
@@ -145,15 +141,13 @@ def _remember(action: Action, where: Location | None, memory: Memory) -> Memory:
     if people:
         return replace(memory, person=Location(people[-1], within=where))
     locations = () if where is None else tuple((phrase, where) for phrase in action.objects)
+    memory = replace(memory, objects=action.objects or memory.objects, locations=(*memory.locations, *locations))
     called = [phrase for phrase in action.objects if phrase.proper]
-    person = memory.person
-    if called:
-        *left, head = called[-1].tokens
-        named = replace(called[-1], tokens=(*left, replace(head, kind=NounKind.PERSON)))
-        person = Location(named, within=where)
-    return replace(
-        memory, person=person, objects=action.objects or memory.objects, locations=(*memory.locations, *locations)
-    )
+    if not called:
+        return memory
+    *left, head = called[-1].tokens
+    named = replace(called[-1], tokens=(*left, replace(head, kind=NounKind.PERSON)))
+    return replace(memory, person=Location(named, within=where))
 
 
 def _all_meant(phrases: Sequence[Phrase], memory: Memory) -> tuple[Phrase, ...]:
@@ -182,20 +176,22 @@ def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:
 
 def _place(place: Location | None, memory: Memory) -> Location | None:
     """Meaning of a place: "there" refers to the last place, "her" to the last person."""
-    phrase = None if place is None else place.phrase
-    pronoun = phrase is not None and (phrase.pronoun or phrase.stands_for_one or phrase.stands_for_somebody)
-    if place is None or not (place == THERE or pronoun):
-        return place
-    meant = memory.person if phrase is not None and phrase.stands_for_somebody and memory.person else memory.place
-    if phrase is not None and phrase.person:
-        within = place.within or (None if memory.person is None else memory.person.within)
-        return replace(memory.person or place, preposition=place.preposition, within=within)
-    spot = () if phrase is None else phrase.relations
-    if spot and (meant is None or meant.phrase is None or meant.living):
-        raise RefusalError(f"on which surface is '{spot[0].said}'?", question=True)
-    if meant is None:
-        word = THERE.preposition if phrase is None else phrase.text
-        raise RefusalError(f"which place is {word!r}?", [word], question=True)
-    if phrase is None or meant.phrase is None:
-        return meant
-    return replace(meant, phrase=replace(meant.phrase, relations=spot), preposition=place.preposition)
+    meant, said, spot = memory.place, THERE.preposition, tuple[SpokenRelation, ...]()
+    match place:
+        case Location(phrase=Phrase(pronoun=False, stands_for_one=False, stands_for_somebody=False)):
+            return place
+        case Location(phrase=Phrase(person=True)):
+            within = place.within or (None if memory.person is None else memory.person.within)
+            return replace(memory.person or place, preposition=place.preposition, within=within)
+        case Location(phrase=Phrase(text=said, relations=spot, stands_for_somebody=somebody)):
+            meant = (memory.person if somebody else None) or meant
+        case _ if place != THERE:
+            return place
+    match meant:
+        case None | Location(phrase=None) | Location(living=True) if spot:
+            raise RefusalError(f"on which surface is '{spot[0].said}'?", question=True)
+        case None:
+            raise RefusalError(f"which place is {said!r}?", [said], question=True)
+        case Location(phrase=Phrase() as known) if place != THERE:
+            return replace(meant, phrase=replace(known, relations=spot), preposition=place.preposition)
+    return meant

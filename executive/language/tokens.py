@@ -8,7 +8,7 @@ as in Brill, "A simple rule-based part of speech tagger" (1992).
 import re
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, Final
 
 from pydantic import TypeAdapter
@@ -171,10 +171,29 @@ def parse_with_names(
     return tuple(tokens)
 
 
-_Rule = tuple[re.Pattern[str], str | Callable[[re.Match[str]], str], bool]
+@dataclass(frozen=True)
+class _Rule:
+    """Rewriting of texts with one of the words `with` (none: of any); `of_work` leaves alone what is to be said."""
+
+    entry: Any
+    instead: str | Callable[[re.Match[str]], str]
+    of_work: bool
+
+    @cached_property
+    def pattern(self) -> re.Pattern[str]:
+        """Expression, compiled when the first text has one of the words."""
+        return re.compile(_filled(expression(self.entry)), re.IGNORECASE)
+
+    def rewrite(self, text: str) -> str:
+        """Rewrites a text."""
+        if not any(word in text.lower() for word in self.entry.get("with", [""])):
+            return text
+        said = next((mark.start() for mark in _SAID.finditer(text)), len(text)) if self.of_work else len(text)
+        return self.pattern.sub(self.instead, text[:said]) + text[said:]
+
+
 _SMOOTHED: Final = ("smoothed", "limited", "asked")
-_OF_WORK: Final = ("limited", "shared")
-"""Families that leave alone what is to be said."""
+_OF_WORK: Final = ("limited", "shared")  # these leave alone what is to be said
 _SAID: Final = re.compile(r"\b(?:say|announce|inform|remind|shout|(?:tell|ask|let) (?!me\b|us\b))", re.IGNORECASE)
 
 
@@ -194,19 +213,16 @@ def smooth(text: str) -> str:
 
 def _rewritten(text: str, families: tuple[str, ...] | None) -> str:
     """Applies the rules of some families, or of all."""
-    for pattern, instead, of_work in _rules(families):
-        said = next((mark.start() for mark in _SAID.finditer(text)), len(text)) if of_work else len(text)
-        text = pattern.sub(instead, text[:said]) + text[said:]
+    for rule in _rules(families):
+        text = rule.rewrite(text)
     return " ".join(text.split()).strip(" ,;:-.")
 
 
 @cache
 def _rules(families: tuple[str, ...] | None) -> tuple[_Rule, ...]:
     table = read_table("rephrasing.yaml")
-    rules = ((rule, name in _OF_WORK) for name in families or [*table][1:] for rule in table[name])
-    pairs = ((*((expression(rule), rule["instead"]) if isinstance(rule, dict) else rule), of) for rule, of in rules)
-    found = ((_filled(pattern), _FUNCTIONS.get(instead, instead), of) for pattern, instead, of in pairs)
-    return tuple((re.compile(pattern, re.IGNORECASE), instead, of) for pattern, instead, of in found)
+    entries = ((entry, name in _OF_WORK) for name in families or [*table][1:] for entry in table[name])
+    return tuple(_Rule(one, _FUNCTIONS.get(one["instead"], one["instead"]), of_work) for one, of_work in entries)
 
 
 def _filled(pattern: str) -> str:

@@ -63,26 +63,6 @@ class OnlyIfNear(OnlyIfKnown):
         return near and self.context.clock.now() - met.stamp_s <= STILL_NEAR_S
 
 
-class LastSeen(ExplainedLeaf):
-    """Leaf that says where the person under `key` was last seen.
-
-    FAILURE with POSTCONDITION if the person was seen before, else with PRECONDITION.
-    """
-
-    kind = "last seen"
-    person: str
-    key: str
-    context: RunContext
-
-    def update(self) -> Status:
-        """Fails with the place in its message."""
-        seen: ObjectObservation | None = self.context.board.get(self.key, None)
-        if seen is None:
-            return self.fail(Failed(Cause.PRECONDITION, f"{self.person} was not seen before"))
-        where = describe_seen(seen).removeprefix("somebody ")
-        return self.fail(Failed(Cause.POSTCONDITION, f"{self.person} was last seen {where}"))
-
-
 class AskWhoItIs(AskPeople):
     """Leaf that checks that the person before the robot, detected under `seen`, is `person`.
 

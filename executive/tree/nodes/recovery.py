@@ -12,13 +12,13 @@ from typing import ClassVar
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained, MemoryComposite, applies, cause_of, message_of
+from executive.tree.behaviour import Explained, ExplainedLeaf, MemoryComposite, applies, cause_of, message_of
 from executive.tree.board import Board
 from executive.tree.context import RunContext
 from executive.tree.estimate import CannotError, Estimate, Walk
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import is_known_as
-from skills.api import Cause, ObjectObservation
+from skills.api import Cause, Failed, ObjectObservation
 
 
 @dataclass(frozen=True)
@@ -247,6 +247,28 @@ class OnlyIfKnown(MemoryComposite):
     def applies(self) -> bool:
         """Returns whether the key has a value."""
         return self.key in self.board
+
+
+class LastSeen(ExplainedLeaf):
+    """Leaf that says where the person detected under `key` was last seen.
+
+    FAILURE with POSTCONDITION if the person was seen before, else with PRECONDITION.
+    """
+
+    kind = "last seen"
+    person: str
+    key: str
+    board: Board
+
+    def update(self) -> Status:
+        """Fails with the place in its message."""
+        seen: ObjectObservation | None = self.board.get(self.key, None)
+        if seen is None:
+            return self.fail(Failed(Cause.PRECONDITION, f"{self.person} was not seen before"))
+        where = f"({seen.position_W[0]:.2f}, {seen.position_W[1]:.2f})" + (
+            f" in the {seen.surface}" if seen.surface else ""
+        )
+        return self.fail(Failed(Cause.POSTCONDITION, f"{self.person} was last seen at {where}"))
 
 
 class OnlyIfHolding(MemoryComposite):

@@ -29,7 +29,8 @@ def cover(
     for clause in clauses:
         unused, words = _unused(clause, phrases), _spoken(clause)
         if _asks(clause, actions):
-            favours = [one for one in unused if one.role is PrepositionRole.FOR and one.phrase.person]
+            persons = [one for one in unused if one.role is PrepositionRole.FOR and one.phrase.person]
+            favours = [one for one in persons if one.phrase.count < 2]
             asides += [one.spoken for one in favours]
             lost += [(one.spoken, words) for one in unused if one not in favours]
             lost += [(said, words) for said in _unrelated(clause, phrases)]

@@ -160,11 +160,10 @@ class _Grounder:
         target = self._described(frame, target, goal)
         if target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
             raise RefusalError(f"which object? Known are {listing(self.knowledge.object_names())}", [target.name])
-        left_out = [each.landmarks[0].name for each in target.relations if each.kind is RelationKind.NOT_AT]
-        if frame.goal is None and goal is not None:
-            inside = set(self.knowledge.surfaces_in(goal))
-            goal = None if any(inside <= set(self.knowledge.surfaces_in(one)) for one in left_out) else goal
-        return target, goal
+        surfaces = self.knowledge.surfaces_in
+        apart = (each.landmarks[0].name for each in target.relations if each.kind is RelationKind.NOT_AT)
+        usual = frame.goal is None and goal is not None and any({*surfaces(goal)} <= {*surfaces(one)} for one in apart)
+        return target, None if usual else goal
 
     def _check_seen(self, kind: ObjectKind | Landmark) -> None:
         """Raises RefusalError for attributes that the robot cannot see."""

@@ -6,7 +6,7 @@ the clause of the word names only objects and places with which the mission does
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,15 +25,18 @@ def second_look(text: str, steps: Sequence[Step], knowledge: Knowledge, *, robot
     walked = [each for step in steps for each in step.walk()]
     commands = [command for each in walked for command in each.commands]
     spoken = [each.speak for each in walked if isinstance(each, Speak)]
-    heard = text.replace("\u2019", "'")
+    raw = heard = text.replace("\u2019", "'")
     for silent in (_any_of(spoken), *_table()["harmless"]):
         heard = re.sub(rf"\b(?:{silent})", lambda match: " " * len(match[0]), heard, flags=re.IGNORECASE)
-    mission = "\n".join((*steps_to_yaml(steps), *map(str, commands), *_marks(walked), *["<robots>"] * robots))
-    people = _any_of(knowledge.spellings(knowledge.people))
+    marks = (*_marks(walked, knowledge), *["<robots>"] * robots)
+    mission = "\n".join((*steps_to_yaml(steps), *map(str, commands), *marks))
+    named = {"people": knowledge.people, "things": (*knowledge.object_names(), "thing", "object")}
+    spelled = {f"<{key}>": f"(?:{_any_of(knowledge.spellings(each))})" for key, each in named.items()}
     for row in _table()["rows"]:
-        cues = rf"(?<!\w)(?:{row['cue'].replace('<people>', people)})\b"
+        form = reduce(lambda text, key: text.replace(key, spelled[key]), spelled, row["cue"])
+        cues = rf"(?<!\w)(?:{form})\b"
         left = 0
-        for cue in re.finditer(cues, heard, re.IGNORECASE):
+        for cue in re.finditer(cues, raw if row.get("raw") else heard, re.IGNORECASE):
             who = cue.groupdict().get("who") or ""
             name = re.escape(knowledge.person(who) or START) + "|speak"
             following = "<next apart>" in row["carried"]
@@ -57,7 +60,7 @@ def _any_of(phrases: Iterable[str]) -> str:
     return "|".join(map(re.escape, sorted(phrases, key=len, reverse=True))) or "(?!)"
 
 
-def _marks(walked: Sequence[Step]) -> Iterator[str]:
+def _marks(walked: Sequence[Step], knowledge: Knowledge) -> Iterator[str]:
     """Yields what the table calls several errands, and a thing that is taken."""
     commands = [command for each in walked for command in each.commands]
     taken = [command for command in commands if command.item is not None]
@@ -67,6 +70,9 @@ def _marks(walked: Sequence[Step]) -> Iterator[str]:
         yield "<several>"
     if taken:
         yield "<takes>"
+    if all(command.goal in knowledge.tops for command in commands if command.task is Task.GRASP):
+        yield "<from a surface>"
+    yield from (f"<{n} taken>" for n in range(1, 1 + sum(command.item_count for command in taken)))
     done = {command.task for command in commands} | ({Task.GRASP} if taken else set())
     yield from (f"<NO {task.name}>" for task in Task if task not in done)
     if not any(isinstance(each, Speak) for each in walked):

@@ -7,6 +7,7 @@ the clause of the word names only objects and places with which the mission does
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache, reduce
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -72,6 +73,8 @@ def _marks(walked: Sequence[Step], knowledge: Knowledge) -> Iterator[str]:
         yield "<takes>"
     if all(command.goal in knowledge.tops for command in commands if command.task is Task.GRASP):
         yield "<from a surface>"
+    if not any(gets.task is Task.GRASP and gets.goal == brings.goal for gets, brings in pairwise(commands)):
+        yield "<moves>"
     yield from (f"<{n} taken>" for n in range(1, 1 + sum(command.item_count for command in taken)))
     done = {command.task for command in commands} | ({Task.GRASP} if taken else set())
     yield from (f"<NO {task.name}>" for task in Task if task not in done)

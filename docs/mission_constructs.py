@@ -241,7 +241,7 @@ CONDITIONS = (
     ("`object`, perhaps `at`", "`{object: beer, at: kitchen}`", "goes there and looks; no only after all views"),
     (
         "`object` as `name` with `next_to`, `left_of`, `right_of`, `behind`, `in_front_of`, `between`, "
-        "`nearest_to`, `part`, `seen_from`, `order` (`nth`, `from`)",
+        "`nearest_to`, `part`, `seen_from`, `order` (`nth`, `from`), `not_at`",
         "`{object: {name: beer, left_of: coke}, at: kitchen}`",
         "the same; [which one](../language.md#which-one-and-where-to-put-it) has all relations",
     ),

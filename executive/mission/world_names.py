@@ -40,18 +40,22 @@ def _wrong_relations(command: Command, knowledge: Knowledge) -> Iterator[tuple[s
             yield key, f"it cannot tell who or what is {item.relations[0]}", "name one kind of object"
     if command.goal_relations and command.item is None and command.task is not Task.PLACE:
         yield "to", f"nothing is put down {command.goal_relations[0]}", "say what to put there under 'take'"
+    if any(each.kind is RelationKind.NOT_AT for each in command.goal_relations):
+        yield "to", f"a spot is not {command.goal_relations[0]}", "name the surface on which to put it"
     if command.goal_relations and knowledge.place(str(command.goal)) not in knowledge.surfaces:
         hint = f"name one of {listing(knowledge.surfaces, last='or')}" if knowledge.surfaces else "this world has none"
         yield "to", f"'{command.goal}' is no surface, and the spot is {command.goal_relations[0]}", hint
     landmarks = (*knowledge.object_names(), *knowledge.place_names(), *knowledge.people, ROBOT, DOOR)
     related = {key: () if item is None else item.relations for key, item in objects.items()}
+    own = {
+        RelationKind.SEEN_FROM: ("person", tuple(knowledge.people)),
+        RelationKind.NOT_AT: ("place", knowledge.place_names()),
+    }
     for key, relations in {**related, "to": command.goal_relations}.items():
         for relation in relations:
-            by_person = relation.kind is RelationKind.SEEN_FROM
-            known = tuple(knowledge.people) if by_person else landmarks
+            what, known = own.get(relation.kind, ("landmark", landmarks))
             for name in (each.name for each in relation.landmarks if _landmark(each.name, knowledge) not in known):
-                hint = suggestion(name, knowledge.spellings(known), shown=known)
-                yield key, f"unknown {'person' if by_person else 'landmark'} {name!r}", hint
+                yield key, f"unknown {what} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
 
 
 def _wrong_with_people(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:

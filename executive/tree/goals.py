@@ -133,10 +133,8 @@ def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) ->
     assert command.goal is not None
     person = knowledge.person(command.goal)
     if person is not None:
-        at = None if command.goal_at is None else knowledge.place(command.goal_at)
-        rooms = () if at is None else (knowledge.room(at),)
-        regions = tuple(Region(room, knowledge.rooms[room]) for room in rooms)
-        return GoalCondition(GoalKind.MET, person=person, goal=regions, when=When.END_OF_STEP)  # the person may walk on
+        room = _room_region(command.goal_at, knowledge)
+        return GoalCondition(GoalKind.MET, person=person, goal=room, when=When.END_OF_STEP)  # the person may walk on
     return GoalCondition(GoalKind.WENT, goal=(_place_region(knowledge, command.goal),))
 
 
@@ -147,10 +145,8 @@ def _with_person(kind: GoalKind) -> _Goal:
         name = "" if command.object is None else command.object.name
         if (kind, name) == (GoalKind.GREETED, SPEAKER):
             return None  # the speaker is unknown, and the speech is judged by itself
-        place = None if command.goal in (None, START) else knowledge.place(command.goal)
-        rooms = () if place is None else (knowledge.room(place),)
-        regions = tuple(Region(room, knowledge.rooms[room]) for room in rooms)
-        return GoalCondition(kind, person=knowledge.person(name), goal=regions, when=When.END_OF_STEP)
+        room = _room_region(None if command.goal == START else command.goal, knowledge)
+        return GoalCondition(kind, person=knowledge.person(name), goal=room, when=When.END_OF_STEP)
 
     return goal
 
@@ -159,6 +155,12 @@ def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondi
     if knowledge.dock is None:
         return None
     return GoalCondition(GoalKind.WENT, goal=(square_region("the dock", knowledge.dock, POSE_NEAR_M),))
+
+
+def _room_region(place: str | None, knowledge: Knowledge) -> tuple[Region, ...]:
+    """Room of a place, as the only region; none without a known place."""
+    known = None if place is None else knowledge.place(place)
+    return () if known is None else (Region(room := knowledge.room(known), knowledge.rooms[room]),)
 
 
 def _place_region(knowledge: Knowledge, goal: str) -> Region:

@@ -302,12 +302,12 @@ def spoken_forms(name: str) -> tuple[str, ...]:
     """Other forms of a name as it is said, in lower case: "lab 2" and "lab two" for "lab #2", "cafe" for "café"."""
     plain = "".join(c for c in unicodedata.normalize("NFKD", name.lower()) if not unicodedata.combining(c))
     words = re.sub(r"[^\w\s.'-]|_", " ", plain).split()
-    numbered = [_NUMBERS[int(word)] if word.isdecimal() and int(word) < len(_NUMBERS) else word for word in words]
+    numbered = [NUMBERS[int(word)] if word.isdecimal() and int(word) < len(NUMBERS) else word for word in words]
     forms = dict.fromkeys((" ".join(words), " ".join(numbered)))
     return tuple(form for form in forms if form and form != name.lower())
 
 
-_NUMBERS: Final = (
+NUMBERS: Final = (
     *("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"),
     *("eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen", "twenty"),
 )
@@ -424,7 +424,7 @@ def _doubles(knowledge: Knowledge, source: YamlSource) -> Iterator[InputError]:
         seen: dict[str, str] = {}
         for kind in kinds:
             for name, facts in getattr(knowledge, kind).items():
-                for word in (name, *facts.aliases):
+                for word in (form for each in (name, *facts.aliases) for form in (each, *spoken_forms(each))):
                     other = seen.setdefault(word.lower(), name)
                     if other != name:
                         hint = "give one of them another name"

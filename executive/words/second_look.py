@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from executive.words.command import START, Command, Task
-from executive.words.knowledge import Knowledge
-from executive.words.leaf_steps import Dock, Picture, Speak
+from executive.words.knowledge import NUMBERS, Knowledge
+from executive.words.leaf_steps import Dock, Picture, Speak, Wait
 from executive.words.step import Step
 from executive.words.steps import steps_to_yaml
 from skills.inputs.yaml_source import read_yaml
@@ -38,18 +38,25 @@ def second_look(text: str, steps: Sequence[Step], knowledge: Knowledge, *, robot
         cues = rf"(?<!\w)(?:{form})\b"
         left = 0
         for cue in re.finditer(cues, raw if row.get("raw") else heard, re.IGNORECASE):
-            who = cue.groupdict().get("who") or ""
-            name = re.escape(knowledge.person(who) or START) + "|speak"
+            carried = reduce(lambda text, part: text.replace(*part), _parts(cue, knowledge), row["carried"])
             following = "<next apart>" in row["carried"]
             looks = following or "<apart>" in row["carried"]
             if looks and _is_apart(heard, cue, commands, knowledge, following=following):
                 continue
             left += 1
-            if len(re.findall(row["carried"].replace("<who>", name), mission)) < (left if row.get("each") else 1):
+            if len(re.findall(carried, mission)) < (left if row.get("each") else 1):
                 return cue[0]
         if row.get("settles"):
             heard = re.sub(cues, lambda match: " " * len(match[0]), heard, flags=re.IGNORECASE)
     return None
+
+
+def _parts(cue: re.Match[str], knowledge: Knowledge) -> Iterator[tuple[str, str]]:
+    """Yields the parts that a carrier takes over from its cue, with their texts."""
+    for name, said in cue.groupdict(default="").items():
+        text = {"who": f"{re.escape(knowledge.person(said) or START)}|speak", "act": said.upper()}.get(name, said)
+        number = NUMBERS.index(text.lower()) if text.lower() in NUMBERS else text
+        yield f"<{name}>", str(number)
 
 
 @cache
@@ -62,7 +69,7 @@ def _any_of(phrases: Iterable[str]) -> str:
 
 
 def _marks(walked: Sequence[Step], knowledge: Knowledge) -> Iterator[str]:
-    """Yields what the table calls several errands, and a thing that is taken."""
+    """Yields what the table says of a mission in angle brackets: what is done, what is not, and how many are taken."""
     commands = [command for each in walked for command in each.commands]
     taken = [command for command in commands if command.item is not None]
     visits = {command.goal for command in commands if command.item is None and command.task is not Task.GRASP}
@@ -76,10 +83,11 @@ def _marks(walked: Sequence[Step], knowledge: Knowledge) -> Iterator[str]:
     if not any(gets.task is Task.GRASP and gets.goal == brings.goal for gets, brings in pairwise(commands)):
         yield "<moves>"
     yield from (f"<{n} taken>" for n in range(1, 1 + sum(command.item_count for command in taken)))
-    done = {command.task for command in commands} | ({Task.GRASP} if taken else set())
-    yield from (f"<NO {task.name}>" for task in Task if task not in done)
-    if not any(isinstance(each, Speak) for each in walked):
-        yield "<NO SPEECH>"
+    done = {command.task.value for command in commands if command.task is not None}
+    done |= {"grasp"} if taken else set()
+    kinds = {Speak: "speak", Wait: "wait", Dock: "charge"}
+    done |= {act for kind, act in kinds.items() if any(isinstance(each, kind) for each in walked)}
+    yield from (f"<NO {act.upper()}>" for act in ({task.value for task in Task} | {"speak"}) - done)
 
 
 def _is_apart(

@@ -8,7 +8,6 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.amounts import parse_seconds
 from executive.language.clauses import CHECKS, Clause, Cue, begins_as, split, trailing_cue
 from executive.language.coverage import TOLD, note_adverbs
 from executive.language.items import verb, without_objects
@@ -25,7 +24,7 @@ from executive.language.templates import Match, page
 from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.condition import Look
 from executive.words.knowledge import ANYBODY
-from executive.words.leaf_steps import Awaited, Check, Do, Speak, Wait, steps_of_commands
+from executive.words.leaf_steps import Check, Do, Speak, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Repeat, Together, Try
 from skills.api import ObjectKind
@@ -99,25 +98,18 @@ def _people_at(group: Location, who: str, state: State, reader: PlainReader) -> 
 
 
 def _meets_people(row: Builder, clause: Clause) -> bool:
-    """Adds a request about people, perhaps for some time."""
-    found, timed = trailing_cue(clause.text), _PEOPLE["timed"].fullmatch(clause.text)
-    seconds = None if timed is None else parse_seconds(timed["span"])
+    """Adds a request about people."""
+    found = trailing_cue(clause.text)
     if found is not None and found.kind in (Cue.WHILE, Cue.UNTIL):
         found = None  # how long the robot follows
-    text = clause.text if timed is None or seconds is None else timed["clause"]
-    request = _parse_people(text if found is None else found.before, row.reader)
+    request = _parse_people(clause.text if found is None else found.before, row.reader)
     if request is None or not _asks_alone(request, row):
         return False
     if found is not None:
         row.modify(clause, found)
         return True
     _flush_reasons(row)
-    steps, state = _steps_on_people(request, row.state, row.reader)
-    if seconds is not None:
-        require(request["task"] == Task.FOLLOW.value, f"I do not do '{clause.text}' for a time", clause.text)
-        wait = Wait(awaited=Awaited(seconds=seconds))
-        steps = (*steps[:-1], Together(steps=(steps[-1], wait), done_when="any"))
-    row.put(steps, state)
+    row.put(*_steps_on_people(request, row.state, row.reader))
     return True
 
 

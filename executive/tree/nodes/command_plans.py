@@ -158,9 +158,9 @@ def go_plan(builder: PlanBuilder) -> NodeSpec:
     """Drives to a place, a person or the start; carries the item if the command has one."""
     command = builder.command
     if command.item is not None:
-        person, at = builder.knowledge.person(command.goal or ""), command.goal_at
-        there = person is not None and at is not None and builder.has_ports("find_people", ())
-        meet = meet_plan(builder.at("meet"), person or "", builder.place(at or "")) if there else None
+        person, meet = builder.knowledge.person(command.goal or ""), None
+        if person is not None and command.goal_at is not None and builder.has_ports("find_people", ()):
+            meet = meet_plan(builder.at("meet"), person, builder.place(command.goal_at))
         return carry_plan(builder, meet)
     if command.goal is None:
         raise builder.error("the command asks for nothing", "name a place to go to, or an object")

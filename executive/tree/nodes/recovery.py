@@ -265,10 +265,8 @@ class LastSeen(ExplainedLeaf):
         seen: ObjectObservation | None = self.board.get(self.key, None)
         if seen is None:
             return self.fail(Failed(Cause.PRECONDITION, f"{self.person} was not seen before"))
-        where = f"({seen.position_W[0]:.2f}, {seen.position_W[1]:.2f})" + (
-            f" in the {seen.surface}" if seen.surface else ""
-        )
-        return self.fail(Failed(Cause.POSTCONDITION, f"{self.person} was last seen at {where}"))
+        (x_m, y_m, _), room = seen.position_W, f" in the {seen.surface}" if seen.surface else ""
+        return self.fail(Failed(Cause.POSTCONDITION, f"{self.person} was last seen at ({x_m:.2f}, {y_m:.2f}){room}"))
 
 
 class OnlyIfHolding(MemoryComposite):

@@ -310,7 +310,8 @@ def _looks_from_aside(
 def surfaces_first_known(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
     """Returns the required surfaces, and before them the surface where another robot last detected the object."""
     known, surfaces = builder.last_known_of(item), required_surfaces(builder, item, place)
-    first = [known.surface] if known is not None and known.surface in builder.knowledge.surfaces else []
+    allowed = {*builder.knowledge.surfaces} - surfaces_left_out(builder.knowledge, item)
+    first = [known.surface] if known is not None and known.surface in allowed else []
     return tuple(dict.fromkeys((*filter(None, first), *surfaces)))
 
 
@@ -321,6 +322,8 @@ def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None)
         raise builder.error(
             f"the robot neither looks into the {place} nor takes anything out of it", "name a surface or a room"
         )
+    if not surfaces and surfaces_left_out(builder.knowledge, item):
+        raise builder.error(f"no place is left to look for {item}", "name a place where it may be")
     if not surfaces:
         raise builder.error(f"'{place}' has no surface to look at", "add one under 'surfaces' in the knowledge file")
     return surfaces

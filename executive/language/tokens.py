@@ -250,6 +250,13 @@ def _each(match: re.Match[str]) -> str:
     return " and ".join(f"{match['main']} {place if ' ' in place else f'the {place}'}" for place in places)
 
 
+def _order(match: re.Match[str]) -> str:
+    """Says two acts in their order: "after taking the coke, go home" is "take the coke, then go home"."""
+    act = f"{read_table('words.yaml')['acts'][match['act'].lower()]}{match['one']}"
+    first, then = (match["other"], act) if match["mark"].lower() == "before" else (act, match["other"])
+    return f"{first}, then {then}"
+
+
 def _span(match: re.Match[str]) -> str:
     """Says a time in whole minutes or seconds: "half an hour" is 30 minutes."""
     seconds = parse_seconds(match[0]) or 0.0
@@ -268,6 +275,7 @@ _FUNCTIONS: Final[Mapping[str, Callable[[re.Match[str]], str]]] = {
     "$full": lambda match: lexicon().short_forms[match[0].lower()],
     "$break": _break,
     "$each": _each,
+    "$order": _order,
     "$span": _span,
     "$wait": _wait,
 }

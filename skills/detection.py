@@ -12,6 +12,7 @@ from skills.robot import Image, Picture
 
 if TYPE_CHECKING:
     from skills.perception.object_model import ObjectModel
+    from skills.perception.shape_model import ShapeModel
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,11 @@ class Detector(Protocol):
     @abstractmethod
     def class_names(self) -> tuple[str, ...]:
         """Names of the known classes."""
+
+    @property
+    def shapes(self) -> ShapeModel | None:
+        """Model of the classes' shapes in depth, a second witness beside the scores; None for scores alone."""
+        return None
 
     @abstractmethod
     def detect(self, pictures: Sequence[Picture]) -> list[Detections]:
@@ -99,6 +105,11 @@ class DetectorWrapper(Detector):
     def class_names(self) -> tuple[str, ...]:
         """Classes that the wrapped detector knows."""
         return self._detector.class_names
+
+    @property
+    def shapes(self) -> ShapeModel | None:
+        """Shapes of the wrapped detector's classes."""
+        return self._detector.shapes
 
     def detect(self, pictures: Sequence[Picture]) -> list[Detections]:
         """Returns the detections of the wrapped detector."""

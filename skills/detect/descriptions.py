@@ -8,6 +8,8 @@ from skills.inputs.errors import with_article
 from skills.world_model import PERSON
 
 SAME_WITHIN_M = 0.12
+_TALL_M = 0.06
+"""Height from which on an object of this size stands rather than lies."""
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
@@ -26,6 +28,13 @@ def describe(seen: ObjectObservation) -> str:
     x, y, z = seen.position_W
     place = f"on the {seen.surface}" if seen.surface else f"at ({x:.2f}, {y:.2f}, {z:.2f})"
     return f"{with_article(str(seen.kind))} {place}, score {seen.score:.2f}"
+
+
+def describe_unknown(seen: ObjectObservation) -> str:
+    """Describes an object that nothing recognises: "something 24 cm tall stands on the kitchen counter"."""
+    length_m, _, height_m = seen.size_m
+    size = f"{100 * height_m:.0f} cm tall stands" if height_m >= _TALL_M else f"{100 * length_m:.0f} cm long lies"
+    return f"something {size} on the {seen.surface}"
 
 
 def count_sentence(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> str:

@@ -1,6 +1,6 @@
 """Selection among tracks and clusters: which objects a search counts, and which need a closer view."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,27 +8,26 @@ import numpy as np
 from skills.api import FLOOR, ObjectObservation, Surface
 from skills.detect.descriptions import count_of, surface_names
 from skills.inputs.errors import listing
-from skills.perception.class_forms import ANY_OBJECT, class_form
+from skills.perception.class_forms import ANY_OBJECT, MEANS_BIG, class_form
 from skills.perception.detection_3d import Detection3D, has_attribute
-from skills.perception.surface_segmentation import Cluster
-from skills.perception.tracker import CONFIRMED_BELIEF, Track
+from skills.perception.tracker import CONFIRMED_CLASS, Track
 from skills.quantities import Angle, Coordinate, Duration, Height, Length, Tries
 from skills.relations import Landmark, Relation, Scene, Standing, choose
 from skills.robot import FloatArray, Pose2D
 
-_NAMED_WITHIN_M = 0.06
-_SAME_PLACE_M = 0.05
 _AVOIDED_M = 0.08
-_DOUBTED = 0.08
-"""Belief in one of the wanted classes from which on a track of another class is worth a closer view."""
+DOUBTED = 0.05
+"""Probability of the wanted classes up to which the robot says that an object is none of them."""
 _LEAST_LENGTH = 0.4
-"""Fraction of the shortest object of a class: a cluster may be hidden in part."""
+"""Fraction of the shortest object of a class: an object may be hidden in part."""
 _MOST_LENGTH = 1.3
-"""Fraction of the longest object of a class: clusters may be merged."""
+"""Fraction of the longest object of a class: two may be merged."""
 _FREE_M = 0.15
 """Distance to the next object beyond which more does not count."""
 _SEEN_AGAIN_M = 0.06
 """Distance from where an object was seen within which a segment without a label may be it."""
+_SEEN_AGAIN_SCORE = 0.9
+"""Least probability that it is."""
 _SAME_SIZE_M = 0.015
 """Difference within which two sizes are alike; for larger objects, this fraction of the size."""
 _SAME_SIZE_SHARE = 0.3
@@ -71,7 +70,7 @@ class DetectOptions:
     """Extent of the search.
 
     `confirm_shifts_rad` and `candidates`: candidates are viewed again from the side, at these angles about the
-    shoulder; so many more of them than are wanted. `closer_looks`: how many unlabelled clusters are viewed from near.
+    shoulder; so many more of them than are wanted. `closer_looks`: how many views from near doubtful objects get.
     `around_rad`: angles from which hidden areas are viewed. `fresh_s`: largest age of the picture on which a result
     rests. `expected_within_m` and `floor_within_m`: largest distance of an object from the expected position, and on
     the floor from the robot.
@@ -179,44 +178,49 @@ def level_distance(p_W: Sequence[float] | FloatArray, q_W: Sequence[float] | Flo
     return float(np.linalg.norm(np.asarray(p_W)[:2] - np.asarray(q_W)[:2]))
 
 
-def unlabelled_clusters(clusters: Iterable[Cluster], tracks: Sequence[Track], classes: Sequence[str]) -> list[Cluster]:
-    """Clusters with the size of a wanted class that no track explains, each position once; largest first.
+def doubtful_tracks(tracks: Sequence[Track], inputs: DetectInputs) -> list[Track]:
+    """Tracks on the surfaces that may be what is sought although nothing recognises them, likeliest first.
 
-    A track of another class does not explain a cluster when it may be of a wanted class.
+    An object of another class, of another size than the wanted classes have, or without the attributes is in no doubt.
     """
-    sure = (t for t in tracks if t.class_name in classes or all(t.classes.get(c, 0.0) <= _DOUBTED for c in classes))
-    named = [track.position_W for track in sure]
-    left: list[Cluster] = []
-    for cluster in sorted(clusters, key=lambda one: -len(one.points)):
-        shape = cluster.shape
-        old = any(level_distance(shape.centre, one.shape.centre) < _SAME_PLACE_M for one in left)
-        within_m = _NAMED_WITHIN_M + 0.5 * shape.width_m
-        known = any(level_distance(shape.centre, p_W) < within_m for p_W in named)
-        if not old and not known and _may_be(cluster, classes):
-            left.append(cluster)
-    return left
+    names = {surface.name for surface in inputs.surfaces}
+    known = {name for name in (*inputs.sought, ANY_OBJECT)}
+    left = [
+        t
+        for t in tracks
+        if t.latest.surface in names and t.exists(1) and (t.class_name in known or t.class_belief < CONFIRMED_CLASS)
+    ]
+    likely = {t.number: max(_likely(t, kind) for kind in (inputs, *inputs.landmarks)) for t in left}
+    return sorted((t for t in left if likely[t.number] > DOUBTED), key=lambda t: -likely[t.number])
 
 
-def _may_be(cluster: Cluster, classes: Sequence[str]) -> bool:
-    """Returns whether a cluster has the size of an object of one of the classes."""
-    longest = max(cluster.shape.length_m, cluster.shape.height_m)
-    ranges = (class_form(name).length_m for name in classes)
-    return any(_LEAST_LENGTH * low < longest < _MOST_LENGTH * high for low, high in ranges)
+def _likely(track: Track, kind: DetectInputs | Landmark) -> float:
+    """Probability that a track is of the wanted kind if no class is left out; 0 for another size or attribute."""
+    fits = [name for name in kind.classes if _has_size_of(track, name)]
+    if not fits or not all(has_attribute(track.best, word) for word in kind.attributes if word not in MEANS_BIG):
+        return 0.0
+    return sum(track.evidence.possible.get(name, 0.0) for name in fits)
+
+
+def _has_size_of(track: Track, name: str) -> bool:
+    """Returns whether a track, which may be hidden in part or merged with another, has the size of a class."""
+    low_m, high_m = class_form(name).length_m
+    return _LEAST_LENGTH * low_m < max(track.latest.size_m) < _MOST_LENGTH * high_m
 
 
 def seen_again(before: ObjectObservation, segments: Sequence[Detection3D]) -> tuple[Detection3D, ...]:
-    """The unlabelled segment with the size and position of a previously observed object, labelled with its class.
+    """Labels the segment with the size and position of a previously observed object with its class.
 
     The search has confirmed its class from two sides; a close picture may lack the features by which the network
-    recognises it. Returns an empty tuple when no segment matches.
+    recognises it.
     """
     off = {id(each): level_distance(each.position_W, before.position_W) for each in segments}
     alike = [each for each in segments if off[id(each)] < _SEEN_AGAIN_M and _is_as_large(each.size_m, before.size_m)]
     nearest = min(alike, key=lambda each: off[id(each)], default=None)
-    if nearest is None:
-        return ()
-    detection = replace(nearest.detection, class_name=before.kind.name, score=max(before.score, CONFIRMED_BELIEF))
-    return (replace(nearest, detection=detection),)
+    label = {"class_name": before.kind.name, "score": max(before.score, _SEEN_AGAIN_SCORE)}
+    return tuple(
+        replace(each, detection=replace(each.detection, **label)) if each is nearest else each for each in segments
+    )
 
 
 def _is_as_large(size_m: Sequence[float], other_m: Sequence[float]) -> bool:

@@ -1,6 +1,7 @@
 """The detect skill: searches surfaces with the hand camera, and confirms each object from a second viewpoint."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -8,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, Detection, LocalisationEstimate, Question, Running, Succeeded
-from skills.detect.descriptions import count_sentence, describe, surface_names, wanted_names
+from skills.api import Cause, Detection, Detector, LocalisationEstimate, Question, Running, Succeeded
+from skills.detect.descriptions import count_sentence, describe, describe_unknown, surface_names, wanted_names
 from skills.detect.messages import (
     coverage_message,
     detections_message,
@@ -20,28 +21,36 @@ from skills.detect.messages import (
 from skills.detect.selection import (
     DetectInputs,
     DetectOptions,
+    doubtful_tracks,
     is_sure,
     level_distance,
     matching_tracks,
     meant_tracks,
     seen_again,
     sure_tracks,
-    unlabelled_clusters,
     why_not_meant,
 )
 from skills.detect.viewpoints import look_targets, surface_boxes
 from skills.geometry import wrap
+from skills.inputs.errors import listing, with_article
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
 from skills.perception.class_forms import ANY_OBJECT, known_attributes
 from skills.perception.detection_3d import Detection3D, detections_3d, observation
-from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image, is_dark
+from skills.perception.detector.camera_images import (
+    DETECTION_LATENCY_S,
+    detect_in_image,
+    is_dark,
+    is_upside_down,
+    rotate_180,
+)
 from skills.perception.model_matching import identified
-from skills.perception.point_cloud import Coverage, in_plain_view
-from skills.perception.surface_segmentation import Cluster, loose_clusters, segment_3d, segment_surfaces
+from skills.perception.object_model import ObjectModel
+from skills.perception.point_cloud import Coverage, camera_pose_W, in_plain_view
+from skills.perception.surface_segmentation import labelled_clusters, segment_3d, segment_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
 from skills.relations import ordinal
-from skills.robot import FloatArray, Image, Mount
+from skills.robot import FloatArray, Image, Mount, Picture
 from skills.routine import PlanningAttempt, Routine, SkillFailure
 from skills.world_model import ObjectKind, ObjectObservation
 
@@ -49,26 +58,30 @@ _LEAST_SEEN = 0.02
 _LEAST_IN_VIEW = 0.5
 """Fraction of a surface in the view of a camera that is fixed to the body."""
 _FITS_NEAR_M = 0.4
-_LOOKED_AT_M = 0.08
 _BELOW_TOP_M = 0.01
 _ANSWER_S = 30.0
 """Time limit for the answer which of several objects is meant."""
+_NEAR_SHIFTS_RAD = (0.0, 0.6, -0.6)
+"""Angles about a doubtful object from which it is viewed from near, one after the other."""
+_MOST_NAMED = 3
+"""Number of unexplained objects that a message names."""
+_MARGIN = 0.3
+"""Margin of a picture of a single object, as a fraction of its longer side."""
 _RAISED_M = 0.15
 """Height by which the body rises for one more view by a camera on a head."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """One picture with the robot's pose, the detections with and without a position, and the surfaces' clusters.
+    """One picture with the robot's pose, and the detections with and without a position.
 
-    Detections may have low scores.
+    Detections may have low scores; those with a position include objects without a label.
     """
 
     image: Image
     localisation: LocalisationEstimate
     detections: tuple[Detection, ...]
     detections_3d: tuple[Detection3D, ...]
-    clusters: tuple[Cluster, ...]
 
 
 class Detect(LookingSkill[DetectInputs]):
@@ -80,11 +93,12 @@ class Detect(LookingSkill[DetectInputs]):
     outputs: ClassVar[Mapping[str, type]] = {
         "observation": ObjectObservation,
         "observations": tuple[ObjectObservation, ...],
+        "unexplained": tuple[ObjectObservation, ...],
     }
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "a class, attribute or surface cannot be searched for from here, or there is no camera",
         Cause.PLANNING: "the arm reaches no viewpoint",
-        Cause.EXECUTION: "the arm did not reach its viewpoint, or the camera shows nothing",
+        Cause.EXECUTION: "the arm did not reach its viewpoint, the camera shows nothing, or an object stays unexplained",
         Cause.POSTCONDITION: "no such object is seen, or fewer than asked for",
     }
     default_timeout_s = 90.0
@@ -107,7 +121,7 @@ class Detect(LookingSkill[DetectInputs]):
         names = (*self.context.detector.class_names, *((*self._own, ANY_OBJECT) if self._own else ()))
         self._tracker, self._coverage = Tracker(tuple(dict.fromkeys(names))), Coverage(inputs.surfaces)
         self._tried: dict[int, int] = {}
-        self._clusters: list[Cluster] = []
+        self._unknown: dict[int, Picture] = {}
         self._is_covered = False
         self._fits_near = inputs.seen_before is not None and max(inputs.seen_before.size_m) < _FITS_NEAR_M
         blocked: list[SkillFailure] = []
@@ -154,27 +168,28 @@ class Detect(LookingSkill[DetectInputs]):
         return 0 < inputs.count <= len(self._sure(inputs))
 
     def _look_closer(self, inputs: DetectInputs) -> Routine[None]:
-        """Views the expected position from near, or unlabelled clusters that may be wanted.
-
-        The second near view of a position is from above.
-        """
+        """Views the expected position from near, or objects that may be wanted, from near and from three sides."""
         if inputs.expected_W is not None:
             if not self._has_enough(inputs):
                 p_BT = self.X_WB().inverse() @ np.array(inputs.expected_W)
                 yield from self._look_and_confirm(inputs, p_BT, [], close=not self._fits_near)
             return
-        if ANY_OBJECT in inputs.classes:
-            return
-        for _ in range(self.options.closer_looks):
-            left = unlabelled_clusters(self._clusters, self._tracker.snapshot(), inputs.sought)
-            if self._has_enough(inputs) or not left:
+        viewed = Counter[int]()
+        while not self._has_enough(inputs) and sum(viewed.values()) < self.options.candidates * len(_NEAR_SHIFTS_RAD):
+            left = [t for t in self._doubts(inputs) if viewed[t.number] < len(_NEAR_SHIFTS_RAD)]
+            if not left:
                 return
-            shape, base_m = left[0].shape, left[0].base_m
-            self._clusters = [c for c in self._clusters if level_distance(c.shape.centre, shape.centre) > _LOOKED_AT_M]
-            p_BT = self.X_WB().inverse() @ np.array([*shape.centre, base_m + 0.5 * shape.height_m])
-            others, self._clusters = self._clusters, []
-            yield from self._look_and_confirm(inputs, p_BT, [], close=True)
-            self._clusters = others
+            shift_rad = _NEAR_SHIFTS_RAD[viewed[left[0].number]]
+            viewed[left[0].number] += 1
+            p_BT = self.X_WB().inverse() @ left[0].position_W
+            yield from self._look_and_confirm(inputs, p_BT, [], close=True, shift_rad=shift_rad)
+
+    def _doubts(self, inputs: DetectInputs) -> list[Track]:
+        """Tracks of objects that may be what is sought although nothing recognises them, likeliest first."""
+        if inputs.expected_W is not None or ANY_OBJECT in inputs.classes:
+            return []
+        sure = {track.number for track in self._sure(inputs)}
+        return [track for track in doubtful_tracks(self._tracker.snapshot(), inputs) if track.number not in sure]
 
     def _look_around(self, inputs: DetectInputs) -> Routine[None]:
         """Views occluded areas from both sides; a camera on a head cannot change sides."""
@@ -313,18 +328,7 @@ class Detect(LookingSkill[DetectInputs]):
         place, detector = self.context.localiser.estimate(), self.context.detector
 
         def examine() -> Look:
-            by_model = {*self._own} - {*detector.class_names}
-            found = () if {*inputs.classes} <= by_model else detect_in_image(detector, image, FAINT_SCORE)
-            placed = detections_3d(image, place, found, inputs.surfaces)
-            views = [view for view in segment_surfaces(image, place.X_WO, inputs.surfaces) if view is not None]
-            if self._own or ANY_OBJECT in inputs.classes:
-                sure = [each for each in placed if each.detection.score >= SURE_SCORE]
-                loose = loose_clusters(image, place, views, sure, inputs.surfaces)
-                placed += identified(loose, image, place, self._own)
-            elif inputs.seen_before is not None and not any(each.class_name in inputs.classes for each in placed):
-                loose = loose_clusters(image, place, views, placed, inputs.surfaces)
-                placed += seen_again(inputs.seen_before, [segment_3d(each, image, place) for each in loose])
-            return Look(image, place, found, placed, tuple(each for view in views for each in view.clusters))
+            return _examined(image, place, detector, inputs, self._own)
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)
         self._update(look, ANY_OBJECT in inputs.classes)
@@ -342,7 +346,9 @@ class Detect(LookingSkill[DetectInputs]):
         sure = [detection for detection in (*look.detections, *own) if detection.score >= SURE_SCORE]
         self.context.publish("detections", detections_message(look.image, sure, look.detections_3d))
         self.context.publish("tracks", tracks_message(self.context, tracks))
-        self._clusters += look.clusters
+        for track in tracks:
+            if track.last_seen_s == look.image.stamp_s and not track.is_confirmed(1):
+                self._unknown[track.number] = _cut_out(look.image, track.latest)
         self._last = look
 
     def _ended(self, inputs: DetectInputs, blocked: Sequence[SkillFailure]) -> Routine[Succeeded]:
@@ -356,11 +362,31 @@ class Detect(LookingSkill[DetectInputs]):
                 message = object_destination_message(self.context, seen, look.image, look.localisation.X_WO)
                 self.context.publish("object_destination", message)
             said = f"saw {describe(found[0])}" if inputs.count == 1 else count_sentence(found, inputs.surfaces)
-            return Succeeded(said, {"observation": found[0], "observations": tuple(found)})
+            doubts = self._doubts(inputs) if inputs.count == 0 else []
+            said += f"; {self._unexplained(doubts)}" if doubts else ""
+            outputs = {"observation": found[0], "observations": tuple(found)}
+            return Succeeded(said, outputs | {"unexplained": tuple(_observed(each, ()) for each in doubts)})
         yield from self.try_stow()
         if blocked:
             raise blocked[0]
         raise self._too_few(inputs, found)
+
+    def _cannot_tell(
+        self, inputs: DetectInputs, found: Sequence[ObjectObservation], doubts: Sequence[Track], seen: str
+    ) -> SkillFailure:
+        """Failure for objects that may be what is sought."""
+        what = wanted_names(inputs.classes, inputs.attributes)
+        known = f"{count_sentence(found, inputs.surfaces)}, and " if found else ""
+        what = f"{known}I cannot tell whether there is {'another' if found else with_article(what)}"
+        return SkillFailure(Cause.EXECUTION, f"{what}: {self._unexplained(doubts)} ({seen})")
+
+    def _unexplained(self, doubts: Sequence[Track]) -> str:
+        """Describes unexplained objects, and shows a picture of each: "something 24 cm tall stands on the desk"."""
+        said = [describe_unknown(_observed(track, ())) for track in doubts[:_MOST_NAMED]]
+        for track, what in zip(doubts, said, strict=False):
+            if (picture := self._unknown.get(track.number)) is not None:
+                self.context.show_picture(picture, f"What is this? {what.capitalize()}")
+        return listing(said)
 
     def _results(self, inputs: DetectInputs) -> list[Track]:
         """Reliable tracks in the order of the result; when any object is wanted, those with a fresh picture first."""
@@ -395,6 +421,8 @@ class Detect(LookingSkill[DetectInputs]):
         if self.object_camera.mount is Mount.BODY and shown < _LEAST_IN_VIEW:
             why = f"most of it is out of the camera's view ({seen})"
             return SkillFailure(Cause.EXECUTION, f"{names} could not be looked at from here: {why}")
+        if doubts := self._doubts(inputs):
+            return self._cannot_tell(inputs, found, doubts, seen)
         unmeant = why_not_meant(self._sure(inputs), inputs) if inputs.relations and not found else None
         if unmeant is not None:
             return SkillFailure(Cause.POSTCONDITION, f"{unmeant} ({seen})")
@@ -402,6 +430,45 @@ class Detect(LookingSkill[DetectInputs]):
             few = f"{count_sentence(found, inputs.surfaces)}, fewer than {inputs.count} ({seen})"
             return SkillFailure(Cause.POSTCONDITION, few)
         return SkillFailure(Cause.POSTCONDITION, f"no {what} seen on {names} from here ({seen})")
+
+
+def _examined(
+    image: Image,
+    place: LocalisationEstimate,
+    detector: Detector,
+    inputs: DetectInputs,
+    own: Mapping[str, ObjectModel],
+) -> Look:
+    """Detections and segments of one picture: each segment on the surfaces has a label or is an `ANY_OBJECT`."""
+    by_model = {*own} - {*detector.class_names}
+    found = () if {*inputs.classes} <= by_model else detect_in_image(detector, image, FAINT_SCORE)
+    placed = detections_3d(image, place, found, inputs.surfaces)
+    views = [view for view in segment_surfaces(image, place.X_WO, inputs.surfaces) if view is not None]
+    labels = [each for each in placed if each.detection.score >= SURE_SCORE] if own else placed
+    pairs = labelled_clusters(image, place, views, labels, inputs.surfaces)
+    loose = [cluster for cluster, label in pairs if label is None]
+    segments = identified(loose, image, place, own) if own else tuple(segment_3d(c, image, place) for c in loose)
+    if not own and inputs.seen_before is not None and not any(each.class_name in inputs.classes for each in placed):
+        segments = seen_again(inputs.seen_before, segments)
+    shapes, p_WC = detector.shapes, camera_pose_W(image, place.X_WO).translation()
+    cluster_of = {id(label): cluster for cluster, label in pairs} | dict(zip(map(id, segments), loose, strict=True))
+    shaped = tuple(
+        replace(each, is_segmented=True, shape=None if shapes is None else shapes.of(cluster, p_WC))
+        if (cluster := cluster_of.get(id(each))) is not None
+        else each
+        for each in (*placed, *segments)
+    )
+    return Look(image, place, found, shaped)
+
+
+def _cut_out(image: Image, detected: Detection3D) -> Picture:
+    """Part of a picture that shows a detected object, upright, with a margin."""
+    picture = image.grey if image.colour is None else image.colour
+    u0, v0, u1, v1 = detected.detection.box
+    margin_px = _MARGIN * max(u1 - u0, v1 - v0)
+    left, top = (max(0, int(low - margin_px)) for low in (u0, v0))
+    part = picture[top : int(v1 + margin_px), left : int(u1 + margin_px)]
+    return rotate_180(part) if is_upside_down(image) else np.ascontiguousarray(part)
 
 
 def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:

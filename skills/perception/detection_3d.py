@@ -1,7 +1,7 @@
 """Detections in 3D: position, size, surface and colours of detected objects in the world."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +31,8 @@ class Detection3D:
     `covariance` (3, 3) of position_W comes from the camera alone; `place_covariance` adds the localisation's. `size_m`
     and `yaw_rad` are as in `ObjectObservation`. `eye_W` is the camera's position. `pixels` (N, 2) as (u, v) are the
     object's own, according to depth, with their `colours` (N, 3), which are empty in a grey picture. `surface` is the
-    name of the surface below it, "floor" for the floor, None when unknown.
+    name of the surface below it, "floor" for the floor, None when unknown. `is_segmented`: depth shows the object as a
+    cluster of its own; `shape` is then the likelihood of each class by its shape, None when unknown.
     """
 
     stamp_s: float
@@ -45,6 +46,8 @@ class Detection3D:
     pixels: NDArray[np.int64]
     colours: NDArray[np.uint8]
     surface: str | None
+    is_segmented: bool = False
+    shape: Mapping[str, float] | None = None
 
     @property
     def class_name(self) -> str:

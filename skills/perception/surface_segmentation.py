@@ -366,22 +366,39 @@ def loose_clusters(
     labelled: Sequence[Detection3D],
     surfaces: Sequence[Surface],
 ) -> list[Cluster]:
-    """Clusters of the objects on surfaces that none of the `labelled` detections explains.
+    """Clusters of the objects on surfaces that none of the `labelled` detections explains."""
+    return [cluster for cluster, label in labelled_clusters(image, place, views, labelled, surfaces) if label is None]
 
-    Omits clusters that the picture's edge cuts off, that stand beside the surface, such as a wall, or that are longer
-    than 0.6 m.
+
+def labelled_clusters(
+    image: Image,
+    place: LocalisationEstimate,
+    views: Iterable[SurfaceView],
+    labelled: Sequence[Detection3D],
+    surfaces: Sequence[Surface],
+) -> list[tuple[Cluster, Detection3D | None]]:
+    """Clusters of the objects on surfaces, each with the detection that explains it, or None.
+
+    Omits clusters without a detection that the picture's edge cuts off, that stand beside the surface, such as a wall,
+    or that are longer than 0.6 m.
     """
     outlines = {surface.name: surface.polygon_W for surface in surfaces}
     p_WC = camera_pose_W(image, place.X_WO).translation()
-    clusters = (cluster for view in views for cluster in _unlabelled(view, labelled, p_WC))
-    return [one for one in clusters if _stands_on(one, outlines[one.surface]) and not _is_cut_off(one, image)]
+    pairs = (pair for view in views for pair in _labelled(view, labelled, p_WC))
+    return [
+        (one, label)
+        for one, label in pairs
+        if label is not None or (_stands_on(one, outlines[one.surface]) and not _is_cut_off(one, image))
+    ]
 
 
-def _unlabelled(view: SurfaceView, labelled: Sequence[Detection3D], p_WC: FloatArray) -> Iterator[Cluster]:
-    """Clusters of a view that match no detection, after the split of objects that touch."""
+def _labelled(
+    view: SurfaceView, labelled: Sequence[Detection3D], p_WC: FloatArray
+) -> Iterator[tuple[Cluster, Detection3D | None]]:
+    """Clusters of a view with the detections that they match, after the split of objects that touch."""
     view = split_touching(reduce(split_detected, labelled, view), p_WC)
-    named = {id(matching_cluster(view.clusters, each)) for each in labelled}
-    return (cluster for cluster in view.clusters if id(cluster) not in named)
+    named = {id(matching_cluster(view.clusters, each)): each for each in reversed(labelled)}
+    return ((cluster, named.get(id(cluster))) for cluster in view.clusters)
 
 
 def _stands_on(cluster: Cluster, outline_W: tuple[tuple[float, float], ...]) -> bool:
@@ -413,4 +430,5 @@ def segment_3d(cluster: Cluster, image: Image, place: LocalisationEstimate) -> D
         pixels=cluster.points.pixels,
         colours=cluster.points.colours,
         surface=cluster.surface,
+        is_segmented=True,
     )

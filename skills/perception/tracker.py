@@ -2,18 +2,17 @@
 
 A detection is associated with the track that it fits by position (Mahalanobis distance) and class; positions are fused
 in information form (inverse covariances add). A track loses belief when a picture should show it and does not. A
-detection with a low score begins no track, but supports one. A segment without a label (`ANY_OBJECT`) gives a position,
-and no evidence of a class, unless `ANY_OBJECT` is among the tracker's names: then it means that the segment is none of
-the others.
+detection with a low score begins no track unless depth shows its object as a cluster of its own. A segment without a
+label (`ANY_OBJECT`) shows that something is there, and is evidence against all classes.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 import numpy as np
 
+from skills.perception.class_evidence import FAINT_SCORE, ClassEvidence
 from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D
 from skills.robot import FloatArray
@@ -22,12 +21,17 @@ GATE = 16.3
 """Squared Mahalanobis distance that holds 99.9 % of the detections of an object."""
 DIFFERENT_PLACES_M = 0.03
 CONFIRMED_BELIEF = 0.6
+CONFIRMED_CLASS = 0.8
+"""Least probability of a class that counts as recognised."""
 SURE_SCORE = 0.5
-FAINT_SCORE = 0.3
-"""Least scores of a detection that begins a track, and of one that supports it."""
+"""Least score of a detection that begins a track."""
+SEGMENT_BELIEF = 0.7
+"""Probability that a segment is an object: one picture may show noise, or a part of one."""
 _JITTER_M = 0.012
 _NEAR_M = 0.03
 _CONFUSED = 0.02
+_SEGMENT_WITHIN_M = 0.06
+"""Distance within which a segment without a label shows a track's object."""
 _MISSED_IF_THERE = 0.15
 _MISSED_IF_NOT = 0.88
 _SEEN_BY_CHANCE = 0.25
@@ -43,12 +47,12 @@ _LEAST_BELIEF = 0.05
 class Track:
     """Track of one object. `position_W` with `covariance` (3, 3) from the views, without the localisation's error.
 
-    `classes` are the probabilities of the classes, `belief` the probability that the object exists. `eyes_W` are the
-    camera positions that saw it; `latest` is its last detection, `best` the one with the highest score.
+    `evidence` gives the probabilities of the classes, `belief` is the probability that the object exists. `eyes_W` are
+    the camera positions that saw it; `latest` is its last detection, `best` the one with the highest score.
     """
 
     number: int
-    classes: Mapping[str, float]
+    evidence: ClassEvidence
     belief: float
     position_W: FloatArray
     covariance: FloatArray
@@ -58,14 +62,19 @@ class Track:
     missed: int = 0
 
     @property
+    def classes(self) -> Mapping[str, float]:
+        """Probabilities of the classes."""
+        return self.evidence.probabilities
+
+    @property
     def class_name(self) -> str:
-        """Most likely class; `ANY_OBJECT` when no view had a label."""
-        return ANY_OBJECT if self.best.class_name == ANY_OBJECT else max(self.classes, key=self.classes.__getitem__)
+        """Most likely class; `ANY_OBJECT` when no view had a label, or none is likely."""
+        return max(self.classes, key=self.classes.__getitem__)
 
     @property
     def class_belief(self) -> float:
-        """Probability of `class_name`; 1 for `ANY_OBJECT`, which every object is."""
-        return self.classes.get(self.class_name, 1.0)
+        """Probability of `class_name`."""
+        return self.classes[self.class_name]
 
     @property
     def views(self) -> int:
@@ -78,10 +87,9 @@ class Track:
         return self.latest.stamp_s
 
     def is_confirmed(self, views: int = 2) -> bool:
-        """Returns whether the object exists and is likely of its class, also according to its last detection."""
-        return (
-            self.exists(views) and self.class_belief >= CONFIRMED_BELIEF and self.latest.class_name == self.class_name
-        )
+        """Returns whether the object exists and is likely of its class; less so where one view must do."""
+        least = CONFIRMED_CLASS if views > 1 else CONFIRMED_BELIEF
+        return self.exists(views) and self.class_name != ANY_OBJECT and self.class_belief >= least
 
     def exists(self, views: int = 2) -> bool:
         """Returns whether enough views saw an object of any class, with enough belief."""
@@ -109,19 +117,18 @@ class Tracker:
                 self._miss(track)
         for k, detected in enumerate(seen):
             if k in pairs:
-                self._tracks[pairs[k]] = _fused(self._tracks[pairs[k]], detected, self._names)
-            elif detected.detection.score >= SURE_SCORE:
+                self._tracks[pairs[k]] = _fused(self._tracks[pairs[k]], detected)
+            elif detected.detection.score >= SURE_SCORE or detected.is_segmented:
                 self._begin(detected)
         return self.snapshot()
 
     def _begin(self, detected: Detection3D) -> None:
         self._count += 1
-        even = MappingProxyType(dict.fromkeys(self._names, 1.0 / max(len(self._names), 1)))
         eye = _point(detected.eye_W)
         self._tracks[self._count] = Track(
             number=self._count,
-            classes=_classes(even, detected),
-            belief=min(detected.detection.score, _MOST_SURE),
+            evidence=ClassEvidence.none(self._names).add(detected.detection, detected.shape),
+            belief=_existence(detected),
             position_W=detected.position_W,
             covariance=_spread(detected),
             eyes_W=(eye,),
@@ -178,10 +185,13 @@ def _matched(tracks: Sequence[Track], seen: Sequence[Detection3D]) -> dict[int, 
 def fits(track: Track, detected: Detection3D) -> bool:
     """Returns whether a detection may show a track's object: near enough, and of a possible class.
 
-    A detection within 3 cm shows the same object, whatever its class.
+    A detection within 3 cm shows the same object, whatever its class. A segment within 6 cm does so too, however high
+    its middle is: a picture's edge may have cut off the other view.
     """
-    apart_m = float(np.linalg.norm(track.position_W - detected.position_W))
-    possible = track.classes.get(detected.class_name, 1.0) > _CONFUSED or apart_m < _NEAR_M
+    off = track.position_W - detected.position_W
+    if ANY_OBJECT in (detected.class_name, track.class_name) and np.linalg.norm(off[:2]) < _SEGMENT_WITHIN_M:
+        return True
+    possible = track.classes.get(detected.class_name, 1.0) > _CONFUSED or float(np.linalg.norm(off)) < _NEAR_M
     return possible and squared_distance(track, detected) < GATE
 
 
@@ -196,7 +206,7 @@ def _spread(detected: Detection3D) -> FloatArray:
     return np.asarray(detected.covariance + _JITTER_M**2 * np.eye(3))
 
 
-def _fused(track: Track, detected: Detection3D, names: Sequence[str]) -> Track:
+def _fused(track: Track, detected: Detection3D) -> Track:
     """Fuses a track with one more detection."""
     track_information, information = np.linalg.inv(track.covariance), np.linalg.inv(_spread(detected))
     covariance = np.linalg.inv(track_information + information)
@@ -205,7 +215,7 @@ def _fused(track: Track, detected: Detection3D, names: Sequence[str]) -> Track:
     known = any(math.dist(one, eye) < DIFFERENT_PLACES_M for one in track.eyes_W)
     return replace(
         track,
-        classes=_classes(track.classes, detected),
+        evidence=track.evidence.add(detected.detection, detected.shape),
         belief=_updated(track.belief, _evidence(detected)),
         position_W=position,
         covariance=covariance,
@@ -216,29 +226,17 @@ def _fused(track: Track, detected: Detection3D, names: Sequence[str]) -> Track:
 
 
 def _latest(track: Track, detected: Detection3D) -> Detection3D:
-    """Last detection for a track.
-
-    A detection with a low score of the same class, or a segment, only renews the time of the previous one.
-    """
-    unlabelled = detected.class_name == ANY_OBJECT != track.latest.class_name and ANY_OBJECT not in track.classes
-    if detected.detection.score >= SURE_SCORE and not unlabelled:
+    """Last detection for a track; one with a low score, or a segment, only renews the time of a labelled one."""
+    is_label = detected.class_name != ANY_OBJECT and detected.detection.score >= SURE_SCORE
+    if is_label or track.latest.class_name == ANY_OBJECT:
         return detected
-    same = unlabelled or detected.class_name == track.latest.class_name
-    return replace(track.latest, stamp_s=detected.stamp_s) if same else track.latest
+    return replace(track.latest, stamp_s=detected.stamp_s)
 
 
-def _classes(before: Mapping[str, float], detected: Detection3D) -> Mapping[str, float]:
-    """Class probabilities after a detection; the rest of its scores is spread over the other classes."""
-    if detected.class_name == ANY_OBJECT and ANY_OBJECT not in before:
-        return before
-    score = float(np.clip(detected.detection.score, 0.3, 0.97))
-    others = (1.0 - score) / max(len(before) - 1, 1)
-    scores = {name: max(alternative, others) for name, alternative in detected.detection.alternatives} | {
-        detected.class_name: score
-    }
-    raw = {name: p * scores.get(name, others) for name, p in before.items()}
-    total = sum(raw.values())
-    return MappingProxyType({name: max(value / total, 1e-3) for name, value in raw.items()})
+def _existence(detected: Detection3D) -> float:
+    """Probability that a detection shows an object of any class."""
+    score = min(detected.detection.score, _MOST_SURE)
+    return max(score, SEGMENT_BELIEF) if detected.is_segmented else score
 
 
 def _evidence(detected: Detection3D) -> float:
@@ -246,7 +244,7 @@ def _evidence(detected: Detection3D) -> float:
 
     Assumes that a score is the fraction of correct detections, as it nearly is (docs/finding-things.md).
     """
-    ratio = _odds(min(detected.detection.score, _MOST_SURE)) / _odds(_SEEN_BY_CHANCE)
+    ratio = _odds(_existence(detected)) / _odds(_SEEN_BY_CHANCE)
     return math.pow(ratio, _NEW_IN_A_VIEW)
 
 

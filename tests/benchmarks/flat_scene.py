@@ -14,8 +14,8 @@ from skills.robot import FrameTree, Image, Pose2D
 SURFACES = ("coffee table", "sideboard", "dresser", "bathroom cabinet", "desk", "workbench", "kitchen counter")
 
 
-def surface_of(name):
-    facts = knowledge_of(open_world("flat")).surfaces[name]
+def surface_of(name, world="flat"):
+    facts = knowledge_of(open_world(world)).surfaces[name]
     return Surface(name, tuple((float(x), float(y)) for x, y in facts.polygon), facts.height)
 
 
@@ -26,11 +26,11 @@ def viewpoint_of(rng, name):
 
 
 class FlatScene:
-    """The flat with models at poses; `bodies` are their labels in Drake's label images."""
+    """The flat, or another world, with models at poses; `bodies` are their labels in Drake's label images."""
 
-    def __init__(self, models, robots=()):
+    def __init__(self, models, robots=(), world="flat"):
         loose = [LooseModel(f"thing{k}", file, X_WO, fixed=True) for k, (file, X_WO) in enumerate(models)]
-        directives, parameters = open_world("flat").directives_path, render_parameters()
+        directives, parameters = open_world(world).directives_path, render_parameters()
         self.built = build_diagram(
             DiagramConfig(directives, loose, robots=list(robots), visuals=False, renderer_parameters=parameters)
         )

@@ -19,7 +19,7 @@ from executive.words.command import PEOPLE_TASKS, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Publish, Surface
-from skills.detect.descriptions import count_of, count_sentence, distinct_objects, plural
+from skills.detect.descriptions import count_of, count_sentence, describe_unknown, distinct_objects, plural
 from skills.geometry import compose
 from skills.inputs.errors import listing, with_article
 from skills.robot import Pose2D
@@ -37,6 +37,8 @@ MOST_ASIDE: Final = 2
 ASIDE_M: Final = 0.45
 _TALLY: Final = "observations"
 """Output port of a look for all objects that it found."""
+_UNEXPLAINED: Final = "unexplained"
+"""Output port of a look for objects that it does not recognise and that may be what is sought."""
 
 
 class Answer(ExplainedDecorator):
@@ -54,7 +56,8 @@ class Answer(ExplainedDecorator):
     | halted | any | INVALID with CANCELLED |
 
     `looks` has the leaves for each surface, one for each viewpoint; a surface is seen when each leaf succeeded or
-    failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; with `tells` it includes the found object.
+    failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; with `tells` it includes the found object,
+    and it names objects that no look recognised, which the leaves write under the keys `doubts`.
     `question` is the text for yes, `denied` the text for no; without `yes_or_no` the text stands alone, because "is it
     empty" and "is there anything on it" are one question. The leaves write all found objects under the blackboard keys
     `tallies`. Each object counts once; the number is written under `count_key`, if given.
@@ -70,6 +73,7 @@ class Answer(ExplainedDecorator):
     publish: Publish
     tells: bool = False
     tallies: Mapping[str, str] = field(default_factory=dict)
+    doubts: Mapping[str, str] = field(default_factory=dict)
     needed: int = 1
     yes_or_no: bool = True
     count_key: str = ""
@@ -103,21 +107,24 @@ class Answer(ExplainedDecorator):
         return self._answered(answer, self.message if answer and self.tells else "")
 
     def _counted(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
-        seen = [key for leaf, key in self.tallies.items() if leaf in nodes and nodes[leaf].status == Status.SUCCESS]
-        looks: list[tuple[ObjectObservation, ...]] = [self.board.get(key) for key in seen]
-        found = distinct_objects(looks)
+        done = {leaf for leaf, node in nodes.items() if node.status == Status.SUCCESS}
+        found, unknown = (
+            distinct_objects([self.board.get(key) for leaf, key in keys.items() if leaf in done])
+            for keys in (self.tallies, self.doubts)
+        )
         enough = len(found) >= self.needed
         if self.count_key:
             self.board.put(self.count_key, float(len(found)))
         if unseen and not enough:
             return self._not_looked(nodes, unseen)
         limits = f", as far as was seen: not {', '.join(unseen)}" if unseen else ""
+        limits += f"; besides, {listing(map(describe_unknown, unknown))}" if unknown else ""
         return self._answered(enough, f"{count_sentence(found, ())}{limits}" if found else "")
 
     def _not_looked(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
         causes = (node.cause for node in nodes.values() if node.cause is not Cause.POSTCONDITION)
         cause = next(filter(None, causes), Cause.EXECUTION)
-        return self.fail(Failed(cause, f"could not look at {', '.join(unseen)}: {self.message}"))
+        return self.fail(Failed(cause, f"no answer for {', '.join(unseen)}: {self.message}"))
 
     def _answered(self, answer: bool, found: str) -> Status:
         self.answer, self.cause = answer, None
@@ -223,6 +230,8 @@ def detect_plan(
     relations, classes = builder.relations(item.relations), builder.search_classes(item.name)
     ports = {"classes": classes, "attributes": item.attributes, "surfaces": where_to_look, **relations, **extra}
     tally = {_TALLY: builder.key("all")} if tallied else {}
+    if tallied and _UNEXPLAINED in builder.registry["detect"].outputs:
+        tally[_UNEXPLAINED] = builder.key("unexplained")
     return builder.skill("detect", ports, {"observation": key, **tally})
 
 
@@ -363,9 +372,15 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
     title = f"look for {what if what == ANYTHING else asked}"
     search = below.node("round" if counting else "selector", title, *(look for _, look in looks))
     leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
-    tallies = {
-        leaf.path_id: leaf.options["outputs"][_TALLY] for _, look in looks if counting for leaf in look.children[1:]
-    }
+    tallies, doubts = (
+        {
+            leaf.path_id: leaf.options["outputs"][port]
+            for _, look in looks
+            for leaf in look.children[1:]
+            if counting and port in leaf.options["outputs"]
+        }
+        for port in (_TALLY, _UNEXPLAINED)
+    )
     spot = place_phrase(knowledge, place)
     denied = f"{'not' if command.object_count > 1 or person in knowledge.people else 'no'} {absent} {spot}"
     if what == ANYTHING:
@@ -383,6 +398,7 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         key=answer_key or builder.key("answer"),
         tells=place is None,
         tallies=MappingProxyType(tallies),
+        doubts=MappingProxyType(doubts),
         needed=max(1, command.object_count),
         yes_or_no=what != ANYTHING,
     )

@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from skills.detection import Detector, DetectorWrapper
+
+if TYPE_CHECKING:
+    from skills.perception.shape_model import ShapeModel
 
 
 @dataclass(frozen=True)
@@ -14,11 +18,13 @@ class Cascade:
     """Cascade of networks in an ONNX `file`; the project's own when none is named.
 
     `views`: a picture of the hand camera with doubtful scores is judged in several views (test-time augmentation).
+    `shapes`: the shape in depth is a second witness of the class beside the scores.
     `objects`: folders written by `errand object import`, whose objects are recognised by their models.
     """
 
     file: Path | None = None
     views: bool = True
+    shapes: bool = True
     objects: tuple[Path, ...] = ()
 
     def build(self) -> Detector:
@@ -34,6 +40,13 @@ class _LoadedWhenUsed(DetectorWrapper):
     """Cascade whose networks load when its classes or a picture are first asked for."""
 
     _options: Cascade
+
+    @property
+    def shapes(self) -> ShapeModel | None:
+        """The project's own shape model, unless the options leave it out."""
+        from skills.perception.shape_model import shape_model
+
+        return shape_model() if self._options.shapes else None
 
     @cached_property
     def _detector(self) -> Detector:  # type: ignore[override]

@@ -18,6 +18,7 @@ from skills.robot import FloatArray, Pose2D
 _AVOIDED_M = 0.08
 DOUBTED = 0.05
 """Probability of the wanted classes up to which the robot says that an object is none of them."""
+_EVEN = 0.5
 _LEAST_LENGTH = 0.4
 """Fraction of the shortest object of a class: an object may be hidden in part."""
 _MOST_LENGTH = 1.3
@@ -184,21 +185,23 @@ def doubtful_tracks(tracks: Sequence[Track], inputs: DetectInputs) -> list[Track
     An object of another class, of another size than the wanted classes have, or without the attributes is in no doubt.
     """
     names = {surface.name for surface in inputs.surfaces}
-    known = {name for name in (*inputs.sought, ANY_OBJECT)}
-    left = [
-        t
-        for t in tracks
-        if t.latest.surface in names and t.exists(1) and (t.class_name in known or t.class_belief < CONFIRMED_CLASS)
-    ]
+    here = [track for track in tracks if track.latest.surface in names and track.exists(1)]
+    other = {t.number for t in here if t.class_name not in (ANY_OBJECT, *inputs.sought)}
+    left = [t for t in here if t.number not in other or t.class_belief < CONFIRMED_CLASS]
     likely = {t.number: max(_likely(t, kind) for kind in (inputs, *inputs.landmarks)) for t in left}
     return sorted((t for t in left if likely[t.number] > DOUBTED), key=lambda t: -likely[t.number])
 
 
 def _likely(track: Track, kind: DetectInputs | Landmark) -> float:
-    """Probability that a track is of the wanted kind if no class is left out; 0 for another size or attribute."""
+    """Probability that a track is of the wanted kind if no class is left out; 0 for another size or attribute.
+
+    An object without a label whose shape no model knows may be of any class of its size.
+    """
     fits = [name for name in kind.classes if _has_size_of(track, name)]
     if not fits or not all(has_attribute(track.best, word) for word in kind.attributes if word not in MEANS_BIG):
         return 0.0
+    if track.class_name == ANY_OBJECT and not track.evidence.shape_views:
+        return _EVEN
     return sum(track.evidence.possible.get(name, 0.0) for name in fits)
 
 

@@ -111,6 +111,7 @@ class Detect(LookingSkill[DetectInputs]):
         models = self.context.detector.models
         self._height_m = 0.0 if inputs.seen_before is None else inputs.seen_before.size_m[2]
         self._own = models if any(name in models for name in inputs.classes) else {}
+        self._only_own = {*self._own} - {*self.context.detector.class_names}
         self._check(inputs)
         self.context.publish("object_to_detect", object_to_detect_message(self.context, inputs.classes))
         X_WB = self.X_WB()
@@ -186,7 +187,7 @@ class Detect(LookingSkill[DetectInputs]):
 
     def _doubts(self, inputs: DetectInputs) -> list[Track]:
         """Tracks of objects that may be what is sought although nothing recognises them, likeliest first."""
-        if inputs.expected_W is not None or ANY_OBJECT in inputs.classes:
+        if inputs.expected_W is not None or {*inputs.classes} <= {ANY_OBJECT, *self._only_own}:
             return []
         sure = {track.number for track in self._sure(inputs)}
         return [track for track in doubtful_tracks(self._tracker.snapshot(), inputs) if track.number not in sure]
@@ -328,7 +329,7 @@ class Detect(LookingSkill[DetectInputs]):
         place, detector = self.context.localiser.estimate(), self.context.detector
 
         def examine() -> Look:
-            return _examined(image, place, detector, inputs, self._own)
+            return _examined(image, place, detector, inputs, self._own, {*inputs.classes} <= self._only_own)
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)
         self._update(look, ANY_OBJECT in inputs.classes)
@@ -438,10 +439,13 @@ def _examined(
     detector: Detector,
     inputs: DetectInputs,
     own: Mapping[str, ObjectModel],
+    only_own: bool,
 ) -> Look:
-    """Detections and segments of one picture: each segment on the surfaces has a label or is an `ANY_OBJECT`."""
-    by_model = {*own} - {*detector.class_names}
-    found = () if {*inputs.classes} <= by_model else detect_in_image(detector, image, FAINT_SCORE)
+    """Detections and segments of one picture: each segment on the surfaces has a label or is an `ANY_OBJECT`.
+
+    Imported objects, `own`, are recognised by their models; with `only_own` nothing else is sought.
+    """
+    found = () if only_own else detect_in_image(detector, image, FAINT_SCORE)
     placed = detections_3d(image, place, found, inputs.surfaces)
     views = [view for view in segment_surfaces(image, place.X_WO, inputs.surfaces) if view is not None]
     labels = [each for each in placed if each.detection.score >= SURE_SCORE] if own else placed

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from skills.perception.class_evidence import FAINT_SCORE, ClassEvidence
+from skills.perception.class_evidence import SURE_SCORE, ClassEvidence
 from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D
 from skills.robot import FloatArray
@@ -21,10 +21,10 @@ GATE = 16.3
 """Squared Mahalanobis distance that holds 99.9 % of the detections of an object."""
 DIFFERENT_PLACES_M = 0.03
 CONFIRMED_BELIEF = 0.6
-CONFIRMED_CLASS = 0.8
+CONFIRMED_CLASS = 0.85
 """Least probability of a class that counts as recognised."""
-SURE_SCORE = 0.5
-"""Least score of a detection that begins a track."""
+FAINT_SCORE = 0.3
+"""Least score of a detection that supports a track."""
 SEGMENT_BELIEF = 0.7
 """Probability that a segment is an object: one picture may show noise, or a part of one."""
 _JITTER_M = 0.012

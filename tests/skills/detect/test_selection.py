@@ -1,50 +1,67 @@
-"""Clusters worth a closer view."""
+"""Objects that may be what is sought although nothing recognises them."""
 
 from dataclasses import replace
 
-import numpy as np
+import pytest
 from made_detections import detected_3d
-from pydrake.math import RigidTransform
-from table_scene import BLUE, COKE, GREY, TABLE, Can, scene
+from table_scene import TABLE
 
-from skills.detect.selection import unlabelled_clusters
-from skills.perception.surface_segmentation import segment_surface
+from skills.detect.selection import DetectInputs, doubtful_tracks
 from skills.perception.tracker import Tracker
 
-BOX = Can(1.1, 0.25, 0.06, 0.10, GREY)
+COKES = DetectInputs(("coke",), (TABLE,))
 
 
-def clusters(*things):
-    return segment_surface(scene(things), RigidTransform(), TABLE).clusters
-
-
-def track_at(x, y, **seen):
+def tracks_of(*, size_m=(0.07, 0.07, 0.12), surface="table", shape=None, views=1, **seen):
     tracker = Tracker(("coke", "beer", "hammer", "wrench", "cube"))
-    return tracker.update([replace(detected_3d(**seen), position_W=np.array([x, y, 0.8]))], lambda track: True)
+    more = {"size_m": size_m, "surface": surface, "shape": shape, "is_segmented": True}
+    for k in range(views):
+        tracks = tracker.update([replace(detected_3d(eye=(0.0, 0.1 * k, 1.0), **seen), **more)], lambda track: True)
+    return tracks
 
 
-def test_clusters_with_a_track_are_not_unlabelled():
-    left = unlabelled_clusters(clusters(COKE, BOX), track_at(COKE.x, COKE.y), ("coke",))
-    assert [round(one.shape.centre[1], 1) for one in left] == [0.2]
+UNKNOWN = {"name": "thing", "score": 0.7}
 
 
-def test_an_empty_table_has_no_unlabelled_clusters():
-    assert unlabelled_clusters(clusters(), (), ("coke",)) == []
+@pytest.mark.parametrize(
+    ("seen", "is_doubtful"),
+    [
+        (UNKNOWN, True),
+        (UNKNOWN | {"surface": "shelf"}, False),
+        (UNKNOWN | {"size_m": (0.5, 0.4, 0.02)}, False),
+        (UNKNOWN | {"shape": {"coke": 0.02, "thing": 2.0}}, False),
+        (UNKNOWN | {"shape": {"coke": 4.0, "thing": 0.3}, "views": 4}, True),
+        (UNKNOWN | {"views": 6}, True),
+        (UNKNOWN | {"shape": {"coke": 1.0, "thing": 1.0}, "views": 6}, False),
+        ({"name": "coke", "score": 0.6}, True),
+        ({"name": "beer", "score": 0.6, "alternatives": (("coke", 0.4),)}, True),
+        ({"name": "beer", "score": 0.95}, False),
+    ],
+    ids=[
+        "unknown",
+        "elsewhere",
+        "of another size",
+        "of another shape",
+        "of its shape in four views",
+        "unknown in six views, of unknown shape",
+        "unknown in six views, of any shape",
+        "a coke in one view",
+        "a beer or a coke",
+        "a beer",
+    ],
+)
+def test_an_object_is_in_doubt_while_it_may_be_what_is_sought(seen, is_doubtful):
+    assert bool(doubtful_tracks(tracks_of(**seen), COKES)) is is_doubtful
 
 
-def test_cluster_with_a_track_that_may_be_wanted_stays_unlabelled():
-    # what it was taken for, and how many clusters are left of the one that stands there
-    rows = [("coke", (), 0), ("beer", (("coke", 0.4),), 1), ("beer", (("hammer", 0.4),), 0), ("beer", (), 0)]
-    for name, alternatives, expected in rows:
-        tracks = track_at(COKE.x, COKE.y, name=name, score=0.76, alternatives=alternatives)
-        assert len(unlabelled_clusters(clusters(COKE), tracks, ("coke",))) == expected, (name, alternatives)
+def test_an_object_without_the_attribute_is_in_no_doubt():
+    tracks = tracks_of(**UNKNOWN)
+    assert doubtful_tracks(tracks, replace(COKES, attributes=("red",))) == []
+    assert doubtful_tracks(tracks, replace(COKES, attributes=("big",))) != []
 
 
-def test_clusters_too_large_or_small_for_the_class_are_ignored():
-    tall = Can(1.1, 0.25, 0.06, 0.39, BLUE)
-    assert len(unlabelled_clusters(clusters(COKE, tall), (), ("person",))) == 1
-    assert len(unlabelled_clusters(clusters(COKE, tall), (), ("person", "coke"))) == 2
-
-
-def test_a_place_that_was_seen_twice_counts_once():
-    assert len(unlabelled_clusters([*clusters(COKE), *clusters(COKE)], (), ("coke",))) == 1
+def test_the_likeliest_comes_first():
+    likely = tracks_of(name="coke", score=0.45)
+    (other,) = tracks_of(**UNKNOWN, shape={"coke": 1.0, "thing": 1.0})
+    left = doubtful_tracks([replace(other, number=2), *likely], COKES)
+    assert [track.number for track in left] == [1, 2]

@@ -101,4 +101,4 @@ def test_objects_are_counted_over_all_surfaces(context, bench, trolley, needed, 
 def test_too_few_is_not_said_when_a_surface_was_missed(context, bench, needed):
     root = count_of(context, (bench, "P"), needed)
     assert (root.status, root.answer, root.cause) == (F, None, Cause.PLANNING)
-    assert "could not look at trolley" in root.message
+    assert "no answer for trolley" in root.message

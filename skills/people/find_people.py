@@ -9,8 +9,9 @@ from typing import ClassVar
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from pydrake.math import RigidTransform
 
-from skills.api import Cause, ObjectObservation, Part, Running, SkillContext, Succeeded, SurveyView
+from skills.api import Cause, Detection, ObjectObservation, Part, Running, SkillContext, Succeeded, SurveyView
 from skills.detect.descriptions import count_sentence
 from skills.detect.messages import detections_message
 from skills.geometry import grid_inside, line_of_sight, wrap
@@ -21,11 +22,12 @@ from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clear,
 from skills.navigate.surroundings import NavigateInputs
 from skills.people.meet_person import person_observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark, turn_upright
-from skills.perception.people import SeenPerson, located_people, people_detections, people_in_scan
+from skills.perception.people import SeenPerson, located_people, people_detections, people_in_scan, pictures_with_depth
 from skills.perception.people_tracking import SCAN_APART_M, PeopleTracker
+from skills.perception.point_cloud import camera_pose_W, project
 from skills.quantities import Coordinate, Count, Delay, Length, Share, Tries, Turn, TurnRate
-from skills.robot import FloatArray, Image, Pose2D
-from skills.routine import Patience, Routine, SkillFailure
+from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D
+from skills.routine import PATIENCE_S, Patience, Routine, SkillFailure
 from skills.world_model import PERSON
 
 _SCAN_AGE_S = 1.0
@@ -39,6 +41,22 @@ _GRID_M = 0.4
 """Distance between such positions."""
 _OWN_M = 0.3
 """Distance from the robot's centre within which an obstacle hides nothing."""
+_AGAIN_S = 0.3
+"""Pause before the robot takes pictures again, because a camera gave an old one or one without depth."""
+_HEIGHTS_M = (0.1, 0.5, 0.9, 1.3, 1.7)
+"""Heights of a standing person, one of which a picture must show."""
+_NEAREST_M = 0.05
+"""Least distance of what a picture shows."""
+_VISIBLE = 0.65
+"""Least length of a person's box, as a fraction of that of a whole person."""
+_AXIS_ASIDE = 0.2
+"""Largest distance of a person's axis from the box, as a fraction of its length."""
+_VIEWS = 3
+"""Number of looks that must show a position if a camera has a fault, because a single one may miss somebody."""
+_CLOSE_M = 2.5
+"""Distance to which the robot approaches positions where depth may be missing because they are far."""
+_BESIDE_M = 0.5
+"""Distance from the robot's centre within which nobody else stands."""
 _BEST_VIEWPOINTS = 4
 """Number of best viewpoints to which the robot tries to drive."""
 _YAWS_RAD = (0.0, 0.8, -0.8, 1.6, -1.6, math.pi)
@@ -97,7 +115,8 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
     }
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "there is no new scan",
-        Cause.EXECUTION: "it is dark, there is no picture, the robot refuses to turn, or part of the area is hidden",
+        Cause.EXECUTION: "it is dark, a camera gives no picture, an old one or no depth, the robot refuses to turn, or "
+        "part of the area is hidden",
         Cause.POSTCONDITION: "nobody is seen, or fewer than asked for",
     }
     default_timeout_s = 150.0
@@ -107,10 +126,11 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
 
     def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
         """Searches until enough people were detected twice; from further viewpoints if the robot may move."""
-        view, tracker = _View(self.context, inputs, self.options.reach_m), PeopleTracker(self.options.same_m)
+        view, tracker = _View(self.context, inputs, self.options), PeopleTracker(self.options.same_m)
+        self._waited_s = 0.0
         found = yield from self._look_round(inputs, tracker, view)
         for _ in range(self.options.viewpoints if inputs.moves else 0):
-            if 0 < inputs.count <= len(found) or view.hidden <= self.options.hidden or not (goals := view.goals()):
+            if 0 < inputs.count <= len(found) or not view.gap(moves=True) or not (goals := view.goals()):
                 break
             try:
                 yield from go_to_one(self, goals)
@@ -123,14 +143,16 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
 
     def _look_round(self, inputs: FindPeopleInputs, tracker: PeopleTracker, view: "_View") -> Routine[list[SeenPerson]]:
         """Looks and turns in place until enough people were detected twice; returns them."""
-        view.look()
-        area, same_m, found = shapely.Polygon(inputs.area_W), self.options.same_m, list[SeenPerson]()
+        area, same_m = shapely.Polygon(inputs.area_W), self.options.same_m
+        found, sure = list[SeenPerson](), list[SeenPerson]()
         area = area.difference(shapely.MultiPoint([one.position_W[:2] for one in inputs.avoid]).buffer(_AVOID_M))
         for look in range(self.options.looks):
             if look:
                 yield from self._turn()
             by_lidar = yield from self._in_scan(f"looking for people in the {inputs.place}")
-            by_camera = yield from self._in_pictures(f"looking for people in the {inputs.place}")
+            by_camera = yield from self._in_pictures(view, f"looking for people in the {inputs.place}")
+            if by_camera is not None and not by_camera and not inputs.unpictured:
+                raise SkillFailure(Cause.EXECUTION, view.fault)
             tracker.update(by_lidar, by_scan=True, apart_m=SCAN_APART_M)
             for people in by_camera or ():
                 tracker.update(people, by_scan=False, apart_m=same_m)
@@ -138,11 +160,13 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
                 again = yield from self._in_scan(f"looking for people in the {inputs.place}")
                 tracker.update(again, by_scan=True, apart_m=SCAN_APART_M)
             least = 0 if by_camera is None or inputs.unpictured else 1
-            inside = (one for one in tracker.people if area.covers(shapely.Point(one.place_W)))
-            found = [one for one in inside if one.looks >= least and one.looks + one.scans > 1]
+            sure = [one for one in tracker.people if one.looks >= least and one.looks + one.scans > 1]
+            found = [one for one in sure if area.covers(shapely.Point(one.place_W))]
             found.sort(key=lambda one: by_camera is not None and one.looks == 0)
             if 0 < inputs.count <= len(found):
                 break
+        unsure = (one for one in tracker.people if one not in sure and area.covers(shapely.Point(one.place_W)))
+        view.end_round(sure, unsure=any(True for _ in unsure))
         return found
 
     def _turn(self) -> Routine[None]:
@@ -164,29 +188,27 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
         enough = len(found) >= max(1, inputs.count)
         else_ = " else" if inputs.avoid else ""
         few = count_sentence(found, ()) if found else f"nobody{else_} is seen in the {inputs.place} from here"
-        if inputs.moves and view.hidden > self.options.hidden and not (enough and inputs.count):
-            raise SkillFailure(Cause.EXECUTION, f"{few}, and {view.hidden:.0%} of it was never in view")
+        if not (enough and inputs.count) and (gap := view.gap(moves=inputs.moves)):
+            raise SkillFailure(Cause.EXECUTION, f"{few}, {gap}")
         if not enough:
             raise SkillFailure(Cause.POSTCONDITION, few)
         who = "somebody" if found[0].kind.name == PERSON else found[0].kind.name
         said = f"saw {who} in the {found[0].surface}" if inputs.count == 1 else count_sentence(found, ())
         return Succeeded(said, {"observation": found[0], "observations": found})
 
-    def _in_pictures(self, message: str) -> Routine[Sequence[Sequence[SeenPerson]] | None]:
+    def _in_pictures(self, view: "_View", message: str) -> Routine[Sequence[Sequence[SeenPerson]] | None]:
         """Detects people in pictures of the body cameras, and publishes each picture with people, or else the first.
 
-        Returns None when the detector has no class of people. Raises SkillFailure when it is too dark.
+        Returns None when the detector has no class of people.
         """
         robot, detector, options = self.context.robot, self.context.detector, self.options
         cameras = robot.capabilities().body_cameras
         if PERSON not in detector.class_names or not cameras:
+            view.look(None, self.context.localiser.estimate().X_WO)
             return None
+        images, faults = yield from self._pictures(cameras, message)
         X_WO, here_W = self.context.localiser.estimate().X_WO, self.context.pose()
-        images: list[Image] = yield from self.sense(
-            lambda: [robot.image(camera.source) for camera in cameras], latency_s=0.0, name="pictures", message=message
-        )
-        if all(map(is_dark, images)):
-            raise SkillFailure(Cause.EXECUTION, "it is too dark to see anybody")
+        view.look(images, X_WO, faults)
         detected = yield from self.compute(
             lambda: people_detections(detector, images, options.least_score),
             latency_s=DETECTION_LATENCY_S,
@@ -196,8 +218,33 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
         for shown in [each for each in images if any(image is each for image, _ in detected)] or images[:1]:
             picture, found = turn_upright(shown, [one for image, one in detected if image is shown])
             self.context.publish("detections", {**detections_message(shown, found, ()), "image": picture})
-        pairs = ([each for each in detected if each[0] is image] for image in images)
-        return [located_people(each, X_WO, here_W, options.reach_m) for each in pairs]
+        people = []
+        for image in images:
+            each = [one for one in detected if one[0] is image]
+            located, without_depth = located_people(each, X_WO, here_W, options.reach_m)
+            view.note_unlocated(image, X_WO, without_depth, located)
+            people.append(located)
+        return people
+
+    def _pictures(
+        self, cameras: Sequence[CameraCapabilities], message: str
+    ) -> Routine[tuple[list[Image], Sequence[str]]]:
+        """Takes the pictures in which people can be located; returns also why other cameras gave none.
+
+        Tries again while a camera has a fault; one attempt of the skill waits `PATIENCE_S` in total.
+        """
+        robot, clock = self.context.robot, self.context.clock
+        while True:
+            begun_s = clock.now()
+            taken = yield from self.sense(
+                lambda: pictures_with_depth(robot, clock, cameras), latency_s=0.0, name="pictures", message=message
+            )
+            images = [image for image in taken[0] if not is_dark(image)]
+            faults = ["it is too dark to see anybody"] * (len(taken[0]) - len(images)) + taken[1]
+            if not faults or self._waited_s > PATIENCE_S:
+                return images, faults
+            yield from self.pause(_AGAIN_S, f"{faults[0]}; {message}")
+            self._waited_s += clock.now() - begun_s
 
     def _in_scan(self, message: str) -> Routine[Sequence[SeenPerson]]:
         """Detects people in the newest scan. Raises SkillFailure when there is no new scan."""
@@ -211,47 +258,118 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
         return people_in_scan(scan, X_WB, robot.capabilities().footprint_m, survey=survey)
 
 
-class _View:
-    """Possible positions of people in an area, with a mask of those that were in view."""
+@dataclass(frozen=True)
+class _Unlocated:
+    """Somebody in a `box` of a picture without depth there: mask of possible positions, and who is `located` in it."""
 
-    def __init__(self, context: SkillContext, inputs: FindPeopleInputs, reach_m: float) -> None:
-        self._context, self._reach_m = context, reach_m
+    image: Image
+    X_WO: RigidTransform
+    box: tuple[float, float, float, float]
+    located: Sequence[SeenPerson]
+    at: NDArray[np.bool_]
+
+    def is_among(self, people: Sequence[SeenPerson], same_m: float) -> bool:
+        """Returns whether another picture has located the person."""
+        own_W = [one.place_W for one in self.located]
+        others_W = [one.place_W for one in people if all(math.dist(one.place_W, own) > same_m for own in own_W)]
+        return bool(_may_show(self.image, self.X_WO, np.array(others_W).reshape(-1, 2), self.box).any())
+
+
+class _View:
+    """Possible positions of people in an area, with masks of those in view, and of those that faulty cameras missed."""
+
+    def __init__(self, context: SkillContext, inputs: FindPeopleInputs, options: FindPeopleOptions) -> None:
+        self._context, self._options = context, options
         points = grid_inside(inputs.area_W, _GRID_M, first_m=_GRID_M / 2)
         known_W = np.array([one.position_W[:2] for one in inputs.avoid]).reshape(-1, 2)
         away_m = np.linalg.norm(points[:, None] - known_W[None], axis=2)
         free = context.costmap.clearance_m(points) > _PERSON_CLEAR_M
         self._points: FloatArray = points[free & (away_m > _AVOID_M).all(axis=1)]
         self._count = max(1, int(free.sum()))
-        self._seen: NDArray[np.bool_] = np.zeros(len(self._points), bool)
+        self._views: NDArray[np.int64] = np.zeros(len(self._points), np.int64)
+        self._missed, self._around, self._unsure, self.fault = self._views > 0, self._views > 0, False, ""
+        self._unlocated, self._new = list[_Unlocated](), list[_Unlocated]()
 
-    @property
-    def hidden(self) -> float:
-        """Fraction of all positions in the area that were out of view, without those beside known people."""
-        return float((~self._seen).sum()) / self._count
+    def gap(self, *, moves: bool) -> str:
+        """Why there may be people whom the search missed; empty when it missed nobody."""
+        if self._unlocated:
+            return "but somebody is in a picture that has no depth there"
+        if self.fault and (self._unsure or (self._missed & self._hidden()).any()):
+            return f"but {self.fault}"
+        hidden = float(self._hidden().sum()) / self._count
+        return f"and {hidden:.0%} of it was never in view" if moves and hidden > self._options.hidden else ""
 
-    def look(self) -> None:
-        """Marks the positions in view from the robot's present pose."""
+    def look(self, images: Sequence[Image] | None, X_WO: RigidTransform, faults: Sequence[str] = ()) -> None:
+        """Marks the positions that images show from the robot's present pose; all in line of sight without cameras."""
         here = self._context.pose()
-        self._seen |= self._shows(np.array((here.x_m, here.y_m)), self._points)
+        here_W = np.array((here.x_m, here.y_m))
+        shown = np.linalg.norm(self._points - here_W, axis=1) < (math.inf if images is None else _BESIDE_M)
+        for image in images or ():
+            shown |= _may_show(image, X_WO, self._points)
+        self._around = self._shows(here_W, self._points, self._options.reach_m)
+        self._views += self._around & shown
+        if faults:
+            self._missed, self.fault = self._missed | self._around, faults[0]
+
+    def note_unlocated(
+        self, image: Image, X_WO: RigidTransform, without_depth: Sequence[Detection], located: Sequence[SeenPerson]
+    ) -> None:
+        """Notes people whose depth a picture of the last look lacks, if they may be in the area."""
+        for one in without_depth:
+            if (at := self._around & _may_show(image, X_WO, self._points, one.box)).any():
+                self._new.append(_Unlocated(image, X_WO, one.box, located, at))
+
+    def _hidden(self) -> NDArray[np.bool_]:
+        """Mask of the positions that too few pictures show: none, or fewer than `_VIEWS` where a camera has a fault."""
+        return self._views < np.where(self._missed, _VIEWS, 1)
+
+    def end_round(self, people: Sequence[SeenPerson], *, unsure: bool) -> None:
+        """Marks as hidden where people without depth may be, unless they are located by now or a later round looked.
+
+        `unsure`: somebody else may be in the area, whom only scans or a single picture show.
+        """
+        self._unsure = unsure
+        hidden, same_m = self._options.hidden, self._options.same_m
+        left = [one for one in self._unlocated if (one.at & self._hidden()).sum() > hidden * one.at.sum()]
+        self._unlocated, self._new = [one for one in (*left, *self._new) if not one.is_among(people, same_m)], []
+        for one in self._unlocated:
+            self._views[one.at] = 0
 
     def goals(self) -> list[NavigateInputs]:
         """Free viewpoints, sorted by the number of hidden positions that they bring into view."""
-        here, hidden = self._context.pose(), self._points[~self._seen]
-        gains = np.array([self._shows(point, hidden).sum() for point in self._points])
+        here, hidden = self._context.pose(), self._points[self._hidden()]
+        reach_m = _CLOSE_M if self._unlocated else self._options.reach_m
+        shown = np.array([self._shows(point, hidden, reach_m) for point in self._points], bool)
+        gains = shown.sum(axis=1)
         drives_m = np.linalg.norm(self._points - (here.x_m, here.y_m), axis=1)
         best = (n for n in np.lexsort((drives_m, -gains)) if gains[n] > 0)
         footprint = ArmFootprint(self._context).now()
-        poses = (pose for n in best if (pose := self._free_pose(self._points[n], hidden, footprint)) is not None)
-        return [NavigateInputs(pose, 0.2, 0.4) for pose in islice(poses, _BEST_VIEWPOINTS)]
+        poses = (self._free_pose(self._points[n], hidden[shown[n]], footprint) for n in best)
+        return [NavigateInputs(pose, 0.2, 0.4) for pose in islice(filter(None, poses), _BEST_VIEWPOINTS)]
 
     def _free_pose(self, at_W: FloatArray, hidden: FloatArray, footprint: Footprint) -> Pose2D | None:
         """A free pose at a position (2,), turned to the hidden positions if possible; None when no pose is free."""
-        towards = hidden[self._shows(at_W, hidden)].mean(axis=0) - at_W
+        towards = hidden.mean(axis=0) - at_W
         (x, y), ahead_rad, costmap = at_W.tolist(), math.atan2(towards[1], towards[0]), self._context.free_space()
         poses = (Pose2D(x, y, wrap(ahead_rad + turn_rad)) for turn_rad in _YAWS_RAD)
         return next((pose for pose in poses if footprint_clear(costmap, footprint, pose)), None)
 
-    def _shows(self, eye_W: FloatArray, points_W: FloatArray) -> NDArray[np.bool_]:
+    def _shows(self, eye_W: FloatArray, points_W: FloatArray, reach_m: float) -> NDArray[np.bool_]:
         """Mask (N,) of the positions (N, 2) within reach of a viewpoint (2,) and not occluded."""
-        is_near: NDArray[np.bool_] = np.linalg.norm(points_W - eye_W, axis=1) <= self._reach_m
+        is_near: NDArray[np.bool_] = np.linalg.norm(points_W - eye_W, axis=1) <= reach_m
         return is_near & line_of_sight(self._context.costmap, eye_W, points_W, beyond_m=_OWN_M)
+
+
+def _may_show(
+    image: Image, X_WO: RigidTransform, points_W: FloatArray, box: tuple[float, float, float, float] | None = None
+) -> NDArray[np.bool_]:
+    """Mask (N,) of the positions (N, 2) where a picture shows a standing person; with a box, one of its size in it."""
+    lens, X_CW = image.intrinsics, camera_pose_W(image, X_WO).inverse()
+    p_C = np.stack([X_CW.multiply(np.insert(points_W, 2, z_m, axis=1).T).T for z_m in _HEIGHTS_M])
+    u, v = project(np.maximum(p_C, [-np.inf, -np.inf, _NEAREST_M]), lens)
+    whole_px = np.hypot(np.ptp(np.clip(u, 0.0, lens.width), axis=0), np.ptp(np.clip(v, 0.0, lens.height), axis=0))
+    u0, v0, u1, v1 = box or (0.0, 0.0, lens.width, lens.height)
+    long_px = max(u1 - u0, v1 - v0)
+    edge_px = _AXIS_ASIDE * long_px if box else 0.0
+    inside = (u > u0 - edge_px) & (u < u1 + edge_px) & (v > v0 - edge_px) & (v < v1 + edge_px)
+    return np.asarray((inside & (p_C[..., 2] > _NEAREST_M)).any(axis=0) & (long_px > _VISIBLE * whole_px))

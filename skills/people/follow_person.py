@@ -104,7 +104,8 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nobody is seen, localisation is lost, or the robot refuses to drive",
         Cause.PLANNING: "no path leads to the person",
-        Cause.EXECUTION: "the person is lost, or the robot loses localisation or its LiDAR, or refuses to drive on",
+        Cause.EXECUTION: "the person is lost, a camera is at fault, or the robot loses localisation or its LiDAR, or "
+        "refuses to drive on",
         Cause.TIMEOUT: "the person has not stood still in the place within the time limit",
     }
     default_timeout_s: ClassVar[float] = 1800.0
@@ -186,6 +187,8 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
                 say(self.context, "I follow you.")
                 return Target(first, self.context.pose(), self.options.target)
             yield from self._tick(f"looking for {self._inputs.person}")
+        if faults := self._company.watch.faults:
+            raise SkillFailure(Cause.EXECUTION, f"cannot see {self._inputs.person}: {faults[0]}")
         where = "ahead" if inputs.place_W is None else f"at {place_text(inputs.place_W)}"
         raise SkillFailure(Cause.PRECONDITION, f"nobody is seen {where}, so {self._inputs.person} cannot be followed")
 

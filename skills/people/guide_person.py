@@ -105,7 +105,7 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "there is no new scan, or localisation is lost",
         Cause.PLANNING: "there is no path to the place, or back to the person",
-        Cause.EXECUTION: "the robot makes no progress or refuses to drive",
+        Cause.EXECUTION: "the robot makes no progress, refuses to drive or cannot see the person",
         Cause.POSTCONDITION: "the person is lost, does not come along, or ends it on the way",
     }
     default_timeout_s = 600.0

@@ -85,7 +85,7 @@ class MeetPerson(RoutineSkill[MeetPersonInputs]):
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "there is no new scan",
         Cause.PLANNING: "there is no free place to stand beside the person, or no path",
-        Cause.EXECUTION: "the robot did not reach the place to stand",
+        Cause.EXECUTION: "the robot did not reach the place to stand, or a camera gives old pictures or no depth",
         Cause.POSTCONDITION: "nobody is seen there, or the person walks on",
     }
     default_timeout_s = 180.0
@@ -114,7 +114,7 @@ class MeetPerson(RoutineSkill[MeetPersonInputs]):
 
     def _look(self, name: str, place_W: tuple[float, float] | None) -> Routine[SeenPerson | None]:
         """Looks for the person nearest to a place (None: nearest ahead); returns None when nobody is there."""
-        clock, patience = self.context.clock, Patience(self.context.clock)
+        clock, patience, sight = self.context.clock, Patience(self.context.clock), Patience(self.context.clock)
         watch, end_s = PeopleWatch(self.context, PeopleOptions(track_m=self.options.reach_m)), -math.inf
         while True:
             scan = self.context.robot.scan()
@@ -127,8 +127,10 @@ class MeetPerson(RoutineSkill[MeetPersonInputs]):
                 watch.step(np.zeros(3))
                 if found := self._candidates(watch.tracks(), place_W):
                     return found[0]
-                if clock.now() >= end_s:
+                if clock.now() >= end_s and not watch.faults:
                     return None
+                if watch.faults and not sight.is_left():
+                    raise SkillFailure(Cause.EXECUTION, f"cannot see {name}: {watch.faults[0]}")
             yield Running(f"looking for {name}")
 
     def _candidates(self, people: Sequence[SeenPerson], place_W: tuple[float, float] | None) -> list[SeenPerson]:

@@ -15,10 +15,10 @@ from pydrake.math import RigidTransform
 
 from skills.api import Detection, Detector, SurveyView
 from skills.estimate.scan_points import placed_points, scan_points
-from skills.perception.detector.camera_images import detect_class_in_grey
+from skills.perception.detector.camera_images import detect_class_in_grey, fresh_image
 from skills.perception.point_cloud import grid_labels
 from skills.perception.position import locate
-from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D, Scan
+from skills.robot import CameraCapabilities, Clock, FloatArray, Image, NoImageError, Pose2D, Robot, Scan
 from skills.world_model import PERSON
 
 _CELL_M = 0.05
@@ -172,33 +172,47 @@ def _person(stamp_s: float, X_WB: RigidTransform, points_B: FloatArray) -> SeenP
     return SeenPerson((x, y), _AXIS_SIGMA_M**2 * np.eye(2), 1.0, stamp_s, Pose2D.from_transform(X_WB))
 
 
+def pictures_with_depth(
+    robot: Robot, clock: Clock, cameras: Sequence[CameraCapabilities]
+) -> tuple[list[Image], list[str]]:
+    """Takes a picture with each camera; returns those in which people can be located, and why others are useless."""
+    images, faults = list[Image](), list[str]()
+    for camera in cameras:
+        try:
+            image = fresh_image(robot, clock, camera.source, camera.source)
+        except NoImageError as error:
+            faults.append(str(error))
+            continue
+        if np.any(image.depth_m > 0.0):
+            images.append(image)
+        else:
+            faults.append(f"the {camera.source} camera gives pictures without depth")
+    return images, faults
+
+
 def people_detections(detector: Detector, images: Sequence[Image], least_score: float) -> list[tuple[Image, Detection]]:
     """Detects people in pictures; pairs each detection with its picture."""
-    found = detect_class_in_grey(detector, images, PERSON)
+    found = detect_class_in_grey(detector, images, PERSON) if images else []
     pairs = ((image, one) for image, ones in zip(images, found, strict=True) for one in ones)
     return [(image, one) for image, one in pairs if one.class_name == PERSON and one.score >= least_score]
 
 
 def located_people(
     detected: Sequence[tuple[Image, Detection]], X_WO: RigidTransform, here_W: Pose2D, reach_m: float
-) -> list[SeenPerson]:
-    """Locates detected people; omits those beyond reach_m from the camera, or without depth."""
-    seen = (_located(image, one, X_WO, here_W, reach_m) for image, one in detected)
-    return [one for one in seen if one is not None]
-
-
-def _located(image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D, reach_m: float) -> SeenPerson | None:
-    """Locates a detected person; None when beyond reach_m, or without depth."""
-    position = locate(image, one)
-    if position is None:
-        return None
-    p_OC = image.frames.pose(image.camera_frame).translation()
-    if float(np.hypot(*(position.p_OT - p_OC)[:2])) > reach_m:
-        return None
-    x, y, _ = (float(value) for value in X_WO @ position.p_OT)
-    turn = X_WO.rotation().matrix()
-    covariance = (turn @ position.covariance_O @ turn.T)[:2, :2]
-    return SeenPerson((x, y), covariance, one.score, image.stamp_s, here_W)
+) -> tuple[list[SeenPerson], list[Detection]]:
+    """Locates detected people within reach_m of the camera; returns them, and the detections without depth."""
+    located, without_depth = list[SeenPerson](), list[Detection]()
+    for image, one in detected:
+        if (position := locate(image, one)) is None:
+            without_depth.append(one)
+            continue
+        p_OC = image.frames.pose(image.camera_frame).translation()
+        if float(np.hypot(*(position.p_OT - p_OC)[:2])) <= reach_m:
+            x, y, _ = (float(value) for value in X_WO @ position.p_OT)
+            turn = X_WO.rotation().matrix()
+            covariance = (turn @ position.covariance_O @ turn.T)[:2, :2]
+            located.append(SeenPerson((x, y), covariance, one.score, image.stamp_s, here_W))
+    return located, without_depth
 
 
 def cameras_towards(velocity: FloatArray, known: Sequence[CameraCapabilities]) -> tuple[CameraCapabilities, ...]:

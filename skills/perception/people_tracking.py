@@ -3,7 +3,6 @@
 Each person is a Kalman filter with constant velocity; detections are assigned to filters at the lowest total cost.
 """
 
-import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -22,10 +21,11 @@ from skills.perception.people import (
     located_people,
     people_detections,
     people_in_scan,
+    pictures_with_depth,
 )
 from skills.perception.point_cloud import camera_pose_W, project
 from skills.quantities import Count, Delay, Duration, Length, Margin, Share, Turn
-from skills.robot import CameraCapabilities, FloatArray, Image, NoImageError, Pose2D
+from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D
 from skills.world_model import PERSON
 
 _ACCELERATION_M_S2 = 1.5
@@ -223,17 +223,22 @@ class PeopleOptions:
 
 @dataclass(frozen=True)
 class _Look:
-    """Detections of people in pictures taken at one time, and these pictures."""
+    """People located in pictures taken at one time, and the pictures in which nobody was detected without depth.
+
+    `faults` say why other cameras gave no picture in which people can be located.
+    """
 
     found: tuple[Sequence[SeenPerson], ...]
     images: tuple[Image, ...]
+    faults: Sequence[str]
     X_WO: RigidTransform
     here_W: Pose2D
 
     def shows(self, one: SeenPerson, reach_m: float) -> bool:
         """Returns whether a still person would be visible: from the pose of the last view, or well in a picture."""
         off = relative_pose(one.here_W, self.here_W)
-        if not one.scans and math.hypot(off.x_m, off.y_m) < _SAME_PLACE_M and abs(off.yaw_rad) < _SAME_YAW_RAD:
+        again = not one.scans and not self.faults
+        if again and math.hypot(off.x_m, off.y_m) < _SAME_PLACE_M and abs(off.yaw_rad) < _SAME_YAW_RAD:
             return True
         upright_W = np.array([[*one.place_W, height_m] for height_m in _HEIGHTS_M])
         return any(_is_inside(image, self.X_WO, upright_W, reach_m) for image in self.images)
@@ -250,6 +255,8 @@ class PeopleWatch:
         self._asked_s = self._looked_s = -math.inf
         self._soon = False
         self._job: Job[_Look] | None = None
+        self.faults: Sequence[str] = ()
+        """Why cameras gave no picture in which people can be located, at the last view."""
         self._tracker = PeopleTracker(self._options.same_m)
         self._scan_s, costmap = -math.inf, context.costmap
         self._survey = costmap if isinstance(costmap, SurveyView) else None
@@ -273,8 +280,7 @@ class PeopleWatch:
         if self._job is not None:
             if self._job.done():
                 job, self._job = self._job, None
-                with contextlib.suppress(NoImageError):
-                    self._update(job.result())
+                self._update(job.result())
             return
         now_s, options = self._context.clock.now(), self._options
         due_s = self._looked_s + (options.again_s if self._soon else options.period_s)
@@ -284,10 +290,10 @@ class PeopleWatch:
         again = self._soon or now_s >= self._looked_s + options.known_s
         if cameras := self._may_show_person(cameras_towards(velocity, self._cameras), again=again):
             self._looked_s, self._soon = now_s, False
-            X_WO, here_W, robot = self._context.localiser.estimate().X_WO, self._context.pose(), self._context.robot
+            X_WO, here_W = self._context.localiser.estimate().X_WO, self._context.pose()
             self._job = self._context.worker.sense(
-                lambda: [robot.image(camera.source) for camera in cameras],
-                lambda images: self._look(images, X_WO, here_W),
+                lambda: pictures_with_depth(self._context.robot, self._context.clock, cameras),
+                lambda taken: self._look(*taken, X_WO, here_W),
                 latency_s=options.latency_s,
                 name="look for people",
             )
@@ -339,18 +345,20 @@ class PeopleWatch:
         least = math.cos(self._options.view_rad)
         return [each for each in cameras if np.any(np.cos(bearings_rad - each.heading_rad) > least)]
 
-    def _look(self, images: Sequence[Image], X_WO: RigidTransform, here_W: Pose2D) -> _Look:
-        """Detects people in one picture of each camera."""
+    def _look(self, images: Sequence[Image], faults: Sequence[str], X_WO: RigidTransform, here_W: Pose2D) -> _Look:
+        """Detects people in one picture of each camera that has no fault."""
         options = self._options
         detected = people_detections(self._context.detector, images, options.least_score)
-        found = tuple(
+        results = [
             located_people([each for each in detected if each[0] is image], X_WO, here_W, options.reach_m)
             for image in images
-        )
-        return _Look(found, tuple(images), X_WO, here_W)
+        ]
+        whole = tuple(image for image, (_, without_depth) in zip(images, results, strict=True) if not without_depth)
+        return _Look(tuple(found for found, _ in results), whole, faults, X_WO, here_W)
 
     def _update(self, look: _Look) -> None:
         """Updates and publishes the known people; schedules the next view early when a person is new."""
+        self.faults = look.faults
         before, stamp_s, options = self._seen, self._context.clock.now(), self._options
         for found in look.found:
             stamp_s = found[0].stamp_s if found else stamp_s

@@ -1,6 +1,6 @@
 """People for the planar robot: boxes that a detector finds wherever they are in the picture."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -12,6 +12,17 @@ from skills.detection import Detection, Detector
 def person_at(x_m, y_m):
     """Somebody who stands upright at a place."""
     return Box(x_m - 0.15, y_m - 0.25, x_m + 0.15, y_m + 0.25, 0.0, 1.7)
+
+
+def blind(bench, monkeypatch):
+    """Lets the cameras give pictures without depth."""
+    take = bench.robot.image
+
+    def without_depth(source):
+        image = take(source)
+        return replace(image, depth_m=np.zeros_like(image.depth_m))
+
+    monkeypatch.setattr(bench.robot, "image", without_depth)
 
 
 class LateAnswer:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -16,15 +17,14 @@ from skills.manipulation.arm.arm_skill import ArmSkill, Goal
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.poses import look_configuration
 from skills.manipulation.arm.solid_cells import add_picture, add_view
-from skills.perception.detector.camera_images import is_dark, lacks_depth
+from skills.perception.detector.camera_images import fresh_image, is_dark, lacks_depth
 from skills.perception.point_cloud import APART_S, is_at_rest
-from skills.robot import CameraCapabilities, FloatArray, HeadCapabilities, Image, Mount, NoImageError
+from skills.robot import CameraCapabilities, FloatArray, HeadCapabilities, Image, Mount
 from skills.routine import PATIENCE_S, Routine, SkillFailure
 
 PICTURE_LATENCY_S = 0.1
 SETTLE_S = 0.15
 """Pause before a picture, in which the camera comes to rest."""
-OLDEST_PICTURE_S = 0.5
 _HEAD_EXPIRY_S = 5.0
 _ASK_AGAIN_S = 0.3
 """Pause after a dark picture or one without depth."""
@@ -144,15 +144,8 @@ class LookingSkill(ArmSkill[InputsT]):
 
     def _picture_now(self, camera: CameraCapabilities, message: str) -> Routine[Image]:
         """Takes one picture. Raises SkillFailure with cause EXECUTION when there is none, or only an old one."""
-        robot, clock, source, name = self.context.robot, self.context.clock, camera.source, camera.mount.value
-
-        def taken() -> Image:
-            asked_s, image = clock.now(), robot.image(source)
-            if image.stamp_s < asked_s - OLDEST_PICTURE_S:
-                age_s = asked_s - image.stamp_s
-                raise NoImageError(f"the {name} camera gives only a picture that is {age_s:.1f} s old")
-            return image
-
+        robot, clock, name = self.context.robot, self.context.clock, camera.mount.value
+        taken = partial(fresh_image, robot, clock, camera.source, name)
         return (yield from self.sense(taken, latency_s=PICTURE_LATENCY_S, name=f"{name} picture", message=message))
 
     def stays_at_rest(self, image: Image, p_W: FloatArray, within_m: float, message: str) -> Routine[bool]:

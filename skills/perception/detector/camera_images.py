@@ -10,15 +10,25 @@ import cv2
 import numpy as np
 
 from skills.detection import Detection, Detections, Detector
-from skills.robot import Image, Picture
+from skills.robot import Clock, Image, NoImageError, Picture, Robot
 
 LEAST_ROLL_DEG: Final = 120.0
 """Roll from upright, either way, beyond which a picture counts as upside down."""
 DETECTION_LATENCY_S: Final = 0.3
 """Time for five views of a picture and the positions of the objects, on two processor cores."""
+OLDEST_PICTURE_S: Final = 0.5
+"""Age from which on a picture is older than the look."""
 _DARK_MEAN, _DARK_SPREAD = 6.0, 4.0
 _DIM_MEAN, _BRIGHT_MEAN, _MOST_GAIN = 70.0, 100.0, 8.0
 _DOWN_IS_UP = -float(np.cos(np.radians(LEAST_ROLL_DEG)))
+
+
+def fresh_image(robot: Robot, clock: Clock, source: str, name: str) -> Image:
+    """Takes a picture with a camera. Raises NoImageError when there is none, or only an old one."""
+    asked_s, image = clock.now(), robot.image(source)
+    if image.stamp_s < asked_s - OLDEST_PICTURE_S:
+        raise NoImageError(f"the {name} camera gives only a picture that is {asked_s - image.stamp_s:.1f} s old")
+    return image
 
 
 def detect_in_image(detector: Detector, image: Image, least_score: float | None = None) -> Detections:

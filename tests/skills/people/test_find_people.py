@@ -76,6 +76,130 @@ def test_a_body_that_no_picture_shows_counts_only_where_that_is_asked_for(unpict
     assert isinstance(step, kind), step
 
 
+def spoil(bench, monkeypatch, change, sources=("frontleft", "frontright"), while_=lambda: True):
+    """Changes the pictures of some cameras while a condition holds."""
+    take = bench.robot.image
+    spoiled = lambda source: change(take(source)) if source in sources and while_() else take(source)  # noqa: E731
+    monkeypatch.setattr(bench.robot, "image", spoiled)
+
+
+def without_depth(image, value=0.0):
+    return replace(image, depth_m=np.full_like(image.depth_m, value))
+
+
+def not_a_number(image):
+    return without_depth(image, np.nan)
+
+
+def old(image):
+    return replace(image, stamp_s=image.stamp_s - 4.0)
+
+
+PERSON = person_at(3.5, 2.0)
+"""A person 2 m ahead of the robot."""
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (without_depth, "the frontleft camera gives pictures without depth"),
+        (not_a_number, "the frontleft camera gives pictures without depth"),
+        (old, "the frontleft camera gives only a picture that is 4.0 s old"),
+    ],
+)
+@pytest.mark.parametrize("count", [0, 1])
+def test_pictures_in_which_nobody_can_be_located_are_no_look(change, says, count, monkeypatch):
+    bench = lit_bench(monkeypatch, PERSON)
+    spoil(bench, monkeypatch, change)
+    step = ended(bench, PeopleDetector(bench, [PERSON]), count=count)
+    assert (step.cause, step.message) == (Cause.EXECUTION, says)
+
+
+def test_robot_waits_for_depth_that_comes_back(monkeypatch):
+    bench = lit_bench(monkeypatch, PERSON)
+    spoil(bench, monkeypatch, not_a_number, while_=lambda: bench.clock.now() < 4.0)
+    assert isinstance(ended(bench, PeopleDetector(bench, [PERSON])), Succeeded)
+
+
+def test_scans_alone_find_a_person_where_bodies_without_a_picture_count(monkeypatch):
+    bench = lit_bench(monkeypatch, PERSON)
+    spoil(bench, monkeypatch, without_depth)
+    assert isinstance(ended(bench, PeopleDetector(bench, [PERSON]), unpictured=True), Succeeded)
+
+
+def test_where_scans_alone_find_nobody_the_camera_is_the_cause(monkeypatch):
+    bench = lit_bench(monkeypatch, BODY)
+    bench.robot.blocks.remove(BODY)
+    spoil(bench, monkeypatch, old)
+    step = ended(bench, PeopleDetector(bench, []), unpictured=True)
+    assert (step.cause, "4.0 s old" in step.message) == (Cause.EXECUTION, True)
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "cause"),
+    [((1.9, 2.5), (2.8, 3.4), Cause.POSTCONDITION), ((0.2, 0.9), (1.6, 2.6), Cause.EXECUTION)],
+    ids=["on the side to which the robot turns", "behind"],
+)
+def test_where_one_camera_is_faulty_only_what_the_other_shows_counts_as_seen(x_m, y_m, cause, monkeypatch):
+    bench = lit_bench(monkeypatch, BODY)
+    bench.robot.blocks.remove(BODY)
+    spoil(bench, monkeypatch, without_depth, ("frontleft",))
+    area_W = tuple((x, y) for x, y in zip((*x_m, *x_m[::-1]), np.repeat(y_m, 2), strict=True))
+    step = ended(bench, PeopleDetector(bench, []), area_W=area_W)
+    assert step.cause is cause, step.message
+
+
+def test_a_body_in_the_scan_is_not_denied_where_a_camera_is_faulty(monkeypatch):
+    # the pictures of the sound camera do not show the body as a person
+    bench = lit_bench(monkeypatch, BODY)
+    spoil(bench, monkeypatch, without_depth, ("frontleft",))
+    area_W = ((2.6, 1.6), (3.4, 1.6), (3.4, 2.4), (2.6, 2.4))
+    step = ended(bench, PeopleDetector(bench, []), area_W=area_W)
+    assert step.cause is Cause.EXECUTION
+    assert step.message.endswith("but the frontleft camera gives pictures without depth")
+
+
+def blank_person(detector):
+    """Change of a picture: no depth in the boxes of people."""
+
+    def change(image):
+        depth_m = image.depth_m.copy()
+        for found in detector.detect([image.grey])[0]:
+            u0, v0, u1, v1 = (round(value) for value in found.box)
+            depth_m[max(0, v0 - 3) : v1 + 3, max(0, u0 - 3) : u1 + 3] = np.nan
+        return replace(image, depth_m=depth_m)
+
+    return change
+
+
+def test_somebody_in_a_picture_that_has_no_depth_there_is_not_nobody(monkeypatch):
+    bench = lit_bench(monkeypatch, PERSON)
+    detector = PeopleDetector(bench, [PERSON])
+    spoil(bench, monkeypatch, blank_person(detector))
+    step = ended(bench, detector)
+    assert step.cause is Cause.EXECUTION
+    assert step.message.endswith("but somebody is in a picture that has no depth there")
+
+
+def test_a_robot_that_may_move_goes_nearer_to_somebody_who_is_too_far_for_depth(monkeypatch):
+    far = person_at(4.2, 2.0)
+    bench = lit_bench(monkeypatch, far)
+    short_m = 2.2
+    spoil(bench, monkeypatch, lambda image: replace(image, depth_m=image.depth_m * (image.depth_m < short_m)))
+    step = ended(bench, PeopleDetector(bench, [far]), moves=True)
+    assert isinstance(step, Succeeded), step.message
+    assert math.dist(step.outputs["observation"].position_W[:2], (4.2, 2.0)) < 0.4
+
+
+def test_a_person_whom_another_picture_locates_is_counted_once(monkeypatch):
+    bench = lit_bench(monkeypatch, PERSON)
+    detector = PeopleDetector(bench, [PERSON])
+    spoil(bench, monkeypatch, blank_person(detector), ("frontleft",))
+    step = ended(bench, detector, count=0)
+    assert isinstance(step, Succeeded), step.message
+    assert len(step.outputs["observations"]) == 1
+
+
 # the room on the left, in which a screen hides the right half of it
 SCREEN = (*TWO_ROOMS, Box(2.6, 0.1, 2.7, 2.2))
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planar_people import LateAnswer, PeopleDetector, person_at
-from planar_robot import Bench, ExactPlace
+from planar_people import LateAnswer, PeopleDetector, blind, person_at
+from planar_robot import Bench, Box, ExactPlace
 
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
 from skills.doorway import Doorway
@@ -111,6 +111,16 @@ def test_without_anybody_ahead_the_skill_fails():
     step = Walk(gone_s=0.0).run()
     assert isinstance(step, Failed) and step.cause is Cause.PRECONDITION
     assert "nobody is seen ahead" in step.message
+
+
+def test_where_cameras_give_no_depth_the_robot_cannot_say_that_nobody_is_ahead(monkeypatch):
+    # something low stands ahead, where a camera looks for people
+    bench = Bench(START, unmapped=(Box(2.7, 5.2, 3.0, 5.5, 0.0, 0.8),), **EXACT)
+    blind(bench, monkeypatch)
+    bench.tick(10)
+    skill = FollowPerson(replace(bench.context(), detector=PeopleDetector(bench, [])), QUICK)
+    step = bench.run(skill, FollowPersonInputs("Robin"))
+    assert step == Failed(Cause.EXECUTION, "cannot see Robin: the frontleft camera gives pictures without depth")
 
 
 def test_the_time_limit_ends_the_skill():

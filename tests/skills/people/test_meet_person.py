@@ -2,9 +2,10 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import pytest
-from planar_people import person_at
+from planar_people import PeopleDetector, blind, person_at
 from planar_robot import TWO_ROOMS, Bench, Box
 
 from skills.api import Cause, Failed, Running, Succeeded
@@ -60,6 +61,16 @@ def test_robot_does_not_claim_to_have_met_a_person_who_is_gone():
     bench = bench_with(first)
     step = met(bench, MeetPersonInputs("Robin", (5.0, 5.4)), {40: lambda: bench.robot.blocks.remove(first)})
     assert step == Failed(Cause.POSTCONDITION, "Robin is not seen at (5.00, 5.40)")
+
+
+def test_where_cameras_give_no_depth_the_robot_cannot_say_that_the_person_is_gone(monkeypatch):
+    # something low stands where a camera looks for the person
+    bench = Bench(START, unmapped=(Box(2.4, 5.2, 2.7, 5.5, 0.0, 0.8),), surveyed=TWO_ROOMS)
+    blind(bench, monkeypatch)
+    bench.tick(10)
+    skill = MeetPerson(replace(bench.context(), detector=PeopleDetector(bench, [])))
+    step = bench.run(skill, MeetPersonInputs("Robin", (2.6, 5.4)))
+    assert step == Failed(Cause.EXECUTION, "cannot see Robin: the frontleft camera gives pictures without depth")
 
 
 @pytest.mark.parametrize("people", [(), (person_at(8.0, 5.4),)])

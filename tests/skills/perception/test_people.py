@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 from analytic_scan import scan_of
+from planar_robot import Bench
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.perception.people import STOWED_AHEAD_M, cameras_towards, people_in_scan
-from skills.robot import CameraCapabilities, Pose2D, Scan
+from skills.perception.people import STOWED_AHEAD_M, cameras_towards, people_in_scan, pictures_with_depth
+from skills.robot import CameraCapabilities, NoImageError, Pose2D, Scan
 
 OUTLINE = ((0.56, 0.25), (0.56, -0.25), (-0.5, -0.25), (-0.5, 0.25))
 
@@ -128,3 +129,17 @@ def test_cameras_face_the_direction_of_motion(velocity, expected):
 
 def test_missing_cameras_are_not_used():
     assert cameras_towards(np.array([-0.3, 0.0, 0.0]), BODY[:1]) == ()
+
+
+def test_each_camera_without_a_useful_picture_is_named():
+    bench = Bench(Pose2D(1.5, 2.0, 0.0))
+
+    class Spoiled:
+        def image(self, source):
+            if source == "frontleft":
+                raise NoImageError("the camera 'frontleft' gives no picture")
+            return bench.robot.image(source)
+
+    images, faults = pictures_with_depth(Spoiled(), bench.clock, bench.robot.capabilities().body_cameras)
+    assert [image.source for image in images] == ["frontright"]
+    assert faults == ["the camera 'frontleft' gives no picture"]

@@ -115,6 +115,23 @@ def test_a_person_out_of_view_is_remembered_while_scans_show_them():
     assert len(watch.people()) == 1
 
 
+@pytest.mark.parametrize("fault", ["old", "without depth"])
+def test_a_picture_that_cannot_locate_people_does_not_count_as_a_miss(fault, monkeypatch):
+    bench, detector, watch = watched(PERSON)
+    take = bench.robot.image
+
+    def spoiled(source):
+        image = take(source)
+        stamp_s, depth_m = image.stamp_s - 9.0 * (fault == "old"), image.depth_m * (fault == "old")
+        return replace(image, stamp_s=stamp_s, depth_m=depth_m)
+
+    monkeypatch.setattr(bench.robot, "image", spoiled)
+    detector.people.clear()
+    look(bench, watch, 6.0)
+    assert watch.faults
+    assert len(watch.people()) == 1
+
+
 def test_people_are_published_and_also_when_none_is_left():
     bench, detector, watch = watched(person_at(3.5, 5.5))
     topic, message = bench.published[-1]

@@ -35,6 +35,7 @@ from skills.geometry import wrap
 from skills.inputs.errors import listing, with_article
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
+from skills.perception.class_evidence import FAINT_SCORE, SURE_SCORE
 from skills.perception.class_forms import ANY_OBJECT, known_attributes
 from skills.perception.detection_3d import Detection3D, detections_3d, observation
 from skills.perception.detector.camera_images import (
@@ -48,7 +49,7 @@ from skills.perception.model_matching import identified
 from skills.perception.object_model import ObjectModel
 from skills.perception.point_cloud import Coverage, camera_pose_W, in_plain_view
 from skills.perception.surface_segmentation import labelled_clusters, segment_3d, segment_surfaces
-from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
+from skills.perception.tracker import Track, Tracker
 from skills.relations import ordinal
 from skills.robot import FloatArray, Image, Mount, Picture
 from skills.routine import PlanningAttempt, Routine, SkillFailure

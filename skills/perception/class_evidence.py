@@ -2,8 +2,8 @@
 
 A detector's score is taken for the probability that the box shows the class, and divided by the class's share among the
 boxes. The errors of several views of one object are alike, so each view counts by a part of its logarithm. The shape is
-the same in each view: its mean counts once. Only classes with a sure score in some view compete, next to `ANY_OBJECT`,
-which stands for all objects that the detector does not know.
+the same in each view: its mean counts once. Only classes with a faint score or more in some view compete, next to
+`ANY_OBJECT`, which stands for all objects that the detector does not know.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ from skills.perception.class_forms import ANY_OBJECT
 from skills.robot import FloatArray
 
 SURE_SCORE: Final = 0.5
-"""Least score that lets a class compete, and a detection begin a track."""
+"""Least score of a detection that begins a track, and that a class needs to be recognised."""
+FAINT_SCORE: Final = 0.3
+"""Least score of a detection that supports a track, and that lets a class compete."""
 _NEW_IN_A_VIEW: Final = 0.5
 """Fraction of a view's evidence that is new; 1 would be views with independent errors."""
 _LEAST_SCORE: Final = 0.04
@@ -71,10 +73,14 @@ class ClassEvidence:
             shape_views=self.shape_views + (shape is not None),
         )
 
+    def is_sure(self, name: str) -> bool:
+        """Returns whether some view gave a class a sure score."""
+        return bool(self.best[self.names.index(name)] >= SURE_SCORE)
+
     @cached_property
     def probabilities(self) -> Mapping[str, float]:
         """Probability of each class that competes; a little for the others."""
-        competes = (self.best >= SURE_SCORE) | np.array([name == ANY_OBJECT for name in self.names])
+        competes = (self.best >= FAINT_SCORE) | np.array([name == ANY_OBJECT for name in self.names])
         return self._normalised(np.where(competes, 0.0, -np.inf))
 
     @cached_property

@@ -23,8 +23,6 @@ DIFFERENT_PLACES_M = 0.03
 CONFIRMED_BELIEF = 0.6
 CONFIRMED_CLASS = 0.85
 """Least probability of a class that counts as recognised."""
-FAINT_SCORE = 0.3
-"""Least score of a detection that supports a track."""
 SEGMENT_BELIEF = 0.7
 """Probability that a segment is an object: one picture may show noise, or a part of one."""
 _JITTER_M = 0.012
@@ -89,7 +87,7 @@ class Track:
     def is_confirmed(self, views: int = 2) -> bool:
         """Returns whether the object exists and is likely of its class; less so where one view must do."""
         least = CONFIRMED_CLASS if views > 1 else CONFIRMED_BELIEF
-        return self.exists(views) and self.class_name != ANY_OBJECT and self.class_belief >= least
+        return self.exists(views) and self.evidence.is_sure(self.class_name) and self.class_belief >= least
 
     def exists(self, views: int = 2) -> bool:
         """Returns whether enough views saw an object of any class, with enough belief."""

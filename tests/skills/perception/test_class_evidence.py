@@ -55,3 +55,8 @@ def test_the_shape_counts_once_however_many_views_show_it():
 def test_an_alternative_competes_by_its_score():
     found = evidence(("beer", 0.5, ("coke", 0.45))).probabilities
     assert found["beer"] > found["coke"] > 0.3 > found["cube"]
+
+
+def test_a_class_is_sure_by_one_sure_score():
+    assert evidence(UNKNOWN, ("beer", 0.5)).is_sure("beer")
+    assert not evidence(("beer", 0.45), ("beer", 0.45)).is_sure("beer")

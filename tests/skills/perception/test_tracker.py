@@ -116,10 +116,10 @@ def test_a_track_that_was_confirmed_and_then_missed_is_no_longer_confirmed():
 
 
 def test_a_track_seen_as_another_class_stays_confirmed_while_its_class_is_likely():
-    # twice surely a beer, then a coke: still likely a beer, and after one more such view no longer
+    # twice surely a beer, then twice a coke
     seen = [[detected_3d(name="beer", eye=LEFT)], [detected_3d(name="beer", eye=RIGHT)]]
     doubt = [detected_3d(name="coke", score=0.6, eye=LEFT)]
-    for doubts, confirmed in ((1, True), (2, False)):
+    for doubts, confirmed in ((0, True), (2, False)):
         (track,) = tracker_of(*seen, *[doubt] * doubts).snapshot()
         assert track.is_confirmed() is confirmed, doubts
 

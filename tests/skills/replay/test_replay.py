@@ -13,7 +13,8 @@ from skills.manipulation.arm.kinematics import arm_model
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import detect_in_image
 from skills.perception.point_cloud import in_plain_view
-from skills.perception.tracker import FAINT_SCORE, Tracker
+from skills.perception.class_evidence import FAINT_SCORE
+from skills.perception.tracker import Tracker
 from skills.robot import Pose2D
 from skills.stack import default_stack
 from tests.skills.replay.stored import load

@@ -65,7 +65,7 @@ SKILL_ROOMS = (
 """The rooms of skills, the lowest first; the lowest is the interface: modules beside the rooms, and `skills.inputs`."""
 NAMES_ABOVE = {
     "skills.api": ("skills.navigate.footprint", "skills.navigate.zone_map"),
-    "skills.detection": ("skills.perception.object_model",),
+    "skills.detection": ("skills.perception.object_model", "skills.perception.shape_model"),
     "skills.stack": (
         *("skills.estimate.grid_map", "skills.manipulation.arm.collision", "skills.manipulation.arm.motion"),
         *("skills.manipulation.grasp.candidates", "skills.manipulation.grasp.placements"),

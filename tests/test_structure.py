@@ -15,7 +15,7 @@ LINES = {
     "executive/language": 8368,  # 84 asked for 8 000, and did not reach it
     "executive/speech": 1673,  # the mission that a recording means (84)
     "executive/mission": 1730,  # places that a search leaves out (84)
-    "executive/tree": 8943,  # a place that was said is meant, of objects and people (84)
+    "executive/tree": 8959,  # a count names what no look recognised (85)
     "executive/run": 3324,
     "executive/record": 1100,
     "executive/store": 1604,
@@ -24,11 +24,11 @@ LINES = {
     "executive/testing": 860,
     "executive/app": 8271,
     "executive/cli": 3943,  # the mission that a recording means (84)
-    "skills": 28972,  # objects without a colour, quotations of words that were said (84)
+    "skills": 29473,  # unexplained objects, shapes as a second witness, people without depth (85 grants 700)
     "plant": 11491,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 427, 60, 7
-"""All modules; those that one other imports; file names that stand more than once. One more of each by 84."""
+MODULES, ONE_IMPORTER, SAME_NAME = 430, 61, 7
+"""All modules; those that one other imports; file names that stand more than once. The class evidence, the shape model and a look by 85."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""
 

@@ -188,7 +188,8 @@ def doubtful_tracks(tracks: Sequence[Track], inputs: DetectInputs) -> list[Track
     here = [track for track in tracks if track.latest.surface in names and track.exists(1)]
     other = {t.number for t in here if t.class_name not in (ANY_OBJECT, *inputs.sought)}
     left = [t for t in here if t.number not in other or t.class_belief < CONFIRMED_CLASS]
-    likely = {t.number: max(_likely(t, kind) for kind in (inputs, *inputs.landmarks)) for t in left}
+    kinds: tuple[DetectInputs | Landmark, ...] = (inputs, *inputs.landmarks)
+    likely = {t.number: max(_likely(t, kind) for kind in kinds) for t in left}
     return sorted((t for t in left if likely[t.number] > DOUBTED), key=lambda t: -likely[t.number])
 
 
@@ -220,9 +221,10 @@ def seen_again(before: ObjectObservation, segments: Sequence[Detection3D]) -> tu
     off = {id(each): level_distance(each.position_W, before.position_W) for each in segments}
     alike = [each for each in segments if off[id(each)] < _SEEN_AGAIN_M and _is_as_large(each.size_m, before.size_m)]
     nearest = min(alike, key=lambda each: off[id(each)], default=None)
-    label = {"class_name": before.kind.name, "score": max(before.score, _SEEN_AGAIN_SCORE)}
+    name, score = before.kind.name, max(before.score, _SEEN_AGAIN_SCORE)
     return tuple(
-        replace(each, detection=replace(each.detection, **label)) if each is nearest else each for each in segments
+        replace(each, detection=replace(each.detection, class_name=name, score=score)) if each is nearest else each
+        for each in segments
     )
 
 

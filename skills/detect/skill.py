@@ -3,14 +3,15 @@
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, Detection, Detector, LocalisationEstimate, Question, Running, Succeeded
+from skills.api import Cause, Question, Running, Succeeded
 from skills.detect.descriptions import count_sentence, describe, describe_unknown, surface_names, wanted_names
+from skills.detect.look import Look, cut_out, examined
 from skills.detect.messages import (
     coverage_message,
     detections_message,
@@ -23,10 +24,8 @@ from skills.detect.selection import (
     DetectOptions,
     doubtful_tracks,
     is_sure,
-    level_distance,
     matching_tracks,
     meant_tracks,
-    seen_again,
     sure_tracks,
     why_not_meant,
 )
@@ -35,23 +34,17 @@ from skills.geometry import wrap
 from skills.inputs.errors import listing, with_article
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
-from skills.perception.class_evidence import FAINT_SCORE, SURE_SCORE
+from skills.perception.class_evidence import SURE_SCORE
 from skills.perception.class_forms import ANY_OBJECT, known_attributes
-from skills.perception.detection_3d import Detection3D, detections_3d, observation
+from skills.perception.detection_3d import observation
 from skills.perception.detector.camera_images import (
     DETECTION_LATENCY_S,
-    detect_in_image,
     is_dark,
-    is_upside_down,
-    rotate_180,
 )
-from skills.perception.model_matching import identified
-from skills.perception.object_model import ObjectModel
-from skills.perception.point_cloud import Coverage, camera_pose_W, in_plain_view
-from skills.perception.surface_segmentation import labelled_clusters, segment_3d, segment_surfaces
+from skills.perception.point_cloud import Coverage, in_plain_view
 from skills.perception.tracker import Track, Tracker
 from skills.relations import ordinal
-from skills.robot import FloatArray, Image, Mount, Picture
+from skills.robot import FloatArray, Mount, Picture
 from skills.routine import PlanningAttempt, Routine, SkillFailure
 from skills.world_model import ObjectKind, ObjectObservation
 
@@ -66,23 +59,8 @@ _NEAR_SHIFTS_RAD = (0.0, 0.6, -0.6)
 """Angles about a doubtful object from which it is viewed from near, one after the other."""
 _MOST_NAMED = 3
 """Number of unexplained objects that a message names."""
-_MARGIN = 0.3
-"""Margin of a picture of a single object, as a fraction of its longer side."""
 _RAISED_M = 0.15
 """Height by which the body rises for one more view by a camera on a head."""
-
-
-@dataclass(frozen=True)
-class Look:
-    """One picture with the robot's pose, and the detections with and without a position.
-
-    Detections may have low scores; those with a position include objects without a label.
-    """
-
-    image: Image
-    localisation: LocalisationEstimate
-    detections: tuple[Detection, ...]
-    detections_3d: tuple[Detection3D, ...]
 
 
 class Detect(LookingSkill[DetectInputs]):
@@ -99,7 +77,7 @@ class Detect(LookingSkill[DetectInputs]):
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "a class, attribute or surface cannot be searched for from here, or there is no camera",
         Cause.PLANNING: "the arm reaches no viewpoint",
-        Cause.EXECUTION: "the arm did not reach its viewpoint, the camera shows nothing, or an object stays unexplained",
+        Cause.EXECUTION: "the arm did not reach its viewpoint, the camera shows nothing, or something is unexplained",
         Cause.POSTCONDITION: "no such object is seen, or fewer than asked for",
     }
     default_timeout_s = 90.0
@@ -176,12 +154,12 @@ class Detect(LookingSkill[DetectInputs]):
                 p_BT = self.X_WB().inverse() @ np.array(inputs.expected_W)
                 yield from self._look_and_confirm(inputs, p_BT, [], close=not self._fits_near)
             return
-        viewed = Counter[int]()
-        while not self._has_enough(inputs) and sum(viewed.values()) < self.options.candidates * len(_NEAR_SHIFTS_RAD):
-            left = [t for t in self._doubts(inputs) if viewed[t.number] < len(_NEAR_SHIFTS_RAD)]
+        viewed, shifts_rad = Counter[int](), _NEAR_SHIFTS_RAD[: self.options.closer_looks]
+        while not self._has_enough(inputs) and viewed.total() < self.options.candidates * len(shifts_rad):
+            left = [track for track in self._doubts(inputs) if viewed[track.number] < len(shifts_rad)]
             if not left:
                 return
-            shift_rad = _NEAR_SHIFTS_RAD[viewed[left[0].number]]
+            shift_rad = shifts_rad[viewed[left[0].number]]
             viewed[left[0].number] += 1
             p_BT = self.X_WB().inverse() @ left[0].position_W
             yield from self._look_and_confirm(inputs, p_BT, [], close=True, shift_rad=shift_rad)
@@ -330,7 +308,7 @@ class Detect(LookingSkill[DetectInputs]):
         place, detector = self.context.localiser.estimate(), self.context.detector
 
         def examine() -> Look:
-            return _examined(image, place, detector, inputs, self._own, {*inputs.classes} <= self._only_own)
+            return examined(image, place, detector, inputs, self._own, {*inputs.classes} <= self._only_own)
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)
         self._update(look, ANY_OBJECT in inputs.classes)
@@ -350,7 +328,7 @@ class Detect(LookingSkill[DetectInputs]):
         self.context.publish("tracks", tracks_message(self.context, tracks))
         for track in tracks:
             if track.last_seen_s == look.image.stamp_s and not track.is_confirmed(1):
-                self._unknown[track.number] = _cut_out(look.image, track.latest)
+                self._unknown[track.number] = cut_out(look.image, track.latest)
         self._last = look
 
     def _ended(self, inputs: DetectInputs, blocked: Sequence[SkillFailure]) -> Routine[Succeeded]:
@@ -432,48 +410,6 @@ class Detect(LookingSkill[DetectInputs]):
             few = f"{count_sentence(found, inputs.surfaces)}, fewer than {inputs.count} ({seen})"
             return SkillFailure(Cause.POSTCONDITION, few)
         return SkillFailure(Cause.POSTCONDITION, f"no {what} seen on {names} from here ({seen})")
-
-
-def _examined(
-    image: Image,
-    place: LocalisationEstimate,
-    detector: Detector,
-    inputs: DetectInputs,
-    own: Mapping[str, ObjectModel],
-    only_own: bool,
-) -> Look:
-    """Detections and segments of one picture: each segment on the surfaces has a label or is an `ANY_OBJECT`.
-
-    Imported objects, `own`, are recognised by their models; with `only_own` nothing else is sought.
-    """
-    found = () if only_own else detect_in_image(detector, image, FAINT_SCORE)
-    placed = detections_3d(image, place, found, inputs.surfaces)
-    views = [view for view in segment_surfaces(image, place.X_WO, inputs.surfaces) if view is not None]
-    labels = [each for each in placed if each.detection.score >= SURE_SCORE] if own else placed
-    pairs = labelled_clusters(image, place, views, labels, inputs.surfaces)
-    loose = [cluster for cluster, label in pairs if label is None]
-    segments = identified(loose, image, place, own) if own else tuple(segment_3d(c, image, place) for c in loose)
-    if not own and inputs.seen_before is not None and not any(each.class_name in inputs.classes for each in placed):
-        segments = seen_again(inputs.seen_before, segments)
-    shapes, p_WC = detector.shapes, camera_pose_W(image, place.X_WO).translation()
-    cluster_of = {id(label): cluster for cluster, label in pairs} | dict(zip(map(id, segments), loose, strict=True))
-    shaped = tuple(
-        replace(each, is_segmented=True, shape=None if shapes is None else shapes.of(cluster, p_WC))
-        if (cluster := cluster_of.get(id(each))) is not None
-        else each
-        for each in (*placed, *segments)
-    )
-    return Look(image, place, found, shaped)
-
-
-def _cut_out(image: Image, detected: Detection3D) -> Picture:
-    """Part of a picture that shows a detected object, upright, with a margin."""
-    picture = image.grey if image.colour is None else image.colour
-    u0, v0, u1, v1 = detected.detection.box
-    margin_px = _MARGIN * max(u1 - u0, v1 - v0)
-    left, top = (max(0, int(low - margin_px)) for low in (u0, v0))
-    part = picture[top : int(v1 + margin_px), left : int(u1 + margin_px)]
-    return rotate_180(part) if is_upside_down(image) else np.ascontiguousarray(part)
 
 
 def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:

@@ -1,9 +1,9 @@
 """Likelihood of each class given the shape of an object in a depth picture.
 
 The features are metric: sizes, the silhouette's width at several heights, and width and height along the outline seen
-from above. A neck narrower than the body means a bottle, a wide end a hammer. A network with one hidden layer, trained on
-rendered clusters (`errand_train.detector.shape`), gives the probabilities of the classes; divided by their shares in the
-training data they are likelihoods up to a factor. Classes share shapes, so that a shape alone seldom tells the class.
+from above. A neck narrower than the body means a bottle, a wide end a hammer. A network with one hidden layer, trained
+on rendered clusters (`errand_train.detector.shape`), gives the probabilities of the classes; divided by their shares in
+the training data they are likelihoods up to a factor. Classes share shapes: a shape alone seldom tells the class.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from skills.perception.surface_segmentation import Cluster
+from skills.perception.fitting import SeenShape
 from skills.robot import FloatArray
 
 MODEL_FILE: Final = Path(__file__).with_name("detector") / "model" / "shapes.npz"
@@ -33,15 +33,13 @@ _FEWEST: Final = 5
 _LEAST_M: Final = 0.005
 
 
-def shape_features(cluster: Cluster, p_WC: FloatArray) -> FloatArray:
-    """Features (34,) of a cluster's shape seen from a camera at p_WC (3,).
+def shape_features(p_W: FloatArray, above_m: FloatArray, shape: SeenShape, p_WC: FloatArray) -> FloatArray:
+    """Features (33,) of an object by its points (N, 3), their heights (N,) above its surface, and its outline.
 
-    Logarithms of height, length, width (m), widest silhouette (m) and distance (m); roundness; elevation of the camera
-    (rad); then, relative to the largest: width of the silhouette at ten heights, width and height of eight parts along the
-    outline, its wider half first.
+    The camera at p_WC (3,) has seen it. Logarithms of height, length, width (m), widest silhouette (m) and distance
+    (m); roundness; elevation of the camera (rad); then, relative to the largest: width of the silhouette at ten
+    heights, width and height of eight parts along the outline, its wider half first.
     """
-    p_W, shape = cluster.points.p_W, cluster.shape
-    above_m = p_W[:, 2] - cluster.plane.z(p_W[:, :2])
     height_m = max(float(np.percentile(above_m, 99)), _LEAST_M)
     view = np.median(p_W[:, :2], axis=0) - p_WC[:2]
     off_m = max(float(np.linalg.norm(view)), 1e-6)
@@ -58,7 +56,7 @@ def shape_features(cluster: Cluster, p_WC: FloatArray) -> FloatArray:
         widths, tops = widths[::-1], tops[::-1]
     widest_m = max(float(levels.max()), _LEAST_M)
     sizes = [height_m, max(shape.length_m, _LEAST_M), max(shape.width_m, _LEAST_M), widest_m, off_m]
-    tilt_rad = math.atan2(p_WC[2] - cluster.base_m, off_m)
+    tilt_rad = math.atan2(p_WC[2] - float(np.median(p_W[:, 2] - above_m)), off_m)
     relative = (levels / widest_m, widths / max(float(widths.max()), _LEAST_M), tops / max(float(tops.max()), _LEAST_M))
     return np.concatenate([np.log(sizes), [float(shape.round), tilt_rad], *relative])
 
@@ -96,12 +94,8 @@ class ShapeModel:
     output: FloatArray
     shares: FloatArray
 
-    def of(self, cluster: Cluster, p_WC: FloatArray) -> Mapping[str, float]:
-        """Likelihood of each class by a cluster's shape seen from p_WC (3,), relative to that of a random object."""
-        return self.likelihoods(shape_features(cluster, p_WC))
-
     def likelihoods(self, features: FloatArray) -> Mapping[str, float]:
-        """The same by its features (F,)."""
+        """Likelihood of each class by the features (F,) of a shape, relative to that of a random object."""
         x = (features - self.mean) / self.scale
         logits = np.tanh(x @ self.hidden[:-1] + self.hidden[-1]) @ self.output[:-1] + self.output[-1]
         p = np.exp(logits - logits.max())

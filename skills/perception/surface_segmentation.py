@@ -34,6 +34,7 @@ from skills.perception.point_cloud import (
     grid_labels,
     may_rest,
 )
+from skills.perception.shape_model import shape_features
 from skills.robot import FloatArray, Image
 
 _CELL_M = 0.005
@@ -97,6 +98,11 @@ class Cluster:
     def base_m(self) -> float:
         """Height of the surface under the object."""
         return float(self.plane.z(np.array([self.shape.centre]))[0])
+
+    def features(self, p_WC: FloatArray) -> FloatArray:
+        """Features of the object's shape, seen from a camera at p_WC (3,); see `shape_features`."""
+        p_W = self.points.p_W
+        return shape_features(p_W, p_W[:, 2] - self.plane.z(p_W[:, :2]), self.shape, p_WC)
 
 
 @dataclass(frozen=True)

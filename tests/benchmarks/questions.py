@@ -1,11 +1,11 @@
 """Answers to "is there a X on Y": right, wrong, or "I cannot tell"; prints JSON.
 
-    python -m tests.benchmarks.questions [--placements 12] [--absent 4] [--seed 1] [--worlds flat,shop,lab] [--scores-alone]
-        [--jobs 1] [--out FOLDER]
+    python -m tests.benchmarks.questions [--placements 12] [--absent 4] [--seed 1] [--worlds flat,shop,lab]
+        [--things beer,coke] [--scores-alone] [--jobs 1] [--out FOLDER]
 
 Each placement puts one shipped form of a class on a surface of a world, beside two forms of other classes; where X is
-absent, three held-out objects of no class stand there. The robot stands at each viewpoint of the surface in turn, as in the
-mission, until it finds X. `--scores-alone` leaves out the shapes in depth (ablation).
+absent, three held-out objects of no class stand there. The robot stands at each viewpoint of the surface in turn, as in
+the mission, until it finds X. `--scores-alone` leaves out the shapes in depth (ablation).
 """
 
 import math
@@ -29,7 +29,7 @@ from skills.geometry import inside_polygon
 from skills.perception.detector import Cascade
 from tests.benchmarks.find_things import held_out_instance, scattered
 from tests.benchmarks.flat_scene import FlatScene, surface_of
-from tests.benchmarks.harness import benchmark, for_each, share, tell
+from tests.benchmarks.harness import benchmark, quantile, tell
 
 RIM_M, APART_M, TRIES, REACH_M = 0.06, 0.08, 300, 1.5
 FORMS = [(name, form) for name, each in load_catalogue().items() if name != "person" for form in each.forms]
@@ -53,11 +53,15 @@ def laid(rng, chosen, surface, pose):
 
 
 def cases(
-    placements: int = 12, absent: int = 4, seed: int = 1, worlds: tuple[str, ...] = ("flat", "shop", "lab"),
+    placements: int = 12,
+    absent: int = 4,
+    seed: int = 1,
+    worlds: tuple[str, ...] = ("flat", "shop", "lab"),
+    things: tuple[str, ...] = (),
     scores_alone: bool = False,
 ):
     for number in range(placements + absent):
-        for k, (name, form) in enumerate(FORMS):
+        for k, (name, form) in enumerate(each for each in FORMS if not things or each[0] in things):
             yield name, form, number < placements, worlds[(k + number) % len(worlds)], seed, number, scores_alone
 
 
@@ -82,7 +86,10 @@ def run_case(name, form, there, world, seed, number, scores_alone, folder):
     answer, message, looks_s = answered(world, surface, views, name, models, places, seed + number, scores_alone)
     tell(f"{world} {surface.name} {name} {form} there={there}: {answer}: {message}")
     return vars(asked) | {
-        "answer": answer, "message": message, "looks_s": looks_s, "busy_s": round(time.process_time() - begun, 1)
+        "answer": answer,
+        "message": message,
+        "looks_s": looks_s,
+        "busy_s": round(time.process_time() - begun, 1),
     }
 
 
@@ -117,15 +124,15 @@ def answered(world, surface, views, name, models, places, seed, scores_alone):
 
 def summary(asked):
     asked = [each for each in asked if each.answer != "did not fit"]
-    return {"there": for_each("there", figures)(asked), "wrong": [vars(e) for e in asked if "wrong" in e.answer],
-            "cannot_tell": [vars(e) for e in asked if "cannot" in e.answer]}
+    there, absent = ([each for each in asked if each.there is is_there] for is_there in (True, False))
+    open_ones = [vars(each) for each in asked if "right" not in each.answer]
+    return {"there": figures(there), "absent": figures(absent), "not_right": open_ones}
 
 
 def figures(asked):
-    kinds = ("right yes", "wrong no", "wrong yes", "right no", "cannot tell")
-    return {"asked": len(asked)} | {kind: share([each.answer == kind for each in asked]) for kind in kinds} | {
-        "looks_s": round(float(np.mean([each.looks_s for each in asked])), 1)
-    }
+    kinds = ("right yes", "right no", "wrong yes", "wrong no", "cannot tell")
+    counts = {kind.replace(" ", "_"): sum(each.answer == kind for each in asked) for kind in kinds}
+    return {"asked": len(asked), **counts, "looks_s": quantile([each.looks_s for each in asked], digits=1)}
 
 
 if __name__ == "__main__":

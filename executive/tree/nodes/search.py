@@ -18,7 +18,7 @@ from executive.tree.plan import PlanBuilder
 from executive.words.command import PEOPLE_TASKS, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
-from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Publish, Surface
+from skills.api import Cause, Failed, ObjectKind, Publish, Surface
 from skills.detect.descriptions import count_of, count_sentence, describe_unknown, distinct_objects, plural
 from skills.geometry import compose
 from skills.inputs.errors import listing, with_article

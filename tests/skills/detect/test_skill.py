@@ -102,14 +102,20 @@ def test_an_object_is_found_at_its_position_and_seen_from_two_viewpoints():
 
 def test_an_object_seen_only_once_does_not_count():
     skill = Detect(context_of(TableRobot(things=[COKE]), detector=SeesIn(lambda number: number == 1)))
-    failed(skill, COKES, Cause.EXECUTION, "cannot tell whether there is a coke: something 12 cm tall stands on the table")
+    failed(
+        skill, COKES, Cause.EXECUTION, "cannot tell whether there is a coke: something 12 cm tall stands on the table"
+    )
 
 
 def test_what_stays_unexplained_is_viewed_from_three_sides_and_shown():
     log = []
     skill = Detect(context_of(TableRobot(things=[replace(COKE, colour=GREY)]), log))
-    failed(skill, COKES, Cause.EXECUTION, "I cannot tell whether there is a coke: something 12 cm tall stands on the table")
-    assert [m["caption"] for topic, m in log if topic == "pictures"] == ["What is this? Something 12 cm tall stands on the table"]
+    failed(
+        skill, COKES, Cause.EXECUTION, "I cannot tell whether there is a coke: something 12 cm tall stands on the table"
+    )
+    assert [m["caption"] for topic, m in log if topic == "pictures"] == [
+        "What is this? Something 12 cm tall stands on the table"
+    ]
     plain = []
     failed(Detect(context_of(TableRobot(things=[]), plain)), COKES, Cause.POSTCONDITION, "no coke seen")
     assert len(detections(log)) > len(detections(plain)) + 2

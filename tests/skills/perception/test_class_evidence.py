@@ -42,7 +42,9 @@ def test_a_class_that_no_view_supports_does_not_compete():
     assert max(found.possible, key=found.possible.get) == "beer"
 
 
-@pytest.mark.parametrize(("shape", "is_likely"), [(BOTTLE, True), (None, False), ({"cube": 6.0, "thing": 1.0, "beer": 0.1}, False)])
+@pytest.mark.parametrize(
+    ("shape", "is_likely"), [(BOTTLE, True), (None, False), ({"cube": 6.0, "thing": 1.0, "beer": 0.1}, False)]
+)
 def test_the_shape_is_a_second_witness(shape, is_likely):
     assert (evidence(("beer", 0.5), UNKNOWN, shape=shape).probabilities["beer"] > 0.8) is is_likely
 

@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RigidTransform
 from table_scene import CAMERA, GREY, TABLE, Can, scene
 
-from skills.perception.shape_model import shape_features, shape_model
+from skills.perception.shape_model import shape_model
 from skills.perception.surface_segmentation import segment_surface
 
 CAN = [Can(1.1, 0.1, 0.033, 0.115, GREY)]
@@ -19,7 +19,7 @@ def cluster_of(things):
 
 
 def test_the_features_are_metric():
-    features = shape_features(cluster_of(CAN), CAMERA)
+    features = cluster_of(CAN).features(CAMERA)
     height_m, length_m, width_m, widest_m, off_m = np.exp(features[:5])
     assert height_m == pytest.approx(0.115, abs=0.006)
     assert (length_m, width_m, widest_m) == pytest.approx((0.066,) * 3, abs=0.012)
@@ -27,7 +27,7 @@ def test_the_features_are_metric():
 
 
 def test_a_neck_is_narrower_than_the_body():
-    levels = shape_features(cluster_of(BOTTLE), CAMERA)[7:17]
+    levels = cluster_of(BOTTLE).features(CAMERA)[7:17]
     assert levels[:5].min() > 0.8
     assert levels[-3:].max() < 0.6
 
@@ -39,10 +39,10 @@ def test_a_neck_is_narrower_than_the_body():
     ids=["bottle", "can"],
 )
 def test_the_model_suggests_the_classes_of_a_shape(things, likely, unlikely):
-    found = shape_model().of(cluster_of(things), CAMERA)
+    found = shape_model().likelihoods(cluster_of(things).features(CAMERA))
     assert max(found, key=found.get) in likely
     assert found[unlikely] < 0.5
 
 
 def test_a_likelihood_is_never_zero():
-    assert min(shape_model().of(cluster_of(LOW), CAMERA).values()) > 0.0
+    assert min(shape_model().likelihoods(cluster_of(LOW).features(CAMERA)).values()) > 0.0

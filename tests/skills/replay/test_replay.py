@@ -10,10 +10,10 @@ import pytest
 from plant.robots.spot.kind import spot_capabilities
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.kinematics import arm_model
+from skills.perception.class_evidence import FAINT_SCORE
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import detect_in_image
 from skills.perception.point_cloud import in_plain_view
-from skills.perception.class_evidence import FAINT_SCORE
 from skills.perception.tracker import Tracker
 from skills.robot import Pose2D
 from skills.stack import default_stack

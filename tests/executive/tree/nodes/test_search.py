@@ -67,7 +67,7 @@ def beer(x_m, surface):
     return ObjectObservation(0.0, ObjectKind("beer"), (x_m, 0.0, 0.8), (0.1, 0.1, 0.1), 0.0, 0.9, surface)
 
 
-def count_of(context, seen, needed):
+def count_of(context, seen, needed, **more):
     """Asked for beers after a look at each surface, which failed (its letter) or saw beers at these places (m)."""
     looks = []
     for name, found in zip(("bench", "trolley"), seen, strict=True):
@@ -77,7 +77,7 @@ def count_of(context, seen, needed):
     search = MemoryRound(path_id="alice/q/search", name="search", children=looks)
     names = {look.name[2:]: [look.path_id] for look in looks}
     tallies = {look.path_id: f"{look.path_id}/all" for look in looks}
-    return asked(context, search, names, "beers in the workshop", tallies=tallies, needed=needed)
+    return asked(context, search, names, "beers in the workshop", tallies=tallies, needed=needed, **more)
 
 
 @pytest.mark.parametrize(
@@ -95,6 +95,15 @@ def test_objects_are_counted_over_all_surfaces(context, bench, trolley, needed, 
     root = count_of(context, (bench, trolley), needed)
     assert (root.status, root.answer) == (S, answer)
     assert root.message == f"{'yes' if answer else 'no'}: beers in the workshop{told}"
+
+
+def test_a_count_names_what_no_look_recognised(context):
+    unknown = ObjectObservation(0.0, ObjectKind("thing"), (3.0, 0.0, 0.8), (0.06, 0.06, 0.24), 0.0, 0.7, "bench")
+    context.board.put("alice/q/bench/unexplained", (unknown,))
+    doubts = {f"alice/q/{name}": f"alice/q/{name}/unexplained" for name in ("bench", "trolley")}
+    root = count_of(context, ((0.0,), "O"), 1, doubts=doubts)
+    told = "there is one beer on the bench; besides, something 24 cm tall stands on the bench"
+    assert root.message == f"yes: beers in the workshop; {told}"
 
 
 @pytest.mark.parametrize(("bench", "needed"), [("O", 1), ((0.0,), 2)])

@@ -27,6 +27,6 @@ def test_a_bottle_that_nothing_recognises_is_not_denied(tmp_path, monkeypatch):
     mission = PlantMission(tmp_path, 29, sentence="is there a beer on the kitchen counter")
     end = mission.end("asked", shown)
     assert (end.claimed, end.cause) == (False, "EXECUTION"), end.message
-    what = "something 25 cm tall stands on the kitchen counter"
+    what = "something 24 cm tall stands on the kitchen counter"
     assert f"I cannot tell whether there is a beer: {what}" in end.message
     assert f"What is this? {what.capitalize()}" in captions

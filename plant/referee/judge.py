@@ -27,17 +27,22 @@ DOOR_LOOK_S = 2.0
 
 
 def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: Sequence[Collision]) -> RefereeReport:
-    """Judges all conditions at the times at which they must hold, and counts collisions and drops."""
+    """Judges all conditions at the times at which they must hold, and counts collisions and drops.
+
+    When the simulation has lost an object, it does not blame the robot: success is then True or None.
+    """
     findings = [_JUDGES[condition.kind](condition, truth) for condition in conditions]
-    success = all(finding.holds for finding in findings) if findings else None
     since_s = min((condition.since_s for condition in conditions), default=0.0)
+    lost = [one for one in truth.histories if one.lost_s is not None and one.lost_s >= since_s]
+    findings += [Finding(True, f"the simulation lost {definite(one.name)}.") for one in lost]
+    success = all(finding.holds for finding in findings) or (None if lost else False)
     collisions = [each for each in collisions if each.time_s >= since_s]
     own = [each for each in collisions if not each.walked_in]
     bins = [each for one in conditions if one.kind is GoalKind.PLACED for each in one.goal if each.is_bin]
     fell = [(one, when_s) for one in truth.histories for when_s in one.dropped_s if when_s >= since_s]
     drops = sum(region_at(bins, next(iter(one.own_rests_W(when_s)), one.last.p_WO)) is None for one, when_s in fell)
     return RefereeReport(
-        success,
+        success if conditions else None,
         " ".join(dict.fromkeys(each.sentence[0].upper() + each.sentence[1:] for each in findings)),
         collisions=len(own),
         drops=drops,

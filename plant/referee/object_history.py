@@ -25,6 +25,8 @@ FLICKER_S = 0.15
 SETTLE_S = 1.0
 HIDES_M = 0.3
 """Depth before a point from which on something hides the point in a picture."""
+GONE_BELOW_M, GONE_BEYOND_M = 1.0, 500.0
+"""Depth below the floor, and distance from its first place, at which an object has left the world."""
 SET_DOWN_S = 0.3
 """Longest time from contact with the floor to the release of an object that was set down, not dropped."""
 
@@ -61,7 +63,7 @@ class ObjectHistory(Stateful):
     """History of one object; `add` is called with every sample.
 
     `rests_W` are its resting places, `rested_s` the times at which it came to rest there, `dropped_s` the times of its
-    drops. `sides_m` are its length, width and height.
+    drops. `sides_m` are its length, width and height. `lost_s` is when it left the world, a fault of the simulation.
     """
 
     name: str
@@ -73,6 +75,7 @@ class ObjectHistory(Stateful):
     events: list[str] = field(default_factory=list)
     dropped_s: list[float] = field(default_factory=list)
     touches: int = 0
+    lost_s: float | None = None
     speed_m_s: float = 0.0
     _last: ObjectSample | None = None
     _grip_s: float = float("-inf")
@@ -201,6 +204,7 @@ class ObjectHistory(Stateful):
         self._note_leaving(sample, with_hand)
         self._note_fall(sample)
         self._note_rest(sample)
+        self._note_loss(sample)
 
     def stay(self, time_s: float) -> None:
         """Adds a sample at time_s that equals the last one."""
@@ -227,7 +231,7 @@ class ObjectHistory(Stateful):
         if self._last is not None and self.holder is None:
             self.lifts, self.rests_W, self.rested_s, self._by_others = [], [], [], []
             self._rests(self._last)
-        self.events, self.dropped_s, self.touches = [], [], 0
+        self.events, self.dropped_s, self.touches, self.lost_s = [], [], 0, None
 
     def _moves_with_hand(self, sample: ObjectSample) -> bool:
         """Returns whether the object has not moved in the hand since the last sample."""
@@ -282,6 +286,16 @@ class ObjectHistory(Stateful):
         if self._carried or float(np.linalg.norm(sample.p_WO - self.rests_W[-1])) > 0.02:
             self._rests(sample)
         self._carried, self._left_z_m, self._dropped = False, None, False
+
+    def _note_loss(self, sample: ObjectSample) -> None:
+        """Records that the object left the world; its last drop is then no fault of the robot."""
+        apart_m = float(np.linalg.norm(sample.p_WO - self.rests_W[0]))
+        if self.lost_s is not None or (sample.p_WO[2] > -GONE_BELOW_M and apart_m < GONE_BEYOND_M):
+            return
+        self.lost_s = sample.time_s
+        lifted_s = self.lifts[-1].time_s if self.lifts else 0.0
+        self.dropped_s = [when_s for when_s in self.dropped_s if when_s < lifted_s]
+        self.events.append(f"The simulation lost {definite(self.name)} at {sample.time_s:.2f} s: it left the world.")
 
     def _rests(self, sample: ObjectSample) -> None:
         self.rests_W.append(sample.p_WO)

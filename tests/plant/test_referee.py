@@ -259,6 +259,15 @@ def test_object_let_go_near_the_person_is_no_hand_over():
     assert (verdict.success, verdict.drops) == (False, 1)
 
 
+def test_an_object_that_leaves_the_world_is_a_fault_of_the_simulation():
+    stage = Stage().lift().carry("coke", OVER_TABLE, ON_TRAY).let_go()
+    stage.put("coke", (9.0, 2.4, 3.0)).watch(0.1).put("coke", (30.0, 2.4, -2.0)).watch(0.1)
+    verdict = stage.referee.judge([GRASPED, HANDED])
+    assert (verdict.success, verdict.drops) == (None, 0)
+    assert "The simulation lost the coke." in verdict.why
+    assert "it left the world." in stage.referee.events[-1]
+
+
 def test_a_hand_over_from_another_source_does_not_count():
     assert given().watch().results(*(replace(HANDED, source=(each,)) for each in (SHELF, TABLE))) == [False, True]
 

@@ -61,13 +61,15 @@ def verdict_of(
     verdict = judge([replace(condition, since_s=since_s) for condition in conditions])
     if result.outcome is not Outcome.SUCCESS:
         why = _joined(f"The mission {_ENDED[result.outcome]}.", verdict.why)
-        return replace(verdict, success=False, why=why, holds=verdict.success)
+        lost = bool(conditions) and verdict.success is None  # by the simulation
+        return replace(verdict, success=None if lost else False, why=why, holds=verdict.success)
     said = dict.fromkeys(_speech(tree, result))
     if said:
-        success = verdict.success is not False and all(holds for holds, _ in said)
+        failed = not all(holds for holds, _ in said)
+        success = False if failed else verdict.success if conditions else True
         verdict = replace(verdict, success=success, why=_joined(verdict.why, *(sentence for _, sentence in said)))
     unseen = listing(_unseen(tree, result)) if _unseen(tree, result) else ""
-    if verdict.success is None:
+    if verdict.success is None and not conditions:
         nothing = f"No goal condition stands for {unseen}." if unseen else "There are no goal conditions."
         return replace(verdict, why=_joined(nothing, verdict.why))
     return replace(verdict, why=_joined(verdict.why, f"Not judged: {unseen}." if unseen else ""))

@@ -42,12 +42,16 @@ _PER_LEVER_N_M = 400.0
 """Additional force per metre between the grip and the centre of mass; the tips would press a thin object out."""
 _THIN_N = 20.0
 """Force on a thin object between rounded fingertips, which press it out with more."""
+_GENTLE_N = 8.0
+"""Force of hinged fingers until they touch the object; faster ones drag a thin object behind their tips."""
 _RELAX_M = 0.002
 """Height by which fingers on the surface rise before they close."""
 _RELAX_THIN_M = 0.0005
 """The same for an object that is thinner than `THIN_M`."""
 _NEARBY_M = 0.02
 """Space between fingers and a thin object before they go down once more, since the moving finger reaches lower then."""
+_NEARBY_USUAL_M = 0.04
+"""The same for another object, before they close gently."""
 _CLEAR_M = 0.002
 """Clearance of a finger that sweeps over the surface."""
 _SHORT_M = 0.025
@@ -314,20 +318,11 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", self.contact_guard(ahead))
         if touched:
             self._check_reached(plan.candidate.X_BH, name)
-        thin, sweep_m = view.target.height_m <= THIN_M, finger_sweep_m(plan.candidate.X_BH, self.X_WB(), self.gripper)
-        rounded, relax_m = thin and self.gripper.kind is GripperKind.HINGED, max(_RELAX_M, sweep_m + _CLEAR_M)
-        lies = view.target.height_m < _FEEL_LOW_M or view.target.length_m > _LONG * view.target.width_m
-        if touched or lies:
-            yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
-        if rounded:
-            nearby = self.gripper.opening_for(plan.candidate.width_m + _NEARBY_M)
-            yield from self.move_gripper(nearby, GRIPPER_FORCE_N, f"closing on the {name}")
-            yield from self._to_the_ground(ahead, False, _RELAX_THIN_M, f"closing on the {name}")
+        yield from self._lower_on(view, plan, touched, name)
         X_BH = self.model.X_BH(self.q_rad())
         self.context.payload.kind = seen.kind
-        lever_m = 0.0 if thin else plan.candidate.lever_m
-        force_n = _THIN_N if rounded else self.options.force_n + _PER_LEVER_N_M * lever_m
-        yield from self.move_gripper(0.0, self._grip_n(force_n, least_kg), f"closing on the {name}")
+        lever_m = None if view.target.height_m <= THIN_M else plan.candidate.lever_m
+        force_n = yield from self._close(lever_m, least_kg, f"closing on the {name}")
         yield from self.pause(_FEEL_S, f"closing on the {name}")
         felt = self.context.robot.gripper()
         if felt.opening > self.gripper.like_turn(SHUT_RAD):
@@ -346,6 +341,31 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         mass_kg = yield from self.weigh(self.held[0].X_FG.translation(), f"lifting the {name}")
         yield from self._refuse_heavy(mass_kg, plan.lift_B, name)
         yield from self.move_gripper(0.0, self._grip_n(force_n, max(mass_kg, least_kg)), f"lifting the {name}")
+
+    def _lower_on(self, view: CloseView, plan: GraspPlan, touched: bool, name: str) -> Routine[None]:
+        """Lowers the fingers onto the surface below a low or long object, and brings hinged ones near its sides."""
+        target, X_BH, message = view.target, plan.candidate.X_BH, f"closing on the {name}"
+        ahead, thin = X_BH.rotation().matrix()[:, 0], target.height_m <= THIN_M
+        relax_m = max(_RELAX_M, finger_sweep_m(X_BH, self.X_WB(), self.gripper) + _CLEAR_M)
+        if touched or target.height_m < _FEEL_LOW_M or target.length_m > _LONG * target.width_m:
+            yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
+        if self.gripper.kind is GripperKind.HINGED:
+            near = self.gripper.opening_for(plan.candidate.width_m + (_NEARBY_M if thin else _NEARBY_USUAL_M))
+            yield from self.move_gripper(min(near, self.context.robot.gripper().opening), GRIPPER_FORCE_N, message)
+            if thin:
+                yield from self._to_the_ground(ahead, False, _RELAX_THIN_M, message)
+
+    def _close(self, lever_m: float | None, mass_kg: float, message: str) -> Routine[float]:
+        """Closes the fingers, hinged ones gently until they touch; returns the force (N) for an object without mass.
+
+        `lever_m` is the distance from the grip to the centre of mass; None for a thin object.
+        """
+        force_n = self.options.force_n + _PER_LEVER_N_M * (lever_m or 0.0)
+        if self.gripper.kind is GripperKind.HINGED:
+            force_n = _THIN_N if lever_m is None else force_n
+            yield from self.move_gripper(0.0, _GENTLE_N, message)
+        yield from self.move_gripper(0.0, self._grip_n(force_n, mass_kg), message)
+        return force_n
 
     def _grip_n(self, least_n: float, mass_kg: float) -> float:
         """Returns the grip force (N) for a mass, within the gripper's limit."""

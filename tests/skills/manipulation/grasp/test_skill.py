@@ -171,3 +171,17 @@ def test_a_surface_below_the_arms_reach_is_not_felt_for():
     context = replace(context, stack=replace(context.stack, arm_planner=AtItsReach()))
     assert isinstance(outcome(Feeling(context), SEEN), Succeeded)
     assert robot.arm_commands == []
+
+
+class Closing(Grasp):
+    """Closes about a tall object."""
+
+    def run(self, inputs):
+        yield from self._close(0.05, 0.5, "closing")
+        return Succeeded("closed")
+
+
+def test_hinged_fingers_close_gently_until_they_touch():
+    robot = TableRobot(opening=0.6)
+    assert isinstance(outcome(Closing(context_of(robot)), SEEN), Succeeded)
+    assert [force_n for _, force_n in robot.commanded("set_gripper")] == [8.0, 106.0]

@@ -81,7 +81,7 @@ def near_upright(trial):
 class Watch(RunVisitor):
     """Observer of the target: time off its support without a break, and from when the robot stood to the lift (s).
 
-    As a visitor it stores where the place skill lowers the target last (m), and whether a grasp succeeds.
+    As a visitor it stores where the place skill lowers the target last (m), and whether a pick-up claims to hold it.
     """
 
     simulation: Simulation
@@ -116,9 +116,14 @@ class Watch(RunVisitor):
     def message(self, topic, message):
         if topic == TOUCHES:
             self.simulation.referee.expect_touch(ROBOT, message["until_s"])
-        grasps = topic == "transitions" and "grasp" in message["node"].rsplit("/", 1)[-1]
-        self.claimed = self.claimed or (grasps and message["to"] == "SUCCESS")
+        ends = topic == "transitions" and message["to"] == "SUCCESS" and ends_pick(message["node"])
+        self.claimed = self.claimed or ends
         return message
+
+
+def ends_pick(node):
+    """True for the path id of a node whose success claims that the object is held."""
+    return "grasp" in node.rsplit("/", 1)[-1] or node.endswith("in-hand/only-if")
 
 
 @dataclass(frozen=True)
@@ -333,6 +338,7 @@ def summary(trials, sheet: Path | None = None):
         "place_error_m_median": quantile([e.place_error_m for e in trials if e.place_error_m is not None], digits=4),
         "planning_s": spread([spent_s for each in trials for spent_s in each.planning_s]),
         "grasp_planning_s": spread([spent_s for each in trials for spent_s in each.grasp_planning_s]),
+        "hit_rate": share([each.collisions > 0 or each.others_disturbed > 0 for each in trials]),
         "disturbed_rate": share([each.others_disturbed > 0 for each in trials]),
         "false_claims": sum(each.false_claim for each in trials),
         "by_class": for_each("name", held)(trials),

@@ -12,6 +12,7 @@ from tests.benchmarks.carry import doors, entered
 from tests.benchmarks.manipulation import (
     TimedWorker,
     cases,
+    ends_pick,
     failure,
     failures,
     is_false_claim,
@@ -74,6 +75,19 @@ def test_a_trial_is_near_upright_within_5_cm_or_tells_why_it_failed(trial, near,
 )
 def test_a_false_claim_is_of_what_was_never_lifted_or_none_of_what_was_held(claimed, lifted, held_s, false):
     assert is_false_claim(claimed, lifted=lifted, held_s=held_s) is false
+
+
+@pytest.mark.parametrize(
+    ("node", "ends"),
+    [
+        ("alice/trial/1-table/grasp", True),
+        ("alice/trial/1-table/in-hand/only-if", True),
+        ("alice/trial/1-table/in-hand/tuck", False),
+        ("alice/trial/1-table/approach", False),
+    ],
+)
+def test_a_grasp_or_a_tool_found_in_the_hand_ends_a_pick(node, ends):
+    assert ends_pick(node) is ends
 
 
 def test_failures_are_counted_by_class_and_cause():

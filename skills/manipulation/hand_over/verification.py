@@ -45,6 +45,12 @@ _PLATE_M = 0.2
 """Half side of the square around the object for the search of a plate below it."""
 _MOVES_ABOUT_M = 0.25
 """Radius around the object in which motion is looked for."""
+_SAME_PLACE_M = 0.015
+"""Distance between detections of an object at rest, while somebody moves beside it."""
+_SAME_PLACES = 4
+"""Number of detections in a row at the same place of an object at rest."""
+_LATER_S = 0.17
+"""Growth of the interval between them, because a rolling object may be back after equal intervals."""
 _BACK_OFF_M = 0.3
 _FLOOR_AHEAD_M = 1.2
 """Least distance ahead of the shoulder at which the hand camera views the floor."""
@@ -83,10 +89,14 @@ class Seen(enum.Enum):
 
 @dataclass(frozen=True)
 class Sight:
-    """Result of checking one picture, and the point (3,) in the world (m) where the object was looked for or found."""
+    """Result of checking one picture, and the point (3,) in the world (m) where the object was looked for or found.
+
+    `detected` is True when the detector found the object there.
+    """
 
     seen: Seen
     p_W: FloatArray
+    detected: bool = False
 
 
 @dataclass(frozen=True)
@@ -126,13 +136,19 @@ def judge_release(
     lowest_m = max(release.low_m - _LOWER_M, _FALLEN_M)
     for each in own:
         if _off_m(each, release) < _TAKEN_WITHIN_M and each.position_W[2] > lowest_m:
-            return Sight(Seen.GIVEN, each.position_W)
+            return Sight(Seen.GIVEN, each.position_W, detected=True)
     if stands_at(image, X_WO, release) or lies_at(image, X_WO, release):
         return Sight(Seen.GIVEN, release.p_W)
     for each in own:
         if _off_m(each, release) < _FELL_WITHIN_M and each.position_W[2] <= _FALLEN_M:
             return Sight(Seen.FELL, each.position_W)
     return Sight(Seen.NOT_SEEN, release.p_W)
+
+
+def stays_in_place(places_W: Sequence[FloatArray]) -> bool:
+    """Returns whether the last detections (3,) of an object lie at the same place."""
+    last_W = places_W[-_SAME_PLACES:]
+    return len(last_W) == _SAME_PLACES and bool(np.all(np.ptp(last_W, axis=0) < _SAME_PLACE_M))
 
 
 def _off_m(found: Detection3D, release: Release) -> float:
@@ -189,16 +205,20 @@ class HandOverVerification(ReleasingSkill[InputsT]):
         """Looks until the object is seen, and then until it is at rest."""
         for p_WT, viewpoints_B in self._looks(release):
             yield from self._turn_to(p_WT, viewpoints_B, name, message)
-            end_s, seen = self.context.clock.now() + SETTLES_WITHIN_S, Seen.MOVES
+            end_s, seen, places_W = self.context.clock.now() + SETTLES_WITHIN_S, Seen.MOVES, list[FloatArray]()
             while seen is Seen.MOVES and self.context.clock.now() < end_s:
-                seen = yield from self._seen(name, release, message)
+                seen = yield from self._seen(name, release, message, places_W)
             if seen is not Seen.NOT_SEEN:
                 return seen
         return Seen.NOT_SEEN
 
-    def _seen(self, name: str, release: Release, message: str) -> Routine[Seen]:
-        """Judges a picture from the present pose; two more pictures show whether a carried object is at rest."""
+    def _seen(self, name: str, release: Release, message: str, places_W: list[FloatArray]) -> Routine[Seen]:
+        """Judges a picture from the present pose; two more pictures show whether a carried object is at rest.
+
+        So do equal detections in a row, whose positions `places_W` has, while somebody moves beside the object.
+        """
         try:
+            yield from self.pause(_LATER_S * len(places_W), message)
             image = yield from self.picture(message)
             sight = yield from self._sight(image, name, release, message)
             if sight.seen is not Seen.GIVEN:
@@ -206,7 +226,8 @@ class HandOverVerification(ReleasingSkill[InputsT]):
             at_rest = yield from self.stays_at_rest(image, sight.p_W, _MOVES_ABOUT_M, message)
         except SkillFailure as failure:
             raise _unseen(name, failure) from failure
-        return Seen.GIVEN if at_rest else Seen.MOVES
+        places_W[:] = [*places_W, sight.p_W] if sight.detected else []
+        return Seen.GIVEN if at_rest or stays_in_place(places_W) else Seen.MOVES
 
     def _looks(self, release: Release) -> Sequence[tuple[FloatArray, Sequence[FloatArray]]]:
         """World points to look at, with viewpoints (B): the release, then the floor.

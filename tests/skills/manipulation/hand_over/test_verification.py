@@ -22,6 +22,7 @@ from skills.manipulation.hand_over.verification import (
     names_in,
     release_of,
     stands_at,
+    stays_in_place,
 )
 from skills.perception.detection_3d import Detection3D
 from skills.robot import Gripper, Scan
@@ -195,6 +196,14 @@ def test_the_release_point_follows_from_the_box_in_the_hand():
     release = release_of(X_WH, P_HT, corners_H)
     assert (release.x_m, release.y_m) == pytest.approx((2.0 + P_HT[0], 1.0))
     assert (release.low_m, release.top_m) == pytest.approx((1.05, 1.16))
+
+
+# places (x) of detections -> whether the object stays there
+@pytest.mark.parametrize(
+    ("places_m", "stays"), [((1.0, 1.01, 1.0, 1.0), True), ((1.0, 1.01, 1.0), False), ((1.0, 1.01, 1.06, 1.0), False)]
+)
+def test_four_detections_at_one_place_show_an_object_at_rest(places_m, stays):
+    assert stays_in_place([np.array([x_m, 0.0, 0.9]) for x_m in places_m]) is stays
 
 
 def test_the_classes_that_a_text_names():

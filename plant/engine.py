@@ -122,7 +122,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         self._steps += steps
         self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
         if not self._sleepers.all_asleep:
-            self._carried.limit_spin()
+            self._carried.limit_motion()
         for name in holding:
             self._carried.after_steps(self._hands[name], TIME_STEP_S, steps)
         self.work["plant_steps"] += steps

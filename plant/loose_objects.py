@@ -16,7 +16,8 @@ contact. Forces, velocities and contacts stay those of the plant.
 
 **Spin.** The plant's steps cannot follow a fast spin: the gyroscopic torque at the beginning of a step makes a flat
 wrench spin ever faster, and a can that turns by radians in a step penetrates a table and leaves it at 90 m/s. So the
-spin of free bodies is limited to a rate that the next step can follow.
+spin of free bodies is limited to a rate that the next step can follow. So is their speed: where a box swallows a thin
+cylinder or a convex mesh, Drake returns depths that are wrong by decimetres, and the contact throws the object away.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -305,13 +306,15 @@ WITH_HAND_M_S: Final = 0.02
 FASTEST_SPIN_RAD_S: Final = 25.0
 """A third of a radian in a step of 12.5 ms."""
 CALM_RAD_S: Final = 1.5
-_FASTEST_ALONG_RAD_S: Final = FASTEST_SPIN_RAD_S / 3.0**0.5
-"""Rate about each axis below which a body's spin cannot exceed `FASTEST_SPIN_RAD_S`."""
+FASTEST_M_S: Final = 5.0
+"""Speed after a fall from 1.3 m; 6 cm in a step of 12.5 ms."""
+_ALONG: Final = 3.0**-0.5
+"""Part of a limit along each axis within which a vector cannot exceed the limit."""
 _AT_HAND_M: Final = 0.5
 
 
 class CarriedObjects:
-    """Corrects the loose bodies that a hand carries; call `limit_spin` and `after_steps` after steps of the plant.
+    """Corrects the loose bodies that a hand carries; call `limit_motion` and `after_steps` after steps of the plant.
 
     `calm` is True while no free body spins faster than `CALM_RAD_S`; then a spin that begins in a step is limited soon
     enough after the next one.
@@ -324,6 +327,7 @@ class CarriedObjects:
         places = [body.floating_positions_start() + 4 for body in self._loose]
         self._places = np.array([range(start, start + 3) for start in places], dtype=np.int64).reshape(-1, 3)
         self._spins = np.array([range(start, start + 3) for start in starts], dtype=np.int64).ravel()
+        self._speeds = self._spins + 3
         self.calm = False
 
     def after_steps(self, hand: RigidBody, dt_s: float, steps: int = 1) -> None:
@@ -350,16 +354,23 @@ class CarriedObjects:
         bias = plant.CalcBiasSpatialAcceleration(context, rates, hand.body_frame(), p_HO, world, world)
         return np.asarray(bias.translational())
 
-    def limit_spin(self) -> None:
-        """Limits the spin of the free bodies to `FASTEST_SPIN_RAD_S`."""
+    def limit_motion(self) -> None:
+        """Limits the spin of the free bodies to `FASTEST_SPIN_RAD_S`, and their speed to `FASTEST_M_S`."""
         velocities = self._plant.GetVelocities(self._context)
-        fastest_rad_s = np.abs(velocities[self._spins]).max(initial=0.0)
-        self.calm = bool(fastest_rad_s < CALM_RAD_S)
-        if fastest_rad_s > _FASTEST_ALONG_RAD_S:
-            spins = velocities[self._spins].reshape(-1, 3)
-            rates = np.linalg.norm(spins, axis=1, keepdims=True)
-            velocities[self._spins] = (spins * np.minimum(1.0, FASTEST_SPIN_RAD_S / np.maximum(rates, 1e-9))).ravel()
+        self.calm = bool(np.abs(velocities[self._spins]).max(initial=0.0) < CALM_RAD_S)
+        limited = [_limit(velocities, self._spins, FASTEST_SPIN_RAD_S), _limit(velocities, self._speeds, FASTEST_M_S)]
+        if any(limited):
             self._plant.SetVelocities(self._context, velocities)
+
+
+def _limit(velocities: FloatArray, indices: NDArray[np.int64], most: float) -> bool:
+    """Shortens the vectors at `indices`, three for each, that are longer than `most`; returns whether any may be."""
+    if np.abs(velocities[indices]).max(initial=0.0) <= _ALONG * most:
+        return False
+    vectors = velocities[indices].reshape(-1, 3)
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    velocities[indices] = (vectors * np.minimum(1.0, most / np.maximum(lengths, 1e-9))).ravel()
+    return True
 
 
 def arc_m(acceleration_W: FloatArray, dt_s: float) -> FloatArray:

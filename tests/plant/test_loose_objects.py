@@ -13,7 +13,7 @@ from pydrake.systems.analysis import Simulator
 
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
-from plant.loose_objects import FASTEST_SPIN_RAD_S, CarriedObjects, arc_m
+from plant.loose_objects import FASTEST_M_S, FASTEST_SPIN_RAD_S, CarriedObjects, arc_m
 from plant.models.catalogue import load_catalogue
 from plant.robots.robot_kind import PlacedRobot
 from skills.robot import Pose2D
@@ -226,13 +226,24 @@ def _spinning_bar(limited):
     for step in range(160):
         simulator.AdvanceTo((step + 1) * DT_S)
         if limited:
-            carried.limit_spin()
+            carried.limit_motion()
     return float(np.linalg.norm(plant.EvalBodySpatialVelocityInWorld(context, bar).rotational()))
 
 
 def test_a_bar_that_spins_as_it_flies_spins_no_faster_with_time():
     assert _spinning_bar(limited=True) < 2.0 * FASTEST_SPIN_RAD_S
     assert not _spinning_bar(limited=False) < 1000.0
+
+
+def test_a_bar_that_a_wrong_contact_throws_is_slowed_down():
+    plant = MultibodyPlant(DT_S)
+    bar = plant.AddRigidBody("bar", SpatialInertia.SolidBoxWithMass(0.15, 0.26, 0.03, 0.01))
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    _set(plant, context, bar, np.zeros(3), np.zeros(3), [30.0, 0.0, 40.0])
+    CarriedObjects(plant, context, [bar]).limit_motion()
+    v_W = plant.EvalBodySpatialVelocityInWorld(context, bar).translational()
+    assert v_W == pytest.approx([0.6 * FASTEST_M_S, 0.0, 0.8 * FASTEST_M_S])
 
 
 @pytest.mark.parametrize("steps_before", [1, 2, 3, 4])

@@ -43,17 +43,15 @@ _PER_LEVER_N_M = 400.0
 _THIN_N = 20.0
 """Force on a thin object between rounded fingertips, which press it out with more."""
 _GENTLE_N = 8.0
-"""Force of hinged fingers until they touch the object; faster ones drag a thin object behind their tips."""
-_RELAX_M = 0.002
-"""Height by which fingers on the surface rise before they close."""
-_RELAX_THIN_M = 0.0005
-"""The same for an object that is thinner than `THIN_M`."""
-_NEARBY_M = 0.02
-"""Space between fingers and a thin object before they go down once more, since the moving finger reaches lower then."""
-_NEARBY_USUAL_M = 0.04
-"""The same for another object, before they close gently."""
+"""Force of hinged fingers until they touch the object; faster ones throw a thin object behind their tips."""
+_RELAX_M, _RELAX_THIN_M = 0.002, 0.0005
+"""Height by which fingers on the surface rise before they close, also on an object that is thinner than `THIN_M`."""
+_NEARBY_M, _NEARBY_USUAL_M = 0.02, 0.04
+"""Space between fingers and a thin object before they go down once more, and about another before they close gently."""
 _CLEAR_M = 0.002
 """Clearance of a finger that sweeps over the surface."""
+_SLIM_M, _BELOW_SLIM_M = 0.015, 0.004
+"""Width of a slim part of a thicker object, and depth of the fingertips below its axis; deeper is the hollow."""
 _SHORT_M = 0.025
 """Distance from the grasp beyond which a contact of the hand is not with the surface below the object."""
 _FEEL_M = 0.014
@@ -66,14 +64,13 @@ _MOST_SHOWN = 8
 """Number of the best grasps that are tried with a way through space that pictures show."""
 _DOWN = 0.8
 """Vertical component of a direction that counts as down."""
-_FEEL_S = 0.4
-"""Pause for the gripper's readings of the held object."""
+_FEEL_S, _RAISE_M = 0.4, 0.08
+"""Pause for the gripper's readings of the held object, and rise of the hand before it weighs it once more."""
 _AIM_LATENCY_S = 0.1
 _AT_OBJECT_M = 0.4
 """Distance within which a hand may have gripped the object before a restart."""
-_GENTLY_RAD_S = 0.45
-"""Joint speed while the arm carries a thin object, or one held far from its centre of mass."""
-_LONG_LEVER_M = 0.05
+_GENTLY_RAD_S, _LONG_LEVER_M = 0.45, 0.05
+"""Joint speed while the arm carries a thin object, or one held farther than this from its centre of mass."""
 _PULL_BACK_UP_M = (0.02, 0.0)
 """Rises of the hand while it draws back from the surface, the best first."""
 _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
@@ -153,7 +150,7 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         try:
             view, plan = yield from self._take_where_it_is(inputs)
         except SkillFailure as failure:
-            if (yield from self._still_held(failure)):
+            if (yield from self._still_held(failure, seen)):
                 return (yield from self._secured(inputs))
             yield from self._let_go(draw_back=len(self._tried) > len(inputs.avoid))
             raise self._with_outputs(failure) from failure
@@ -161,7 +158,7 @@ class Grasp(CloseLookingSkill[GraspInputs]):
             yield from self._carry(plan.candidate, name, view.target.height_m < THIN_M)
             yield from self.stand_as_usual(f"carrying the {name}")
         except SkillFailure as failure:
-            if (yield from self._still_held(failure)):
+            if (yield from self._still_held(failure, seen)):
                 return (yield from self._secured(inputs))
             raise self._with_outputs(failure) from failure
         return Succeeded(f"holding the {name}", self._outputs())
@@ -178,12 +175,16 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         yield from self._keep_held(seen, at_object)
         return Succeeded(f"the {seen.kind} was in the gripper already; holding it", self._outputs())
 
-    def _still_held(self, failure: SkillFailure) -> Routine[bool]:
-        """Returns whether the gripper still holds the object that a failure calls lost."""
+    def _still_held(self, failure: SkillFailure, seen: ObjectObservation) -> Routine[bool]:
+        """Returns whether the gripper still holds the object that a failure calls lost; feels its weight once more."""
         if failure.cause is not Cause.POSTCONDITION:
             return False
-        yield from self.pause(_FEEL_S, "feeling whether the gripper is empty")  # moving fingers feel nothing
-        return (yield from self.holds("feeling whether the gripper is empty"))
+        message = "feeling whether the gripper is empty"
+        yield from self.pause(_FEEL_S, message)  # moving fingers feel nothing
+        if self.context.payload.kind is None:  # shut jaws felt light, maybe because the object lay on the arm
+            self.context.payload.kind = seen.kind
+            yield from self.shift_by_first([_RAISE_M * up_B(self.X_WB())], message, clear_of_boxes=True)
+        return (yield from self.holds(message))
 
     def _secured(self, inputs: GraspInputs) -> Routine[Succeeded]:
         """Carries an object that seemed to be lost while the arm still feels its weight."""
@@ -347,6 +348,8 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         target, X_BH, message = view.target, plan.candidate.X_BH, f"closing on the {name}"
         ahead, thin = X_BH.rotation().matrix()[:, 0], target.height_m <= THIN_M
         relax_m = max(_RELAX_M, finger_sweep_m(X_BH, self.X_WB(), self.gripper) + _CLEAR_M)
+        if plan.candidate.width_m < _SLIM_M and not target.upright:
+            relax_m = max(relax_m, 0.5 * target.height_m - _BELOW_SLIM_M)
         if touched or target.height_m < _FEEL_LOW_M or target.length_m > _LONG * target.width_m:
             yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
         if self.gripper.kind is GripperKind.HINGED:

@@ -1,6 +1,7 @@
 """Tests of failures of the grasp skill."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,10 @@ from table_robot import MODEL, TableRobot, context_of, failed, outcome
 
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, PlanningError, Running, Succeeded
 from skills.manipulation.arm.motion import RrtConnect
+from skills.manipulation.grasp.candidates import GraspCandidate
+from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
+from skills.routine import SkillFailure
 
 SEEN = GraspInputs(
     ObjectObservation(0.0, ObjectKind("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
@@ -185,3 +189,51 @@ def test_hinged_fingers_close_gently_until_they_touch():
     robot = TableRobot(opening=0.6)
     assert isinstance(outcome(Closing(context_of(robot)), SEEN), Succeeded)
     assert [force_n for _, force_n in robot.commanded("set_gripper")] == [8.0, 106.0]
+
+
+class Lowering(Grasp):
+    """Brings its fingers about a part of a screwdriver whose handle is 37 mm thick; notes how far they rise again."""
+
+    def __init__(self, context, width_m):
+        super().__init__(context)
+        hand = RigidTransform(MODEL.X_BH(self.q_rad()).rotation(), [0.8, 0.0, 0.1])
+        self._plan = SimpleNamespace(candidate=GraspCandidate(hand, width_m, 0.0, 1.57))
+        self.relax_m = []
+
+    def run(self, inputs):
+        target = Target(np.zeros((1, 3)), (0.8, 0.0), 0.0, 0.2, 0.037, 0.037, 0.2, False)
+        yield from self._lower_on(SimpleNamespace(target=target), self._plan, False, "screwdriver")
+        return Succeeded("lowered")
+
+    def _to_the_ground(self, ahead_B, touched, relax_m, message):
+        self.relax_m.append(relax_m)
+        yield Running(message)
+
+
+def test_fingers_take_a_raised_slim_shaft_with_their_tips():
+    relax_m = []
+    for width_m in (0.01, 0.035):
+        skill = Lowering(context_of(TableRobot(opening=1.4)), width_m)
+        assert isinstance(outcome(skill, SEEN), Succeeded)
+        relax_m += skill.relax_m
+    assert relax_m[0] == pytest.approx(0.0145)
+    assert relax_m[1] < relax_m[0]
+
+
+class SeemsLost(Grasp):
+    """Weighs nothing until its hand has been raised, as when the object lies on the arm."""
+
+    def run(self, inputs):
+        self.hand_m = [float(MODEL.X_BH(self.q_rad()).translation()[2])]
+        lost = SkillFailure(Cause.POSTCONDITION, "the object was lost")
+        return Succeeded(str((yield from self._still_held(lost, inputs.observation))))
+
+    def holds(self, message):
+        self.hand_m.append(float(MODEL.X_BH(self.q_rad()).translation()[2]))
+        yield Running(message)
+        return self.context.payload.kind is not None and self.hand_m[1] > self.hand_m[0] + 0.05
+
+
+def test_a_hand_that_felt_nothing_is_raised_and_feels_again():
+    robot = TableRobot(np.array([0.0, -1.6, 1.6, 0.0, 0.4, 0.0]))
+    assert outcome(SeemsLost(context_of(robot)), SEEN).message == "True"

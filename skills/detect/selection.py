@@ -16,7 +16,7 @@ from skills.relations import Landmark, Relation, Scene, Standing, choose
 from skills.robot import FloatArray, Pose2D
 
 _AVOIDED_M = 0.08
-DOUBTED = 0.05
+DOUBTED = 0.1
 """Probability of the wanted classes up to which the robot says that an object is none of them."""
 _EVEN = 0.5
 _LEAST_LENGTH = 0.4

@@ -352,13 +352,13 @@ class Detect(LookingSkill[DetectInputs]):
         raise self._too_few(inputs, found)
 
     def _cannot_tell(
-        self, inputs: DetectInputs, found: Sequence[ObjectObservation], doubts: Sequence[Track], seen: str
+        self, inputs: DetectInputs, found: Sequence[ObjectObservation], doubts: Sequence[Track]
     ) -> SkillFailure:
         """Failure for objects that may be what is sought."""
         what = wanted_names(inputs.classes, inputs.attributes)
         known = f"{count_sentence(found, inputs.surfaces)}, and " if found else ""
         what = f"{known}I cannot tell whether there is {'another' if found else with_article(what)}"
-        return SkillFailure(Cause.EXECUTION, f"{what}: {self._unexplained(doubts)} ({seen})")
+        return SkillFailure(Cause.EXECUTION, f"{what}: {self._unexplained(doubts)}")
 
     def _unexplained(self, doubts: Sequence[Track]) -> str:
         """Describes unexplained objects, and shows a picture of each: "something 24 cm tall stands on the desk"."""
@@ -402,7 +402,7 @@ class Detect(LookingSkill[DetectInputs]):
             why = f"most of it is out of the camera's view ({seen})"
             return SkillFailure(Cause.EXECUTION, f"{names} could not be looked at from here: {why}")
         if doubts := self._doubts(inputs):
-            return self._cannot_tell(inputs, found, doubts, seen)
+            return self._cannot_tell(inputs, found, doubts)
         unmeant = why_not_meant(self._sure(inputs), inputs) if inputs.relations and not found else None
         if unmeant is not None:
             return SkillFailure(Cause.POSTCONDITION, f"{unmeant} ({seen})")

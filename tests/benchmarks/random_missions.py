@@ -290,7 +290,7 @@ class Robotics:
             return Succeeded("seen", {"open": self.rng.random() < 0.5})
         if name == "find_people":
             seen = ObjectObservation(0.0, ObjectKind("person"), (0.5, 4.5, 0.9), (0.5, 0.5, 1.7), 0.0, 0.9)
-            some = Succeeded("seen", {"observation": seen, "observations": (seen,)})
+            some = Succeeded("seen", {"observation": seen, "observations": (seen,), "unexplained": ()})
             return some if self.rng.random() < 0.5 else Failed(Cause.POSTCONDITION, "nobody is there")
         if name == "meet_person":
             at, size = (*skill.inputs.place_W, 0.9), (0.5, 0.5, 1.7)

@@ -244,7 +244,7 @@ class ScriptedWorld:
 def _seen(observations, otherwise):
     if not observations:
         return Failed(Cause.POSTCONDITION, otherwise)
-    return Succeeded("seen", {"observation": observations[0], "observations": tuple(observations)})
+    return Succeeded("seen", {"observation": observations[0], "observations": tuple(observations), "unexplained": ()})
 
 
 def _person(now_s, p_W, place=None):

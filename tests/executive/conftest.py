@@ -203,7 +203,7 @@ def default_end(script, name):
     def detect(skill):
         seen = any(surface.name in script.seen_on for surface in skill.inputs.surfaces)
         return (
-            Succeeded("seen", {"observation": COKE, "observations": (COKE,)})
+            Succeeded("seen", {"observation": COKE, "observations": (COKE,), "unexplained": ()})
             if seen
             else Failed(Cause.POSTCONDITION, "not seen")
         )

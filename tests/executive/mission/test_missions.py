@@ -45,7 +45,7 @@ def run_mission(parser, knowledge_in, skills, run_tree, script, missions, make):
 
     def somebody(skill):
         found = skill.inputs.avoid == ()
-        seen = {"observation": make.COKE, "observations": (make.COKE,)}
+        seen = {"observation": make.COKE, "observations": (make.COKE,), "unexplained": ()}
         return Succeeded("seen", seen) if found else Failed(Cause.POSTCONDITION, "nobody else is there")
 
     def scripted(name, skill):

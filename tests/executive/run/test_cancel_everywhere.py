@@ -55,7 +55,7 @@ def moving_skill(skill_name, inputs, outputs_):
                 self.context.robot.drive(1.6, 0.0, 1.0, until_s=until_s, lease=self.context.lease)
             if self.left > 0:
                 return Running("in motion")
-            values = {"observation": COKE, "observations": (COKE,), "tried": ()}
+            values = {"observation": COKE, "observations": (COKE,), "unexplained": (), "tried": ()}
             return Succeeded("done", {name: values[name] for name in outputs_})
 
     return Moving

@@ -253,7 +253,7 @@ def test_a_kill_in_any_round_moves_each_object_once(moved_once, world, script, m
         if world.places == 2:
             return Failed(Cause.POSTCONDITION, "nothing is left")
         seen = dataclasses.replace(make.COKE, position_W=(1.0 + world.places, 2.0, 0.9))
-        return Succeeded("seen", {"observation": seen, "observations": (seen,)})
+        return Succeeded("seen", {"observation": seen, "observations": (seen,), "unexplained": ()})
 
     script.ends["detect"] = look
     moved_once(CLEAR, 2, lags=(0, 3), every=2, says="moved two cokes")
@@ -268,7 +268,7 @@ def test_after_a_kill_in_any_tick_each_person_has_been_greeted(live, store, scri
     def look(skill):
         left = [place for place in places if all(one.position_W != place for one in skill.inputs.avoid)]
         seen = tuple(map(person, left))
-        found = {"observation": seen[0], "observations": seen} if seen else {}
+        found = {"observation": seen[0], "observations": seen, "unexplained": ()} if seen else {}
         return Succeeded("seen", found) if seen else Failed(Cause.POSTCONDITION, "nobody else is there")
 
     script.ends["find_people"] = look

@@ -81,7 +81,7 @@ def live(tmp_path, make, works, registry, knowledge, script, done):
 
     def detect(skill):
         there = done.count("a") >= 2
-        seen = {"observation": make.COKE, "observations": (make.COKE,)}
+        seen = {"observation": make.COKE, "observations": (make.COKE,), "unexplained": ()}
         return Succeeded("seen", seen) if there else Failed(Cause.POSTCONDITION, "not seen")
 
     script.ends["detect"], script.steps = detect, 2

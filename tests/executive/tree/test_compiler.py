@@ -169,7 +169,9 @@ def test_people_are_looked_for_in_rooms(
         (x_m, y_m), *_ = skill.inputs.area_W
         who = ObjectKind(skill.inputs.person)
         seen = ObjectObservation(0.0, who, (x_m, y_m, 1.0), (0.5, 0.5, 1.7), 0.0, 0.9, skill.inputs.place)
-        return Succeeded(f"saw them in the {skill.inputs.place}", {"observation": seen, "observations": (seen,)})
+        return Succeeded(
+            f"saw them in the {skill.inputs.place}", {"observation": seen, "observations": (seen,), "unexplained": ()}
+        )
 
     script.ends["find_people"] = look
     worst = run_tree(compiled(f"Take [Nothing] to [{goal}] and do [find] to [{asked}]")).worst
@@ -194,7 +196,7 @@ def test_objects_are_counted_on_all_surfaces_of_a_place(compiled, run_tree, scri
             return Failed(Cause.POSTCONDITION, "not seen")
         x_m, y_m = surface.polygon_W[0]
         seen = ObjectObservation(0.0, ObjectKind("coke"), (x_m, y_m, 1.0), (0.1, 0.1, 0.1), 0.0, 0.9, surface.name)
-        return Succeeded("seen", {"observation": seen, "observations": (seen,)})
+        return Succeeded("seen", {"observation": seen, "observations": (seen,), "unexplained": ()})
 
     script.ends["detect"] = look
     worst = run_tree(compiled(f"Take [Nothing] to [kitchen] and do [find] to [{asked}]")).worst

@@ -473,9 +473,13 @@ def looks_of(script, seen_by_alice=COKE):
     def detect(skill):
         if skill.context.robot.name == "Alice":
             seen = default_end(script, "detect")(skill)
-            return replace(seen, outputs={"observation": seen_by_alice, "observations": ()}) if script.seen_on else seen
+            return (
+                replace(seen, outputs={"observation": seen_by_alice, "observations": (), "unexplained": ()})
+                if script.seen_on
+                else seen
+            )
         looks.append((skill.inputs.surfaces[0].name, skill.inputs.floor))
-        return Succeeded("seen", {"observation": COKE, "observations": (COKE,)})
+        return Succeeded("seen", {"observation": COKE, "observations": (COKE,), "unexplained": ()})
 
     script.ends.update(detect=detect, approach=lambda skill: Succeeded("near", {"observation": seen_by_alice}))
     return looks

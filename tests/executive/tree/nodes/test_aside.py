@@ -67,7 +67,9 @@ def table(script):
     made = Table([COKE], [], [], [])
     script.ends |= {"grasp": made.grasp, "place": made.place, "back_off": lambda skill: Succeeded("backed off")}
     script.ends["approach"] = lambda skill: Succeeded("near", {"observation": skill.inputs.observation})
-    script.ends["detect"] = lambda skill: Succeeded("seen", {"observation": BEER, "observations": (BEER,)})
+    script.ends["detect"] = lambda skill: Succeeded(
+        "seen", {"observation": BEER, "observations": (BEER,), "unexplained": ()}
+    )
     return made
 
 

@@ -27,7 +27,7 @@ def table(script):
         left = sorted(there, key=lambda each: each.position_W in avoided)
         if not left:
             return Failed(Cause.POSTCONDITION, "no thing seen")
-        return Succeeded("seen", {"observation": left[0], "observations": tuple(left)})
+        return Succeeded("seen", {"observation": left[0], "observations": tuple(left), "unexplained": ()})
 
     def hold(skill):
         skill.context.robot._robot.holding = True

@@ -29,7 +29,7 @@ def run_steps(knowledge, registry, run_tree, make, script, there):
         if not there.pop(0):
             return Failed(Cause.POSTCONDITION, "not seen")
         apart = replace(make.COKE, position_W=(1.5, 2.0, 0.9))
-        return Succeeded("seen", {"observation": make.COKE, "observations": (make.COKE, apart)})
+        return Succeeded("seen", {"observation": make.COKE, "observations": (make.COKE, apart), "unexplained": ()})
 
     script.ends["detect"] = script.ends["find_people"] = seen
     script.ends["fails"] = lambda skill: Failed(Cause.EXECUTION, "no")

@@ -43,7 +43,7 @@ def there(script, robot):
         ]
         if not seen:
             return Failed(Cause.POSTCONDITION, f"nobody is seen in the {inputs.place} from here")
-        return Succeeded("saw somebody", {"observation": seen[0], "observations": tuple(seen)})
+        return Succeeded("saw somebody", {"observation": seen[0], "observations": tuple(seen), "unexplained": ()})
 
     def meet(skill):
         x, y = skill.inputs.place_W

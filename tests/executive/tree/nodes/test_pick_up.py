@@ -279,7 +279,9 @@ def test_a_loss_ends_the_running_skill_within_three_ticks_and_is_told(carrying, 
 
 
 def test_a_dropped_object_is_searched_where_the_robot_was(carrying, fails):
-    detect = fails("detect", then=lambda skill: Succeeded("seen", {"observation": COKE, "observations": ()}))
+    detect = fails(
+        "detect", then=lambda skill: Succeeded("seen", {"observation": COKE, "observations": (), "unexplained": ()})
+    )
     assert carrying(0.5).outcome is Outcome.SUCCESS
     (floor,) = detect[0].surfaces
     assert (floor.name, floor.height_m) == ("floor", 0.0)
@@ -395,7 +397,9 @@ def test_a_failed_drive_with_the_object_still_held_is_no_fall(worst, script, rob
 
 def test_an_object_that_falls_while_the_arm_is_drawn_in_is_searched_on_the_floor_too(worst, script, robot, fails):
     script.steps = 40
-    detect = fails("detect", then=lambda skill: Succeeded("seen", {"observation": COKE, "observations": ()}))
+    detect = fails(
+        "detect", then=lambda skill: Succeeded("seen", {"observation": COKE, "observations": (), "unexplained": ()})
+    )
     assert worst(GRASP, observer=Loses(robot, 0.0)).outcome is Outcome.SUCCESS
     assert " ".join(script.begun) == f"navigate detect {TAKEN} detect {TAKEN}"
     assert [inputs.floor for inputs in detect] == [False, True]

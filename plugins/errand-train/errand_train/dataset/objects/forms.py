@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
-from errand_make.shapes import Model
+from errand_make.shapes import Box, Cylinder, Model, Shape
 from errand_train.dataset.objects.draft import Draft
 from errand_train.dataset.objects.recipes import build, load_recipes
 from errand_train.models.__main__ import write_model
@@ -42,6 +43,9 @@ FORMS: Final[Mapping[tuple[str, str], int]] = MappingProxyType(
 )
 """Number of the instance of each form, by class and name of the form."""
 
+TOOLS: Final = frozenset({"hammer", "screwdriver", "wrench"})
+"""Classes without cylinders: Drake mistakes how deep a box swallows a thin disc, and the contact flings the tool away."""
+
 
 def write_forms(folder: Path) -> None:
     """Writes each form into `CLASS/FORM` below a folder. The same sources give the same bytes."""
@@ -49,8 +53,20 @@ def write_forms(folder: Path) -> None:
     for (category, form), number in FORMS.items():
         draft = Draft(np.random.default_rng([number, *category.encode()]))
         made, kind, _ = build(category, recipes[category], draft)
-        model = Model(category, f"{category}.obj", made.collisions, made.mass, comment=f"{kind} {category}")
+        shapes = tuple(_without_discs(made.collisions)) if category in TOOLS else made.collisions
+        model = Model(category, f"{category}.obj", shapes, made.mass, comment=f"{kind} {category}")
         write_model(folder / category / form, model, Appearance(made.mesh, made.pictures))
+
+
+def _without_discs(shapes: Sequence[Shape]) -> Iterator[Shape]:
+    """Yields the shapes, with two boxes in each upright cylinder, one turned by 45 degrees."""
+    for shape in shapes:
+        if not isinstance(shape, Cylinder):
+            yield shape
+            continue
+        side_m, (roll, pitch, yaw) = math.sqrt(2.0) * shape.radius, shape.rpy
+        for turn_rad in (0.0, math.pi / 4.0):
+            yield Box(p=shape.p, rpy=(roll, pitch, yaw + turn_rad), size=(side_m, side_m, shape.length))
 
 
 if __name__ == "__main__":

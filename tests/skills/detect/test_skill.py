@@ -107,7 +107,7 @@ def test_an_object_seen_only_once_does_not_count():
     )
 
 
-def test_what_stays_unexplained_is_viewed_from_three_sides_and_shown():
+def test_an_unexplained_object_is_viewed_from_three_sides_and_shown():
     log = []
     skill = Detect(context_of(TableRobot(things=[replace(COKE, colour=GREY)]), log))
     failed(

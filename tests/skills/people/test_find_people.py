@@ -127,7 +127,7 @@ def test_scans_alone_find_a_person_where_bodies_without_a_picture_count(monkeypa
     assert isinstance(ended(bench, PeopleDetector(bench, [PERSON]), unpictured=True), Succeeded)
 
 
-def test_where_scans_alone_find_nobody_the_camera_is_the_cause(monkeypatch):
+def test_the_camera_is_the_cause_where_scans_alone_find_nobody(monkeypatch):
     bench = lit_bench(monkeypatch, BODY)
     bench.robot.blocks.remove(BODY)
     spoil(bench, monkeypatch, old)
@@ -140,7 +140,7 @@ def test_where_scans_alone_find_nobody_the_camera_is_the_cause(monkeypatch):
     [((1.9, 2.5), (2.8, 3.4), Cause.POSTCONDITION), ((0.2, 0.9), (1.6, 2.6), Cause.EXECUTION)],
     ids=["on the side to which the robot turns", "behind"],
 )
-def test_where_one_camera_is_faulty_only_what_the_other_shows_counts_as_seen(x_m, y_m, cause, monkeypatch):
+def test_only_a_sound_camera_shows_what_counts_as_seen(x_m, y_m, cause, monkeypatch):
     bench = lit_bench(monkeypatch, BODY)
     bench.robot.blocks.remove(BODY)
     spoil(bench, monkeypatch, without_depth, ("frontleft",))

@@ -113,7 +113,7 @@ def test_without_anybody_ahead_the_skill_fails():
     assert "nobody is seen ahead" in step.message
 
 
-def test_where_cameras_give_no_depth_the_robot_cannot_say_that_nobody_is_ahead(monkeypatch):
+def test_the_robot_does_not_say_that_nobody_is_ahead_without_depth(monkeypatch):
     # something low stands ahead, where a camera looks for people
     bench = Bench(START, unmapped=(Box(2.7, 5.2, 3.0, 5.5, 0.0, 0.8),), **EXACT)
     blind(bench, monkeypatch)

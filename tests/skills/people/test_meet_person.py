@@ -63,7 +63,7 @@ def test_robot_does_not_claim_to_have_met_a_person_who_is_gone():
     assert step == Failed(Cause.POSTCONDITION, "Robin is not seen at (5.00, 5.40)")
 
 
-def test_where_cameras_give_no_depth_the_robot_cannot_say_that_the_person_is_gone(monkeypatch):
+def test_the_robot_does_not_say_that_the_person_is_gone_without_depth(monkeypatch):
     # something low stands where a camera looks for the person
     bench = Bench(START, unmapped=(Box(2.4, 5.2, 2.7, 5.5, 0.0, 0.8),), surveyed=TWO_ROOMS)
     blind(bench, monkeypatch)

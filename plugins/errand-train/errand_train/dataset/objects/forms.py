@@ -44,7 +44,7 @@ FORMS: Final[Mapping[tuple[str, str], int]] = MappingProxyType(
 """Number of the instance of each form, by class and name of the form."""
 
 TOOLS: Final = frozenset({"hammer", "screwdriver", "wrench"})
-"""Classes without cylinders: Drake mistakes how deep a box swallows a thin disc, and the contact flings the tool away."""
+"""Classes without cylinders: Drake mistakes how deep a box swallows a thin disc, and the contact flings the tool."""
 
 
 def write_forms(folder: Path) -> None:

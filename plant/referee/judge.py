@@ -29,7 +29,7 @@ DOOR_LOOK_S = 2.0
 def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: Sequence[Collision]) -> RefereeReport:
     """Judges all conditions at the times at which they must hold, and counts collisions and drops.
 
-    When the simulation has lost an object, it does not blame the robot: success is then True or None.
+    The robot is not blamed when the simulation has lost an object: success is then True or None.
     """
     findings = [_JUDGES[condition.kind](condition, truth) for condition in conditions]
     since_s = min((condition.since_s for condition in conditions), default=0.0)

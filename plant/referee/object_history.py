@@ -227,11 +227,14 @@ class ObjectHistory(Stateful):
         self.events.append(f"Somebody moved {definite(self.name)} at {time_s:.2f} s.")
 
     def forget_past(self) -> None:
-        """Clears the history for the next mission; only a held object keeps its lifts and rests."""
+        """Clears the history for the next mission; only a held object keeps its lifts and rests.
+
+        The time at which the object left the world stays, so that it excuses no later mission.
+        """
         if self._last is not None and self.holder is None:
             self.lifts, self.rests_W, self.rested_s, self._by_others = [], [], [], []
             self._rests(self._last)
-        self.events, self.dropped_s, self.touches, self.lost_s = [], [], 0, None
+        self.events, self.dropped_s, self.touches = [], [], 0
 
     def _moves_with_hand(self, sample: ObjectSample) -> bool:
         """Returns whether the object has not moved in the hand since the last sample."""

@@ -33,7 +33,7 @@ class Look:
     detections_3d: tuple[Detection3D, ...]
 
 
-def examined(
+def examine_image(
     image: Image,
     place: LocalisationEstimate,
     detector: Detector,

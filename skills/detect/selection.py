@@ -16,7 +16,7 @@ from skills.relations import Landmark, Relation, Scene, Standing, choose
 from skills.robot import FloatArray, Pose2D
 
 _AVOIDED_M = 0.08
-DOUBTED = 0.1
+_DOUBTED = 0.1
 """Probability of the wanted classes up to which the robot says that an object is none of them."""
 _EVEN = 0.5
 _LEAST_LENGTH = 0.4
@@ -183,14 +183,21 @@ def doubtful_tracks(tracks: Sequence[Track], inputs: DetectInputs) -> list[Track
     """Tracks on the surfaces that may be what is sought although nothing recognises them, likeliest first.
 
     An object of another class, of another size than the wanted classes have, or without the attributes is in no doubt.
+    One that may be a landmark is in doubt only where a wanted object may be, too.
     """
     names = {surface.name for surface in inputs.surfaces}
     here = [track for track in tracks if track.latest.surface in names and track.exists(1)]
-    other = {t.number for t in here if t.class_name not in (ANY_OBJECT, *inputs.sought)}
-    left = [t for t in here if t.number not in other or t.class_belief < CONFIRMED_CLASS]
-    kinds: tuple[DetectInputs | Landmark, ...] = (inputs, *inputs.landmarks)
-    likely = {t.number: max(_likely(t, kind) for kind in kinds) for t in left}
-    return sorted((t for t in left if likely[t.number] > DOUBTED), key=lambda t: -likely[t.number])
+    left = [t for t in here if not (t.class_name not in inputs.sought and _is_recognised(t))]
+    likely = {t.number: _likely(t, inputs) for t in left}
+    if max(likely.values(), default=0.0) > _DOUBTED or any(is_of_kind(t, inputs) for t in here):
+        landmarks = {t.number: max((_likely(t, one) for one in inputs.landmarks), default=0.0) for t in left}
+        likely = {number: max(value, landmarks[number]) for number, value in likely.items()}
+    return sorted((t for t in left if likely[t.number] > _DOUBTED), key=lambda t: -likely[t.number])
+
+
+def _is_recognised(track: Track) -> bool:
+    """Returns whether a track is likely of its class, and one view was sure of it."""
+    return track.evidence.is_sure(track.class_name) and track.class_belief >= CONFIRMED_CLASS
 
 
 def _likely(track: Track, kind: DetectInputs | Landmark) -> float:

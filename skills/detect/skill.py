@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 
 from skills.api import Cause, Question, Running, Succeeded
 from skills.detect.descriptions import count_sentence, describe, describe_unknown, surface_names, wanted_names
-from skills.detect.look import Look, cut_out, examined
+from skills.detect.look import Look, cut_out, examine_image
 from skills.detect.messages import (
     coverage_message,
     detections_message,
@@ -57,6 +57,8 @@ _ANSWER_S = 30.0
 """Time limit for the answer which of several objects is meant."""
 _NEAR_SHIFTS_RAD = (0.0, 0.6, -0.6)
 """Angles about a doubtful object from which it is viewed from near, one after the other."""
+_NEAR_UNTIL_S = 50.0
+"""Time of a search up to which near views of doubtful objects begin, so that its time limit is not passed."""
 _MOST_NAMED = 3
 """Number of unexplained objects that a message names."""
 _RAISED_M = 0.15
@@ -102,6 +104,7 @@ class Detect(LookingSkill[DetectInputs]):
         self._tracker, self._coverage = Tracker(tuple(dict.fromkeys(names))), Coverage(inputs.surfaces)
         self._tried: dict[int, int] = {}
         self._unknown: dict[int, Picture] = {}
+        self._near_until_s = self.context.clock.now() + _NEAR_UNTIL_S
         self._is_covered = False
         self._fits_near = inputs.seen_before is not None and max(inputs.seen_before.size_m) < _FITS_NEAR_M
         blocked: list[SkillFailure] = []
@@ -155,7 +158,8 @@ class Detect(LookingSkill[DetectInputs]):
                 yield from self._look_and_confirm(inputs, p_BT, [], close=not self._fits_near)
             return
         viewed, shifts_rad = Counter[int](), _NEAR_SHIFTS_RAD[: self.options.closer_looks]
-        while not self._has_enough(inputs) and viewed.total() < self.options.candidates * len(shifts_rad):
+        most = self.options.candidates * len(shifts_rad) if self.object_camera.on_hand else 0
+        while not self._has_enough(inputs) and viewed.total() < most and self.context.clock.now() < self._near_until_s:
             left = [track for track in self._doubts(inputs) if viewed[track.number] < len(shifts_rad)]
             if not left:
                 return
@@ -308,7 +312,7 @@ class Detect(LookingSkill[DetectInputs]):
         place, detector = self.context.localiser.estimate(), self.context.detector
 
         def examine() -> Look:
-            return examined(image, place, detector, inputs, self._own, {*inputs.classes} <= self._only_own)
+            return examine_image(image, place, detector, inputs, self._own, {*inputs.classes} <= self._only_own)
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)
         self._update(look, ANY_OBJECT in inputs.classes)
@@ -319,7 +323,10 @@ class Detect(LookingSkill[DetectInputs]):
         X_WO = look.localisation.X_WO
         if not is_dark(look.image):
             self._coverage.add(look.image, X_WO)
-        tracks = self._tracker.update(look.detections_3d, lambda t: in_plain_view(look.image, X_WO, t.position_W))
+        tracks = self._tracker.update(
+            look.detections_3d,
+            lambda t: in_plain_view(look.image, X_WO, t.position_W, 0.5 * max(t.latest.size_m)),
+        )
         shown = {*self._own, ANY_OBJECT} if things else {*self._own}
         placed = [each.detection for each in look.detections_3d if each.detection.class_name in shown]
         own = [each for each in placed if all(each is not one for one in look.detections)]
@@ -327,7 +334,7 @@ class Detect(LookingSkill[DetectInputs]):
         self.context.publish("detections", detections_message(look.image, sure, look.detections_3d))
         self.context.publish("tracks", tracks_message(self.context, tracks))
         for track in tracks:
-            if track.last_seen_s == look.image.stamp_s and not track.is_confirmed(1):
+            if any(track.latest is each for each in look.detections_3d) and not track.is_confirmed(1):
                 self._unknown[track.number] = cut_out(look.image, track.latest)
         self._last = look
 

@@ -221,9 +221,13 @@ def depth_at_points(image: Image, X_WO: RigidTransform, points_W: FloatArray) ->
     return np.where(inside, p_C[:, 2], np.nan), seen
 
 
-def in_plain_view(image: Image, X_WO: RigidTransform, p_W: FloatArray) -> bool:
-    """Returns whether a picture should show an object at a point: well inside, near, and not occluded."""
-    beside = p_W + np.array([[0.0, 0.0, 0.0], *(_EDGE_M * np.eye(3)), *(-_EDGE_M * np.eye(3))])
+def in_plain_view(image: Image, X_WO: RigidTransform, p_W: FloatArray, reach_m: float = 0.0) -> bool:
+    """Returns whether a picture should show an object at a point: well inside, near, and not occluded.
+
+    The object reaches `reach_m` beyond the point; a picture whose edge cuts it off need not show it.
+    """
+    edge_m = max(_EDGE_M, reach_m)
+    beside = p_W + np.array([[0.0, 0.0, 0.0], *(edge_m * np.eye(3)), *(-edge_m * np.eye(3))])
     depth, seen = depth_at_points(image, X_WO, beside)
     if not np.all(np.isfinite(depth)) or depth[0] > _PLAIN_M:
         return False

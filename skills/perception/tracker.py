@@ -23,7 +23,7 @@ DIFFERENT_PLACES_M = 0.03
 CONFIRMED_BELIEF = 0.6
 CONFIRMED_CLASS = 0.85
 """Least probability of a class that counts as recognised."""
-SEGMENT_BELIEF = 0.7
+_SEGMENT_BELIEF = 0.7
 """Probability that a segment is an object: one picture may show noise, or a part of one."""
 _JITTER_M = 0.012
 _NEAR_M = 0.03
@@ -213,7 +213,7 @@ def _fused(track: Track, detected: Detection3D) -> Track:
     known = any(math.dist(one, eye) < DIFFERENT_PLACES_M for one in track.eyes_W)
     return replace(
         track,
-        evidence=track.evidence.add(detected.detection, detected.shape),
+        evidence=track.evidence if known else track.evidence.add(detected.detection, detected.shape),
         belief=_updated(track.belief, _evidence(detected)),
         position_W=position,
         covariance=covariance,
@@ -234,7 +234,7 @@ def _latest(track: Track, detected: Detection3D) -> Detection3D:
 def _existence(detected: Detection3D) -> float:
     """Probability that a detection shows an object of any class."""
     score = min(detected.detection.score, _MOST_SURE)
-    return max(score, SEGMENT_BELIEF) if detected.is_segmented else score
+    return max(score, _SEGMENT_BELIEF) if detected.is_segmented else score
 
 
 def _evidence(detected: Detection3D) -> float:

@@ -34,6 +34,8 @@ HALF_M: Final = 1.2
 BACK_M: Final = 0.5
 """Distance to back off, to bring an object before the feet to about the distance of a grasp."""
 MOST_ASIDE: Final = 2
+_SAME_M: Final = 0.12
+"""Distance within which an object that one look recognised is the one that another look did not."""
 ASIDE_M: Final = 0.45
 _TALLY: Final = "observations"
 """Output port of a look for all objects that it found."""
@@ -112,11 +114,13 @@ class Answer(ExplainedDecorator):
             distinct_objects([self.board.get(key) for leaf, key in keys.items() if leaf in done])
             for keys in (self.tallies, self.doubts)
         )
+        unknown = tuple(one for one in unknown if all(math.dist(one.position_W, f.position_W) > _SAME_M for f in found))
         enough = len(found) >= self.needed
         if self.count_key:
             self.board.put(self.count_key, float(len(found)))
-        if unseen and not enough:
-            return self._not_looked(nodes, unseen)
+        if not enough and (unseen or unknown):
+            unsure = (f"{one.surface}" for one in unknown if one.surface not in unseen)
+            return self._not_looked(nodes, (*unseen, *dict.fromkeys(unsure)))
         limits = f", as far as was seen: not {', '.join(unseen)}" if unseen else ""
         limits += f"; besides, {listing(map(describe_unknown, unknown))}" if unknown else ""
         return self._answered(enough, f"{count_sentence(found, ())}{limits}" if found else "")

@@ -182,8 +182,8 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         message = "feeling whether the gripper is empty"
         yield from self.pause(_FEEL_S, message)  # moving fingers feel nothing
         if self.context.payload.kind is None:  # shut jaws felt light, maybe because the object lay on the arm
-            self.context.payload.kind = seen.kind
             yield from self.shift_by_first([_RAISE_M * up_B(self.X_WB())], message, clear_of_boxes=True)
+            self.context.payload.kind = seen.kind
         return (yield from self.holds(message))
 
     def _secured(self, inputs: GraspInputs) -> Routine[Succeeded]:

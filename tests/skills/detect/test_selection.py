@@ -8,6 +8,7 @@ from table_scene import TABLE
 
 from skills.detect.selection import DetectInputs, doubtful_tracks
 from skills.perception.tracker import Tracker
+from skills.relations import Landmark, Relation, RelationKind
 
 COKES = DetectInputs(("coke",), (TABLE,))
 
@@ -58,6 +59,17 @@ def test_an_object_without_the_attribute_is_in_no_doubt():
     tracks = tracks_of(**UNKNOWN)
     assert doubtful_tracks(tracks, replace(COKES, attributes=("red",))) == []
     assert doubtful_tracks(tracks, replace(COKES, attributes=("big",))) != []
+
+
+def test_a_faint_score_of_another_class_explains_nothing():
+    shape = {"hammer": 5.0, "coke": 6.0, "thing": 0.3}
+    assert doubtful_tracks(tracks_of(name="hammer", score=0.31, shape=shape), COKES) != []
+
+
+def test_a_landmark_is_in_doubt_only_where_a_wanted_object_may_be():
+    beside = (Relation(RelationKind.NEXT_TO, (Landmark("hammer", classes=("hammer",)),)),)
+    pipe = {"size_m": (0.3, 0.05, 0.03), "shape": {"coke": 0.02, "hammer": 6.0, "thing": 0.3}}
+    assert doubtful_tracks(tracks_of(**UNKNOWN, **pipe), replace(COKES, relations=beside)) == []
 
 
 def test_the_likeliest_comes_first():

@@ -82,10 +82,15 @@ def test_an_object_detected_as_two_classes_is_the_better_one():
 
 
 def test_the_class_follows_the_scores_of_all_views():
-    seen = detected_3d(score=0.55, name="beer"), detected_3d(score=0.9), detected_3d(score=0.9)
+    seen = detected_3d(score=0.55, name="beer"), detected_3d(score=0.9, eye=LEFT), detected_3d(score=0.9, eye=RIGHT)
     (track,) = tracker_of(*([each] for each in seen)).snapshot()
     assert track.class_name == "coke"
     assert track.class_belief > 0.8
+
+
+def test_a_picture_from_the_same_place_is_no_new_evidence_of_the_class():
+    once, twice = (tracker_of(*[[detected_3d(score=0.6)]] * count).snapshot()[0].class_belief for count in (1, 2))
+    assert once == twice
 
 
 def test_a_missed_track_loses_belief():
@@ -118,10 +123,10 @@ def test_a_track_that_was_confirmed_and_then_missed_is_no_longer_confirmed():
 def test_a_track_seen_as_another_class_stays_confirmed_while_its_class_is_likely():
     # twice surely a beer, then twice a coke
     seen = [[detected_3d(name="beer", eye=LEFT)], [detected_3d(name="beer", eye=RIGHT)]]
-    doubt = [detected_3d(name="coke", score=0.6, eye=LEFT)]
-    for doubts, confirmed in ((0, True), (2, False)):
-        (track,) = tracker_of(*seen, *[doubt] * doubts).snapshot()
-        assert track.is_confirmed() is confirmed, doubts
+    doubts = [[detected_3d(name="coke", score=0.6, eye=(0.0, y_m, 1.0))] for y_m in (0.3, -0.3)]
+    for count, confirmed in ((0, True), (2, False)):
+        (track,) = tracker_of(*seen, *doubts[:count]).snapshot()
+        assert track.is_confirmed() is confirmed, count
 
 
 def test_a_segment_of_a_cluster_begins_a_track_that_another_label_joins():

@@ -106,6 +106,17 @@ def test_a_count_names_what_no_look_recognised(context):
     assert root.message == f"yes: beers in the workshop; {told}"
 
 
+def test_too_few_is_not_said_while_something_is_unexplained(context):
+    unknown = ObjectObservation(0.0, ObjectKind("thing"), (3.0, 0.0, 0.8), (0.06, 0.06, 0.24), 0.0, 0.7, "bench")
+    for name in ("bench", "trolley"):
+        context.board.put(f"alice/q/{name}/unexplained", (unknown,))
+    doubts = {f"alice/q/{name}": f"alice/q/{name}/unexplained" for name in ("bench", "trolley")}
+    root = count_of(context, ((0.0,), "O"), 2, doubts=doubts)
+    assert (root.status, root.answer, root.cause) == (F, None, Cause.EXECUTION)
+    assert "no answer for bench" in root.message
+    assert count_of(context, ((0.0,), (3.0,)), 2, doubts=doubts).answer is True  # another look recognised it
+
+
 @pytest.mark.parametrize(("bench", "needed"), [("O", 1), ((0.0,), 2)])
 def test_too_few_is_not_said_when_a_surface_was_missed(context, bench, needed):
     root = count_of(context, (bench, "P"), needed)

@@ -365,17 +365,6 @@ def _convexity(part: NDArray[np.uint8] | Mask) -> float:
     return float(part.sum()) / max(float(hull_cells), 1.0)
 
 
-def loose_clusters(
-    image: Image,
-    place: LocalisationEstimate,
-    views: Iterable[SurfaceView],
-    labelled: Sequence[Detection3D],
-    surfaces: Sequence[Surface],
-) -> list[Cluster]:
-    """Clusters of the objects on surfaces that none of the `labelled` detections explains."""
-    return [cluster for cluster, label in labelled_clusters(image, place, views, labelled, surfaces) if label is None]
-
-
 def labelled_clusters(
     image: Image,
     place: LocalisationEstimate,

@@ -19,7 +19,14 @@ from executive.words.command import PEOPLE_TASKS, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
 from skills.api import Cause, Failed, ObjectKind, Publish, Surface
-from skills.detect.descriptions import count_of, count_sentence, describe_unknown, distinct_objects, plural
+from skills.detect.descriptions import (
+    SAME_WITHIN_M,
+    count_of,
+    count_sentence,
+    describe_unknown,
+    distinct_objects,
+    plural,
+)
 from skills.geometry import compose
 from skills.inputs.errors import listing, with_article
 from skills.robot import Pose2D
@@ -34,8 +41,6 @@ HALF_M: Final = 1.2
 BACK_M: Final = 0.5
 """Distance to back off, to bring an object before the feet to about the distance of a grasp."""
 MOST_ASIDE: Final = 2
-_SAME_M: Final = 0.12
-"""Distance within which an object that one look recognised is the one that another look did not."""
 ASIDE_M: Final = 0.45
 _TALLY: Final = "observations"
 """Output port of a look for all objects that it found."""
@@ -114,7 +119,9 @@ class Answer(ExplainedDecorator):
             distinct_objects([self.board.get(key) for leaf, key in keys.items() if leaf in done])
             for keys in (self.tallies, self.doubts)
         )
-        unknown = tuple(one for one in unknown if all(math.dist(one.position_W, f.position_W) > _SAME_M for f in found))
+        unknown = tuple(
+            one for one in unknown if all(math.dist(one.position_W, f.position_W) > SAME_WITHIN_M for f in found)
+        )
         enough = len(found) >= self.needed
         if self.count_key:
             self.board.put(self.count_key, float(len(found)))

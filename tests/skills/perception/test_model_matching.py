@@ -13,7 +13,7 @@ from skills.api import LocalisationEstimate
 from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.model_matching import ModelDetector, identified, likeness, with_models
 from skills.perception.object_model import view_of
-from skills.perception.surface_segmentation import loose_clusters, segment_surface
+from skills.perception.surface_segmentation import labelled_clusters, segment_surface
 from skills.testing.estimators import PlainColours
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
@@ -26,7 +26,8 @@ by_mesh_and_by_photographs = pytest.mark.parametrize("model", [MODEL, PHOTOGRAPH
 
 def seen(things, models):
     image = scene(things)
-    clusters = loose_clusters(image, PLACE, [segment_surface(image, RigidTransform(), TABLE)], [], [TABLE])
+    pairs = labelled_clusters(image, PLACE, [segment_surface(image, RigidTransform(), TABLE)], [], [TABLE])
+    clusters = [cluster for cluster, _ in pairs]
     return identified(clusters, image, PLACE, {model.name: model for model in models})
 
 

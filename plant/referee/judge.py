@@ -24,18 +24,24 @@ from skills.robot import FloatArray
 PERSON = "person"
 DOOR_LOOK_S = 2.0
 """Longest time between the robot's look at a door and its answer."""
+_ABOUT_OBJECTS = frozenset(
+    (GoalKind.GRASPED, GoalKind.HANDED_OVER, GoalKind.PLACED, GoalKind.ANSWERED, GoalKind.CLEARED, GoalKind.PICTURED)
+)
 
 
 def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: Sequence[Collision]) -> RefereeReport:
     """Judges all conditions at the times at which they must hold, and counts collisions and drops.
 
-    The robot is not blamed when the simulation has lost an object: success is then True or None.
+    The robot is not blamed when the simulation has lost an object of each condition that does not hold: success is then
+    None.
     """
     findings = [_JUDGES[condition.kind](condition, truth) for condition in conditions]
     since_s = min((condition.since_s for condition in conditions), default=0.0)
     lost = [one for one in truth.histories if one.lost_s is not None and one.lost_s >= since_s]
+    failed = [condition for condition, finding in zip(conditions, findings, strict=True) if not finding.holds]
+    excused = all(_is_about(condition, lost, truth) for condition in failed)
+    success = not failed or (None if excused else False)
     findings += [Finding(True, f"the simulation lost {definite(one.name)}.") for one in lost]
-    success = all(finding.holds for finding in findings) or (None if lost else False)
     collisions = [each for each in collisions if each.time_s >= since_s]
     own = [each for each in collisions if not each.walked_in]
     bins = [each for one in conditions if one.kind is GoalKind.PLACED for each in one.goal if each.is_bin]
@@ -50,6 +56,11 @@ def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: Sequ
         hit_by_people=len(collisions) - len(own),
         robots_hit=sum(each.other_robot is not None for each in own),
     )
+
+
+def _is_about(condition: GoalCondition, objects: Sequence[ObjectHistory], truth: Truth) -> bool:
+    """Returns whether a condition is about one of some objects."""
+    return condition.kind in _ABOUT_OBJECTS and any(one in objects for one in _of_class(condition, truth))
 
 
 def _taken_again(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:

@@ -48,7 +48,8 @@ def examine_image(
     found = () if only_own else detect_in_image(detector, image, FAINT_SCORE)
     placed = detections_3d(image, place, found, inputs.surfaces)
     views = [view for view in segment_surfaces(image, place.X_WO, inputs.surfaces) if view is not None]
-    labels = [each for each in placed if each.detection.score >= SURE_SCORE] if own else placed
+    own_sought = any(name in own for name in inputs.classes)
+    labels = [each for each in placed if each.detection.score >= SURE_SCORE] if own_sought else placed
     pairs = labelled_clusters(image, place, views, labels, inputs.surfaces)
     loose = [cluster for cluster, label in pairs if label is None]
     segments = identified(loose, image, place, own) if own else tuple(segment_3d(c, image, place) for c in loose)

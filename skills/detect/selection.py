@@ -1,5 +1,6 @@
 """Selection among tracks and clusters: which objects a search counts, and which need a closer view."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -23,6 +24,10 @@ _LEAST_LENGTH = 0.4
 """Fraction of the shortest object of a class: an object may be hidden in part."""
 _MOST_LENGTH = 1.3
 """Fraction of the longest object of a class: two may be merged."""
+_PART = 0.6
+"""Length of a part of a larger object, at most, as a fraction of the object's."""
+_BESIDE_M = 0.02
+"""Distance beyond the outline of an object within which its parts are."""
 _FREE_M = 0.15
 """Distance to the next object beyond which more does not count."""
 _SEEN_AGAIN_M = 0.06
@@ -182,17 +187,29 @@ def level_distance(p_W: Sequence[float] | FloatArray, q_W: Sequence[float] | Flo
 def doubtful_tracks(tracks: Sequence[Track], inputs: DetectInputs) -> list[Track]:
     """Tracks on the surfaces that may be what is sought although nothing recognises them, likeliest first.
 
-    An object of another class, of another size than the wanted classes have, or without the attributes is in no doubt.
-    One that may be a landmark is in doubt only where a wanted object may be, too.
+    An object of another class, of another size than the wanted classes have, or without the attributes is in no doubt,
+    nor is a part of a larger object that a picture shows by itself. One that may be a landmark is in doubt only where a
+    wanted object may be, too.
     """
     names = {surface.name for surface in inputs.surfaces}
     here = [track for track in tracks if track.latest.surface in names and track.exists(1)]
-    left = [t for t in here if not (t.class_name not in inputs.sought and _is_recognised(t))]
+    whole = [t for t in here if not any(_is_part(t, other) for other in here)]
+    left = [t for t in whole if not (t.class_name not in inputs.sought and _is_recognised(t))]
     likely = {t.number: _likely(t, inputs) for t in left}
     if max(likely.values(), default=0.0) > _DOUBTED or any(is_of_kind(t, inputs) for t in here):
         landmarks = {t.number: max((_likely(t, one) for one in inputs.landmarks), default=0.0) for t in left}
         likely = {number: max(value, landmarks[number]) for number, value in likely.items()}
     return sorted((t for t in left if likely[t.number] > _DOUBTED), key=lambda t: -likely[t.number])
+
+
+def _is_part(track: Track, other: Track) -> bool:
+    """Returns whether a track without a class stands within the outline of a larger object."""
+    if track.class_name != ANY_OBJECT or max(track.latest.size_m) >= _PART * max(other.latest.size_m):
+        return False
+    x, y = track.position_W[:2] - other.position_W[:2]
+    c, s = math.cos(other.latest.yaw_rad), math.sin(other.latest.yaw_rad)
+    length_m, width_m, _ = other.latest.size_m
+    return abs(c * x + s * y) < 0.5 * length_m + _BESIDE_M and abs(c * y - s * x) < 0.5 * width_m + _BESIDE_M
 
 
 def _is_recognised(track: Track) -> bool:

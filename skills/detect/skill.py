@@ -100,7 +100,7 @@ class Detect(LookingSkill[DetectInputs]):
         targets = self._targets(inputs, X_WB)
         if not targets:
             raise SkillFailure(Cause.PRECONDITION, f"{surface_names(inputs.surfaces)} is out of sight from here")
-        names = (*self.context.detector.class_names, *((*self._own, ANY_OBJECT) if self._own else ()))
+        names = (*self.context.detector.class_names, *models)
         self._tracker, self._coverage = Tracker(tuple(dict.fromkeys(names))), Coverage(inputs.surfaces)
         self._tried: dict[int, int] = {}
         self._unknown: dict[int, Picture] = {}
@@ -163,6 +163,7 @@ class Detect(LookingSkill[DetectInputs]):
             left = [track for track in self._doubts(inputs) if viewed[track.number] < len(shifts_rad)]
             if not left:
                 return
+            self._own = self.context.detector.models  # imported objects explain what else may be sought
             shift_rad = shifts_rad[viewed[left[0].number]]
             viewed[left[0].number] += 1
             p_BT = self.X_WB().inverse() @ left[0].position_W

@@ -24,11 +24,12 @@ SURE_SCORE: Final = 0.5
 """Least score of a detection that begins a track, and that a class needs to be recognised."""
 FAINT_SCORE: Final = 0.3
 """Least score of a detection that supports a track, and that lets a class compete."""
-_NEW_IN_A_VIEW: Final = 0.5
+NEW_IN_A_VIEW: Final = 0.5
 """Fraction of a view's evidence that is new; 1 would be views with independent errors."""
 _LEAST_SCORE: Final = 0.04
 """Share of the views of an object of a class in which the detector gives the class no score."""
-_MOST_SURE: Final = 0.97
+MOST_SURE: Final = 0.97
+"""Highest score that counts as a probability."""
 _SHARE: Final = 0.07
 """Share of each class among the objects that the detector judges."""
 _OTHERS: Final = 0.43
@@ -62,12 +63,12 @@ class ClassEvidence:
         given = dict(seen.alternatives) | {seen.class_name: seen.score}
         score = np.array([0.0 if name == ANY_OBJECT else given.get(name, 0.0) for name in self.names])
         is_other = np.array([name == ANY_OBJECT for name in self.names])
-        likelihood = np.clip(score, _LEAST_SCORE, _MOST_SURE) / _SHARE
+        likelihood = np.clip(score, _LEAST_SCORE, MOST_SURE) / _SHARE
         likelihood[is_other] = max(1.0 - float(score.sum()), _LEAST_OTHERS) / _OTHERS
         shapes = np.array([shape.get(name, 1.0) for name in self.names]) if shape else np.ones(len(self.names))
         return replace(
             self,
-            scores=self.scores + _NEW_IN_A_VIEW * np.log(likelihood),
+            scores=self.scores + NEW_IN_A_VIEW * np.log(likelihood),
             shapes=self.shapes + np.log(shapes),
             best=np.maximum(self.best, score),
             shape_views=self.shape_views + (shape is not None),

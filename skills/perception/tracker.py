@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from skills.perception.class_evidence import SURE_SCORE, ClassEvidence
+from skills.perception.class_evidence import MOST_SURE, NEW_IN_A_VIEW, SURE_SCORE, ClassEvidence
 from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D
 from skills.robot import FloatArray
@@ -34,9 +34,6 @@ _MISSED_IF_THERE = 0.15
 _MISSED_IF_NOT = 0.88
 _SEEN_BY_CHANCE = 0.25
 """Fraction of objects among all detections, faint ones included."""
-_NEW_IN_A_VIEW = 0.5
-"""Fraction of a view's evidence that is new; 1 would be views with independent errors."""
-_MOST_SURE = 0.97
 _MOST_BELIEF = 0.999
 _LEAST_BELIEF = 0.05
 
@@ -233,7 +230,7 @@ def _latest(track: Track, detected: Detection3D) -> Detection3D:
 
 def _existence(detected: Detection3D) -> float:
     """Probability that a detection shows an object of any class."""
-    score = min(detected.detection.score, _MOST_SURE)
+    score = min(detected.detection.score, MOST_SURE)
     return max(score, _SEGMENT_BELIEF) if detected.is_segmented else score
 
 
@@ -243,7 +240,7 @@ def _evidence(detected: Detection3D) -> float:
     Assumes that a score is the fraction of correct detections, as it nearly is (docs/finding-things.md).
     """
     ratio = _odds(_existence(detected)) / _odds(_SEEN_BY_CHANCE)
-    return math.pow(ratio, _NEW_IN_A_VIEW)
+    return math.pow(ratio, NEW_IN_A_VIEW)
 
 
 def _updated(belief: float, ratio: float) -> float:

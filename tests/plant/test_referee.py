@@ -266,6 +266,8 @@ def test_an_object_that_leaves_the_world_is_a_fault_of_the_simulation():
     assert (verdict.success, verdict.drops) == (None, 0)
     assert "The simulation lost the coke." in verdict.why
     assert "it left the world." in stage.referee.events[-1]
+    hammer = replace(GRASPED, classes=("hammer",))
+    assert stage.referee.judge([GRASPED, HANDED, hammer]).success is False
 
 
 def test_a_hand_over_from_another_source_does_not_count():

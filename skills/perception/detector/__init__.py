@@ -43,10 +43,10 @@ class _LoadedWhenUsed(DetectorWrapper):
 
     @property
     def shapes(self) -> ShapeModel | None:
-        """The project's own shape model, for its own networks, unless the options leave it out."""
+        """The project's own shape model, unless the options leave it out."""
         from skills.perception.shape_model import shape_model
 
-        return shape_model() if self._options.shapes and self._options.file is None else None
+        return shape_model() if self._options.shapes else None
 
     @cached_property
     def _detector(self) -> Detector:  # type: ignore[override]

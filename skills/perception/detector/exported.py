@@ -29,6 +29,7 @@ from skills.perception.detector.layouts import (
     recognise,
 )
 from skills.perception.detector.model_files import ModelFileError, open_session
+from skills.perception.shape_model import ShapeModel, shape_model
 from skills.quantities import Count, Factor, Quantity, Share
 from skills.robot import Picture
 
@@ -91,6 +92,12 @@ class ExportedDetector(Detector):
     threshold: float
     suppression: SuppressionOptions
     class_names: tuple[str, ...] = ()
+
+    @property
+    def shapes(self) -> ShapeModel | None:
+        """The project's own shape model where it knows one of the classes."""
+        model = shape_model()
+        return model if any(name in model.names for name in self.class_names) else None
 
     def detect(self, pictures: Sequence[Picture]) -> list[Detections]:
         """Detects the objects in each picture, best first. Raises ValueError when an array is no picture."""

@@ -55,6 +55,14 @@ def test_an_object_is_in_doubt_while_it_may_be_what_is_sought(seen, is_doubtful)
     assert bool(doubtful_tracks(tracks_of(**seen), COKES)) is is_doubtful
 
 
+def test_a_part_of_a_larger_object_is_in_no_doubt():
+    (part,) = tracks_of(**UNKNOWN, size_m=(0.05, 0.04, 0.1))
+    (box,) = tracks_of(**UNKNOWN, size_m=(0.4, 0.3, 0.1))
+    beside = replace(part, number=2, position_W=box.position_W + [0.3, 0.0, 0.0])
+    within = replace(part, number=3, position_W=box.position_W + [0.15, 0.1, 0.0])
+    assert [track.number for track in doubtful_tracks([box, beside, within], COKES)] == [2]
+
+
 def test_an_object_without_the_attribute_is_in_no_doubt():
     tracks = tracks_of(**UNKNOWN)
     assert doubtful_tracks(tracks, replace(COKES, attributes=("red",))) == []

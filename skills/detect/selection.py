@@ -48,6 +48,7 @@ class DetectInputs:
     objects. `expected_W`: the search views only this position, and only objects within 0.35 m of it count. `floor`:
     visible objects on the floor beside the surfaces count too. With `relations`, only the objects that they mean count:
     the search views the whole surface and also looks for the landmarks. With a count of 1, exactly one must be meant.
+    `likely`: where nothing is recognised, an object counts that is more likely of a wanted class than of any other.
     """
 
     classes: tuple[str, ...]
@@ -59,6 +60,7 @@ class DetectInputs:
     avoid: tuple[ObjectObservation, ...] = ()
     seen_before: ObjectObservation | None = None
     relations: tuple[Relation, ...] = ()
+    likely: bool = False
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:

@@ -23,6 +23,7 @@ from skills.detect.selection import (
     DetectInputs,
     DetectOptions,
     doubtful_tracks,
+    is_of_kind,
     is_sure,
     matching_tracks,
     meant_tracks,
@@ -176,6 +177,12 @@ class Detect(LookingSkill[DetectInputs]):
         sure = {track.number for track in self._sure(inputs)}
         return [track for track in doubtful_tracks(self._tracker.snapshot(), inputs) if track.number not in sure]
 
+    def _likely(self, inputs: DetectInputs) -> list[Track]:
+        """Tracks that count where nothing is recognised: more likely of a wanted class than of any other."""
+        if not inputs.likely or inputs.relations or self._sure(inputs):
+            return []
+        return [track for track in self._doubts(inputs) if is_of_kind(track, inputs)]
+
     def _look_around(self, inputs: DetectInputs) -> Routine[None]:
         """Views occluded areas from both sides; a camera on a head cannot change sides."""
         around = inputs.expected_W is None and self.object_camera.on_hand
@@ -214,7 +221,7 @@ class Detect(LookingSkill[DetectInputs]):
 
     def _old_result(self, inputs: DetectInputs) -> Track | None:
         """The track seen last, if it is reliable and its picture is old."""
-        newest = next(iter(self._meant(inputs)), None)
+        newest = next(iter((*self._meant(inputs), *self._likely(inputs))), None)
         return newest if newest is not None and self._is_old(newest) else None
 
     def _is_old(self, track: Track) -> bool:
@@ -344,12 +351,15 @@ class Detect(LookingSkill[DetectInputs]):
         found = [_observed(track, inputs.attributes) for track in self._results(inputs)]
         if inputs.relations and inputs.count == 1 and len(found) > 1:
             found = [(yield from self._which(inputs, found))]
+        likely = self._likely(inputs)[:1]
+        found += [replace(_observed(t, ()), kind=ObjectKind(t.class_name, inputs.attributes)) for t in likely]
         if found and len(found) >= inputs.count:
             look = self._last
             for seen in found:
                 message = object_destination_message(self.context, seen, look.image, look.localisation.X_WO)
                 self.context.publish("object_destination", message)
-            said = f"saw {describe(found[0])}" if inputs.count == 1 else count_sentence(found, inputs.surfaces)
+            saw = "saw what is most likely" if likely else "saw"
+            said = f"{saw} {describe(found[0])}" if inputs.count == 1 else count_sentence(found, inputs.surfaces)
             doubts = self._doubts(inputs) if inputs.count == 0 else []
             said += f"; {self._unexplained(doubts)}" if doubts else ""
             outputs = {"observation": found[0], "observations": tuple(found)}

@@ -269,9 +269,11 @@ def search_plan(
     )
     known = builder.last_known_of(item)
     first = tuple(each for each in surfaces if known is not None and each == known.surface)
-    floor = builder.optional_ports("detect", {"floor": True})
-    looks = (*look_plans(builder, item, first, key, floor), *look_plans(builder, item, surfaces[len(first) :], key))
-    further = look_plans(builder.at("elsewhere"), item, elsewhere, key)
+    likely = builder.optional_ports("detect", {"likely": True})
+    floor = builder.optional_ports("detect", {"floor": True}) | likely
+    rest = surfaces[len(first) :]
+    looks = (*look_plans(builder, item, first, key, floor), *look_plans(builder, item, rest, key, likely))
+    further = look_plans(builder.at("elsewhere"), item, elsewhere, key, likely)
     looked, meant = place_phrase(builder.knowledge, place), bool(builder.relations(item.relations))
     looked += f", nor on the {listing(elsewhere)}" if elsewhere and not meant else ""
     needed = (

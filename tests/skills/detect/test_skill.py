@@ -107,6 +107,23 @@ def test_an_object_seen_only_once_does_not_count():
     )
 
 
+class Faint(Colours):
+    """Detector whose scores are never sure."""
+
+    def detect(self, pictures):
+        return [tuple(replace(one, score=0.45) for one in found) for found in super().detect(pictures)]
+
+
+def test_what_is_most_likely_the_object_counts_only_where_it_may():
+    likely = replace(COKES, likely=True)
+    step, _ = found([COKE], likely, detector=Faint())
+    assert step.message.startswith("saw what is most likely a coke on the table")
+    assert step.outputs["observation"].kind.name == "coke"
+    failed(Detect(context_of(TableRobot(things=[COKE]), detector=Faint())), COKES, Cause.EXECUTION, "cannot tell")
+    beer = Detect(context_of(TableRobot(things=[replace(COKE, colour=BLUE)]), detector=Faint()))
+    failed(beer, likely, Cause.POSTCONDITION, "no coke seen")
+
+
 def test_an_unexplained_object_is_viewed_from_three_sides_and_shown():
     log = []
     skill = Detect(context_of(TableRobot(things=[replace(COKE, colour=GREY)]), log))

@@ -21,7 +21,7 @@ GATE = 16.3
 """Squared Mahalanobis distance that holds 99.9 % of the detections of an object."""
 DIFFERENT_PLACES_M = 0.03
 CONFIRMED_BELIEF = 0.6
-CONFIRMED_CLASS = 0.85
+CONFIRMED_CLASS = 0.95
 """Least probability of a class that counts as recognised."""
 _SEGMENT_BELIEF = 0.7
 """Probability that a segment is an object: one picture may show noise, or a part of one."""

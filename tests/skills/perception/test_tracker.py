@@ -160,7 +160,7 @@ def test_a_snapshot_does_not_change_afterwards():
 # odds: s / (1 - s) of the first score, times the root of the odds of the second over those of 0.25
 @pytest.mark.parametrize(
     ("scores", "belief", "confirmed"),
-    [((0.5, 0.3), 0.53, False), ((0.5, 0.4), 0.59, False), ((0.5, 0.5), 0.63, True), ((0.6, 0.4), 0.68, True)],
+    [((0.5, 0.3), 0.53, False), ((0.5, 0.4), 0.59, False), ((0.6, 0.4), 0.68, False), ((0.9, 0.6), 0.95, True)],
 )
 def test_a_faint_detection_supports_a_track_a_little(scores, belief, confirmed):
     pictures = [[detected_3d(score=score, eye=(0.0, 0.1 * k, 1.0))] for k, score in enumerate(scores)]

@@ -1,21 +1,25 @@
 """Answers to "is there a X on Y": right, wrong, or "I cannot tell"; prints JSON.
 
     python -m tests.benchmarks.questions [--placements 12] [--absent 4] [--seed 1] [--worlds flat,shop,lab]
-        [--things beer,coke] [--scores-alone] [--jobs 1] [--out FOLDER]
+        [--things beer,coke] [--scores-alone] [--foreign FOLDER] [--jobs 1] [--out FOLDER]
 
 Each placement puts one shipped form of a class on a surface of a world, beside two forms of other classes; where X is
 absent, three held-out objects of no class stand there. The robot stands at each viewpoint of the surface in turn, as in
-the mission, until it finds X. `--scores-alone` leaves out the shapes in depth (ablation).
+the mission, until it finds X. `--scores-alone` leaves out the shapes in depth (ablation). With `--foreign` objects that
+others modelled stand there instead, from a folder that `flat_pictures --foreign FOLDER` has written.
 """
 
 import math
 import time
+from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from errand_train.dataset.objects import DISTRACTORS
+from errand_train.dataset.objects.model import read_model
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.testing.bench import SkillBench
 from plant.engine import Engine
@@ -27,8 +31,9 @@ from skills.estimate.grid_map import load_grid_map
 from skills.estimate.localiser import ScanMatchingLocaliser
 from skills.geometry import inside_polygon
 from skills.perception.detector import Cascade
-from tests.benchmarks.find_things import held_out_instance, scattered
+from tests.benchmarks.find_things import held_out_instance, middle, scattered
 from tests.benchmarks.flat_scene import FlatScene, surface_of
+from tests.benchmarks.foreign_models import OTHERS
 from tests.benchmarks.harness import benchmark, quantile, tell
 
 RIM_M, APART_M, TRIES, REACH_M = 0.06, 0.08, 300, 1.5
@@ -59,18 +64,33 @@ def cases(
     worlds: tuple[str, ...] = ("flat", "shop", "lab"),
     things: tuple[str, ...] = (),
     scores_alone: bool = False,
+    foreign: Path | None = None,
 ):
+    known = {name for name, _ in FORMS} if foreign is None else {*models_in(foreign)}
     for number in range(placements + absent):
-        for k, (name, form) in enumerate(each for each in FORMS if not things or each[0] in things):
-            yield name, form, number < placements, worlds[(k + number) % len(worlds)], seed, number, scores_alone
+        for k, (name, form) in enumerate(each for each in FORMS if each[0] in (things or known)):
+            yield name, form, number < placements, worlds[(k + number) % len(worlds)], seed, number, scores_alone, foreign
 
 
-def run_case(name, form, there, world, seed, number, scores_alone, folder):
+@cache
+def models_in(folder):
+    """The models in a folder by category."""
+    models = [read_model(each.parent) for each in sorted(folder.glob("*/model.json"))]
+    return {name: [each for each in models if each.category == name] for name in {each.category for each in models}}
+
+
+def run_case(name, form, there, world, seed, number, scores_alone, foreign, folder):
     rng = np.random.default_rng([seed, number, FORMS.index((name, form)), 85])
     known = knowledge_of(open_world(world))
     surface = surface_of(str(rng.choice(sorted(known.tops))), world)
     views = known.surfaces[surface.name].viewpoints
-    if there:
+    if foreign is not None:
+        given = models_in(foreign)
+        drawn = [given[each][int(rng.integers(len(given[each])))] for each in (name if there else OTHERS, OTHERS, OTHERS)]
+        placed = list(scattered(rng, drawn, surface, views[int(rng.integers(len(views)))].pose_2d()))
+        models = [(each.model.path, each.X_WO) for each in placed]
+        places = [middle(each) for each in placed if each.model.category == name]
+    elif there:
         others = [FORMS[k] for k in rng.permutation(len(FORMS)) if FORMS[k][0] != name][:2]
         objects = list(laid(rng, [(name, form), *others], surface, views[int(rng.integers(len(views)))]))
         models, places = [(file, X) for _, file, X in objects], [X.translation() for n, _, X in objects if n == name]

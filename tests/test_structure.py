@@ -22,9 +22,9 @@ LINES = {
     "executive/conversation": 597,
     "executive/view": 1922,
     "executive/testing": 860,
-    "executive/app": 8273,  # an object that the simulation lost (85)
+    "executive/app": 8307,  # an object that the simulation lost, views of unexplained objects (85)
     "executive/cli": 3943,  # the mission that a recording means (84)
-    "skills": 29524,  # unexplained objects, shapes, people without depth, a gentle grip (85)
+    "skills": 29588,  # unexplained objects and their views, shapes, people without depth, a gentle grip (85)
     "plant": 11524,  # the speed of free bodies, objects that left the world (85)
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 430, 61, 7

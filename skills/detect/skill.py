@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, Question, Running, Succeeded
+from skills.api import PICTURES, Cause, Question, Running, Succeeded
 from skills.detect.descriptions import count_sentence, describe, describe_unknown, surface_names, wanted_names
-from skills.detect.look import Look, cut_out, examine_image
+from skills.detect.look import Look, UnknownObject, examine_image
 from skills.detect.messages import (
     coverage_message,
     detections_message,
@@ -45,7 +45,7 @@ from skills.perception.detector.camera_images import (
 from skills.perception.point_cloud import Coverage, in_plain_view
 from skills.perception.tracker import Track, Tracker
 from skills.relations import ordinal
-from skills.robot import FloatArray, Mount, Picture
+from skills.robot import FloatArray, Mount
 from skills.routine import PlanningAttempt, Routine, SkillFailure
 from skills.world_model import ObjectKind, ObjectObservation
 
@@ -104,7 +104,7 @@ class Detect(LookingSkill[DetectInputs]):
         names = (*self.context.detector.class_names, *models)
         self._tracker, self._coverage = Tracker(tuple(dict.fromkeys(names))), Coverage(inputs.surfaces)
         self._tried: dict[int, int] = {}
-        self._unknown: dict[int, Picture] = {}
+        self._unknown: dict[int, UnknownObject] = {}
         self._near_until_s = self.context.clock.now() + _NEAR_UNTIL_S
         self._is_covered = False
         self._fits_near = inputs.seen_before is not None and max(inputs.seen_before.size_m) < _FITS_NEAR_M
@@ -343,7 +343,7 @@ class Detect(LookingSkill[DetectInputs]):
         self.context.publish("tracks", tracks_message(self.context, tracks))
         for track in tracks:
             if any(track.latest is each for each in look.detections_3d) and not track.is_confirmed(1):
-                self._unknown[track.number] = cut_out(look.image, track.latest)
+                self._unknown.setdefault(track.number, UnknownObject()).add(look, track.latest)
         self._last = look
 
     def _ended(self, inputs: DetectInputs, blocked: Sequence[SkillFailure]) -> Routine[Succeeded]:
@@ -382,8 +382,9 @@ class Detect(LookingSkill[DetectInputs]):
         """Describes unexplained objects, and shows a picture of each: "something 24 cm tall stands on the desk"."""
         said = [describe_unknown(_observed(track, ())) for track in doubts[:_MOST_NAMED]]
         for track, what in zip(doubts, said, strict=False):
-            if (picture := self._unknown.get(track.number)) is not None:
-                self.context.show_picture(picture, f"What is this? {what.capitalize()}")
+            if (seen := self._unknown.get(track.number)) is not None:
+                facts = {"caption": f"What is this? {what.capitalize()}", "image": seen.picture}
+                self.context.publish(PICTURES, facts | seen.facts())
         return listing(said)
 
     def _results(self, inputs: DetectInputs) -> list[Track]:

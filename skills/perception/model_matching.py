@@ -87,13 +87,18 @@ _OUTLINE: Final = 0.8
 
 def seen_view(cluster: Cluster, image: Image, X_WC: RigidTransform) -> NDArray[np.uint8]:
     """View (24, 24, 4) of a segment, down to the surface, in a picture that is upright."""
+    return view_of(segment_picture(cluster, image, X_WC))
+
+
+def segment_picture(cluster: Cluster, image: Image, X_WC: RigidTransform) -> NDArray[np.uint8]:
+    """Picture (H, W, 4) of a segment, down to the surface, within its bounds and transparent around it."""
     low_W = cluster.points.p_W[cluster.points.p_W[:, 2] < cluster.base_m + _LOW_M]
     u, v = project((X_WC.inverse() @ (low_W * [1, 1, 0] + [0, 0, cluster.base_m]).T).T, image.intrinsics)
     pixels = np.concatenate([cluster.points.pixels, nearest_pixels(u, v, image.intrinsics)])
     mask = closed_mask(pixels, *image.grey.shape).astype(np.uint8)
     left, top, width, height = cv2.boundingRect(mask)
     colour = np.repeat(image.grey[..., None], 3, axis=2) if image.colour is None else image.colour
-    return view_of(np.dstack([colour, 255 * mask])[top : top + height, left : left + width])
+    return np.dstack([colour, 255 * mask])[top : top + height, left : left + width]
 
 
 def likeness(seen: NDArray[np.uint8], views: NDArray[np.uint8]) -> float:

@@ -383,7 +383,7 @@ def labelled_clusters(
     return [
         (one, label)
         for one, label in pairs
-        if label is not None or (_stands_on(one, outlines[one.surface]) and not _is_cut_off(one, image))
+        if label is not None or (_stands_on(one, outlines[one.surface]) and not is_cut_off(one, image))
     ]
 
 
@@ -401,7 +401,8 @@ def _stands_on(cluster: Cluster, outline_W: tuple[tuple[float, float], ...]) -> 
     return cluster.shape.length_m < LONGEST_M and bool(inside_polygon(centre, outline_W, -_RIM_M)[0])
 
 
-def _is_cut_off(cluster: Cluster, image: Image) -> bool:
+def is_cut_off(cluster: Cluster, image: Image) -> bool:
+    """Returns whether the picture's edge may cut off a cluster."""
     u0, v0, u1, v1 = cluster.box
     lens = image.intrinsics
     return min(u0, v0, lens.width - 1 - u1, lens.height - 1 - v1) < _BORDER_PX

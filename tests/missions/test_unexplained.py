@@ -30,3 +30,4 @@ def test_a_bottle_that_nothing_recognises_is_not_denied(tmp_path, monkeypatch):
     what = "something 24 cm tall stands on the kitchen counter"
     assert f"I cannot tell whether there is a beer: {what}" in end.message
     assert f"What is this? {what.capitalize()}" in captions
+    assert len(list((tmp_path / "what_is_this_1").glob("view_*.png"))) >= 4

@@ -38,8 +38,13 @@ def photographed_can(name, radius, height, colour):
         mask = np.uint8(255) * (photograph != GREY).any(axis=-1)
         left, top, width, height_px = cv2.boundingRect(mask)
         views.append(view_of(np.dstack([photograph, mask])[top : top + height_px, left : left + width]))
+    return viewed_model(name, (2.0 * radius, 2.0 * radius, height), views)
+
+
+def viewed_model(name, size_m, views):
+    """A box of a size that is known by views."""
     steps = np.linspace(-1.0, 1.0, 13)
     box = np.array([p for p in product(steps, steps, steps) if max(map(abs, p)) == 1.0])
     normals = box / np.linalg.norm(box, axis=1)[:, None]
     grey = np.full(box.shape, 128, np.uint8)
-    return ObjectModel(name, box * [radius, radius, 0.5 * height], normals, grey, np.eye(3)[None], np.array(views))
+    return ObjectModel(name, 0.5 * box * size_m, normals, grey, np.eye(3)[None], np.array(views))

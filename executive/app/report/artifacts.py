@@ -2,6 +2,7 @@
 
 import base64
 import json
+import math
 import re
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,6 +30,13 @@ DETECTIONS: Final = "detections"
 MOST_BYTES: Final = 1_500_000
 MOST_SHOWN: Final = 12
 """Number of pictures of skills in the report of a robot."""
+UNEXPLAINED: Final = "what_is_this"
+MOST_VIEWS: Final = 24
+"""Number of views of an unexplained object in its folder."""
+_SAME_M: Final = 0.08
+"""Horizontal distance within which unexplained objects of two searches are one."""
+_LEAST_MM: Final = 8
+"""Least side of an imported object."""
 _FACTS: Final = ("of", "robot", "camera", "stamp_s", "pose")
 """Facts on a picture that stand in `pictures.json`."""
 _MARGIN_M: Final = 0.3
@@ -69,7 +77,8 @@ class Artifacts(RunVisitor):
 
     `pictures` are small JPEG files of the answers, at most `MOST_BYTES` in all. `numbers` maps a node's path id and a
     time (s) to the index of an answer's picture. `drawn` are the written files by name, `trees` the logged trees,
-    `steps` what each robot does, with the times (s).
+    `steps` what each robot does, with the times (s). `unexplained` are the positions p_W of objects that nothing
+    recognised, each with its views as PNG files.
     """
 
     def __init__(self) -> None:
@@ -80,6 +89,7 @@ class Artifacts(RunVisitor):
         self.drawn: dict[str, Path] = {}
         self.trees: list[Mapping[str, Any]] = []
         self.steps: dict[str, list[tuple[float, str]]] = {}
+        self.unexplained: list[tuple[Sequence[float], list[bytes]]] = []
         self._step_of: dict[str, str] = {}
         self._running: dict[str, dict[str, str]] = {}
 
@@ -102,8 +112,9 @@ class Artifacts(RunVisitor):
         if topic == PICTURES and "of" in message:
             own.looked.clear()
             own.looked.append((own.looks, {**message, "detections": ()}))
-        elif topic == PICTURES and len(own.shown) < MOST_SHOWN:
-            own.shown.append((str(message["caption"]), to_jpeg(message["image"])))
+        elif topic == PICTURES:
+            caption = str(message["caption"]) + self._collect_views(message)
+            own.shown += [(caption, to_jpeg(message["image"]))] if len(own.shown) < MOST_SHOWN else []
         if topic == DESTINATION:
             own.confirmed += [] if own.seen is None else [own.seen]
             own.detection = own.detection or own.seen
@@ -130,6 +141,19 @@ class Artifacts(RunVisitor):
             own.pop()
         text = next(reversed(running.values()), text)
         own += [(t_s, text)] if not own or own[-1][1] != text else []
+
+    def _collect_views(self, message: Mapping[str, Any]) -> str:
+        """Collects the views of an unexplained object; returns the sentence that says how to import it, if any."""
+        if not (views := [base64.b64decode(each) for each in message.get("views", ())]):
+            return ""
+        p_W = message["position_W"]
+        near = (k for k, (q_W, _) in enumerate(self.unexplained) if math.dist(p_W[:2], q_W[:2]) < _SAME_M)
+        number = next(near, len(self.unexplained))
+        self.unexplained += [(p_W, [])] if number == len(self.unexplained) else []
+        self.unexplained[number][1].extend(views)
+        size = "x".join(str(max(_LEAST_MM, round(1e3 * side_m))) for side_m in message["size_m"])
+        command = f"errand object import {UNEXPLAINED}_{number + 1} --name NAME --size {size}"
+        return f". Import it from the run's folder: {command}"
 
     def _with_picture(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
         """Adds a picture to an answer: the views with the found objects or the person, or all views if none was found.
@@ -234,6 +258,15 @@ def save_pictures(events: Iterable[Event], folder: Path) -> Sequence[Path]:
         facts.append({"file": files[-1].name, **{key: each[key] for key in _FACTS}})
     (folder / "pictures.json").write_text(json.dumps(facts, indent=1), encoding="utf-8")
     return files
+
+
+def save_views(artifacts: Artifacts, folder: Path) -> None:
+    """Writes the views of each unexplained object into a folder of its own, as `errand object import` takes them."""
+    for number, (_, views) in enumerate(artifacts.unexplained, start=1):
+        own = folder / f"{UNEXPLAINED}_{number}"
+        own.mkdir(exist_ok=True)
+        for k, view in enumerate(views[:MOST_VIEWS], start=1):
+            (own / f"view_{k}.png").write_bytes(view)
 
 
 def to_jpeg(picture: Picture, widest_px: int = _WIDEST_PX, quality: int = _JPEG_QUALITY) -> bytes:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from py_trees.behaviour import Behaviour
 
 from executive.app.prepare.prepared import Prepared
-from executive.app.report.artifacts import Artifacts, draw_answer, save_pictures
+from executive.app.report.artifacts import Artifacts, draw_answer, save_pictures, save_views
 from executive.app.report.report_page import REPORT, EndedTree, with_findings, write_report
 from executive.app.report.run_report import RobotReport, RunReport
 from executive.app.runs.backend import Backend, Durable
@@ -141,6 +141,7 @@ def _conclude(
     report = with_findings(report, prepared.knowledge, result, artifacts, events)
     draw_answer(artifacts, out)
     save_pictures(events, out / "pictures")
+    save_views(artifacts, out)
     recording = backend.leave(artifacts, out)
     write_report(prepared, report, ended, artifacts, events)
     return replace(finished, report=report), recording

@@ -1,15 +1,20 @@
 """Search for own objects, which the detector knows by their models."""
 
+import base64
 from dataclasses import replace
 
-from own_models import can_model
+import cv2
+import numpy as np
+from own_models import can_model, viewed_model
 from table_robot import Colours, TableRobot, context_of, failed, outcome
 from table_scene import BLUE, COKE, GREEN, RED, TABLE, Can
 
 from skills.api import Cause, Succeeded
 from skills.detect.skill import Detect, DetectInputs
 from skills.perception.model_matching import ModelDetector
+from skills.perception.object_model import view_of
 
+COKES = DetectInputs(("coke",), (TABLE,))
 TIN = Can(1.1, 0.2, 0.04, 0.12, GREEN)
 MODELS = [can_model("tin", 0.04, 0.12, GREEN), can_model("pot", 0.05, 0.08, RED)]
 
@@ -67,3 +72,45 @@ def test_own_object_has_a_box_in_the_published_picture():
     assert not any("thing" in each for each in names)
     u0, v0, u1, v1 = next(each["box"] for message in shown for each in message["detections"])
     assert u1 > u0 and v1 > v0
+
+
+def pictures_of(png):
+    """The object in a view of the log, RGB with alpha."""
+    return cv2.cvtColor(cv2.imdecode(np.frombuffer(base64.b64decode(png), np.uint8), -1), cv2.COLOR_BGRA2RGBA)
+
+
+def unexplained(things):
+    """The message about what stays unexplained in a search for a coke."""
+    log = []
+    detector = Colours({"coke": RED})
+    failed(Detect(context_of(TableRobot(things=things), log, detector=detector)), COKES, Cause.EXECUTION, "cannot tell")
+    (message,) = [message for topic, message in log if topic == "pictures"]
+    return message
+
+
+def test_an_unexplained_object_has_clear_views_from_several_sides_and_its_size():
+    message = unexplained([TIN])
+    views = [pictures_of(each) for each in message["views"]]
+    assert 4 <= len(views) <= 6
+    assert sum(map(len, message["views"])) < 20_000
+    for view in views:
+        opaque = view[..., 3] > 127
+        assert 20 < max(view.shape[:2]) <= 132
+        assert not view[[0, -1]].any()
+        assert not view[:, [0, -1]].any()
+        assert np.abs(np.median(view[opaque][:, :3], axis=0) - GREEN).max() < 6
+        assert not view[~opaque].any()
+    assert np.allclose(message["size_m"], (0.08, 0.08, 0.12), atol=0.01)
+    assert np.allclose(message["position_W"][:2], (TIN.x, TIN.y), atol=0.01)
+
+
+def test_an_unexplained_object_is_recognised_by_the_views_of_it():
+    message = unexplained([TIN])
+    views = [view_of(pictures_of(each)[2:-2, 2:-2]) for each in message["views"]]
+    detector = ModelDetector(Colours({"coke": RED}), [viewed_model("jar", message["size_m"], views)])
+    step = outcome(Detect(context_of(TableRobot(things=[TIN]), detector=detector)), DetectInputs(("jar",), (TABLE,)))
+    assert isinstance(step, Succeeded), step
+    coke = Detect(context_of(TableRobot(things=[TIN]), detector=detector))
+    failed(coke, COKES, Cause.POSTCONDITION, "no coke seen")
+    blue = Detect(context_of(TableRobot(things=[replace(TIN, colour=BLUE)]), detector=detector))
+    failed(blue, DetectInputs(("jar",), (TABLE,)), Cause.POSTCONDITION, "no jar seen")

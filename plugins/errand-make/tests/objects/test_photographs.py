@@ -3,10 +3,14 @@
 import cv2
 import numpy as np
 import pytest
+from table_robot import TableRobot, context_of, outcome
+from table_scene import GREEN, TABLE, Can
 
 from errand_make.objects import ImportOptions, ImportReports, import_photographs
 from errand_make.objects.photographs import cut_out
+from executive.app.report.artifacts import Artifacts, save_views
 from plant.models.catalogue import read_imported
+from skills.detect.skill import Detect, DetectInputs
 from skills.inputs.errors import InputError
 from skills.perception.object_model import read_model
 from tests.tables import table
@@ -89,3 +93,19 @@ def test_less_than_four_good_photographs_are_refused_with_the_bad_ones(tmp_path)
     with pytest.raises(InputError, match=r"of 5 photographs 3 can be used") as caught:
         import_photographs(photographs, ImportOptions("mug"), tmp_path, ImportReports(), SIZE_M)
     assert [each.file.name for each in caught.value.others if each.file] == ["1.png", "2.png"]
+
+
+def test_the_views_of_an_unexplained_object_are_photographs_of_it(tmp_path):
+    log, artifacts, out, notes = [], Artifacts(), tmp_path / "tin", list[str]()
+    robot = TableRobot(things=[Can(1.1, 0.2, 0.06, 0.2, GREEN)])
+    outcome(Detect(context_of(robot, log)), DetectInputs(("extinguisher",), (TABLE,)))
+    for topic, message in log:
+        artifacts.message(topic, message)
+    save_views(artifacts, tmp_path)
+    out.mkdir()
+    reports = ImportReports(note=notes.append)
+    made = import_photographs(tmp_path / "what_is_this_1", ImportOptions("tin"), out, reports, (0.12, 0.12, 0.2))
+    assert notes == []
+    assert made.photographs >= 4
+    views = read_model(out).views
+    assert np.abs(np.median(views[views[..., 3] > 127][:, :3], axis=0) - GREEN).max() < 6

@@ -8,7 +8,15 @@ import cv2
 import numpy as np
 import pytest
 
-from executive.app.report.artifacts import MOST_SHOWN, Artifacts, draw_answer, save_pictures, to_jpeg
+from executive.app.report.artifacts import (
+    MOST_SHOWN,
+    MOST_VIEWS,
+    Artifacts,
+    draw_answer,
+    save_pictures,
+    save_views,
+    to_jpeg,
+)
 from executive.app.report.report_page import _pictures
 from executive.record.history import Event
 from executive.testing.bench import scripted_bench
@@ -170,6 +178,41 @@ def test_pictures_that_a_skill_shows_go_into_the_report_with_their_captions():
     pictures = list(_pictures(artifacts, "Alice", ["Alice"]))
     assert [caption for caption, _ in pictures] == [f"gauge {number}" for number in range(MOST_SHOWN)]
     assert all(data.startswith(b"\xff\xd8") for _, data in pictures)
+
+
+def unknown(x_m, *views, size_m=(0.0723, 0.07, 0.241)):
+    """A skill's message about an object that nothing recognised."""
+    picture = np.full((48, 64, 3), 90, np.uint8)
+    encoded = [base64.b64encode(view).decode() for view in views]
+    return {"robot": "Alice", "caption": "What is this?", "image": picture} | (
+        {"views": encoded, "position_W": [x_m, 2.0, 0.9], "size_m": list(size_m)} if views else {}
+    )
+
+
+def test_views_of_each_unexplained_object_are_written_for_the_import(tmp_path):
+    artifacts = Artifacts()
+    thin = (0.2, 0.004, 0.03)
+    for message in (unknown(1.0, b"a", b"b"), unknown(3.0, b"c", size_m=thin), unknown(1.02, b"d"), unknown(2.0)):
+        artifacts.message("pictures", message)
+    save_views(artifacts, tmp_path)
+    files = {str(file.relative_to(tmp_path)): file.read_bytes() for file in sorted(tmp_path.rglob("*.png"))}
+    bottle = {f"what_is_this_1/view_{k}.png": data for k, data in enumerate((b"a", b"b", b"d"), start=1)}
+    assert files == {**bottle, "what_is_this_2/view_1.png": b"c"}
+    commands = [caption.rpartition("folder: ")[2] for caption, _ in artifacts.of_robot("Alice").shown]
+    assert commands == [
+        "errand object import what_is_this_1 --name NAME --size 72x70x241",
+        "errand object import what_is_this_2 --name NAME --size 200x8x30",
+        "errand object import what_is_this_1 --name NAME --size 72x70x241",
+        "What is this?",
+    ]
+
+
+def test_the_views_of_one_object_are_limited(tmp_path):
+    artifacts = Artifacts()
+    for _ in range(MOST_SHOWN):
+        artifacts.message("pictures", unknown(1.0, *[b"a"] * 6))
+    save_views(artifacts, tmp_path)
+    assert len(list(tmp_path.rglob("*.png"))) == MOST_VIEWS
 
 
 def captions(*messages):

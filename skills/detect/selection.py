@@ -208,7 +208,7 @@ def _is_part(track: Track, other: Track) -> bool:
     """Returns whether a track without a class stands within the outline of a larger object."""
     if track.class_name != ANY_OBJECT or max(track.latest.size_m) >= _PART * max(other.latest.size_m):
         return False
-    x, y = track.position_W[:2] - other.position_W[:2]
+    x, y = (float(value) for value in track.position_W[:2] - other.position_W[:2])
     c, s = math.cos(other.latest.yaw_rad), math.sin(other.latest.yaw_rad)
     length_m, width_m, _ = other.latest.size_m
     return abs(c * x + s * y) < 0.5 * length_m + _BESIDE_M and abs(c * y - s * x) < 0.5 * width_m + _BESIDE_M

@@ -114,7 +114,7 @@ class Faint(Colours):
         return [tuple(replace(one, score=0.45) for one in found) for found in super().detect(pictures)]
 
 
-def test_what_is_most_likely_the_object_counts_only_where_it_may():
+def test_the_likeliest_object_counts_only_where_it_may():
     likely = replace(COKES, likely=True)
     step, _ = found([COKE], likely, detector=Faint())
     assert step.message.startswith("saw what is most likely a coke on the table")

@@ -69,7 +69,16 @@ def cases(
     known = {name for name, _ in FORMS} if foreign is None else {*models_in(foreign)}
     for number in range(placements + absent):
         for k, (name, form) in enumerate(each for each in FORMS if each[0] in (things or known)):
-            yield name, form, number < placements, worlds[(k + number) % len(worlds)], seed, number, scores_alone, foreign
+            yield (
+                name,
+                form,
+                number < placements,
+                worlds[(k + number) % len(worlds)],
+                seed,
+                number,
+                scores_alone,
+                foreign,
+            )
 
 
 @cache
@@ -86,7 +95,9 @@ def run_case(name, form, there, world, seed, number, scores_alone, foreign, fold
     views = known.surfaces[surface.name].viewpoints
     if foreign is not None:
         given = models_in(foreign)
-        drawn = [given[each][int(rng.integers(len(given[each])))] for each in (name if there else OTHERS, OTHERS, OTHERS)]
+        drawn = [
+            given[each][int(rng.integers(len(given[each])))] for each in (name if there else OTHERS, OTHERS, OTHERS)
+        ]
         placed = list(scattered(rng, drawn, surface, views[int(rng.integers(len(views)))].pose_2d()))
         models = [(each.model.path, each.X_WO) for each in placed]
         places = [middle(each) for each in placed if each.model.category == name]

@@ -151,7 +151,7 @@ def draw_map(
     """Draws paths (N, 2 or more columns: x, y), labels and marked points on a copy of a map, with a legend below it.
 
     Each path has a legend text and a colour. No label covers another one or a mark. The zones, in the form of
-    `skills.navigate.zone_map.zone_messages`, are drawn first.
+    `skills.zone_map.zone_messages`, are drawn first.
     """
     picture = view.picture.copy()
     for zone in zones:

@@ -56,7 +56,7 @@ from skills.world_model import ZoneMask as ZoneMask
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform, RotationMatrix
 
-    from skills.navigate.zone_map import ZoneMap
+    from skills.zone_map import ZoneMap
 
 ResultT = TypeVar("ResultT")
 ReadT = TypeVar("ReadT")
@@ -308,7 +308,7 @@ class SkillContext:
 
     def zone_map(self) -> ZoneMap:
         """Returns the zones as layers on the ground. Raises InputError when a mask cannot be read."""
-        from skills.navigate.zone_map import zone_map
+        from skills.zone_map import zone_map
 
         full_m_s = min(self.robot.capabilities().max_speed_m_s, self.stack.controller.max_speed_m_s)
         return zone_map(self.zones, full_m_s)
@@ -317,8 +317,8 @@ class SkillContext:
         """Returns the costmap with the keep-out zones as obstacles; a robot inside such a zone may still leave it."""
         if not self.zones:
             return self.costmap
-        from skills.navigate.footprint import Footprint
-        from skills.navigate.zone_map import KeepOut
+        from skills.footprint import Footprint
+        from skills.zone_map import KeepOut
 
         return KeepOut(self.zone_map()).space(self.costmap, Footprint.of(self.robot.capabilities()), self.pose())
 

@@ -27,17 +27,17 @@ from skills.robot import ConnectedRobot, FloatArray, GripperCapabilities, Pose2D
 
 if TYPE_CHECKING:
     from skills.detection import Detector
-    from skills.estimate.grid_map import GridMap
+    from skills.footprint import Footprint
+    from skills.grid_map import GridMap
     from skills.manipulation.arm.collision import ArmScene
     from skills.manipulation.arm.motion import ArmPlanner
     from skills.manipulation.grasp.candidates import GraspCandidate
     from skills.manipulation.grasp.placements import Target
     from skills.manipulation.grasp.planning import GraspPlan, Surroundings
     from skills.navigate.follower import Drive
-    from skills.navigate.footprint import Footprint
-    from skills.navigate.path import Path as WayPath
-    from skills.navigate.zone_map import ZoneMap
+    from skills.path import Path as WayPath
     from skills.world_model import Costmap, FreeSpace, Localiser, WorkCounter
+    from skills.zone_map import ZoneMap
 
 SLOTS: Final[Mapping[str, str]] = {
     "localiser": "errand.localisers",

@@ -24,7 +24,7 @@ Check = Callable[[str, str], list[str]]
 Graph = Mapping[str, frozenset[str]]
 WORDS_MAY = (
     *("executive.words", "skills.api", "skills.inputs", "skills.quantities", "skills.relations", "skills.robot"),
-    *("skills.world_model", "skills.perception.class_forms"),
+    *("skills.world_model", "skills.class_forms"),
 )
 """All that the words import: what things are, how files are read, and which numbers a quantity may have."""
 PLANT_MAY = (
@@ -64,16 +64,14 @@ SKILL_ROOMS = (
 )
 """The rooms of skills, the lowest first; the lowest is the interface: modules beside the rooms, and `skills.inputs`."""
 NAMES_ABOVE = {
-    "skills.api": ("skills.navigate.footprint", "skills.navigate.zone_map"),
     "skills.detection": ("skills.perception.object_model", "skills.perception.shape_model"),
     "skills.stack": (
-        *("skills.estimate.grid_map", "skills.manipulation.arm.collision", "skills.manipulation.arm.motion"),
+        *("skills.manipulation.arm.collision", "skills.manipulation.arm.motion"),
         *("skills.manipulation.grasp.candidates", "skills.manipulation.grasp.placements"),
-        *("skills.manipulation.grasp.planning", "skills.navigate.follower", "skills.navigate.footprint"),
-        *("skills.navigate.path", "skills.navigate.zone_map"),
+        *("skills.manipulation.grasp.planning", "skills.navigate.follower"),
     ),
 }
-"""What the interface of skills names of the rooms above: zones in a context, and types in the protocols of slots."""
+"""What the interface of skills names of the rooms above: models of a detector, and types in the protocols of slots."""
 PLANT_ROOMS = (
     ("plant.rendering", "plant.saved_state"),
     ("plant.sensors",),
@@ -257,11 +255,11 @@ CALL = "def f():\n    "
         (upward_in_app, "executive/app/runs/a.py", "import executive.app.fleet.chain", ["executive.app.fleet.chain"]),
         (upward_in_app, "executive/app/runs/a.py", "from executive.app.kernels import k", ["executive.app.kernels.k"]),
         (upward_in_app, "executive/app/runs/a.py", "from executive.app.report.run_report import RunReport", []),
-        (upward_in_rooms, "skills/estimate/a.py", "import skills.navigate.path", ["skills.navigate.path"]),
+        (upward_in_rooms, "skills/estimate/a.py", "import skills.navigate.skill", ["skills.navigate.skill"]),
         (upward_in_rooms, "skills/manipulation/arm/a.py", f"{CALL}import skills.detect.u", ["skills.detect.u"]),
-        (upward_in_rooms, "skills/manipulation/place/a.py", "import skills.navigate.path, skills.api", []),
-        (upward_in_rooms, "skills/geometry.py", "import skills.navigate.footprint", ["skills.navigate.footprint"]),
-        (upward_in_rooms, "skills/api.py", "import skills.navigate.footprint", []),
+        (upward_in_rooms, "skills/manipulation/place/a.py", "import skills.navigate.skill, skills.api", []),
+        (upward_in_rooms, "skills/geometry.py", "import skills.detect.look", ["skills.detect.look"]),
+        (upward_in_rooms, "skills/stack.py", "import skills.navigate.follower", []),
         (upward_in_rooms, "plant/people/walkers.py", "from plant.engine import Engine", ["plant.engine.Engine"]),
         (upward_in_rooms, "plant/engine.py", "from plant.people.walkers import Walkers", []),
         (plugin_imports, "plant/work.py", f"{CALL}import errand_train", ["errand_train"]),

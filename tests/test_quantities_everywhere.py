@@ -16,7 +16,7 @@ OURS_ALONE = (
     "executive/tree/estimate.py",
     "plant/models/catalogue.py",
     "plant/sensors/camera_spec.py",
-    "skills/perception/class_forms.py",
+    "skills/class_forms.py",
 )
 """Modules whose models describe files that come with the project, that Errand writes, or that other programs write."""
 

@@ -18,7 +18,7 @@ from executive.app.runs.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.robot_config import RobotConfig
-from skills.estimate.compiled import CompiledFunction
+from skills.compiled import CompiledFunction
 from skills.inputs.errors import InputError
 from skills.inputs.plugins import KERNELS, PluginDefect, distribution_of, installed_plugins, run_plugin
 
@@ -121,8 +121,8 @@ def _map_cells() -> None:
 
 def _match_scan() -> None:
     """Localises in a world's map by scan matching."""
-    from skills.estimate.grid_map import load_grid_map
     from skills.estimate.matching import score_poses
+    from skills.grid_map import load_grid_map
 
     score_poses(load_grid_map(open_world(DEFAULT_WORLD).scan_map_path), np.ones((2, 3)), np.ones((1, 3)))
 

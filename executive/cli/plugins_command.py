@@ -26,10 +26,10 @@ from executive.tree import registry
 from executive.tree.port_values import describe_type, field_types
 from plant.models.catalogue import load_catalogue
 from plant.robots import robot_kind as kinds
+from skills.class_forms import class_forms
 from skills.inputs import plugins as loading
 from skills.inputs.errors import InputError
 from skills.inputs.yaml_source import yaml_of
-from skills.perception.class_forms import class_forms
 from skills.quantities import Duration
 from skills.stack import BACKENDS, DOORS, SLOTS, is_frozen_dataclass, stack_data
 

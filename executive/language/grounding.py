@@ -22,8 +22,8 @@ from executive.language.spelling import look_alikes, synonyms_for, synonyms_of
 from executive.words.command import Command, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge, except_for, split_exceptions
 from skills.api import ObjectKind
+from skills.class_forms import NON, known_attributes
 from skills.inputs.errors import known_names, listing
-from skills.perception.class_forms import NON, known_attributes
 from skills.relations import DOOR, ORDERS, ROBOT, Landmark, Relation, RelationKind
 
 

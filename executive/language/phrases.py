@@ -13,7 +13,7 @@ from executive.language.lexicon import word_list
 from executive.language.nouns import NounKind
 from executive.language.tokens import Token
 from skills.api import ObjectKind
-from skills.detect.descriptions import plural
+from skills.descriptions import plural
 from skills.relations import RelationKind
 
 _LEFT: Final = frozenset(

@@ -18,7 +18,7 @@ from executive.language.lexicon import any_of, expression, lexicon, read_table
 from executive.language.nouns import NounKind
 from executive.words.command import is_attribute, may_be_attribute
 from executive.words.knowledge import Knowledge
-from skills.perception.class_forms import NON, known_attributes
+from skills.class_forms import NON, known_attributes
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from executive.record.schemas import RUN, TASK
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectKind, Publish
-from skills.estimate.grid_map import GridMap
-from skills.perception.class_forms import class_form
+from skills.class_forms import class_form
+from skills.grid_map import GridMap
 from skills.robot import Clock
 
 PACKAGES: Final = ("spot-errand", "drake", "py-trees", "numpy")

@@ -38,10 +38,10 @@ from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, logged_view
 from executive.words.robot_config import find_robot
 from skills.api import Cause, ObjectKind, ObjectObservation
-from skills.detect.descriptions import distinct_objects
+from skills.class_forms import ANY_OBJECT
+from skills.descriptions import distinct_objects
 from skills.inputs.errors import InputError
 from skills.inputs.outside import plain_file
-from skills.perception.class_forms import ANY_OBJECT
 
 MOST_BYTES = 100_000_000_000
 _EXISTS: Final = "name a log that exists"

@@ -24,9 +24,9 @@ from executive.tree.plan import start_key
 from executive.words.slug import slug
 from skills.api import Cause
 from skills.detection import Detector
+from skills.footprint import Footprint
 from skills.inputs.errors import shortage
 from skills.navigate.cut_off import DoorWatch
-from skills.navigate.footprint import Footprint
 from skills.robot import Lease, Pose2D
 
 HOLDER: Final = "errand"

@@ -18,7 +18,7 @@ from executive.tree.node import Change, NodeState, Snapshot
 from executive.tree.node_view import node_view
 from executive.words.goal import GoalKind
 from skills.api import Cause
-from skills.navigate.zone_map import zone_messages
+from skills.zone_map import zone_messages
 
 POSE_NOTE_PERIOD_S = 1.0
 

@@ -19,15 +19,15 @@ from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import area_m2
 from skills.api import FreeSpace, Part, PlanningError, Zone, ZoneKind
+from skills.footprint import Footprint
 from skills.inputs.errors import InputError, SourceLine, listing, suggestion
-from skills.navigate.footprint import Footprint
-from skills.navigate.path import Path, path_length
+from skills.path import Path, path_length
 from skills.robot import Pose2D
 from skills.stack import GlobalPlanner
 from skills.world_model import zones_sentence
 
 if TYPE_CHECKING:
-    from skills.navigate.zone_map import ZoneMap
+    from skills.zone_map import ZoneMap
 
 
 _TAKE_PICTURE: Final = "take_picture"
@@ -110,7 +110,7 @@ class PlannedRoutes(RoutePlanner):
         if not zones:
             path = self._path(self._costmap, start, goal)
             return Route(path_length(path), float(path.progress_m()[-1]))
-        from skills.navigate.zone_map import zone_map
+        from skills.zone_map import zone_map
 
         ground, place = zone_map(zones, self._full_m_s()), f"({goal.x_m:.2f}, {goal.y_m:.2f})"
         if names := ground.names_at(ZoneKind.KEEP_OUT, goal, self._footprint):
@@ -129,7 +129,7 @@ class PlannedRoutes(RoutePlanner):
         return self._planner.problem(space, self._footprint, start, goal, max_speed_m_s=math.inf, **costs)()
 
     def _space(self, zones: tuple[Zone, ...], start: Pose2D) -> FreeSpace:
-        from skills.navigate.zone_map import KeepOut, zone_map
+        from skills.zone_map import KeepOut, zone_map
 
         return KeepOut(zone_map(zones, self._full_m_s())).space(self._costmap, self._footprint, start)
 

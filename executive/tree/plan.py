@@ -24,8 +24,8 @@ from executive.words.goal import GoalCondition
 from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge
 from executive.words.slug import slug
 from skills.api import Cause, ObjectKind, Part, Skill, Surface
+from skills.class_forms import ANY_OBJECT
 from skills.inputs.errors import InputError, SourceLine, suggestion
-from skills.perception.class_forms import ANY_OBJECT
 from skills.relations import Relation
 from skills.robot import Pose2D
 

@@ -16,10 +16,10 @@ from executive.words.outlines import Corner, Polygon, distance_m
 from executive.words.robot_config import RobotsFile
 from executive.words.zone import ZoneFacts, with_files
 from skills.api import Surface, Tag, Zone
+from skills.class_forms import ANY_OBJECT, class_forms
 from skills.inputs.errors import InputError, suggestion
 from skills.inputs.schema import Name, Strict, validate
 from skills.inputs.yaml_source import YamlSource, read_yaml
-from skills.perception.class_forms import ANY_OBJECT, class_forms
 from skills.quantities import Angle, Coordinate, Height, Opening, Quantity, TagNumber, TagSize, TopHeight
 from skills.robot import Pose2D
 from skills.world_model import PERSON

@@ -6,7 +6,7 @@ from typing import Any
 from pydrake.math import RigidTransform
 
 from skills.api import Detection, ObjectObservation, SkillContext
-from skills.perception.class_forms import class_form
+from skills.class_forms import class_form
 from skills.perception.detection_3d import Detection3D
 from skills.perception.point_cloud import SurfaceShares, camera_pose_W
 from skills.perception.tracker import Track

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from skills.api import FLOOR, ObjectObservation, Surface
-from skills.detect.descriptions import count_of, surface_names
+from skills.class_forms import ANY_OBJECT, MEANS_BIG, class_form
+from skills.descriptions import count_of, surface_names
 from skills.inputs.errors import listing
-from skills.perception.class_forms import ANY_OBJECT, MEANS_BIG, class_form
 from skills.perception.detection_3d import Detection3D, has_attribute
 from skills.perception.tracker import CONFIRMED_CLASS, Track
 from skills.quantities import Angle, Coordinate, Duration, Height, Length, Tries

@@ -10,7 +10,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import PICTURES, Cause, Question, Running, Succeeded
-from skills.detect.descriptions import count_sentence, describe, describe_unknown, surface_names, wanted_names
+from skills.class_forms import ANY_OBJECT, known_attributes
+from skills.descriptions import count_sentence, describe, describe_unknown, surface_names, wanted_names
 from skills.detect.look import Look, UnknownObject, examine_image
 from skills.detect.messages import (
     coverage_message,
@@ -36,7 +37,6 @@ from skills.inputs.errors import listing, with_article
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
 from skills.perception.class_evidence import SURE_SCORE
-from skills.perception.class_forms import ANY_OBJECT, known_attributes
 from skills.perception.detection_3d import observation
 from skills.perception.detector.camera_images import (
     DETECTION_LATENCY_S,

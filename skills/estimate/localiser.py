@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 
 from skills.api import LocalisationEstimate
-from skills.estimate.grid_map import GridMap
 from skills.estimate.matching import Match, MatchOptions, grid_surfaces, match, score_poses
 from skills.estimate.scan_points import has_moved, outside_discs, placed_points, scan_points
 from skills.geometry import compose, inverse, relative_pose
+from skills.grid_map import GridMap
 from skills.quantities import Count, Duration, Height, Length, Share, Turn
 from skills.robot import FloatArray, Odometry, Pose2D, Robot, Scan
 

@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import Triple, bilinear, compiled
-from skills.estimate.grid_map import GridMap
+from skills.compiled import Triple, bilinear, compiled
 from skills.geometry import wrap
+from skills.grid_map import GridMap
 from skills.quantities import Count, Factor, Length
 from skills.robot import FloatArray, Pose2D
 

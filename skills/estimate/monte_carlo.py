@@ -9,11 +9,11 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import LocalisationEstimate
-from skills.estimate.grid_map import GridMap
 from skills.estimate.localiser import LocaliserOptions, ScanMatchingLocaliser
 from skills.estimate.matching import Match, match
 from skills.estimate.particle_filter import MODE_RADIUS_M, MODE_TURN_RAD, FilterOptions, Mode, ParticleFilter
 from skills.geometry import compose, inverse, relative_pose, wrap
+from skills.grid_map import GridMap
 from skills.quantities import Count, Length, Share, Turn
 from skills.robot import FloatArray, Pose2D, Scan
 

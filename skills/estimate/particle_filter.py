@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import Triple, compiled
-from skills.estimate.grid_map import GridMap
+from skills.compiled import Triple, compiled
 from skills.geometry import wrap
+from skills.grid_map import GridMap
 from skills.inputs.errors import InputError
 from skills.quantities import Count, Factor, Length, Margin, Share, Tries, Turn
 from skills.robot import FloatArray, Pose2D

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import Triple, compiled
+from skills.compiled import Triple, compiled
 from skills.geometry import relative_pose
 from skills.robot import Capabilities, FloatArray, Joints, Pose2D, Robot, Scan
 

@@ -7,8 +7,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import SkillContext
+from skills.footprint import Footprint
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
-from skills.navigate.footprint import Footprint
 from skills.robot import FloatArray
 
 LINK_RADIUS_M = 0.06

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import Cause, InputsT, Running, SkillContext
+from skills.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.geometry import compose
-from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.robot import CommandCause, CommandId, CommandState, Pose2D
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from skills.api import ReturnsView, SkillContext
-from skills.navigate.footprint import Footprint, disc_centres, outline_distances_m
-from skills.navigate.path import progress_m
+from skills.footprint import Footprint, disc_centres, outline_distances_m
+from skills.path import progress_m
 from skills.perception.moving_objects import Moving, MovingOptions, MovingWatch
 from skills.quantities import Acceleration, Count, Delay, Duration, Length, Margin, Speed, Turn
 from skills.robot import FloatArray, Pose2D

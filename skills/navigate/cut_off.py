@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skills.api import ClearableCostmap, FreeSpace, SkillContext
 from skills.doorway import DoorState, Doorway, measure_opening
-from skills.navigate.footprint import Footprint, clearance_on_grid, with_segments
+from skills.footprint import Footprint, clearance_on_grid, with_segments
 from skills.quantities import Delay, Length, Margin, Turn
 from skills.robot import FloatArray, Pose2D
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.geometry import wrap
+from skills.motion_cost import Space, clearance_needed, drive_cost, segment_cost, zone_factor
 from skills.navigate.lattice import Lattice
-from skills.navigate.motion_cost import Space, clearance_needed, drive_cost, segment_cost, zone_factor
-from skills.navigate.path import clearances
+from skills.path import clearances
 from skills.robot import FloatArray
 
 CELL_SHARE = 0.5

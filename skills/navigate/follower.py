@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from skills.footprint import Footprint, disc_centres, footprint_clearance_m
 from skills.geometry import wrap
-from skills.navigate.footprint import Footprint, disc_centres, footprint_clearance_m
-from skills.navigate.path import TURN_M_PER_RAD, Path
+from skills.path import TURN_M_PER_RAD, Path
 from skills.quantities import Acceleration, Delay, Duration, Factor, Length, Margin, Speed, TurnAcceleration, TurnRate
 from skills.robot import BaseKind, FloatArray, Pose2D
 from skills.world_model import FreeSpace

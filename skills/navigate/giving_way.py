@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import FreeSpace, SkillContext
-from skills.navigate.footprint import (
+from skills.footprint import (
     SAFE_MARGIN_M,
     Footprint,
     NoObstacles,
@@ -25,7 +25,7 @@ from skills.navigate.footprint import (
     pose_array,
     with_outlines,
 )
-from skills.navigate.path import progress_m
+from skills.path import progress_m
 from skills.quantities import Count, Delay, Length, Margin
 from skills.robot import FloatArray, Pose2D
 from skills.stack import LocalController

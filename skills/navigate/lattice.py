@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import compiled
-from skills.navigate.footprint import clearance_at
-from skills.navigate.motion_cost import Space, Weights, clearance_needed, mean_zone_factor, motion_seconds, nearness
+from skills.compiled import compiled
+from skills.footprint import clearance_at
+from skills.motion_cost import Space, Weights, clearance_needed, mean_zone_factor, motion_seconds, nearness
 from skills.robot import FloatArray
 
 IntArray = NDArray[np.int64]

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from skills.api import FreeSpace
-from skills.estimate.compiled import compiled
+from skills.compiled import compiled
+from skills.footprint import ClearanceField, Footprint, clearance_at, clearance_on_grid, footprint_clearance_m
 from skills.geometry import wrap
 from skills.navigate.follower import Drive, FollowerOptions, PathFollower
-from skills.navigate.footprint import ClearanceField, Footprint, clearance_at, clearance_on_grid, footprint_clearance_m
-from skills.navigate.path import Path
+from skills.path import Path
 from skills.quantities import Count, Duration, Factor, Margin, Speed, TurnRate
 from skills.robot import FloatArray, Pose2D
 

@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import NO_WORK_COUNTER, FreeSpace, PlanningError, WorkCounter
+from skills.footprint import SAFE_MARGIN_M, ClearanceField, Footprint, clearance_at, clearance_on_grid
 from skills.geometry import wrap
+from skills.motion_cost import NO_ZONES, TURNING_RADIUS_M, Needs, Space, Weights, ZoneCosts, segment_cost
 from skills.navigate.differential import CELL_SHARE, Links, courses, driven_poses, links
-from skills.navigate.footprint import SAFE_MARGIN_M, ClearanceField, Footprint, clearance_at, clearance_on_grid
 from skills.navigate.lattice import Lattice, cost_to_go, lattice_moves, search
-from skills.navigate.motion_cost import NO_ZONES, TURNING_RADIUS_M, Needs, Space, Weights, ZoneCosts, segment_cost
-from skills.navigate.path import Path, clearances, densify, relax, shortcut
-from skills.navigate.zone_map import ZoneMap
+from skills.path import Path, clearances, densify, relax, shortcut
 from skills.quantities import Count, Factor, Length, Margin, Speed, TurnRate
 from skills.robot import BaseKind, FloatArray, Pose2D
 from skills.world_model import ZoneKind, zones_sentence
+from skills.zone_map import ZoneMap
 
 FIELD_CELL_M = 0.05
 STEP_M = 0.06

@@ -10,15 +10,15 @@ from typing import ClassVar
 import numpy as np
 
 from skills.api import Cause, Failed, Part, PlanningError, Running, SkillContext, Step, Succeeded
+from skills.footprint import Footprint, footprint_clearance_m
 from skills.geometry import relative_pose
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
 from skills.navigate.follower import Drive
-from skills.navigate.footprint import Footprint, footprint_clearance_m
 from skills.navigate.giving_way import Avoided
-from skills.navigate.path import Path
 from skills.navigate.surroundings import Company, NavigateInputs, NavigateOptions, Surroundings
 from skills.navigate.trip_planning import TripPlanning, place_text
+from skills.path import Path
 from skills.robot import Pose2D
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 from skills.stack import LocalController

@@ -8,15 +8,14 @@ import numpy as np
 
 from skills.api import ClearableCostmap, FreeSpace, SkillContext
 from skills.doorway import Doorway
+from skills.footprint import Footprint, outline_distances_m, pose_array, with_discs
 from skills.geometry import bearing_rad
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.cut_off import DoorOptions, DoorWatch
-from skills.navigate.footprint import Footprint, outline_distances_m, pose_array, with_discs
 from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
-from skills.navigate.path import progress_m
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, ScanHealthOptions, WatchOptions
-from skills.navigate.zone_map import KeepOut, ZoneMap
+from skills.path import progress_m
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.quantities import Coordinate, Delay, Duration, Length, Margin, Speed, Tries, Turn, TurnRate
@@ -24,6 +23,7 @@ from skills.robot import FloatArray, Pose2D
 from skills.routine import PATIENCE_S
 from skills.stack import LocalController
 from skills.world_model import Zone, ZoneKind
+from skills.zone_map import KeepOut, ZoneMap
 
 
 @dataclass(frozen=True)

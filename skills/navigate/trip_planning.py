@@ -12,9 +12,9 @@ from skills.navigate.cut_off import closed_doors_sentence
 from skills.navigate.door_openers import DoorCalls
 from skills.navigate.giving_way import Avoided
 from skills.navigate.pass_request import PassRequest
-from skills.navigate.path import Path
 from skills.navigate.planner import LatticePlanner, xy_text
 from skills.navigate.surroundings import NavigateInputs, NavigateOptions, Surroundings
+from skills.path import Path
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
 from skills.routine import Patience, SkillFailure

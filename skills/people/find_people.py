@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, Detection, ObjectObservation, Part, Running, SkillContext, Succeeded, SurveyView
-from skills.detect.descriptions import count_sentence
+from skills.descriptions import count_sentence
 from skills.detect.messages import detections_message
+from skills.footprint import SAFE_MARGIN_M, Footprint, footprint_clear, footprint_clearance_m, pose_array
 from skills.geometry import grid_inside, line_of_sight, wrap
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
-from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clear, footprint_clearance_m, pose_array
 from skills.navigate.surroundings import NavigateInputs
 from skills.people.meet_person import person_observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark, turn_upright

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from skills.api import Cause, ClearableCostmap, Failed, Part, Running, SkillContext, Succeeded, say
+from skills.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
 from skills.geometry import bearing_rad, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
-from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
 from skills.navigate.giving_way import GivingWayOptions, pose_aside
 from skills.navigate.skill import Navigate
 from skills.navigate.surroundings import Company, NavigateInputs

@@ -8,9 +8,9 @@ from typing import ClassVar, Final
 import numpy as np
 
 from skills.api import Cause, Part, Running, Step, Succeeded, say
+from skills.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.geometry import grid_inside, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
-from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.navigate.skill import Navigate
 from skills.navigate.surroundings import Company, NavigateInputs
 from skills.people.followed_person import Target, TargetOptions, people_about

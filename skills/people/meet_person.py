@@ -9,10 +9,10 @@ from typing import ClassVar, Final
 import numpy as np
 
 from skills.api import Cause, ObjectKind, ObjectObservation, Part, Running, Succeeded
+from skills.footprint import footprint_clear
 from skills.geometry import bearing_rad, facing_poses, line_of_sight
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
-from skills.navigate.footprint import footprint_clear
 from skills.navigate.surroundings import NavigateInputs
 from skills.navigate.trip_planning import place_text
 from skills.perception.people import SeenPerson

@@ -16,8 +16,8 @@ from typing import Final
 
 import numpy as np
 
+from skills.class_forms import ANY_OBJECT
 from skills.detection import Detection
-from skills.perception.class_forms import ANY_OBJECT
 from skills.robot import FloatArray
 
 SURE_SCORE: Final = 0.5

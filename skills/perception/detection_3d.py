@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pydrake.math import RollPitchYaw
 
 from skills.api import FLOOR, Detection, LocalisationEstimate, ObjectKind, ObjectObservation, Surface
+from skills.class_forms import MEANS_BIG, NON, class_form, class_forms, colour_words
 from skills.geometry import inside_polygon
-from skills.perception.class_forms import MEANS_BIG, NON, class_form, class_forms, colour_words
 from skills.perception.point_cloud import Mask, camera_pose_W, closed_mask, project
 from skills.perception.position import Position, locate
 from skills.robot import FloatArray, Image

@@ -18,8 +18,8 @@ import cv2
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from skills.class_forms import class_form
 from skills.detection import Detection, Detections, Detector, DetectorWrapper, box_overlap
-from skills.perception.class_forms import class_form
 from skills.perception.object_segmentation import Box, Window, groups_in_picture, in_plane, level_planes, window_about
 from skills.robot import FloatArray, Image, Picture
 from skills.routine import Routine, RoutineSkill

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.perception.class_forms import ClassForm
+from skills.class_forms import ClassForm
 from skills.perception.fitting import LevelPlane
 from skills.perception.point_cloud import (
     MAX_DEPTH_M,

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from skills.api import Detection
-from skills.perception.class_forms import ClassForm, class_form
+from skills.class_forms import ClassForm, class_form
 from skills.perception.fitting import LevelPlane, fit_circle, fit_rectangle, without_strays
 from skills.perception.object_segmentation import ObjectSegment, Window, segment_object, window_about
 from skills.perception.point_cloud import Mask, distinct_cells

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.api import Detection, LocalisationEstimate, Surface
+from skills.class_forms import ANY_OBJECT
 from skills.detection import box_overlap
 from skills.geometry import inside_polygon
-from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D, place_covariance
 from skills.perception.fitting import LevelPlane, SeenShape, measure
 from skills.perception.point_cloud import (

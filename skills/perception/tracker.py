@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from skills.class_forms import ANY_OBJECT
 from skills.perception.class_evidence import MOST_SURE, NEW_IN_A_VIEW, SURE_SCORE, ClassEvidence
-from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D
 from skills.robot import FloatArray
 

@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from skills.api import Cause, Part, Running, SkillContext, Succeeded
+from skills.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.geometry import compose, relative_pose
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
-from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.navigate.sensor_watch import ScanHealth
 from skills.quantities import Delay, Length, Speed
 from skills.robot import BaseKind, Pose2D

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.estimate.compiled import compiled
-from skills.estimate.grid_map import GridMap
+from skills.compiled import compiled
+from skills.grid_map import GridMap
 from skills.robot import CameraCapabilities, FloatArray, FrameTree, Image, Intrinsics, Mount, Scan, unit_rays
 
 Colour = tuple[int, int, int]

@@ -16,7 +16,7 @@ import numpy as np
 from errand_make.worlds.own import world_from_cylinders
 from executive.mission.load import load_stack
 from plant.worlds.world import load_world
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.navigate.skill import NavigateInputs
 from skills.robot import Pose2D
 from tests.benchmarks.driving import TICK_S, Driver

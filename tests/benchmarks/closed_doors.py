@@ -15,7 +15,7 @@ from executive.record.history import read_history
 from executive.record.schemas import DOORS
 from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from tests.benchmarks.harness import benchmark, totals
 from tests.benchmarks.plant_mission import PlantMission
 

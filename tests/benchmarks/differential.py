@@ -16,8 +16,8 @@ import numpy as np
 from plant.worlds.world import load_world
 from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
+from skills.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.geometry import compose
-from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.navigate.planner import LatticePlanner
 from skills.robot import BaseKind, Pose2D
 from skills.stack import components

@@ -18,9 +18,9 @@ from plant.robots.spot.kind import spot_capabilities
 from plant.simulation import Simulation
 from skills.api import Failed, PlanningError, Running, SkillContext
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import GridMap, load_grid_map
+from skills.footprint import Footprint, footprint_clear
 from skills.geometry import relative_pose
-from skills.navigate.footprint import Footprint, footprint_clear
+from skills.grid_map import GridMap, load_grid_map
 from skills.navigate.planner import plan_path
 from skills.navigate.sensor_watch import WatchOptions
 from skills.navigate.skill import Navigate

@@ -32,9 +32,9 @@ from skills.api import Surface
 from skills.detect.skill import Detect, DetectInputs
 from skills.detection import Detector
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import load_grid_map
 from skills.estimate.localiser import ScanMatchingLocaliser
 from skills.geometry import inside_polygon
+from skills.grid_map import load_grid_map
 from skills.robot import FrameTree, Image, Pose2D
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace

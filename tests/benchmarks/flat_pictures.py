@@ -37,7 +37,7 @@ from errand_train.dataset.views import (
 from executive.app.prepare.worlds import knowledge_of, open_world
 from plant.scene_pictures import look_at
 from plant.sensors.noise import PictureDegrader, PictureNoise
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from tests.benchmarks.find_things import LYING_ABOUT, held_out_instance, middle, scattered
 from tests.benchmarks.flat_scene import FlatScene, surface_of, viewpoint_of
 from tests.benchmarks.foreign_models import CATALOGUES, OTHERS, supplied

@@ -22,9 +22,9 @@ from plant.worlds.world import load_world
 from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
 from skills.geometry import relative_pose
-from skills.navigate.path import path_length
 from skills.navigate.planner import LatticePlanner, plan_path
 from skills.navigate.skill import NavigateInputs
+from skills.path import path_length
 from skills.robot import Pose2D
 from tests.benchmarks.driving import SPOT, Driver, free_poses, maps_of, within
 from tests.benchmarks.harness import command, quantile, tell

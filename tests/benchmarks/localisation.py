@@ -22,10 +22,10 @@ from pydrake.math import RigidTransform
 
 from plant.simulation import Simulation
 from plant.worlds.world import load_world
-from skills.estimate.grid_map import load_grid_map
 from skills.estimate.monte_carlo import MonteCarloLocaliser, MonteCarloOptions
 from skills.estimate.particle_filter import FilterOptions, ParticleFilter
 from skills.geometry import compose, relative_pose
+from skills.grid_map import load_grid_map
 from skills.robot import Odometry, Pose2D, Scan
 from skills.stack import components
 from tests.benchmarks.gliding import GlidingBase

@@ -50,8 +50,8 @@ from plant.scene_pictures import best_view, render_view, save_png
 from plant.simulation import Simulation
 from plant.worlds.seeding import place_objects
 from skills.api import TOUCHES, Worker
+from skills.class_forms import ANY_OBJECT
 from skills.inputs.errors import InputError
-from skills.perception.class_forms import ANY_OBJECT
 from tests.benchmarks.harness import benchmark, for_each, quantile, share, tell
 from tests.benchmarks.manipulation_room import CLASSES, LOOK_S, ROBOT, SECOND, SURFACES, TAKEN, TARGET, room
 from tests.benchmarks.shapes import written_shape

@@ -23,8 +23,8 @@ from errand_make.maps.survey import Survey
 from errand_make.maps.trajectory import align, trajectory_error_m
 from plant.simulation import Simulation
 from plant.worlds.world import load_world
-from skills.estimate.grid_map import load_grid_map
 from skills.geometry import compose, relative_pose
+from skills.grid_map import load_grid_map
 from skills.robot import CommandId, CommandState, CommandStatus, Pose2D
 from tests.benchmarks.driving import within
 from tests.benchmarks.gliding import GlidingBase

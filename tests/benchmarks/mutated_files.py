@@ -35,7 +35,7 @@ from executive.tree.registry import installed_skills
 from executive.words.knowledge import load_knowledge
 from plant.models.catalogue import read_imported
 from plant.worlds.world import WORLDS_FOLDER, load_world
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from tests.benchmarks.errand_process import ROOT
 from tests.benchmarks.harness import command

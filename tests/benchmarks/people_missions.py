@@ -18,7 +18,7 @@ from executive.words.mission import Route
 from executive.words.outlines import inside
 from plant.worlds.seeding import add_answers
 from plant.worlds.world import load_world
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from tests.benchmarks.harness import benchmark, quantile, totals
 from tests.benchmarks.plant_mission import PlantMission
 

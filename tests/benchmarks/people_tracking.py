@@ -15,7 +15,7 @@ import numpy as np
 
 from executive.words.mission import Route
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.perception.people import people_in_scan
 from skills.perception.people_tracking import SCAN_APART_M, PeopleOptions, PeopleTracker
 from tests.benchmarks.harness import benchmark, quantile, totals

@@ -27,9 +27,9 @@ from plant.models.catalogue import load_catalogue
 from plant.robots.robot_kind import PlacedRobot
 from skills.detect.skill import Detect, DetectInputs
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import load_grid_map
 from skills.estimate.localiser import ScanMatchingLocaliser
 from skills.geometry import inside_polygon
+from skills.grid_map import load_grid_map
 from skills.perception.detector import Cascade
 from tests.benchmarks.find_things import held_out_instance, middle, scattered
 from tests.benchmarks.flat_scene import FlatScene, surface_of

@@ -15,7 +15,7 @@ from bosdyn.client.robot_command import RobotCommandBuilder as Build
 
 from errand_spot.messages import frame_tree
 from executive.app.prepare.worlds import open_world
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.robot import Pose2D
 from tests.benchmarks.harness import benchmark, quantile
 

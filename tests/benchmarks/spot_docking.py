@@ -15,8 +15,8 @@ from bosdyn.api.docking import docking_pb2
 from errand_spot.server.docking import DOCK_ID
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import open_world
-from skills.estimate.grid_map import load_grid_map
 from skills.geometry import compose, inverse
+from skills.grid_map import load_grid_map
 from skills.robot import Pose2D
 from tests.benchmarks.harness import benchmark, quantile
 

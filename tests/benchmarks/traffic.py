@@ -20,8 +20,8 @@ from executive.run.visitor import RunVisitor
 from executive.words.robot_config import RobotConfig
 from plant.robots.robot_kind import robot_kind
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import load_grid_map
-from skills.navigate.footprint import Footprint, footprint_clearance_m
+from skills.footprint import Footprint, footprint_clearance_m
+from skills.grid_map import load_grid_map
 from skills.robot import Pose2D
 from tests.benchmarks.harness import benchmark, for_each, totals
 from tests.benchmarks.plant_mission import PlantMission

@@ -23,8 +23,8 @@ from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
 from skills.navigate.planner import plan_path
 from skills.navigate.surroundings import NavigateInputs
-from skills.navigate.zone_map import KeepOut, zone_map
 from skills.world_model import FilterType, Zone, ZoneKind, ZoneMask
+from skills.zone_map import KeepOut, zone_map
 from tests.benchmarks.driving import SPOT, TICK_S, Driver, free_poses, maps_of
 from tests.benchmarks.goals import from_people
 from tests.benchmarks.harness import benchmark, tell

@@ -13,8 +13,8 @@ from executive.run.resting import SteppingAside
 from executive.run.traffic_table import TrafficTable
 from executive.run.worker import LockStepWorker
 from skills.api import Failed, SkillContext, Step, Succeeded
-from skills.estimate.grid_map import GridMap
-from skills.navigate.footprint import Footprint, disc_centres, pose_array
+from skills.footprint import Footprint, disc_centres, pose_array
+from skills.grid_map import GridMap
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import BaseKind, Pose2D
 from skills.testing.clock import VirtualClock

@@ -13,7 +13,7 @@ from executive.app.prepare.feasibility import abilities_in
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.mission.request import Request
 from executive.words.knowledge import Knowledge
-from skills.detect.descriptions import plural
+from skills.descriptions import plural
 from skills.inputs.errors import InputError, with_article
 from skills.inputs.outside import is_file
 from skills.inputs.yaml_source import read_yaml

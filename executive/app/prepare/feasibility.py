@@ -18,9 +18,9 @@ from executive.tree.estimate import Route, RoutePlanner, load_estimates
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
 from skills.api import Zone
+from skills.class_forms import class_forms, known_attributes, shipped_forms
 from skills.inputs.errors import Problems
 from skills.manipulation.arm.kinematics import arm_model
-from skills.perception.class_forms import class_forms, known_attributes, shipped_forms
 from skills.robot import Capabilities, Mount, Pose2D
 from skills.stack import DEFAULT_FILE, ControllerComponent, default_component
 
@@ -38,8 +38,8 @@ class _RoutesOnMap(RoutePlanner):
 
     @cached_property
     def _routes(self) -> PlannedRoutes:
-        from skills.estimate.grid_map import load_grid_map
-        from skills.navigate.footprint import Footprint
+        from skills.footprint import Footprint
+        from skills.grid_map import load_grid_map
 
         keepout_map = load_grid_map(self._world.keepout_map_path)
         costmap, planner = self._component("costmap"), self._component("planner")

@@ -224,8 +224,8 @@ def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
 
 def _read_again(masks: Sequence[Path]) -> None:
     """Reads filter masks from their files again. Raises InputError if a mask cannot be read."""
-    from skills.estimate.grid_map import load_filter_mask  # most worlds have no masks, and need no pictures
-    from skills.navigate.zone_map import zone_map
+    from skills.grid_map import load_filter_mask  # most worlds have no masks, and need no pictures
+    from skills.zone_map import zone_map
 
     load_filter_mask.cache_clear()
     zone_map.cache_clear()

@@ -17,8 +17,8 @@ from executive.words.knowledge import DOCK, Knowledge, Pose, RobotFacts
 from executive.words.robot_config import RobotConfig
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
+from skills.footprint import Footprint
 from skills.inputs.errors import InputError
-from skills.navigate.footprint import Footprint
 from skills.robot import FloatArray, Pose2D
 from skills.stack import DetectorComponent, RobotStack, default_component, default_stack
 

@@ -21,9 +21,9 @@ from executive.words.robot_config import named_robot
 from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.seeding import add_answers, add_crowd
 from plant.worlds.world import DoorRule, MoveRule, World, WorldError
-from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.faults.fault_kinds import SUBJECTS
 from skills.faults.faulty_robot import parse_fault, random_faults
+from skills.grid_map import GridMap, load_grid_map
 from skills.inputs.errors import InputError, Problems, nearest_name, suggestion, with_article
 from skills.inputs.schema import Name, Strict, Text, validate
 from skills.inputs.yaml_source import KeyPath, YamlSource, read_yaml

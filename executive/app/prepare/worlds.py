@@ -17,7 +17,7 @@ from skills.inputs.yaml_source import KeyPath, read_yaml
 from skills.robot import Pose2D
 
 if TYPE_CHECKING:
-    from skills.estimate.grid_map import GridMap
+    from skills.grid_map import GridMap
 
 
 def open_world(name: str) -> World:
@@ -35,7 +35,7 @@ def refuse_unusable(world: World) -> None:
     """Raises InputError unless a user's world, its maps and the imported models can be loaded."""
     is_ours = world.folder.is_relative_to(WORLDS_FOLDER)
     if not is_ours or world.maps is not None:
-        from skills.estimate.grid_map import load_grid_map
+        from skills.grid_map import load_grid_map
 
         for path in {*world.scan_map_paths, *([world.scan_map_path] if world.keepout_map_path.is_file() else ())}:
             load_grid_map(path)
@@ -97,6 +97,6 @@ def refuse_blocked_poses(
 
 def free_ground(world: World) -> GridMap:
     """Loads the world's surveyed map, in which unknown cells count as blocked."""
-    from skills.estimate.grid_map import load_grid_map
+    from skills.grid_map import load_grid_map
 
     return load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()

@@ -38,10 +38,10 @@ from executive.words.knowledge import Knowledge
 from executive.words.robot_config import named_robot
 from plant.worlds.world import World
 from skills.api import PlanningError, Publish, Worker
-from skills.estimate.grid_map import load_grid_map
 from skills.faults.faulty_robot import FaultyRobot, inject_faults, parse_fault
+from skills.footprint import Footprint
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError, SpareFiles, shortage_of_files
-from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path
 from skills.quantities import clock_s
 from skills.robot import Pose2D, Robot

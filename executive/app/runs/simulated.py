@@ -33,7 +33,7 @@ from plant.simulation import Simulation
 from plant.snapshot_file import SnapshotError
 from plant.worlds.world import World, WorldError
 from skills.api import PICTURES, TOUCHES, Publish
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from skills.manipulation.arm.solid_cells import map_columns
 from skills.navigate.lattice import search

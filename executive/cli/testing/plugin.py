@@ -93,8 +93,8 @@ def _small_plant(folder: Path, *, can: bool = True) -> SmallPlant:
     from plant.simulation import Simulation
     from plant.worlds.world import load_world
     from skills.estimate.costmap import LayeredCostmap
-    from skills.estimate.grid_map import load_grid_map
     from skills.estimate.localiser import ScanMatchingLocaliser
+    from skills.grid_map import load_grid_map
 
     world = load_world(write_small_room(folder, can=can))
     simulation = Simulation(world, seed=1, robots=[PlacedRobot(_ROBOT, "spot", world.start, world.dock)], visuals=False)

@@ -20,9 +20,9 @@ from executive.tree.plan import PlanBuilder
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import EVERYTHING
 from skills.api import Cause, ObjectKind, ObjectObservation
-from skills.detect.descriptions import count_of
+from skills.class_forms import ANY_OBJECT
+from skills.descriptions import count_of
 from skills.inputs.errors import listing
-from skills.perception.class_forms import ANY_OBJECT
 from skills.robot import Robot
 
 SAME_PLACE_M: Final = 0.15

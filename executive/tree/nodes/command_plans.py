@@ -29,7 +29,7 @@ from executive.words.command import START, TIME_UNITS_S, Command, Task
 from executive.words.goal import GoalCondition, When
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Do, Say
-from skills.detect.descriptions import count_of
+from skills.descriptions import count_of
 from skills.inputs.errors import InputError, listing
 from skills.quantities import Quantity
 

@@ -17,8 +17,8 @@ from executive.tree.behaviour import ExplainedDecorator, suspend
 from executive.tree.context import RunContext
 from executive.words.step import StaleData
 from skills.api import Cause, Failed, ObjectKind
+from skills.class_forms import ANY_OBJECT
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
-from skills.perception.class_forms import ANY_OBJECT
 from skills.robot import Pose2D
 
 CONTROL_TOPIC = "control"

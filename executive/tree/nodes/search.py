@@ -19,7 +19,7 @@ from executive.words.command import PEOPLE_TASKS, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
 from skills.api import Cause, Failed, ObjectKind, Publish, Surface
-from skills.detect.descriptions import (
+from skills.descriptions import (
     SAME_WITHIN_M,
     count_of,
     count_sentence,

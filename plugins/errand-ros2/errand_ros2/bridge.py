@@ -35,7 +35,7 @@ from executive.run.outcome import RunResult
 from executive.run.visitor import MissionEnd, Progress, RunVisitor
 from executive.tree.compiler import CompiledTree
 from skills.api import LocalisationEstimate, ParticleView, SearchingLocaliser, SkillContext
-from skills.estimate.grid_map import GridMap, load_grid_map
+from skills.grid_map import GridMap, load_grid_map
 
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""

@@ -66,7 +66,7 @@ def serve_ros2(
     from executive.app.prepare.worlds import open_world
     from executive.app.runs.simulated import compile_first, simulate
     from executive.record.other_tools import ros_name
-    from skills.estimate.grid_map import load_grid_map
+    from skills.grid_map import load_grid_map
 
     at, opened, space = Place.parse(place), open_world(world), topic_name(f"/{ros_name(robot)}")
     capabilities_of(kind)

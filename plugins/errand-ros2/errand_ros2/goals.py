@@ -32,7 +32,7 @@ from executive.run.visitor import Progress
 from executive.tree.compiler import CompiledTree
 from executive.words.mission import Mission
 from skills.api import SkillContext
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 

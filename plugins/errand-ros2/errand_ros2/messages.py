@@ -14,8 +14,8 @@ from pydrake.math import RigidTransform
 from errand_ros2.wire.types import ros_types
 from executive.record.event_log import plain_values
 from skills.api import FreeSpace
-from skills.estimate.grid_map import GridMap
-from skills.navigate.footprint import clearance_on_grid
+from skills.footprint import clearance_on_grid
+from skills.grid_map import GridMap
 from skills.robot import Battery, FloatArray, Image, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
 MAP_FRAME: Final = "map"  # it equals the frame "world" of logs

@@ -14,10 +14,10 @@ from errand_ros2.readings import planar_pose
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError
 from errand_ros2.wire.node import Node, Place, open_session
 from skills.api import FreeSpace, PlanningError
+from skills.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.geometry import compose, inverse
 from skills.inputs.errors import InputError
-from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
-from skills.navigate.path import Path, densify
+from skills.path import Path, densify
 from skills.quantities import Angle, Coordinate, Duration, Length
 from skills.robot import Pose2D
 

@@ -13,8 +13,8 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
 from errand_ros2.messages import MAP_FRAME
-from skills.estimate.grid_map import GridMap
 from skills.geometry import compose
+from skills.grid_map import GridMap
 from skills.inputs.errors import InputError
 from skills.robot import Capabilities, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 

@@ -19,7 +19,7 @@ from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.wire.node import Node, Session
 from errand_ros2.wire.types import LATCHED
 from executive.record.other_tools import ros_name
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.inputs.errors import InputError
 from skills.robot import Clock, CommandId, Robot
 

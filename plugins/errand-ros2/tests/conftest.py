@@ -16,7 +16,7 @@ from executive.testing.bench import room_knowledge
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.mission import Mission
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.robot import Joints, Pose2D, Scan
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace

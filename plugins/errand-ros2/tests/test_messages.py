@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform
 
 from errand_ros2 import messages
 from errand_ros2.wire.types import ros_types
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.robot import FrameTree, Image, Intrinsics, Odometry, Pose2D, Scan
 from skills.testing.blocks import Block
 from skills.testing.estimators import BlockCostmap

@@ -18,7 +18,7 @@ from errand_ros2.wire.node import Node, Place, open_session
 from executive.testing.bench import SkillBench
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import PlanningError, Running, Succeeded
-from skills.navigate.footprint import Footprint
+from skills.footprint import Footprint
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 from skills.stack import default_stack

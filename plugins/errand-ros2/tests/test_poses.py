@@ -7,7 +7,7 @@ import pytest
 
 from errand_ros2.readings import planar_pose, pose_on_map, velocity
 from errand_ros2.wire.types import ros_types
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 

@@ -25,7 +25,7 @@ from errand_ros2.wire import actions
 from errand_ros2.wire.node import Node, Place, open_session
 from errand_ros2.wire.types import LATCHED, ros_types
 from plant.robots.spot.kind import spot_capabilities
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.testing.blocks import ROOM
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot

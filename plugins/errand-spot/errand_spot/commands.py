@@ -162,7 +162,7 @@ def _write_graph(world: World, folder: Path) -> None:
 
 def _free_floor(world: World) -> Pose2D:
     """Pose nearest to the world's start with free floor around and ahead, away from people; else the start itself."""
-    from skills.estimate.grid_map import load_grid_map
+    from skills.grid_map import load_grid_map
 
     ground, start = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked(), world.start
     people = [np.mean(each.ranges[:2], axis=1) for each in world.seed_rules.people if each.ranges is not None]

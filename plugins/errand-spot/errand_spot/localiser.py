@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from skills.api import LocalisationEstimate
-from skills.estimate.grid_map import GridMap
 from skills.geometry import compose
+from skills.grid_map import GridMap
 from skills.inputs.errors import InputError
 from skills.quantities import Angle, Coordinate, Delay, Length, Turn
 from skills.robot import OwnLocalisation, Pose2D, Robot

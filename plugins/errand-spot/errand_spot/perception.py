@@ -16,9 +16,9 @@ from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.world import World
 from skills.api import FreeSpace, LocalisationEstimate, PlanningError
 from skills.estimate.costmap import CostmapOptions
-from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.estimate.localiser import ScanMatchingLocaliser
-from skills.navigate.footprint import Footprint
+from skills.footprint import Footprint
+from skills.grid_map import GridMap, load_grid_map
 from skills.navigate.planner import plan_path
 from skills.perception.fiducials import MOST_AMBIGUITY, find_tags
 from skills.robot import FloatArray, Image, Pose2D, Robot, Scan

@@ -25,9 +25,9 @@ from skills.api import (
     Running,
     SkillContext,
 )
+from skills.class_forms import ANY_OBJECT
 from skills.manipulation.grasp.candidates import GraspCandidate
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
-from skills.perception.class_forms import ANY_OBJECT
 from skills.robot import Clock, FloatArray, Lease, Robot, Scan
 from skills.stack import default_stack
 from skills.world_model import FLOOR

@@ -27,7 +27,7 @@ from executive.view.feed import Feed
 from executive.view.server import PageContent, serve
 from plant.worlds.world import World
 from skills.api import SkillContext
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from skills.quantities import Delay, Seed
 from skills.robot import Clock, LeaseError, Pose2D, Robot

@@ -14,7 +14,7 @@ from executive.view.page_control import RefusedError, control_json
 from executive.words.knowledge import Knowledge
 from plant.worlds.world import World
 from skills.api import SkillContext
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from skills.perception.detector.camera_images import turn_upright
 

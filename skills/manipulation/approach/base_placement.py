@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from skills.api import FreeSpace, Running
+from skills.footprint import Footprint, footprint_clear
 from skills.geometry import wrap
-from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.skill import Navigate
 from skills.navigate.surroundings import NavigateInputs
 from skills.robot import ArmCapabilities, FloatArray, Pose2D

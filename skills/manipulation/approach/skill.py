@@ -11,6 +11,7 @@ import numpy as np
 from skills.api import FLOOR, Cause, ObjectObservation, Succeeded, Surface
 from skills.detect.selection import DetectInputs
 from skills.detect.skill import Detect
+from skills.footprint import Footprint
 from skills.manipulation.approach.base_placement import (
     BasePlacement,
     free_placements,
@@ -21,7 +22,6 @@ from skills.manipulation.approach.base_placement import (
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.grasp.candidates import why_no_candidates
 from skills.manipulation.grasp.reach import body_heights_m, choose_with_look, observed_target, reach_check
-from skills.navigate.footprint import Footprint
 from skills.navigate.surroundings import NavigateInputs
 from skills.quantities import Count, Length, Margin, Speed, Turn
 from skills.robot import FloatArray, Pose2D

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import compiled
+from skills.compiled import compiled
 from skills.robot import FloatArray
 
 _PARALLEL = 1e-6

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.estimate.compiled import compiled
+from skills.compiled import compiled
 from skills.manipulation.arm.clearance import place_links
 from skills.robot import FloatArray
 

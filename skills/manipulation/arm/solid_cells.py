@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
-from skills.estimate.compiled import compiled
-from skills.estimate.grid_map import GridMap
+from skills.compiled import compiled
 from skills.estimate.scan_points import segment_distance
 from skills.geometry import grid_inside, inside_polygon
+from skills.grid_map import GridMap
 from skills.manipulation.arm.collision import Box
 from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, distinct_cells, lens_rays
 from skills.robot import FloatArray, Image, Intrinsics

@@ -13,9 +13,9 @@ import numpy as np
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
+from skills.class_forms import class_form
 from skills.manipulation.arm.poses import hand_rotation
 from skills.manipulation.grasp.placements import Placement, Target, placements
-from skills.perception.class_forms import class_form
 from skills.quantities import Coordinate, Cosine
 from skills.robot import FloatArray, GripperCapabilities, GripperKind
 from skills.world_model import ObjectKind

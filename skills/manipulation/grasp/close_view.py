@@ -10,13 +10,13 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, InputsT, LocalisationEstimate, ObjectKind, ObjectObservation, Surface
+from skills.class_forms import ANY_OBJECT
 from skills.detect.viewpoints import cluster_boxes, part_box, surface_boxes
 from skills.manipulation.arm.collision import Box
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import TALL_M, close_viewpoints, overview_viewpoints, sees_closely
 from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.planning import Obstacle
-from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
 from skills.perception.point_cloud import camera_pose_W

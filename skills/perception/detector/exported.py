@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from skills.class_forms import class_forms
 from skills.detection import Detections, Detector
 from skills.inputs.errors import nearest_name, suggestion
 from skills.inputs.outside import read_text
-from skills.perception.class_forms import class_forms
 from skills.perception.detector.boxes import SuppressionOptions, check_picture, detections_from, select_candidates
 from skills.perception.detector.layouts import (
     LAYOUTS,

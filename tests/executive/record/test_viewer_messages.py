@@ -11,9 +11,9 @@ from mcap.reader import make_reader
 from executive.record.announce import map_message
 from executive.record.event_log import EventLog, box_annotations, compress_picture, viewer_messages
 from executive.record.history import read_events
-from skills.estimate.grid_map import GridMap
-from skills.navigate.zone_map import zone_messages
+from skills.grid_map import GridMap
 from skills.world_model import Zone, ZoneKind
+from skills.zone_map import zone_messages
 
 SEEN = {"class_name": "coke", "score": 0.9, "box": [10, 20, 30, 40]}
 

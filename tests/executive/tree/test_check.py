@@ -18,9 +18,9 @@ from executive.words.steps import Group, Loop, Repeat, Together
 from executive.words.zone import ZoneFacts
 from skills.api import Part
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import GridMap
+from skills.footprint import Footprint
+from skills.grid_map import GridMap
 from skills.inputs.yaml_source import YamlSource
-from skills.navigate.footprint import Footprint
 from skills.navigate.planner import LatticePlanner
 from skills.robot import Pose2D
 from skills.world_model import Zone, ZoneKind

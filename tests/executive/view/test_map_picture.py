@@ -12,8 +12,8 @@ from executive.view.map_picture import WIDTH_PX, map_picture
 from executive.view.text import ROBOT_COLOURS, rgb_of
 from skills.inputs.errors import InputError
 from skills.map_drawing import ZONE_COLOURS, draw_zone
-from skills.navigate.zone_map import zone_messages
 from skills.world_model import Zone, ZoneKind
+from skills.zone_map import zone_messages
 
 SCALE = WIDTH_PX / 7.0
 """Pixels per metre of the map below, 7 m x 3.5 m from (-1, -1)."""

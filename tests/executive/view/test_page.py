@@ -39,7 +39,7 @@ from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from skills.api import Cause, Failed, Question
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.robot import Pose2D
 
 LIMIT_MS, CHANGES = 300, 24

@@ -26,9 +26,9 @@ from executive.view.text import Styles, readable
 from executive.words.goal import RefereeReport
 from executive.words.knowledge import Pose
 from executive.words.mission import Mission
-from skills.estimate.grid_map import GridMap
-from skills.navigate.zone_map import zone_messages
+from skills.grid_map import GridMap
 from skills.world_model import Zone, ZoneKind
+from skills.zone_map import zone_messages
 
 DESK, TELEPHONE = {"width": 1400, "height": 900}, {"width": 390, "height": 844}
 LONG = f"waits until sixty seconds are over, as the mission says, and goes on with the rest of the round {'x' * 60}"

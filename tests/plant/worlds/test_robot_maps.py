@@ -9,8 +9,8 @@ from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.seeding import place_people
 from plant.worlds.world import load_world
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import load_grid_map
-from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m
+from skills.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m
+from skills.grid_map import load_grid_map
 
 FLOORS_M = {"flat": 0.05, "shop": 0.10, "lab": 0.15}
 BODY_M = 0.3

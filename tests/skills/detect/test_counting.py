@@ -3,7 +3,7 @@
 import pytest
 
 from skills.api import ObjectKind, ObjectObservation
-from skills.detect.descriptions import distinct_objects
+from skills.descriptions import distinct_objects
 
 
 def beer(x_m, name="beer"):

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from tests.skills.estimate.map_forms import FORMS, FREE, OCCUPIED, UNKNOWN, room
 

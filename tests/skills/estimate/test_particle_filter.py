@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from skills.estimate.grid_map import GridMap
 from skills.estimate.particle_filter import FilterOptions, ParticleFilter
+from skills.grid_map import GridMap
 from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 from skills.testing.blocks import Block, block_array, cast_rays, grid_of

@@ -18,8 +18,8 @@ from executive.language import spelling
 from plant.models.catalogue import MODELS_FOLDER, load_catalogue
 from plant.worlds.seeding import place_objects
 from plant.worlds.world import WORLDS_FOLDER, load_world
+from skills.class_forms import class_forms
 from skills.inputs.plugins import CLASSES
-from skills.perception.class_forms import class_forms
 from tests.executive.cli.calls import done, errand, json_of, refusal
 from tests.skills.exported_networks import export
 

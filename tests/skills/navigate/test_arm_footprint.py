@@ -12,11 +12,11 @@ from table_robot import CAPABILITIES, GRIPPER, MODEL, TableRobot, context_of
 from skills.api import Succeeded
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.scan_points import ArmShape, SelfFilter
+from skills.footprint import Footprint
 from skills.manipulation.arm.collision import ArmScene, box_corners
 from skills.manipulation.arm.collision import Box as HeldBox
 from skills.manipulation.arm.poses import carry_configuration
 from skills.navigate.arm_footprint import ArmFootprint
-from skills.navigate.footprint import Footprint
 from skills.navigate.planner import NoPathError, plan_path
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D

@@ -8,8 +8,8 @@ from planar_people import person_at
 from planar_robot import OUTLINE, Bench
 
 from skills.api import Running, Succeeded
+from skills.footprint import Footprint, disc_centres, pose_array
 from skills.navigate.collision_guard import CollisionGuard
-from skills.navigate.footprint import Footprint, disc_centres, pose_array
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.navigate.surroundings import NavigateOptions
 from skills.robot import Pose2D

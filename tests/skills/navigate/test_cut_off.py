@@ -9,8 +9,8 @@ from planar_robot import Bench, Box
 
 from skills.api import Cause, Failed, Succeeded
 from skills.doorway import DoorState, Doorway, SeenDoor
+from skills.footprint import Footprint
 from skills.navigate.cut_off import DoorOptions, DoorWatch, closed_doors_sentence
-from skills.navigate.footprint import Footprint
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 

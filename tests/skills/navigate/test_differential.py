@@ -10,11 +10,11 @@ from wheeled_toy import BODY, TOY
 
 from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
+from skills.footprint import Footprint, footprint_clearance_m
 from skills.navigate.follower import FollowerOptions, corners_of, tracking_velocity
-from skills.navigate.footprint import Footprint, footprint_clearance_m
 from skills.navigate.mppi import MppiOptions
-from skills.navigate.path import Path, path_length
 from skills.navigate.planner import LatticePlanner, NoPathError, plan_path
+from skills.path import Path, path_length
 from skills.robot import BaseKind, Pose2D
 from tests.benchmarks.differential import BASE, drive
 

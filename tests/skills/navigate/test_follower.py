@@ -5,9 +5,9 @@ import pytest
 from planar_robot import OUTLINE, TWO_ROOMS, Box, grid_of
 
 from skills.estimate.costmap import LayeredCostmap
+from skills.footprint import Footprint
 from skills.navigate.follower import FollowerOptions, PathFollower, speed_limits
-from skills.navigate.footprint import Footprint
-from skills.navigate.path import Path
+from skills.path import Path
 from skills.robot import Pose2D
 
 FOOTPRINT = Footprint.rectangle(OUTLINE)

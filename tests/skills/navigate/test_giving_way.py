@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from executive.run.traffic_table import TrafficTable
-from skills.navigate.footprint import Footprint, with_outlines
+from skills.footprint import Footprint, with_outlines
 from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions, first_suitable_pose, reachable_cells
 from skills.robot import Pose2D
 from skills.testing.estimators import OPEN_M, BlockCostmap

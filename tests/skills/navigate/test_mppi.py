@@ -6,11 +6,11 @@ from planar_robot import OUTLINE, TWO_ROOMS, Bench, Box, grid_of
 
 from skills.api import Succeeded
 from skills.estimate.costmap import LayeredCostmap
-from skills.navigate.footprint import Footprint
+from skills.footprint import Footprint
 from skills.navigate.mppi import MppiController, MppiOptions
-from skills.navigate.path import Path
 from skills.navigate.planner import plan_path
 from skills.navigate.skill import Navigate, NavigateInputs
+from skills.path import Path
 from skills.robot import Pose2D
 from skills.stack import default_stack
 

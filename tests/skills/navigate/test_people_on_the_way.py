@@ -9,7 +9,7 @@ from planar_people import PeopleDetector, person_at
 from planar_robot import OUTLINE, TWO_ROOMS, Bench, ExactPlace
 
 from skills.api import Cause, Failed, Running, Succeeded
-from skills.navigate.footprint import Footprint, disc_centres, pose_array
+from skills.footprint import Footprint, disc_centres, pose_array
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.navigate.surroundings import NavigateOptions
 from skills.robot import Pose2D

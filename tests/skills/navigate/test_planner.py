@@ -9,10 +9,10 @@ from planar_robot import OUTLINE, TWO_ROOMS, Box, grid_of
 import plant
 from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import load_grid_map
-from skills.navigate.footprint import Footprint, footprint_clear, footprint_clearance_m, pose_array
-from skills.navigate.path import path_length
+from skills.footprint import Footprint, footprint_clear, footprint_clearance_m, pose_array
+from skills.grid_map import load_grid_map
 from skills.navigate.planner import LatticePlanner, NoPathError, plan_path
+from skills.path import path_length
 from skills.robot import Pose2D
 
 FOOTPRINT = Footprint.rectangle(OUTLINE)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from skills.navigate.footprint import Footprint, with_discs
+from skills.footprint import Footprint, with_discs
 from skills.navigate.surroundings import PaceManager, SpaceOptions, outline_distance_m, with_people
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D

@@ -10,7 +10,7 @@ from table_scene import BLUE, RED, TABLE, Can, scene
 
 from executive.record.work import CountedDetector, Work
 from skills.api import LocalisationEstimate
-from skills.perception.class_forms import ANY_OBJECT
+from skills.class_forms import ANY_OBJECT
 from skills.perception.model_matching import ModelDetector, identified, likeness, with_models
 from skills.perception.object_model import view_of
 from skills.perception.surface_segmentation import labelled_clusters, segment_surface

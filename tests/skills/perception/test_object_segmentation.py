@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from table_scene import BLUE, COKE, TABLE, Can, scene, seen_as
 
-from skills.perception.class_forms import class_forms
+from skills.class_forms import class_forms
 from skills.perception.object_segmentation import level_planes, segment_object, window_about
 
 FORM = class_forms()["coke"]

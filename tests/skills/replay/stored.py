@@ -7,7 +7,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Detection, LocalisationEstimate, Surface
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.manipulation.grasp.planning import Box, Surroundings, Target
 from skills.robot import FrameTree, Image, Intrinsics, Odometry, Pose2D, Scan
 

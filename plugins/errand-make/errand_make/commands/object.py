@@ -15,9 +15,9 @@ from executive.cli.number_options import OutOfRangeError, quantity_argument, qua
 from executive.cli.options import AS_JSON
 from executive.cli.output import console_for, new_folder, print_json, progress_bar
 from plant.models.catalogue import ImportedObject, read_imported
+from skills.class_forms import class_forms
 from skills.inputs.errors import InputError, count_text
 from skills.inputs.outside import writing
-from skills.perception.class_forms import class_forms
 from skills.quantities import Factor, Mass, TagNumber, TagSize
 
 PICTURE_PX = (640, 480)

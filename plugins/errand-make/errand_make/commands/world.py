@@ -17,7 +17,7 @@ from executive.cli.options import START, StartCommand, start_pose
 from executive.cli.output import console_for, new_folder, show_table
 from plant.worlds.world import WorldError, known_worlds
 from skills.api import ZoneKind
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError, count_text
 from skills.inputs.outside import writing
 from skills.inputs.yaml_source import read_yaml

@@ -21,8 +21,8 @@ from executive.app.prepare.placed_robots import only_robot
 from executive.app.report.pictures import write_picture
 from executive.app.runs.simulated import simulate
 from plant.worlds.world import World
-from skills.estimate.grid_map import GridMap
 from skills.geometry import compose
+from skills.grid_map import GridMap
 from skills.inputs.errors import InputError
 from skills.inputs.outside import read_text, writing
 from skills.inputs.yaml_source import read_yaml

@@ -18,10 +18,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from errand_make.maps.mapper import Mapper, MapperOptions, Submap
 from errand_make.maps.occupancy import BANDS_M, LayeredOccupancy
 from errand_make.maps.pose_graph import Edge, Keyframe, PoseGraph
+from skills.footprint import pose_array
 from skills.inputs.errors import InputError
 from skills.inputs.outside import plain_file, read_text
 from skills.inputs.schema import first_error
-from skills.navigate.footprint import pose_array
 from skills.robot import Pose2D
 
 RESOLUTION_M: Final = 0.025

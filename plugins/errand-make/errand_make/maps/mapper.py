@@ -18,11 +18,11 @@ import numpy as np
 from errand_make.maps.pose_graph import Edge, Keyframe, PoseGraph, matching_points
 from errand_make.maps.submap_matching import Distributions, Window, find_pose
 from skills.api import LocalisationEstimate
-from skills.estimate.grid_map import GridMap
 from skills.estimate.localiser import moved_covariance
 from skills.estimate.matching import Match, MatchOptions, match
 from skills.estimate.scan_points import SelfFilter, has_moved
 from skills.geometry import compose, inverse, relative_pose
+from skills.grid_map import GridMap
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 _FIELD_CELL_M = 0.05

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from errand_make.maps.pose_graph import Keyframe
-from skills.estimate.compiled import compiled
-from skills.estimate.grid_map import GridMap
+from skills.compiled import compiled
+from skills.grid_map import GridMap
 from skills.robot import FloatArray, Pose2D
 
 LOWEST_M: Final = 0.05

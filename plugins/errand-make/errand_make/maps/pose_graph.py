@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import compiled
+from skills.compiled import compiled
 from skills.estimate.scan_points import SelfFilter, scan_points
 from skills.geometry import relative_pose
 from skills.robot import FloatArray, Pose2D, Robot, Scan, unit_rays

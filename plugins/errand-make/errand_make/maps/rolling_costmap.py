@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import LocalisationEstimate
-from skills.estimate.compiled import Triple, bilinear, compiled
-from skills.estimate.grid_map import GridMap
+from skills.compiled import Triple, bilinear, compiled
 from skills.estimate.scan_points import SelfFilter, outside_discs, placed_points, points_in_body_axes, scan_points
 from skills.geometry import compose
+from skills.grid_map import GridMap
 from skills.quantities import Count, Factor, Height, Length, Margin
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 

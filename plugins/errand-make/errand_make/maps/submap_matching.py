@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import compiled
-from skills.estimate.grid_map import GridMap
+from skills.compiled import compiled
 from skills.estimate.matching import add_residual
+from skills.grid_map import GridMap
 from skills.robot import FloatArray, Pose2D
 
 CELL_M = 0.1

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from errand_make.maps.mapper import Mapper
 from errand_make.maps.occupancy import Frontier, Ground, LayeredOccupancy
 from skills.api import Costmap, PlanningError
-from skills.estimate.grid_map import GridMap
+from skills.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.geometry import relative_pose
-from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
+from skills.grid_map import GridMap
 from skills.robot import CommandState, FloatArray, Lease, Pose2D, Robot
 from skills.stack import LocalController, RobotStack, stack_of
 

@@ -10,10 +10,10 @@ from executive.words.knowledge import Knowledge
 from plant.scene_pictures import MapView, draw_path
 from plant.worlds.seeding import place_people
 from plant.worlds.world import World
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.map_drawing import ZONE_COLOURS, Names, draw_zone, drawable, with_legend
-from skills.navigate.zone_map import zone_messages
 from skills.robot import FloatArray, Intrinsics, Picture, Pose2D
+from skills.zone_map import zone_messages
 
 _Colour = tuple[int, int, int]
 WIDTH_PX = 1400

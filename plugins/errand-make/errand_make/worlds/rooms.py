@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.robot import FloatArray, Pose2D
 
 Bools = NDArray[np.bool_]

@@ -14,7 +14,7 @@ from errand_make.worlds.rooms import Grid, grid_of
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.words.knowledge import Knowledge
 from plant.worlds.world import World, WorldError
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError, suggestion
 
 

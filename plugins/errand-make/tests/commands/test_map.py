@@ -7,7 +7,7 @@ import cv2
 import pytest
 
 from errand_make.maps.map_drive import route_points
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from tests.executive.cli.calls import done, errand, json_of, refusal, write_room
 

@@ -5,7 +5,7 @@ import pytest
 
 from errand_make.maps.occupancy import Ground, LayeredOccupancy
 from errand_make.maps.pose_graph import Keyframe
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.robot import Pose2D
 
 ELEVATIONS = np.radians(np.arange(-15.0, 16.0, 2.0))

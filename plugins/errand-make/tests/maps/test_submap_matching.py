@@ -5,9 +5,9 @@ import pytest
 
 from errand_make.maps.mapper import MapperOptions
 from errand_make.maps.submap_matching import Distributions, Window, find_pose
-from skills.estimate.grid_map import GridMap
 from skills.estimate.matching import match
 from skills.geometry import relative_pose
+from skills.grid_map import GridMap
 from skills.robot import Pose2D
 
 MATCHING = MapperOptions().matching

@@ -8,8 +8,8 @@ import pytest
 from errand_make.maps.map_folder import load_mapper, map_grids, save_graph, save_grids
 from errand_make.maps.mapper import Mapper
 from errand_make.maps.survey import Survey
-from skills.estimate.grid_map import load_grid_map
 from skills.geometry import relative_pose
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from skills.robot import Pose2D
 from skills.testing.blocks import grid_of

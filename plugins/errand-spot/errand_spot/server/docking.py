@@ -20,7 +20,7 @@ from errand_spot.server.obstacles import SeenSpace
 from errand_spot.server.refusals import LONGEST_S
 from errand_spot.server.task import WHOLE, Steps, Task, stow, walk
 from skills.api import PlanningError
-from skills.navigate.footprint import Footprint
+from skills.footprint import Footprint
 from skills.navigate.planner import LatticePlanner, plan_path
 from skills.robot import Pose2D
 

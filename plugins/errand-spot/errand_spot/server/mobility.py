@@ -18,7 +18,7 @@ from errand_spot.server.obstacles import Clearance
 from errand_spot.server.posture import Posture
 from errand_spot.server.refusals import check_values, known_frame, times_of
 from skills.geometry import compose, relative_pose
-from skills.navigate.path import progress_m
+from skills.path import progress_m
 from skills.robot import FloatArray, Pose2D
 
 Status = basic_command_pb2.RobotCommandFeedbackStatus

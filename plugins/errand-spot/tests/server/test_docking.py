@@ -17,7 +17,7 @@ from errand_spot.server import docking
 from errand_spot.server.computer import Pace
 from errand_spot.server.docking import DOCK_ID
 from errand_spot.server.obstacles import Region, SeenSpace
-from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
+from skills.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.robot import Pose2D
 from skills.testing.blocks import Block
 from tests.tables import table

@@ -43,7 +43,7 @@ from plant.scene_pictures import look_at
 from plant.sensors.camera_spec import colour_render_camera, depth_render_camera
 from plant.sensors.noise import DepthDegrader, DepthNoise
 from skills.api import Surface
-from skills.perception.class_forms import ANY_OBJECT
+from skills.class_forms import ANY_OBJECT
 from skills.perception.shape_model import MODEL_FILE, ShapeModel
 from skills.perception.surface_segmentation import Cluster, segment_surface, split_touching
 from skills.robot import FloatArray, FrameTree, Image

@@ -9,7 +9,7 @@ from pycocotools import mask as coco_mask
 
 from errand_train.dataset.coco import annotation, box_of, categories, counts, document, is_black, run_lengths
 from errand_train.dataset.silhouette import Silhouette
-from skills.perception.class_forms import class_forms
+from skills.class_forms import class_forms
 
 
 @given(arrays(bool, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=12)))

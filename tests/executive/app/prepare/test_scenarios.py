@@ -13,7 +13,7 @@ from executive.mission.request import Request
 from executive.mission.scenario import Scenario
 from executive.words.knowledge import Door, Knowledge, ObjectFacts, Person, Place, Pose, SurfaceFacts
 from executive.words.mission import Route
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from tests.tables import yaml_beside
 

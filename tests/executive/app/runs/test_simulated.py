@@ -17,7 +17,7 @@ from executive.run.visitor import Progress
 from plant.worlds.seeding import place_people
 from plant.worlds.world import load_world
 from skills.api import Question
-from skills.estimate.grid_map import load_grid_map
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from skills.perception.detector import Cascade
 from skills.robot import Pose2D

@@ -8,6 +8,7 @@ import pytest
 from table_robot import CAPABILITIES, GRIPPER, MODEL
 
 from skills.api import ObjectKind, ObjectObservation
+from skills.footprint import Footprint
 from skills.manipulation.approach.base_placement import (
     BasePlacement,
     first_reachable_spot,
@@ -17,7 +18,6 @@ from skills.manipulation.approach.base_placement import (
 )
 from skills.manipulation.grasp.planning import GeometricGraspPlanner
 from skills.manipulation.grasp.reach import observed_target, reached_grasps
-from skills.navigate.footprint import Footprint
 from skills.robot import Pose2D
 from skills.testing.blocks import Block
 from skills.testing.estimators import BlockCostmap

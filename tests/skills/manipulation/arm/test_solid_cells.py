@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from table_scene import CAMERA, TABLE, Can, scene
 
-from skills.estimate.grid_map import GridMap
+from skills.grid_map import GridMap
 from skills.manipulation.arm.solid_cells import (
     CELL_M,
     Outline,

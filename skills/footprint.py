@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import compiled
+from skills.compiled import compiled
 from skills.robot import BaseKind, Capabilities, FloatArray, Pose2D
 from skills.world_model import FreeSpace
 

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from skills.estimate.grid_map import FilterMask, GridMap, load_grid_map
+from skills.grid_map import FilterMask, GridMap, load_grid_map
 from skills.inputs.errors import InputError
 from tests.tables import table
 

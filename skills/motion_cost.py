@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import compiled
+from skills.compiled import compiled
+from skills.footprint import ClearanceField, clearance_at
 from skills.geometry import wrap
-from skills.navigate.footprint import ClearanceField, clearance_at
 from skills.robot import FloatArray
 
 TURNING_RADIUS_M = 0.6

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
-from skills.estimate.compiled import distances
+from skills.compiled import distances
 from skills.inputs.errors import InputError, count_text, nearest_name
 from skills.inputs.outside import file_beside, is_file
 from skills.inputs.picture_files import Brightness, read_brightness

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from skills.estimate.compiled import compiled
-from skills.navigate.footprint import clearance_at
-from skills.navigate.motion_cost import TURNING_RADIUS_M, Space, clearance_needed, drive_cost, segment_cost, zone_factor
+from skills.compiled import compiled
+from skills.footprint import clearance_at
+from skills.motion_cost import TURNING_RADIUS_M, Space, clearance_needed, drive_cost, segment_cost, zone_factor
 from skills.robot import FloatArray, Pose2D
 
 TURN_M_PER_RAD = 0.4

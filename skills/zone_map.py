@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.estimate.compiled import distances
-from skills.estimate.grid_map import BoolGrid, load_filter_mask, signed_distance
-from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, WithObstacles, clearance_on_grid, disc_centres
-from skills.navigate.motion_cost import ZoneCosts
+from skills.compiled import distances
+from skills.footprint import SAFE_MARGIN_M, Footprint, WithObstacles, clearance_on_grid, disc_centres
+from skills.grid_map import BoolGrid, load_filter_mask, signed_distance
+from skills.motion_cost import ZoneCosts
 from skills.robot import FloatArray, Pose2D
 from skills.world_model import FilterType, FreeSpace, Zone, ZoneKind
 

@@ -1,7 +1,7 @@
 import pytest
 
 from skills.api import ObjectKind, ObjectObservation, Surface
-from skills.detect.descriptions import count_sentence, plural, wanted_names
+from skills.descriptions import count_sentence, plural, wanted_names
 
 
 def seen(name, surface="bench", *attributes):

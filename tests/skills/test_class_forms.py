@@ -5,7 +5,7 @@ import pytest
 from made_detections import detected_3d
 
 from plant.models.catalogue import load_catalogue
-from skills.perception.class_forms import class_forms, known_attributes
+from skills.class_forms import class_forms, known_attributes
 from skills.perception.detection_3d import has_attribute
 from tests.tables import table
 

@@ -10,12 +10,12 @@ from planar_robot import OUTLINE, TWO_ROOMS, Bench, grid_of
 
 from skills.api import Cause, Failed, NoWorkCounter, Succeeded
 from skills.estimate.costmap import LayeredCostmap
-from skills.navigate.footprint import Footprint, disc_centres, footprint_clearance_m, pose_array
+from skills.footprint import Footprint, disc_centres, footprint_clearance_m, pose_array
 from skills.navigate.planner import LatticePlanner, NoPathError
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.navigate.zone_map import KeepOut, zone_map
 from skills.robot import Pose2D
 from skills.world_model import FilterType, Zone, ZoneKind, ZoneMask, zones_sentence
+from skills.zone_map import KeepOut, zone_map
 
 FOOTPRINT = Footprint.rectangle(OUTLINE)
 FULL_M_S = 0.8

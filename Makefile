@@ -99,6 +99,7 @@ check: env
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python -m tests.rooms
 	test ! -x $(BIN)/hadolint || $(BIN)/hadolint Dockerfile
 
 wheels:

@@ -1,7 +1,9 @@
 """What the project's modules import, define and document: each source is parsed once in a process."""
 
 import ast
+import io
 import re
+import tokenize
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -11,6 +13,9 @@ ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 PLUGINS = tuple(sorted(str(path.parent.relative_to(ROOT)) for path in ROOT.glob("plugins/*/errand_*/__init__.py")))
 """Folders of the packages of plug-ins."""
+_LAYOUT = {
+    *(tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER),
+}
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,19 @@ def read(text: str) -> Source:
         tuple((node.name, (node.end_lineno or node.lineno) - node.lineno + 1) for node in functions),
         tuple((name, text.partition("\n")[0]) for name, text in documented if text),
     )
+
+
+@cache
+def code_lines(text: str) -> int:
+    """Number of lines with code: no blank lines, comments and docstrings."""
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    lines = {k for each in tokens if each.type not in _LAYOUT for k in range(each.start[0], each.end[0] + 1)}
+    strings = (
+        node
+        for node in statements(ast.parse(text, feature_version=(3, 11)))
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+    )
+    return len(lines - {k for node in strings for k in range(node.lineno, (node.end_lineno or node.lineno) + 1)})
 
 
 def statements(node: ast.AST) -> Iterator[ast.AST]:

@@ -21,10 +21,9 @@ from pydrake.math import RigidTransform
 
 from errand_spot.messages import Frames, depth_frame, picture_frame, pose_between, timestamp
 from errand_spot.server.estop import EstopService
-from errand_spot.server.gripper import Grip
 from errand_spot.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
-from errand_spot.server.obstacles import Region, ScanPoints
 from errand_spot.server.refusals import known_frame
+from errand_spot.server.scan_points import Region, ScanPoints
 from executive.run.worker import WorkQueue
 from skills.robot import (
     Battery,
@@ -125,6 +124,29 @@ class Motion(Protocol):
 
     def end(self, status: int) -> None:
         """Ends it with a status of `RobotCommandFeedbackStatus`."""
+
+
+@dataclass
+class Grip:
+    """Word of clients on the item in the gripper, in place of the robot's own: is one held, and how it is carried."""
+
+    holding: bool | None = None
+    carry: int | None = None
+
+    def holds(self, gripper: Gripper) -> bool:
+        """Returns whether an item is held."""
+        return gripper.holding if self.holding is None else self.holding
+
+    def carry_state(self, gripper: Gripper) -> int:
+        """Returns the carry state: unless clients say otherwise an item is carriable, since the grip stays firm."""
+        State = robot_state_pb2.ManipulatorState
+        own = State.CARRY_STATE_CARRIABLE if self.holds(gripper) else State.CARRY_STATE_NOT_CARRIABLE
+        return int(own if self.carry is None else self.carry)
+
+    def may_stow(self, gripper: Gripper) -> bool:
+        """Returns whether the arm may stow: with an item only on a client's word."""
+        stowable = robot_state_pb2.ManipulatorState.CARRY_STATE_CARRIABLE_AND_STOWABLE
+        return not self.holds(gripper) or self.carry_state(gripper) == stowable
 
 
 class Computer:

@@ -1,46 +1,20 @@
-"""The gripper: its motions, and clients' word on the item that it holds."""
+"""Motions of the gripper."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from bosdyn.api import basic_command_pb2, gripper_command_pb2, robot_state_pb2
+from bosdyn.api import basic_command_pb2, gripper_command_pb2
 
 from errand_spot.messages import InvalidRequestError, points_of
+from errand_spot.server.computer import Computer
 from errand_spot.server.refusals import times_of
 from plant.robots.spot.description import spot_facts
-from skills.robot import CommandState, Gripper
-
-if TYPE_CHECKING:
-    from errand_spot.server.computer import Computer
+from skills.robot import CommandState
 
 Status: Final = basic_command_pb2.RobotCommandFeedbackStatus
 _OPENS, _SLACK_RAD = 0.05, 0.02
-
-
-@dataclass
-class Grip:
-    """Word of clients on the item in the gripper, in place of the robot's own: is one held, and how it is carried."""
-
-    holding: bool | None = None
-    carry: int | None = None
-
-    def holds(self, gripper: Gripper) -> bool:
-        """Returns whether an item is held."""
-        return gripper.holding if self.holding is None else self.holding
-
-    def carry_state(self, gripper: Gripper) -> int:
-        """Returns the carry state: unless clients say otherwise an item is carriable, since the grip stays firm."""
-        State = robot_state_pb2.ManipulatorState
-        own = State.CARRY_STATE_CARRIABLE if self.holds(gripper) else State.CARRY_STATE_NOT_CARRIABLE
-        return int(own if self.carry is None else self.carry)
-
-    def may_stow(self, gripper: Gripper) -> bool:
-        """Returns whether the arm may stow: with an item only on a client's word."""
-        stowable = robot_state_pb2.ManipulatorState.CARRY_STATE_CARRIABLE_AND_STOWABLE
-        return not self.holds(gripper) or self.carry_state(gripper) == stowable
 
 
 class Claw:

@@ -32,7 +32,8 @@ from errand_spot.server.graph_map import Perception, SeenTag
 from errand_spot.server.hand import X_HAND, solutions
 from errand_spot.server.identity import DOMAIN
 from errand_spot.server.mobility import FEET_M
-from errand_spot.server.obstacles import Region, region_of
+from errand_spot.server.obstacles import region_of
+from errand_spot.server.scan_points import Region
 from skills.robot import Mount, NoImageError
 
 RUNTIME_S: Final = 5400.0

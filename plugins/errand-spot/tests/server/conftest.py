@@ -23,10 +23,9 @@ from bosdyn.client.time_sync import TimeSyncEndpoint
 from google.protobuf.duration_pb2 import Duration
 from lock_step import PASSWORD, USER, robot_time, scripted, scripted_spot
 
-from errand_spot.server.computer import Pace
-from errand_spot.server.gripper import Grip
+from errand_spot.server.computer import Grip, Pace
 from errand_spot.server.leases import ARM, GRIPPER, MOBILITY
-from errand_spot.server.obstacles import ScanPoints
+from errand_spot.server.scan_points import ScanPoints
 from errand_spot.server.server import SpotServer
 from skills.testing.blocks import Block
 from skills.testing.robot import ScriptedRobot

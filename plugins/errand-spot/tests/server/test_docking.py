@@ -16,7 +16,8 @@ from errand_spot.messages import timestamp
 from errand_spot.server import docking
 from errand_spot.server.computer import Pace
 from errand_spot.server.docking import DOCK_ID
-from errand_spot.server.obstacles import Region, SeenSpace
+from errand_spot.server.obstacles import SeenSpace
+from errand_spot.server.scan_points import Region
 from skills.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.robot import Pose2D
 from skills.testing.blocks import Block

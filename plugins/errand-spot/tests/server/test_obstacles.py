@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.math import RigidTransform
 
-from errand_spot.server.obstacles import ScanPoints
+from errand_spot.server.scan_points import ScanPoints
 from skills.robot import Scan
 
 ELEVATIONS_RAD = np.radians([-14.0, -12.0, -10.0, -8.0, -6.0, -4.0])

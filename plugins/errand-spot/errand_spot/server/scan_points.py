@@ -1,4 +1,4 @@
-"""What the robot's computer knows of obstacles: points of the last scans, and the no-go regions of clients."""
+"""Points of the last scans, and the no-go regions of clients."""
 
 from __future__ import annotations
 

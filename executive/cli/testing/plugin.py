@@ -92,17 +92,17 @@ def _small_plant(folder: Path, *, can: bool = True) -> SmallPlant:
     from plant.robots.robot_kind import PlacedRobot
     from plant.simulation import Simulation
     from plant.worlds.world import load_world
-    from skills.estimate.costmap import LayeredCostmap
-    from skills.estimate.localiser import ScanMatchingLocaliser
     from skills.grid_map import load_grid_map
+    from skills.stack import stack_of
 
     world = load_world(write_small_room(folder, can=can))
     simulation = Simulation(world, seed=1, robots=[PlacedRobot(_ROBOT, "spot", world.start, world.dock)], visuals=False)
+    stack = stack_of({"localiser": {"use": "scan_matching"}})
     bench = SkillBench(
         simulation.robots[_ROBOT],
         simulation.clock,
-        localiser=ScanMatchingLocaliser(load_grid_map(world.scan_map_path), world.start),
-        costmap=LayeredCostmap(load_grid_map(world.keepout_map_path)),
+        localiser=stack.localiser.build(load_grid_map(world.scan_map_path), world.start, surely=True),
+        costmap=stack.costmap.build(load_grid_map(world.keepout_map_path)),
         detector=shared_detector(),
         seed=1,
     )

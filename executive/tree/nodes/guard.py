@@ -18,7 +18,7 @@ from executive.tree.context import RunContext
 from executive.words.step import StaleData
 from skills.api import Cause, Failed, ObjectKind
 from skills.class_forms import ANY_OBJECT
-from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
+from skills.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.robot import Pose2D
 
 CONTROL_TOPIC = "control"

@@ -10,9 +10,9 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, InputsT, Running, SkillContext
+from skills.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.forces import hand_force_n, held_mass_kg
-from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.manipulation.arm.motion import GripperTurn
 from skills.manipulation.arm.poses import carry_configuration, hangs_below

@@ -12,10 +12,10 @@ from pydrake.math import RigidTransform, RotationMatrix
 from skills.api import Cause, PlanningError, Question, Running, Succeeded
 from skills.footprint import footprint_clear
 from skills.geometry import facing_poses
+from skills.hold import Grip
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.forces import PullWatch
-from skills.manipulation.arm.hold import Grip
 from skills.manipulation.hand_over.verification import HandOverVerification, Release, Seen, release_of
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.surroundings import NavigateInputs

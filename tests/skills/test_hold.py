@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from plant.robots.fetch.kind import FETCH
-from skills.manipulation.arm.hold import Grip, HoldWatch, firmer_n, grip_again, hold_watch
+from skills.hold import Grip, HoldWatch, firmer_n, grip_again, hold_watch
 from skills.robot import Gripper
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import BASE_ONLY, ScriptedRobot, Start

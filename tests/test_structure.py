@@ -30,9 +30,9 @@ BASE = {
 }
 """Lines of code of each room on 2026-11-30, before issue 85."""
 GRANTS = (
-    (85, "skills", 430),
+    (85, "skills", 437),
     (85, "executive/tree", 27),
-    (85, "executive/app", 27),
+    (85, "executive/app", 43),
     (85, "plant", 26),
 )
 """Issue, room, and the lines that the issue has added to the room."""

@@ -63,13 +63,14 @@ def examine_image(
     found = () if only_own else detect_in_image(detector, image, FAINT_SCORE)
     placed = detections_3d(image, place, found, inputs.surfaces)
     views = [view for view in segment_surfaces(image, place.X_WO, inputs.surfaces) if view is not None]
-    own_sought = any(name in own for name in inputs.classes)
-    labels = [each for each in placed if each.detection.score >= SURE_SCORE] if own_sought else placed
+    sure = tuple(each for each in placed if each.detection.score >= SURE_SCORE)
+    again = None if any(each.class_name in inputs.classes for each in sure) else inputs.seen_before
+    labels = placed if again is None and not any(name in own for name in inputs.classes) else sure
     pairs = labelled_clusters(image, place, views, labels, inputs.surfaces)
     loose = [cluster for cluster, label in pairs if label is None]
     segments = identified(loose, image, place, own) if own else tuple(segment_3d(c, image, place) for c in loose)
-    if not own and inputs.seen_before is not None and not any(each.class_name in inputs.classes for each in placed):
-        segments = seen_again(inputs.seen_before, segments)
+    if not own and again is not None:
+        segments = seen_again(again, segments)
     shapes, p_WC = detector.shapes, camera_pose_W(image, place.X_WO).translation()
     cluster_of = {id(label): cluster for cluster, label in pairs} | dict(zip(map(id, segments), loose, strict=True))
     every = (*placed, *segments)
@@ -117,7 +118,8 @@ class UnknownObject:
 def _png(view: Picture) -> bytes:
     """Encodes a view (H, W, 4) as PNG, with a transparent border."""
     scale = min(1.0, _LONGEST_PX / max(view.shape[:2]))
-    small = cv2.resize(view, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    width, height = (max(1, round(scale * side)) for side in view.shape[1::-1])
+    small = cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA)
     small[small[..., 3] < 128] = 0
     framed = cv2.copyMakeBorder(small, *4 * (_AROUND_PX,), cv2.BORDER_CONSTANT)
     return cv2.imencode(".png", cv2.cvtColor(framed, cv2.COLOR_RGBA2BGRA))[1].tobytes()

@@ -26,8 +26,8 @@ _MOST_LENGTH = 1.3
 """Fraction of the longest object of a class: two may be merged."""
 _PART = 0.6
 """Length of a part of a larger object, at most, as a fraction of the object's."""
-_BESIDE_M = 0.02
-"""Distance beyond the outline of an object within which its parts are."""
+_ABOVE_M = 0.02
+"""Height by which a part may seem to be taller than the object."""
 _FREE_M = 0.15
 """Distance to the next object beyond which more does not count."""
 _SEEN_AGAIN_M = 0.06
@@ -205,13 +205,14 @@ def doubtful_tracks(tracks: Sequence[Track], inputs: DetectInputs) -> list[Track
 
 
 def _is_part(track: Track, other: Track) -> bool:
-    """Returns whether a track without a class stands within the outline of a larger object."""
+    """Returns whether a track without a class stands within a larger object that is as tall and was seen as late."""
     if track.class_name != ANY_OBJECT or max(track.latest.size_m) >= _PART * max(other.latest.size_m):
         return False
     x, y = (float(value) for value in track.position_W[:2] - other.position_W[:2])
     c, s = math.cos(other.latest.yaw_rad), math.sin(other.latest.yaw_rad)
-    length_m, width_m, _ = other.latest.size_m
-    return abs(c * x + s * y) < 0.5 * length_m + _BESIDE_M and abs(c * y - s * x) < 0.5 * width_m + _BESIDE_M
+    length_m, width_m, height_m = other.latest.size_m
+    inside = abs(c * x + s * y) < 0.5 * length_m and abs(c * y - s * x) < 0.5 * width_m
+    return inside and track.latest.size_m[2] < height_m + _ABOVE_M and other.last_seen_s >= track.last_seen_s
 
 
 def _is_recognised(track: Track) -> bool:
@@ -241,7 +242,7 @@ def _has_size_of(track: Track, name: str) -> bool:
 def seen_again(before: ObjectObservation, segments: Sequence[Detection3D]) -> tuple[Detection3D, ...]:
     """Labels the segment with the size and position of a previously observed object with its class.
 
-    The search has confirmed its class from two sides; a close picture may lack the features by which the network
+    The search has found it from several sides; a close picture may lack the features by which the network
     recognises it.
     """
     off = {id(each): level_distance(each.position_W, before.position_W) for each in segments}

@@ -95,6 +95,7 @@ class Detect(LookingSkill[DetectInputs]):
         self._own = models if any(name in models for name in inputs.classes) else {}
         self._only_own = {*self._own} - {*self.context.detector.class_names}
         self._check(inputs)
+        self._own = self._own if self.object_camera.on_hand else models  # no nearer looks follow, which would use them
         self.context.publish("object_to_detect", object_to_detect_message(self.context, inputs.classes))
         X_WB = self.X_WB()
         self.boxes = surface_boxes(inputs.surfaces, X_WB)

@@ -35,8 +35,9 @@ MOST_VIEWS: Final = 24
 """Number of views of an unexplained object in its folder."""
 _SAME_M: Final = 0.08
 """Horizontal distance within which unexplained objects of two searches are one."""
-_LEAST_MM: Final = 8
-"""Least side of an imported object."""
+FEWEST_VIEWS: Final = 4
+_SIDES_MM: Final = (10, 600)
+"""Least and longest side of an object that is imported by its views."""
 _FACTS: Final = ("of", "robot", "camera", "stamp_s", "pose")
 """Facts on a picture that stand in `pictures.json`."""
 _MARGIN_M: Final = 0.3
@@ -72,13 +73,21 @@ class RobotArtifacts:
     shown: list[tuple[str, bytes]] = field(default_factory=list)
 
 
+@dataclass
+class UnexplainedObject:
+    """Object that nothing recognised, at p_W: its views as PNG files, and its picture in the report with caption."""
+
+    p_W: Sequence[float]
+    views: list[bytes] = field(default_factory=list)
+    shown: tuple[str, bytes] | None = None
+
+
 class Artifacts(RunVisitor):
     """Visitor that collects what the pictures of a run need, and adds a picture to each answer in the log.
 
     `pictures` are small JPEG files of the answers, at most `MOST_BYTES` in all. `numbers` maps a node's path id and a
     time (s) to the index of an answer's picture. `drawn` are the written files by name, `trees` the logged trees,
-    `steps` what each robot does, with the times (s). `unexplained` are the positions p_W of objects that nothing
-    recognised, each with its views as PNG files.
+    `steps` what each robot does, with the times (s). `unexplained` are the objects that nothing recognised.
     """
 
     def __init__(self) -> None:
@@ -89,7 +98,7 @@ class Artifacts(RunVisitor):
         self.drawn: dict[str, Path] = {}
         self.trees: list[Mapping[str, Any]] = []
         self.steps: dict[str, list[tuple[float, str]]] = {}
-        self.unexplained: list[tuple[Sequence[float], list[bytes]]] = []
+        self.unexplained: list[UnexplainedObject] = []
         self._step_of: dict[str, str] = {}
         self._running: dict[str, dict[str, str]] = {}
 
@@ -113,8 +122,7 @@ class Artifacts(RunVisitor):
             own.looked.clear()
             own.looked.append((own.looks, {**message, "detections": ()}))
         elif topic == PICTURES:
-            caption = str(message["caption"]) + self._collect_views(message)
-            own.shown += [(caption, to_jpeg(message["image"]))] if len(own.shown) < MOST_SHOWN else []
+            self._show(message, own)
         if topic == DESTINATION:
             own.confirmed += [] if own.seen is None else [own.seen]
             own.detection = own.detection or own.seen
@@ -142,18 +150,23 @@ class Artifacts(RunVisitor):
         text = next(reversed(running.values()), text)
         own += [(t_s, text)] if not own or own[-1][1] != text else []
 
-    def _collect_views(self, message: Mapping[str, Any]) -> str:
-        """Collects the views of an unexplained object; returns the sentence that says how to import it, if any."""
-        if not (views := [base64.b64decode(each) for each in message.get("views", ())]):
-            return ""
-        p_W = message["position_W"]
-        near = (k for k, (q_W, _) in enumerate(self.unexplained) if math.dist(p_W[:2], q_W[:2]) < _SAME_M)
-        number = next(near, len(self.unexplained))
-        self.unexplained += [(p_W, [])] if number == len(self.unexplained) else []
-        self.unexplained[number][1].extend(views)
-        size = "x".join(str(max(_LEAST_MM, round(1e3 * side_m))) for side_m in message["size_m"])
-        command = f"errand object import {UNEXPLAINED}_{number + 1} --name NAME --size {size}"
-        return f". Import it from the run's folder: {command}"
+    def _show(self, message: Mapping[str, Any], own: RobotArtifacts) -> None:
+        """Shows a picture of a skill; collects the views of an unexplained object, which is shown once."""
+        caption = str(message["caption"])
+        if views := [base64.b64decode(each) for each in message.get("views", ())]:
+            p_W = message["position_W"]
+            near = (one for one in self.unexplained if math.dist(p_W[:2], one.p_W[:2]) < _SAME_M)
+            if (known := next(near, None)) is None:
+                known = UnexplainedObject(p_W)
+                self.unexplained.append(known)
+            known.views.extend(views)
+            own.shown = [each for each in own.shown if each is not known.shown]
+            if len(known.views) >= FEWEST_VIEWS:
+                caption += _how_to_import(self.unexplained.index(known) + 1, message["size_m"])
+            known.shown = shown = (caption, to_jpeg(message["image"]))
+        else:
+            shown = (caption, to_jpeg(message["image"]))
+        own.shown += [shown] if len(own.shown) < MOST_SHOWN else []
 
     def _with_picture(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
         """Adds a picture to an answer: the views with the found objects or the person, or all views if none was found.
@@ -260,12 +273,20 @@ def save_pictures(events: Iterable[Event], folder: Path) -> Sequence[Path]:
     return files
 
 
+def _how_to_import(number: int, size_m: Sequence[float]) -> str:
+    """Sentence that says how to import an unexplained object; empty for one that is too large."""
+    low_mm, high_mm = _SIDES_MM
+    sides_mm = [max(low_mm, round(1e3 * side_m)) for side_m in size_m]
+    command = f"errand object import {UNEXPLAINED}_{number} --name NAME --size {'x'.join(map(str, sides_mm))}"
+    return f". Import it from the run's folder: {command}" if max(sides_mm) <= high_mm else ""
+
+
 def save_views(artifacts: Artifacts, folder: Path) -> None:
     """Writes the views of each unexplained object into a folder of its own, as `errand object import` takes them."""
-    for number, (_, views) in enumerate(artifacts.unexplained, start=1):
+    for number, one in enumerate(artifacts.unexplained, start=1):
         own = folder / f"{UNEXPLAINED}_{number}"
         own.mkdir(exist_ok=True)
-        for k, view in enumerate(views[:MOST_VIEWS], start=1):
+        for k, view in enumerate(one.views[:MOST_VIEWS], start=1):
             (own / f"view_{k}.png").write_bytes(view)
 
 

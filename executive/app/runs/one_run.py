@@ -141,7 +141,8 @@ def _conclude(
     report = with_findings(report, prepared.knowledge, result, artifacts, events)
     draw_answer(artifacts, out)
     save_pictures(events, out / "pictures")
-    save_views(artifacts, out)
+    if prepared.request.record:
+        save_views(artifacts, out)
     recording = backend.leave(artifacts, out)
     write_report(prepared, report, ended, artifacts, events)
     return replace(finished, report=report), recording

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from skills.detection import Detector, DetectorWrapper
 
@@ -32,7 +32,7 @@ class Cascade:
         from skills.perception.model_matching import with_models
 
         cascade = _LoadedWhenUsed(self)
-        return with_models(cascade if self.file is None else cascade._detector, self.objects)
+        return with_models(cascade if self.file is None else cascade.loaded(), self.objects)
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,11 @@ class _LoadedWhenUsed(DetectorWrapper):
     """Cascade whose networks load when its classes or a picture are first asked for."""
 
     _options: Cascade
+
+    def loaded(self) -> Self:
+        """Loads the networks now. Raises InputError if their file is unusable."""
+        _ = self._detector
+        return self
 
     @property
     def shapes(self) -> ShapeModel | None:

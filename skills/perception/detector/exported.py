@@ -95,9 +95,9 @@ class ExportedDetector(Detector):
 
     @property
     def shapes(self) -> ShapeModel | None:
-        """The project's own shape model where it knows one of the classes."""
+        """The project's own shape model where it knows all classes."""
         model = shape_model()
-        return model if any(name in model.names for name in self.class_names) else None
+        return model if {*self.class_names} <= {*model.names} else None
 
     def detect(self, pictures: Sequence[Picture]) -> list[Detections]:
         """Detects the objects in each picture, best first. Raises ValueError when an array is no picture."""

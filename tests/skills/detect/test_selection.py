@@ -60,7 +60,10 @@ def test_a_part_of_a_larger_object_is_in_no_doubt():
     (box,) = tracks_of(**UNKNOWN, size_m=(0.4, 0.3, 0.1))
     beside = replace(part, number=2, position_W=box.position_W + [0.3, 0.0, 0.0])
     within = replace(part, number=3, position_W=box.position_W + [0.15, 0.1, 0.0])
-    assert [track.number for track in doubtful_tracks([box, beside, within], COKES)] == [2]
+    on_it = replace(within, number=4, latest=replace(part.latest, size_m=(0.07, 0.07, 0.14)))
+    later = replace(within, number=5, latest=replace(part.latest, stamp_s=part.latest.stamp_s + 1.0))
+    left = doubtful_tracks([box, beside, within, on_it, later], COKES)
+    assert {track.number for track in left} == {2, 4, 5}
 
 
 def test_an_object_without_the_attribute_is_in_no_doubt():

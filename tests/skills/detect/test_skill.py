@@ -124,6 +124,11 @@ def test_the_likeliest_object_counts_only_where_it_may():
     failed(beer, likely, Cause.POSTCONDITION, "no coke seen")
 
 
+def test_a_faint_score_keeps_no_object_from_being_seen_again():
+    step, _ = found([COKE], AGAIN, detector=Faint())
+    assert step.outputs["observation"].kind.name == "coke"
+
+
 def test_an_unexplained_object_is_viewed_from_three_sides_and_shown():
     log = []
     skill = Detect(context_of(TableRobot(things=[replace(COKE, colour=GREY)]), log))

@@ -192,18 +192,25 @@ def unknown(x_m, *views, size_m=(0.0723, 0.07, 0.241)):
 def test_views_of_each_unexplained_object_are_written_for_the_import(tmp_path):
     artifacts = Artifacts()
     thin = (0.2, 0.004, 0.03)
-    for message in (unknown(1.0, b"a", b"b"), unknown(3.0, b"c", size_m=thin), unknown(1.02, b"d"), unknown(2.0)):
+    seen = unknown(1.0, b"a", b"b"), unknown(3.0, *[b"c"] * 4, size_m=thin), unknown(2.0), unknown(4.0, b"f")
+    for message in (*seen, unknown(1.02, b"d", b"e"), unknown(5.0, *[b"g"] * 4, size_m=(0.7, 0.1, 0.1))):
         artifacts.message("pictures", message)
     save_views(artifacts, tmp_path)
     files = {str(file.relative_to(tmp_path)): file.read_bytes() for file in sorted(tmp_path.rglob("*.png"))}
-    bottle = {f"what_is_this_1/view_{k}.png": data for k, data in enumerate((b"a", b"b", b"d"), start=1)}
-    assert files == {**bottle, "what_is_this_2/view_1.png": b"c"}
+    views = (b"a", b"b", b"d", b"e"), [b"c"] * 4, [b"f"], [b"g"] * 4
+    expected = {
+        f"what_is_this_{n}/view_{k}.png": data
+        for n, own in enumerate(views, start=1)
+        for k, data in enumerate(own, start=1)
+    }
+    assert files == expected
     commands = [caption.rpartition("folder: ")[2] for caption, _ in artifacts.of_robot("Alice").shown]
     assert commands == [
+        "errand object import what_is_this_2 --name NAME --size 200x10x30",
+        "What is this?",  # without views
+        "What is this?",  # too few for the import
         "errand object import what_is_this_1 --name NAME --size 72x70x241",
-        "errand object import what_is_this_2 --name NAME --size 200x8x30",
-        "errand object import what_is_this_1 --name NAME --size 72x70x241",
-        "What is this?",
+        "What is this?",  # too long
     ]
 
 

@@ -37,8 +37,12 @@ class CompiledFunction:
         for name in self._function.__code__.co_names:
             if isinstance(names.get(name), CompiledFunction):
                 names[name] = names[name].machine_code
-        code: Callable[..., Any] = njit(cache=True, nogil=True)(self._function)
-        return code
+        code: Any = njit(cache=True, nogil=True)(self._function)
+        try:
+            code._cache._cache_file._load_index()
+        except (ImportError, AttributeError):  # its arguments' types stood in another module when it was compiled
+            code._cache.flush()
+        return cast(Callable[..., Any], code)
 
 
 @functools.cache

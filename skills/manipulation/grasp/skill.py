@@ -366,7 +366,8 @@ class Grasp(CloseLookingSkill[GraspInputs]):
         force_n = self.options.force_n + _PER_LEVER_N_M * (lever_m or 0.0)
         if self.gripper.kind is GripperKind.HINGED:
             force_n = _THIN_N if lever_m is None else force_n
-            yield from self.move_gripper(0.0, _GENTLE_N, message)
+            with suppress(SkillFailure):  # a heavy object still moves when the command expires
+                yield from self.move_gripper(0.0, _GENTLE_N, message)
         yield from self.move_gripper(0.0, self._grip_n(force_n, mass_kg), message)
         return force_n
 
@@ -383,8 +384,7 @@ class Grasp(CloseLookingSkill[GraspInputs]):
 
     def _refuse_heavy(self, mass_kg: float, lift_B: FloatArray, name: str) -> Routine[None]:
         """Sets down an object that is heavier than the arm may carry. Raises SkillFailure with cause PRECONDITION."""
-        most_kg = self.arm.max_payload_kg
-        if mass_kg <= most_kg:
+        if mass_kg <= (most_kg := self.arm.max_payload_kg):
             return
         with suppress(PlanningError):
             yield from self.press(-lift_B, -up_B(self.X_WB()), _FEEL_RAD_S, f"setting the {name} down again")

@@ -25,6 +25,7 @@ def test_a_bottle_that_nothing_recognises_is_not_denied(tmp_path, monkeypatch):
     monkeypatch.setattr(simulated, "shared_detector", lambda *given: BlindToBeer(usual(*given)))
     shown = OnMessage(lambda topic, message: captions.append(message["caption"]) if topic == "pictures" else None)
     mission = PlantMission(tmp_path, 29, sentence="is there a beer on the kitchen counter")
+    mission.prepared = replace(mission.prepared, request=replace(mission.prepared.request, record=True))
     end = mission.end("asked", shown)
     assert (end.claimed, end.cause) == (False, "EXECUTION"), end.message
     what = "something 24 cm tall stands on the kitchen counter"

@@ -36,6 +36,7 @@ MOST_VIEWS: Final = 24
 _SAME_M: Final = 0.08
 """Horizontal distance within which unexplained objects of two searches are one."""
 FEWEST_VIEWS: Final = 4
+"""Number of views that the import needs."""
 _SIDES_MM: Final = (10, 600)
 """Least and longest side of an object that is imported by its views."""
 _FACTS: Final = ("of", "robot", "camera", "stamp_s", "pose")
@@ -75,10 +76,11 @@ class RobotArtifacts:
 
 @dataclass
 class UnexplainedObject:
-    """Object that nothing recognised, at p_W: its views as PNG files, and its picture in the report with caption."""
+    """Object that nothing recognised, at p_W: its views as PNG files, its size, and its picture with caption."""
 
     p_W: Sequence[float]
     views: list[bytes] = field(default_factory=list)
+    size_m: Sequence[float] = ()
     shown: tuple[str, bytes] | None = None
 
 
@@ -152,21 +154,22 @@ class Artifacts(RunVisitor):
 
     def _show(self, message: Mapping[str, Any], own: RobotArtifacts) -> None:
         """Shows a picture of a skill; collects the views of an unexplained object, which is shown once."""
-        caption = str(message["caption"])
-        if views := [base64.b64decode(each) for each in message.get("views", ())]:
+        shown = (str(message["caption"]), to_jpeg(message["image"]))
+        if "views" in message:
             p_W = message["position_W"]
             near = (one for one in self.unexplained if math.dist(p_W[:2], one.p_W[:2]) < _SAME_M)
             if (known := next(near, None)) is None:
                 known = UnexplainedObject(p_W)
                 self.unexplained.append(known)
-            known.views.extend(views)
+            known.views.extend(map(base64.b64decode, message["views"]))
             own.shown = [each for each in own.shown if each is not known.shown]
-            if len(known.views) >= FEWEST_VIEWS:
-                caption += _how_to_import(self.unexplained.index(known) + 1, message["size_m"])
-            known.shown = shown = (caption, to_jpeg(message["image"]))
-        else:
-            shown = (caption, to_jpeg(message["image"]))
+            known.size_m, known.shown = message["size_m"], shown
         own.shown += [shown] if len(own.shown) < MOST_SHOWN else []
+
+    def add_to_caption(self, shown: tuple[str, bytes] | None, sentence: str) -> None:
+        """Adds a sentence to the caption of a shown picture."""
+        for own in self._of_robot.values():
+            own.shown = [(each[0] + sentence, each[1]) if each is shown else each for each in own.shown]
 
     def _with_picture(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
         """Adds a picture to an answer: the views with the found objects or the person, or all views if none was found.
@@ -273,21 +276,18 @@ def save_pictures(events: Iterable[Event], folder: Path) -> Sequence[Path]:
     return files
 
 
-def _how_to_import(number: int, size_m: Sequence[float]) -> str:
-    """Sentence that says how to import an unexplained object; empty for one that is too large."""
-    low_mm, high_mm = _SIDES_MM
-    sides_mm = [max(low_mm, round(1e3 * side_m)) for side_m in size_m]
-    command = f"errand object import {UNEXPLAINED}_{number} --name NAME --size {'x'.join(map(str, sides_mm))}"
-    return f". Import it from the run's folder: {command}" if max(sides_mm) <= high_mm else ""
-
-
 def save_views(artifacts: Artifacts, folder: Path) -> None:
-    """Writes the views of each unexplained object into a folder of its own, as `errand object import` takes them."""
+    """Writes the views of each unexplained object into a folder, and adds to its caption how to import it."""
+    low_mm, high_mm = _SIDES_MM
     for number, one in enumerate(artifacts.unexplained, start=1):
         own = folder / f"{UNEXPLAINED}_{number}"
         own.mkdir(exist_ok=True)
         for k, view in enumerate(one.views[:MOST_VIEWS], start=1):
             (own / f"view_{k}.png").write_bytes(view)
+        sides_mm = [max(low_mm, round(1e3 * side_m)) for side_m in one.size_m]
+        command = f"errand object import {own.name} --name NAME --size {'x'.join(map(str, sides_mm))}"
+        if len(one.views) >= FEWEST_VIEWS and max(sides_mm) <= high_mm:
+            artifacts.add_to_caption(one.shown, f". Import it from the run's folder: {command}")
 
 
 def to_jpeg(picture: Picture, widest_px: int = _WIDEST_PX, quality: int = _JPEG_QUALITY) -> bytes:

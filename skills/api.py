@@ -331,9 +331,9 @@ class SkillContext:
         """Returns the body's estimated pose in the world."""
         return self.localiser.estimate().X_WO @ self.robot.odometry().X_OB
 
-    def show_picture(self, picture: Picture, caption: str) -> None:
-        """Puts a picture (RGB or grey, uint8) with its caption into the log and into the report."""
-        self.publish(PICTURES, {"caption": caption, "image": picture})
+    def show_picture(self, picture: Picture, caption: str, **facts: object) -> None:
+        """Puts a picture (RGB or grey, uint8) with its caption and further facts into the log and into the report."""
+        self.publish(PICTURES, {"caption": caption, "image": picture, **facts})
 
     def expect_touch(self, span_s: float) -> None:
         """Says that the fingertips may touch a surface within a time (s); 0 takes that back."""

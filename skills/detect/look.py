@@ -92,7 +92,7 @@ class UnknownObject:
     camera positions, each with its detection.
     """
 
-    picture: Picture | None = None
+    picture: Picture = field(default_factory=lambda: np.zeros((1, 1, 3), np.uint8))
     views: list[tuple[Picture, Detection3D]] = field(default_factory=list)
 
     def add(self, look: Look, detected: Detection3D) -> None:

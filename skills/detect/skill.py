@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import PICTURES, Cause, Question, Running, Succeeded
+from skills.api import Cause, Question, Running, Succeeded
 from skills.class_forms import ANY_OBJECT, known_attributes
 from skills.descriptions import count_sentence, describe, describe_unknown, surface_names, wanted_names
 from skills.detect.look import Look, UnknownObject, examine_image
@@ -384,8 +384,7 @@ class Detect(LookingSkill[DetectInputs]):
         said = [describe_unknown(_observed(track, ())) for track in doubts[:_MOST_NAMED]]
         for track, what in zip(doubts, said, strict=False):
             if (seen := self._unknown.get(track.number)) is not None:
-                facts = {"caption": f"What is this? {what.capitalize()}", "image": seen.picture}
-                self.context.publish(PICTURES, facts | seen.facts())
+                self.context.show_picture(seen.picture, f"What is this? {what.capitalize()}", **seen.facts())
         return listing(said)
 
     def _results(self, inputs: DetectInputs) -> list[Track]:

@@ -7,7 +7,7 @@ from typing import ClassVar, Final
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import PICTURES, Cause, ObjectObservation, Running, Succeeded
+from skills.api import Cause, ObjectObservation, Running, Succeeded
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import overview_viewpoints
 from skills.perception.detector.camera_images import is_dark
@@ -127,7 +127,7 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         pose = {"position_W": p_WC, "wxyz": X_WC.rotation().ToQuaternion().wxyz().tolist()}
         facts = {"robot": self.context.robot.name, "of": of, "camera": image.source, "stamp_s": image.stamp_s}
         picture = image.grey if image.colour is None else image.colour
-        self.context.publish(PICTURES, {"caption": text, "image": picture, "pose": pose, **facts})
+        self.context.show_picture(picture, text, pose=pose, **facts)
         return Succeeded(f"took a picture of {text}")
 
 

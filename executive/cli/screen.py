@@ -186,6 +186,7 @@ WRITTEN: Final[Mapping[str, str]] = {
     "map.png": "the world from above, with the path",
     "tree.svg": "executed nodes, with the cause of each failure",
     "pictures": "the pictures that the mission asked for, and `pictures.json` with their poses and times",
+    "what_is_this": "views of an object that nothing recognised, for `errand object import`",
     "answer.png": "what the robot saw for its last answer",
     "detection.png": "the first detection",
     "grasp.png": "the grasp",
@@ -195,8 +196,8 @@ WRITTEN: Final[Mapping[str, str]] = {
     "run.json": "what was asked, when, and the report's values, for scripts and `errand runs`",
 }
 """Files of a run, with their content, in the order in which to look at them."""
-_OWN: Final = re.compile(r"-\d+(?=\.mcap$)|_[^_]+(?=\.(svg|png)$)")
-"""Number of a restart in the name of its log, or name of one of several robots in the name of its picture."""
+_OWN: Final = re.compile(r"-\d+(?=\.mcap$)|_[^_]+(?=\.(svg|png)$)|_\d+$")
+"""Number of a restart in the name of its log, of an object, or name of a robot in the name of its picture."""
 REFRESH_S = 0.2
 BAR_CELLS = 20
 FEWEST_ROWS = 5

@@ -20,6 +20,21 @@ class BlindToBeer(DetectorWrapper):
         return tuple(replace(one, alternatives=tuple(a for a in one.alternatives if a[0] != "beer")) for one in found)
 
 
+class FaintBeers(DetectorWrapper):
+    """Detector that is never sure of a beer."""
+
+    def detect_in_views(self, picture, least_score=None):
+        found = super().detect_in_views(picture, least_score)
+        return tuple(replace(one, score=min(one.score, 0.45)) if one.class_name == "beer" else one for one in found)
+
+
+def test_a_bottle_that_is_most_likely_a_beer_is_fetched(tmp_path, monkeypatch):
+    usual = simulated.shared_detector
+    monkeypatch.setattr(simulated, "shared_detector", lambda *given: FaintBeers(usual(*given)))
+    end = PlantMission(tmp_path, 29, sentence="take a beer from the kitchen counter").end("fetched")
+    assert (end.claimed, end.fulfilled) == (True, True), end.message
+
+
 def test_a_bottle_that_nothing_recognises_is_not_denied(tmp_path, monkeypatch):
     usual, captions = simulated.shared_detector, []
     monkeypatch.setattr(simulated, "shared_detector", lambda *given: BlindToBeer(usual(*given)))
